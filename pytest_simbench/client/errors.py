@@ -1,0 +1,100 @@
+"""The ways in which a worker can fail, seen from the pytest process."""
+
+from __future__ import annotations
+
+import signal
+from dataclasses import dataclass
+
+
+@dataclass
+class Where:
+    """Where something happened, for messages and records."""
+
+    simulator: str
+    mode: str
+    repetition: int | None = None
+    seed: int | None = None
+    phase: str = "launch"
+
+    def __str__(self) -> str:
+        parts = [f"{self.simulator} {self.mode}"]
+        if self.repetition is not None:
+            parts.append(f"repetition {self.repetition}")
+        if self.seed is not None:
+            parts.append(f"seed {self.seed}")
+        return ", ".join([*parts, f"phase {self.phase}"])
+
+
+class WorkerError(Exception):
+    """A repetition's worker failed. The message says what, where, and what to do.
+
+    Attributes:
+        what: what happened, without the place.
+        where: simulator, mode, repetition, seed, phase.
+        log_tail: the last lines of the worker's log.
+    """
+
+    def __init__(self, what: str, where: Where, log_tail: str = "") -> None:
+        self.what = what
+        self.phase = where.phase
+        self.log_tail = log_tail
+        text = f"{what} [{where}]"
+        if log_tail:
+            text += "\n--- last lines of the worker's log ---\n" + log_tail
+        super().__init__(text)
+
+
+class WorkerStartError(WorkerError):
+    """The worker could not be started, or did not answer the handshake."""
+
+
+class WorkerExited(WorkerError):
+    """The worker's process ended in the middle."""
+
+
+class WorkerHung(WorkerError):
+    """The worker gave no sign of life."""
+
+
+class RepetitionTimeout(WorkerError):
+    """The repetition took longer than its time-out."""
+
+
+class OutOfMemory(WorkerError):
+    """The worker used more memory than allowed, or its allocation failed."""
+
+
+class ProtocolError(WorkerError):
+    """The worker sent something that is no answer."""
+
+
+class WorldParityError(WorkerError):
+    """The engine built another world than the scene describes."""
+
+
+class Diverged(WorkerError):
+    """The engine's state is not finite."""
+
+
+class EngineFailed(WorkerError):
+    """The engine or its adapter raised an exception, or rejected the scene or settings."""
+
+
+REMOTE_ERRORS: dict[str, type[WorkerError]] = {
+    "ParityError": WorldParityError,
+    "DivergedError": Diverged,
+    "MemoryError": OutOfMemory,
+}
+"""Worker-side error names and what they become here; all others are `EngineFailed`."""
+
+
+def exit_text(code: int | None) -> str:
+    """A process's exit status in words: "was killed by SIGSEGV", "exited with status 3"."""
+    if code is None:
+        return "broke the connection"
+    if code < 0:
+        try:
+            return f"was killed by {signal.Signals(-code).name}"
+        except ValueError:
+            return f"was killed by signal {-code}"
+    return f"exited with status {code}"

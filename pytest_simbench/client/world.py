@@ -1,0 +1,162 @@
+"""A world: one scene in one worker, as tasks see it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_simbench.client.process import WorkerProcess
+from pytest_simbench.client.stopwatch import Stopwatch
+from pytest_simbench.scene import FloatArray, Pose, Scene, Trajectory
+
+
+@dataclass(frozen=True)
+class Motion:
+    """States sampled during one motion or wait.
+
+    Attributes:
+        time: simulated time of each sample [s], (n,).
+        joints: positions and velocities, (n, 2, n_joints).
+        bodies: rows as `World.bodies`, (n, n_free, 13).
+    """
+
+    time: FloatArray
+    joints: FloatArray
+    bodies: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @classmethod
+    def joined(cls, parts: list[Motion]) -> Motion:
+        return cls(
+            np.concatenate([part.time for part in parts]),
+            np.concatenate([part.joints for part in parts]),
+            np.concatenate([part.bodies for part in parts]),
+        )
+
+
+class World:
+    """The scene as it is now, and the means to move it on.
+
+    Attributes:
+        scene: what was loaded.
+        time: simulated [s].
+        joints: position and velocity of the driven joints, (2, n_joints).
+        bodies: rows of the free bodies, (n_free, 13): position [m], quaternion w, x, y, z, linear
+            [m/s] and angular velocity [rad/s], in the world frame.
+        excused: differences from the scene that the adapter declares.
+        trace: samples at `trace_period` of everything since loading, if asked for.
+        stopwatch: wall seconds of this repetition by kind; `plan` is the task's to measure.
+    """
+
+    def __init__(
+        self,
+        process: WorkerProcess,
+        scene: Scene,
+        *,
+        stopwatch: Stopwatch | None = None,
+        on_phase: Callable[[str], None] = lambda name: None,
+        trace_period: float | None = None,
+        load_timeout: float = 120.0,
+        parity: bool = True,
+    ) -> None:
+        self.process = process
+        self.scene = scene
+        self.stopwatch = stopwatch or Stopwatch()
+        self.trace: list[Motion] = []
+        self._trace_period = trace_period
+        self._on_phase = on_phase
+        self._names = [body.name for body in scene.free_bodies]
+        with self.phase("load"), self.stopwatch.measuring("load"):
+            answer = process.request(
+                "load", timeout=load_timeout, scene=scene.to_wire(), parity=parity
+            )
+        self.excused: list[str] = answer["excused"]
+        self._take(answer)
+
+    def _take(self, answer: Mapping[str, Any]) -> None:
+        self.time = float(answer["time"])
+        self.joints: FloatArray = answer["joints"]
+        self.bodies: FloatArray = answer["bodies"]
+
+    @contextmanager
+    def phase(self, name: str) -> Iterator[None]:
+        """Name what happens now, for errors, progress and the resource samples."""
+        before = self.process.where.phase
+        self._enter(name)
+        yield  # on an error the phase stays, so that the error and the record name it
+        self._enter(before)
+
+    def _enter(self, name: str) -> None:
+        self.process.where.phase = name
+        self._on_phase(name)
+
+    def pose(self, name: str) -> Pose:
+        """Present pose of a free body, by name."""
+        return Pose.from_array(self.bodies[self._names.index(name)])
+
+    def poses(self) -> dict[str, Pose]:
+        """Present poses of all free bodies."""
+        return {name: Pose.from_array(row) for name, row in zip(self._names, self.bodies, strict=True)}
+
+    def follow(self, trajectory: Trajectory, *, log_period: float | None = None) -> Motion | None:
+        """Have the robot follow a trajectory; the motion sampled every `log_period` [s] (0: each
+        step, None: no samples)."""
+        return self._move(
+            "follow",
+            log_period,
+            tick=trajectory.tick,
+            position=trajectory.position,
+            velocity=trajectory.velocity,
+            effort=trajectory.effort,
+        )
+
+    def wait(self, duration: float, *, log_period: float | None = None) -> Motion | None:
+        """Let `duration` [s] of simulated time pass under the last command."""
+        return self._move("wait", log_period, duration=float(duration))
+
+    def _move(self, operation: str, log_period: float | None, **arguments: Any) -> Motion | None:
+        period = log_period if log_period is not None else self._trace_period
+        answer = self.process.request(operation, log_period=period, **arguments)
+        self._take(answer)
+        if not answer["log"]:
+            return None
+        motion = Motion(**answer["log"])
+        if self._trace_period is not None and len(motion):
+            self.trace.append(self._thinned(motion))
+        return motion if log_period is not None else None
+
+    def _thinned(self, motion: Motion) -> Motion:
+        """A denser log, reduced to about the trace's period."""
+        if len(motion) < 2 or self._trace_period is None:
+            return motion
+        period = (motion.time[-1] - motion.time[0]) / (len(motion) - 1)
+        every = slice(None, None, max(1, round(self._trace_period / period)))
+        return Motion(motion.time[every], motion.joints[every], motion.bodies[every])
+
+    def save(self, name: str = "saved") -> None:
+        """Keep the whole state in the worker under `name`."""
+        self.process.request("save", name=name)
+
+    def restore(self, name: str = "saved") -> None:
+        """Go back to a kept state."""
+        self._take(self.process.request("restore", name=name))
+
+    def contact_count(self) -> int:
+        return int(self.process.request("contact_count"))
+
+    def render(self, width: int = 640, height: int = 480) -> NDArray[np.uint8]:
+        """An offscreen picture, (height, width, 3)."""
+        picture: NDArray[np.uint8] = self.process.request("render", width=width, height=height)
+        return picture
+
+    def stats(self) -> dict[str, Any]:
+        """The worker's clocks of stepping and its exact memory peak."""
+        stats: dict[str, Any] = self.process.request("stats")
+        return stats

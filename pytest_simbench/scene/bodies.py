@@ -1,0 +1,88 @@
+"""Boxes: the only rigid bodies that the tasks need beside the robot and the ground."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
+
+Colour = tuple[float, float, float, float]
+
+WOOD: Colour = (0.72, 0.56, 0.38, 1.0)
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box, free to move when it has a mass, fixed in the world when it has none.
+
+    Attributes:
+        name: unique in its scene.
+        size: full edge lengths x, y, z [m].
+        pose: of its centre, in the world.
+        mass: [kg]; 0 fixes the box in the world.
+        friction: Coulomb coefficient mu of its surface, sliding. Every surface of a scene has the
+            same one, so that the engines' different rules for combining two do not matter.
+        colour: red, green, blue, alpha in 0..1.
+    """
+
+    name: str
+    size: Vector3
+    pose: Pose
+    mass: float = 0.0
+    friction: float = 1.0
+    colour: Colour = WOOD
+
+    @property
+    def fixed(self) -> bool:
+        return self.mass == 0.0
+
+    def inertia(self) -> FloatArray:
+        """Principal moments about the centre (3,) [kg m^2]: m/12 (b^2 + c^2), homogeneous box."""
+        squares = np.square(self.size)
+        return self.mass / 12.0 * (squares.sum() - squares)
+
+    def moved_to(self, pose: Pose) -> Box:
+        return replace(self, pose=pose)
+
+    def to_wire(self) -> dict[str, Any]:
+        return {
+            "name": self.name,
+            "size": list(self.size),
+            "pose": self.pose.to_wire(),
+            "mass": self.mass,
+            "friction": self.friction,
+            "colour": list(self.colour),
+        }
+
+    @classmethod
+    def from_wire(cls, data: dict[str, Any]) -> Box:
+        return cls(
+            name=data["name"],
+            size=tuple(data["size"]),
+            pose=Pose.from_wire(data["pose"]),
+            mass=data["mass"],
+            friction=data["friction"],
+            colour=tuple(data["colour"]),
+        )
+
+
+def penetration(a: Box, b: Box) -> float:
+    """How deep two boxes overlap [m]; 0 or less when they are apart or touch.
+
+    The separating-axis test: two convex boxes are apart when one of 15 axes (3 face normals each
+    and the 9 products of their edges) separates their projections.
+    """
+    ra, rb = a.pose.rotation(), b.pose.rotation()
+    offset = np.asarray(b.pose.position) - np.asarray(a.pose.position)
+    half_a, half_b = np.asarray(a.size) / 2, np.asarray(b.size) / 2
+    if np.linalg.norm(offset) > np.linalg.norm(half_a) + np.linalg.norm(half_b):
+        return 0.0
+    crosses = np.cross(ra.T[:, None, :], rb.T[None, :, :]).reshape(9, 3)
+    axes = np.vstack([ra.T, rb.T, crosses])
+    lengths = np.linalg.norm(axes, axis=1)
+    axes = axes[lengths > 1e-9] / lengths[lengths > 1e-9, None]
+    reach = np.abs(axes @ ra) @ half_a + np.abs(axes @ rb) @ half_b
+    return float((reach - np.abs(axes @ offset)).min())

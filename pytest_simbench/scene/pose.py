@@ -1,0 +1,116 @@
+"""Rigid poses: a position and a unit quaternion (w, x, y, z), world z up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+Vector3 = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+
+def rotation_matrix(quaternion: Sequence[float] | FloatArray) -> FloatArray:
+    """Rotation matrix (3, 3) of a quaternion w, x, y, z, which is normalised first."""
+    q = np.asarray(quaternion, dtype=float)
+    w, x, y, z = q / np.linalg.norm(q)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def quaternion_product(a: Sequence[float], b: Sequence[float]) -> Quaternion:
+    """Hamilton product of two quaternions w, x, y, z: first rotate by `b`, then by `a`."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
+    return (
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+    )
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A rigid transform from a body's frame to the world's (or a parent's).
+
+    Attributes:
+        position: x, y, z in [m].
+        quaternion: w, x, y, z; unit length.
+    """
+
+    position: Vector3 = (0.0, 0.0, 0.0)
+    quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+    @classmethod
+    def at(cls, x: float, y: float, z: float, *, yaw: float = 0.0) -> Pose:
+        """Pose at x, y, z [m], turned by `yaw` [rad] about the vertical."""
+        return cls((x, y, z), (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)))
+
+    @classmethod
+    def from_array(cls, array: Sequence[float] | FloatArray) -> Pose:
+        """Pose from (7,): position, then quaternion w, x, y, z."""
+        x, y, z, qw, qx, qy, qz = (float(value) for value in array[:7])
+        return cls((x, y, z), (qw, qx, qy, qz))
+
+    def as_array(self) -> FloatArray:
+        """The pose as (7,): position, then quaternion w, x, y, z."""
+        return np.array([*self.position, *self.quaternion])
+
+    def rotation(self) -> FloatArray:
+        """Rotation matrix, (3, 3)."""
+        return rotation_matrix(self.quaternion)
+
+    def matrix(self) -> FloatArray:
+        """Homogeneous transform, (4, 4)."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.rotation()
+        matrix[:3, 3] = self.position
+        return matrix
+
+    def __mul__(self, other: Pose) -> Pose:
+        """Composition: `other` is given in this pose's frame."""
+        x, y, z = self.rotation() @ np.asarray(other.position) + np.asarray(self.position)
+        quaternion = quaternion_product(self.quaternion, other.quaternion)
+        return Pose((float(x), float(y), float(z)), quaternion)
+
+    def inverse(self) -> Pose:
+        """The transform back."""
+        w, x, y, z = self.quaternion
+        px, py, pz = -(self.rotation().T @ np.asarray(self.position))
+        return Pose((float(px), float(py), float(pz)), (w, -x, -y, -z))
+
+    def translated(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Pose:
+        """The same orientation, moved by x, y, z [m] in the parent's frame."""
+        px, py, pz = self.position
+        return Pose((px + x, py + y, pz + z), self.quaternion)
+
+    @property
+    def yaw(self) -> float:
+        """Angle about the vertical of the body's x axis [rad], in (-pi, pi]."""
+        w, x, y, z = self.quaternion
+        return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+    def tilt(self) -> float:
+        """Angle between the vertical and the body axis nearest to it [rad].
+
+        A cube lying on any of its six faces has tilt 0.
+        """
+        return float(math.acos(min(1.0, float(np.abs(self.rotation()[2]).max()))))
+
+    def to_wire(self) -> dict[str, Any]:
+        return {"position": list(self.position), "quaternion": list(self.quaternion)}
+
+    @classmethod
+    def from_wire(cls, data: dict[str, Any]) -> Pose:
+        return cls(tuple(data["position"]), tuple(data["quaternion"]))

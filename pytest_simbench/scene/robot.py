@@ -1,0 +1,124 @@
+"""The robot as every simulator is told to build it: description files, drives and gripper."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene.pose import FloatArray, Pose
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One driven joint and its controller: tau = clip(k (q* - q) + d (v* - v) + tau_ff, +-limit).
+
+    Attributes:
+        name: as in the robot's URDF.
+        stiffness: k [N m/rad], or [N/m] for a prismatic joint.
+        damping: d [N m s/rad], or [N s/m].
+        effort_limit: largest effort of the drive [N m], or [N].
+        armature: rotor inertia as seen at the joint [kg m^2], or [kg].
+        initial_position: [rad], or [m].
+    """
+
+    name: str
+    stiffness: float
+    damping: float
+    effort_limit: float
+    armature: float
+    initial_position: float
+
+    def to_wire(self) -> dict[str, Any]:
+        return dict(self.__dict__)
+
+
+@dataclass(frozen=True)
+class Gripper:
+    """A parallel gripper.
+
+    Attributes:
+        joints: names of its finger joints, commanded together.
+        opened: position of each finger, open [m].
+        closed: position commanded to grasp, beyond the object's surface [m].
+        squeeze: the force each finger then presses with [N]: its effort limit. The commanded
+            position lies so deep that the drive saturates, and every engine squeezes alike.
+    """
+
+    joints: tuple[str, ...]
+    opened: float
+    closed: float
+    squeeze: float
+
+    def to_wire(self) -> dict[str, Any]:
+        return {**self.__dict__, "joints": list(self.joints)}
+
+    @classmethod
+    def from_wire(cls, data: dict[str, Any]) -> Gripper:
+        return cls(**{**data, "joints": tuple(data["joints"])})
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A fixed-base arm with a gripper.
+
+    Attributes:
+        name: of the robot ("panda").
+        urdf: path of its URDF file.
+        packages: directory of each `package://NAME/` that the URDF refers to.
+        srdf: path of its SRDF file, which lists the link pairs not to be checked for collision.
+        joints: the driven joints in command order, arm first, then fingers.
+        gripper: the fingers.
+        tool_frame: link whose origin is the tool centre point.
+        base: pose of the root link in the world.
+        friction: of every link's surface.
+    """
+
+    name: str
+    urdf: str
+    packages: Mapping[str, str]
+    srdf: str
+    joints: tuple[Joint, ...]
+    gripper: Gripper
+    tool_frame: str
+    base: Pose = field(default_factory=Pose)
+    friction: float = 1.0
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        return tuple(joint.name for joint in self.joints)
+
+    @property
+    def arm_joints(self) -> tuple[Joint, ...]:
+        return tuple(joint for joint in self.joints if joint.name not in self.gripper.joints)
+
+    @property
+    def finger_indices(self) -> list[int]:
+        """Where the gripper's joints stand among `joints`."""
+        return [self.joint_names.index(name) for name in self.gripper.joints]
+
+    def column(self, attribute: str) -> FloatArray:
+        """One attribute of all joints, (n_joints,): `robot.column("effort_limit")`."""
+        return np.array([getattr(joint, attribute) for joint in self.joints], dtype=float)
+
+    def to_wire(self) -> dict[str, Any]:
+        return {
+            **self.__dict__,
+            "packages": dict(self.packages),
+            "joints": [joint.to_wire() for joint in self.joints],
+            "gripper": self.gripper.to_wire(),
+            "base": self.base.to_wire(),
+        }
+
+    @classmethod
+    def from_wire(cls, data: dict[str, Any]) -> Robot:
+        return cls(
+            **{
+                **data,
+                "joints": tuple(Joint(**joint) for joint in data["joints"]),
+                "gripper": Gripper.from_wire(data["gripper"]),
+                "base": Pose.from_wire(data["base"]),
+            }
+        )

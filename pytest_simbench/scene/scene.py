@@ -1,0 +1,106 @@
+"""The whole world of a repetition, as plain data that crosses the process boundary."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from typing import Any
+
+from pytest_simbench.scene.bodies import Box, penetration
+from pytest_simbench.scene.pose import Pose, Vector3
+from pytest_simbench.scene.robot import Robot
+
+STANDARD_GRAVITY: Vector3 = (0.0, 0.0, -9.80665)
+"""Standard acceleration of free fall [m/s^2] (ISO 80000-3)."""
+
+OVERLAP_TOLERANCE = 1e-4
+"""Boxes may overlap this deep at the start [m]: resting contacts are given to rounding."""
+
+
+class SceneError(ValueError):
+    """A scene that cannot exist: two bodies of one name, bodies inside each other."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Bodies, robot and gravity above an endless ground plane at z = 0.
+
+    Attributes:
+        name: for messages and file names.
+        bodies: boxes, fixed and free.
+        robot: the arm, or None for a scene of boxes alone.
+        gravity: [m/s^2].
+        ground_friction: Coulomb coefficient of the ground plane.
+
+    Raises:
+        SceneError: when two bodies share a name or overlap.
+    """
+
+    name: str
+    bodies: tuple[Box, ...] = ()
+    robot: Robot | None = None
+    gravity: Vector3 = field(default=STANDARD_GRAVITY)
+    ground_friction: float = 1.0
+
+    def __post_init__(self) -> None:
+        names = [body.name for body in self.bodies]
+        for name in names:
+            if names.count(name) > 1:
+                raise SceneError(f"scene {self.name!r}: {names.count(name)} bodies are named {name!r}")
+        for a, b in combinations(self.bodies, 2):
+            if a.fixed and b.fixed:
+                continue
+            depth = penetration(a, b)
+            if depth > OVERLAP_TOLERANCE:
+                raise SceneError(
+                    f"scene {self.name!r}: {a.name!r} and {b.name!r} overlap by "
+                    f"{1000 * depth:.1f} mm; move one of them"
+                )
+
+    @property
+    def free_bodies(self) -> tuple[Box, ...]:
+        """The bodies that can move, in scene order: the rows of every body state."""
+        return tuple(body for body in self.bodies if not body.fixed)
+
+    @property
+    def fixed_bodies(self) -> tuple[Box, ...]:
+        return tuple(body for body in self.bodies if body.fixed)
+
+    def body(self, name: str) -> Box:
+        """The body of that name.
+
+        Raises:
+            KeyError: no such body; the message lists those there are.
+        """
+        for body in self.bodies:
+            if body.name == name:
+                return body
+        raise KeyError(f"no body {name!r} in scene {self.name!r}; it has {[b.name for b in self.bodies]}")
+
+    def with_body(self, body: Box) -> Scene:
+        """The same scene with one body replaced by its namesake."""
+        self.body(body.name)
+        return replace(self, bodies=tuple(body if b.name == body.name else b for b in self.bodies))
+
+    def with_pose(self, name: str, pose: Pose) -> Scene:
+        return self.with_body(self.body(name).moved_to(pose))
+
+    def to_wire(self) -> dict[str, Any]:
+        """The scene as nested dicts, lists, strings and numbers."""
+        return {
+            "name": self.name,
+            "bodies": [body.to_wire() for body in self.bodies],
+            "robot": None if self.robot is None else self.robot.to_wire(),
+            "gravity": list(self.gravity),
+            "ground_friction": self.ground_friction,
+        }
+
+    @classmethod
+    def from_wire(cls, data: dict[str, Any]) -> Scene:
+        return cls(
+            name=data["name"],
+            bodies=tuple(Box.from_wire(body) for body in data["bodies"]),
+            robot=None if data["robot"] is None else Robot.from_wire(data["robot"]),
+            gravity=tuple(data["gravity"]),
+            ground_friction=data["ground_friction"],
+        )

@@ -1,0 +1,33 @@
+"""What an adapter implements, its settings, capabilities and report of the world it built."""
+
+from pytest_simbench.simulator.base import Simulator
+from pytest_simbench.simulator.errors import (
+    DescriptionError,
+    DivergedError,
+    EngineError,
+    NotSupportedError,
+    ParityError,
+    SettingsError,
+    SimulatorError,
+)
+from pytest_simbench.simulator.info import Capability, Deviation, SimulatorInfo
+from pytest_simbench.simulator.lazy import lazy_import
+from pytest_simbench.simulator.settings import Settings
+from pytest_simbench.simulator.urdf import PreparedRobot
+
+__all__ = [
+    "Capability",
+    "DescriptionError",
+    "Deviation",
+    "DivergedError",
+    "EngineError",
+    "NotSupportedError",
+    "ParityError",
+    "PreparedRobot",
+    "Settings",
+    "SettingsError",
+    "Simulator",
+    "SimulatorError",
+    "SimulatorInfo",
+    "lazy_import",
+]

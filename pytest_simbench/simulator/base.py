@@ -1,0 +1,115 @@
+"""The abstract simulator: what an adapter implements, and all that the rest knows of an engine."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.simulator.errors import NotSupportedError
+from pytest_simbench.simulator.info import SimulatorInfo
+from pytest_simbench.simulator.settings import Settings
+
+
+class Simulator(ABC):
+    """One engine holding one world, in a process of its own.
+
+    Subclass it in `sims/` (or in a package of your own, registered in the entry-point group
+    `pytest_simbench.simulators`), fill in `info` and `profiles`, and implement the abstract
+    methods. The module must import without the engine: import that lazily (`lazy_import`).
+
+    The life of a simulator: constructed with its settings, `load` once, then `command` and `step`
+    again and again with state read in between, and `close` at the end. A command holds until the
+    next one. Free bodies are always given in the order of `scene.free_bodies`, joints in the
+    order of `scene.robot.joints`. Joint drives obey the law in `scene.Joint`; where the
+    engine has a native drive, it is used. Links of the robot do not collide with each other,
+    everything else does.
+
+    Attributes:
+        info: facts about the engine, its capabilities and its deviations.
+        profiles: settings by profile name; `default` and `tuned` at least.
+        settings: those of this instance.
+        gui: whether a window is to be opened in `load`.
+    """
+
+    info: ClassVar[SimulatorInfo]
+    profiles: ClassVar[Mapping[str, Settings]]
+
+    def __init__(self, settings: Settings, *, gui: bool = False) -> None:
+        self.settings = settings
+        self.gui = gui
+
+    @abstractmethod
+    def load(self, scene: Scene) -> None:
+        """Build the world of `scene`; its joints at rest at their initial positions."""
+
+    @abstractmethod
+    def read_back(self) -> dict[str, Any]:
+        """What the engine says that it built, by the names of `parity.expected_quantities`.
+
+        Values must come from the engine, never from the scene. What the engine cannot tell is
+        left out and declared in `info.deviations`.
+        """
+
+    @abstractmethod
+    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        """Set points of all joints, each (n_joints,): position, velocity, feed-forward effort."""
+
+    @abstractmethod
+    def step(self) -> None:
+        """Advance the world by one time step."""
+
+    @property
+    @abstractmethod
+    def time(self) -> float:
+        """Simulated time since `load` [s]."""
+
+    @abstractmethod
+    def body_state(self) -> FloatArray:
+        """State of the free bodies, (n_free, 13).
+
+        Columns: position [m], quaternion w, x, y, z, linear velocity of the centre of mass [m/s],
+        angular velocity [rad/s]; all in the world frame.
+        """
+
+    @abstractmethod
+    def joint_state(self) -> FloatArray:
+        """Positions and velocities of the driven joints, (2, n_joints)."""
+
+    def save(self) -> Any:
+        """The whole state of the world, to be given to `restore` in this process."""
+        raise self._missing("save and restore")
+
+    def restore(self, state: Any) -> None:
+        """Go back to a state from `save`; stepping from it repeats the same future."""
+        raise self._missing("save and restore")
+
+    def contact_count(self) -> int:
+        """Number of contact points at present."""
+        raise self._missing("contact count")
+
+    def render(self, width: int, height: int) -> NDArray[np.uint8]:
+        """A picture of the world without a window, (height, width, 3), RGB."""
+        raise self._missing("offscreen picture")
+
+    def refresh_window(self) -> None:
+        """Show the present state in the window; called about 30 times a second in GUI mode."""
+
+    def close(self) -> None:
+        """Release the engine's resources; the process ends right after."""
+
+    def versions(self) -> dict[str, str]:
+        """Versions of the packages that the results depend on."""
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            return {self.info.distribution: version(self.info.distribution)}
+        except PackageNotFoundError:
+            return {}
+
+    def _missing(self, what: str) -> NotSupportedError:
+        return NotSupportedError(f"{self.info.name} has no {what}")

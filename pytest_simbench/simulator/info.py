@@ -1,0 +1,74 @@
+"""What an adapter says of itself and its engine without importing the engine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from fnmatch import fnmatchcase
+
+
+class Capability(StrEnum):
+    """What a simulator may be able to do beyond stepping; `needs(...)` marks take these names."""
+
+    WINDOW = "window"
+    OFFSCREEN = "offscreen"
+    SAVE_RESTORE = "save_restore"
+    CONTACT_COUNT = "contact_count"
+    CONTACT_FORCES = "contact_forces"
+    DETERMINISTIC = "deterministic"
+    GPU = "gpu"
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Something of the scene that an engine cannot express or cannot report.
+
+    Attributes:
+        quantity: pattern of the parity quantities that it excuses ("joint/*/armature"), or "" when
+            it concerns no quantity that is read back.
+        reason: why, in one sentence for the user.
+    """
+
+    quantity: str
+    reason: str
+
+    def excuses(self, quantity: str) -> bool:
+        return bool(self.quantity) and fnmatchcase(quantity, self.quantity)
+
+
+@dataclass(frozen=True)
+class SimulatorInfo:
+    """The facts that `--sims` lists.
+
+    Attributes:
+        name: short and stable; part of test ids and records.
+        title: engine and company as a user knows them.
+        distribution: PyPI distribution whose version is the engine's.
+        modules: modules that must be importable for the simulator to be here.
+        install: what to type when it is missing.
+        licence: of the engine.
+        engine: physics engine inside.
+        tested_version: newest version that passed the conformance kit.
+        capabilities: what it can do.
+        deviations: what it cannot express of a scene.
+        costly_start: starting is so costly (kernels to compile) that one worker serves several
+            repetitions, with a checked reset in between.
+        install_size_mb: download and unpacked size on disk, rounded [MB].
+    """
+
+    name: str
+    title: str
+    distribution: str
+    modules: tuple[str, ...]
+    install: str
+    licence: str
+    engine: str
+    tested_version: str
+    capabilities: frozenset[Capability]
+    deviations: tuple[Deviation, ...] = ()
+    costly_start: bool = False
+    install_size_mb: int | None = None
+
+    @property
+    def modes(self) -> tuple[str, ...]:
+        return ("headless", "gui") if Capability.WINDOW in self.capabilities else ("headless",)

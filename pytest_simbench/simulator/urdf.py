@@ -1,0 +1,302 @@
+"""The robot's description, reduced to what every engine reads alike.
+
+URDF importers differ in what they make of package paths, fixed joints, zero-mass frames, mimic
+joints, passive damping and visual meshes. So all of them get the same reduced description: mesh
+paths absolute, fixed joints merged into the link above (masses and inertias added), the base
+placed, no mimic joint (both fingers are driven), no passive damping, and the collision shapes
+as visual shapes too.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Pose, Robot, Vector3
+from pytest_simbench.simulator.errors import DescriptionError
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A collision shape: a box with `size` [m], or a mesh with its file; `pose` in the link."""
+
+    pose: Pose
+    size: Vector3 | None = None
+    mesh: str | None = None
+
+
+@dataclass
+class Link:
+    """A rigid link: mass [kg], centre of mass [m] and inertia about it [kg m^2], link axes."""
+
+    name: str
+    mass: float = 0.0
+    centre: FloatArray = field(default_factory=lambda: np.zeros(3))
+    inertia: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
+    shapes: list[Shape] = field(default_factory=list)
+
+    def principal_inertia(self) -> FloatArray:
+        """Principal moments, ascending, (3,)."""
+        return np.sort(np.linalg.eigvalsh(self.inertia))
+
+    def absorb(self, other: Link, pose: Pose) -> None:
+        """Weld `other`, placed at `pose` in this link's frame, onto this link."""
+        rotation, offset = pose.rotation(), np.asarray(pose.position)
+        centre = rotation @ other.centre + offset
+        total = self.mass + other.mass
+        if total > 0:
+            middle = (self.mass * self.centre + other.mass * centre) / total
+            self.inertia = _about(self.inertia, self.mass, self.centre - middle) + _about(
+                rotation @ other.inertia @ rotation.T, other.mass, centre - middle
+            )
+            self.mass, self.centre = total, middle
+        self.shapes += [Shape(pose * s.pose, s.size, s.mesh) for s in other.shapes]
+
+
+@dataclass(frozen=True)
+class MovingJoint:
+    """A revolute or prismatic joint between two links of the reduced robot."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: Pose
+    axis: Vector3
+
+
+class PreparedRobot:
+    """The reduced robot.
+
+    Attributes:
+        root: the link fixed in the world, its frame the world's.
+        joints: the moving joints, parents first.
+        links: all links by name.
+        limits: lower and upper position of each joint [rad or m], (2,).
+
+    Raises:
+        DescriptionError: the file cannot be read, or lacks a driven joint.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        xml = _parse(robot.urdf)
+        raw = {e.attrib["name"]: self._read_link(e) for e in xml.findall("link")}
+        joints = xml.findall("joint")
+        children = {_child(j): j for j in joints}
+        roots = [name for name in raw if name not in children]
+        if len(roots) != 1:
+            raise DescriptionError(f"{robot.urdf} has {len(roots)} root links, not one")
+        self.root = "base"
+        self.links: dict[str, Link] = {self.root: Link(self.root)}
+        self.joints: list[MovingJoint] = []
+        self.limits: dict[str, FloatArray] = {}
+        self.links[self.root].absorb(raw[roots[0]], robot.base)
+        self._descend(roots[0], self.root, robot.base, joints, raw)
+        missing = set(robot.joint_names) ^ {joint.name for joint in self.joints}
+        if missing:
+            raise DescriptionError(
+                f"{robot.urdf} and the drives of {robot.name} disagree about joints "
+                f"{', '.join(sorted(missing))}"
+            )
+
+    @property
+    def moving_links(self) -> list[Link]:
+        return [self.links[joint.child] for joint in self.joints]
+
+    def _descend(
+        self, name: str, into: str, pose: Pose, joints: list[ET.Element], raw: dict[str, Link]
+    ) -> None:
+        """Attach what hangs on raw link `name`, which sits at `pose` in reduced link `into`."""
+        for joint in joints:
+            if _parent(joint) != name:
+                continue
+            child, origin = _child(joint), pose * _origin(joint)
+            if joint.attrib["type"] == "fixed":
+                self.links[into].absorb(raw[child], origin)
+                self._descend(child, into, origin, joints, raw)
+                continue
+            kind, limit = joint.attrib["type"], joint.find("limit")
+            if kind not in ("revolute", "prismatic") or limit is None:
+                raise DescriptionError(
+                    f"{self.robot.urdf}: joint {joint.attrib['name']} must be revolute or "
+                    f"prismatic with limits, not {kind}"
+                )
+            axis = joint.find("axis")
+            self.joints.append(
+                MovingJoint(
+                    joint.attrib["name"],
+                    kind,
+                    into,
+                    child,
+                    origin,
+                    _vector("1 0 0" if axis is None else axis.attrib["xyz"]),
+                )
+            )
+            self.limits[joint.attrib["name"]] = np.array(
+                [float(limit.attrib["lower"]), float(limit.attrib["upper"])]
+            )
+            self.links[child] = raw[child]
+            self._descend(child, child, Pose(), joints, raw)
+
+    def _read_link(self, element: ET.Element) -> Link:
+        link = Link(element.attrib["name"])
+        inertial = element.find("inertial")
+        if inertial is not None:
+            mass, i = inertial.find("mass"), inertial.find("inertia")
+            if mass is not None and i is not None:
+                pose = _origin(inertial)
+                values = {key: float(value) for key, value in i.attrib.items()}
+                tensor = np.array(
+                    [
+                        [values["ixx"], values["ixy"], values["ixz"]],
+                        [values["ixy"], values["iyy"], values["iyz"]],
+                        [values["ixz"], values["iyz"], values["izz"]],
+                    ]
+                )
+                link.mass = float(mass.attrib["value"])
+                link.centre = np.asarray(pose.position)
+                link.inertia = pose.rotation() @ tensor @ pose.rotation().T
+        for collision in element.findall("collision"):
+            box, mesh = collision.find("geometry/box"), collision.find("geometry/mesh")
+            if box is not None:
+                link.shapes.append(Shape(_origin(collision), size=_vector(box.attrib["size"])))
+            elif mesh is not None:
+                path = self._resolve(mesh.attrib["filename"])
+                link.shapes.append(Shape(_origin(collision), mesh=path))
+            else:
+                raise DescriptionError(
+                    f"{self.robot.urdf}: a collision shape of {link.name} is neither box nor mesh"
+                )
+        return link
+
+    def _resolve(self, filename: str) -> str:
+        """Absolute path of a mesh file."""
+        path = Path(self.robot.urdf).parent / filename
+        if filename.startswith("package://"):
+            package, _, rest = filename.removeprefix("package://").partition("/")
+            if package not in self.robot.packages:
+                raise DescriptionError(f"{self.robot.urdf} refers to unknown package {package!r}")
+            path = Path(self.robot.packages[package]) / rest
+        if not path.is_file():
+            raise DescriptionError(f"{self.robot.urdf} refers to {path}, which does not exist")
+        return str(path)
+
+    def to_urdf(self) -> str:
+        """The reduced robot as URDF text."""
+        root = ET.Element("robot", name=self.robot.name)
+        for link in self.links.values():
+            element = ET.SubElement(root, "link", name=link.name)
+            if link.mass > 0:
+                _write_inertial(element, link)
+            for shape in link.shapes:
+                for tag in ("visual", "collision"):
+                    _write_shape(ET.SubElement(element, tag), shape)
+        for joint in self.joints:
+            element = ET.SubElement(root, "joint", name=joint.name, type=joint.kind)
+            _write_origin(element, joint.origin)
+            ET.SubElement(element, "parent", link=joint.parent)
+            ET.SubElement(element, "child", link=joint.child)
+            ET.SubElement(element, "axis", xyz=_spaced(joint.axis))
+            lower, upper = self.limits[joint.name]
+            drive = self.robot.joints[self.robot.joint_names.index(joint.name)]
+            ET.SubElement(
+                element,
+                "limit",
+                lower=repr(float(lower)),
+                upper=repr(float(upper)),
+                effort=repr(drive.effort_limit),
+                velocity="100",
+            )
+        return ET.tostring(root, encoding="unicode")
+
+    def write_urdf(self, directory: str | Path) -> Path:
+        """Write the reduced robot into a file of `directory`, for engines that read only files."""
+        path = Path(directory) / f"{self.robot.name}.urdf"
+        path.write_text(self.to_urdf(), encoding="utf-8")
+        return path
+
+
+def _parse(path: str) -> ET.Element:
+    try:
+        return ET.parse(path).getroot()
+    except OSError as error:
+        raise DescriptionError(f"cannot read the robot description {path}: {error.strerror}") from None
+    except ET.ParseError as error:
+        raise DescriptionError(f"the robot description {path} is not valid XML: {error}") from None
+
+
+def _about(inertia: FloatArray, mass: float, offset: FloatArray) -> FloatArray:
+    """Inertia about a point `offset` away from the centre of mass (Steiner)."""
+    steiner = mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+    return np.asarray(inertia + steiner)
+
+
+def _parent(joint: ET.Element) -> str:
+    return _required(joint, "parent").attrib["link"]
+
+
+def _child(joint: ET.Element) -> str:
+    return _required(joint, "child").attrib["link"]
+
+
+def _required(element: ET.Element, tag: str) -> ET.Element:
+    found = element.find(tag)
+    if found is None:
+        raise DescriptionError(f"<{element.tag} name={element.attrib.get('name')!r}> lacks <{tag}>")
+    return found
+
+
+def _vector(text: str) -> Vector3:
+    x, y, z = (float(part) for part in text.split())
+    return (x, y, z)
+
+
+def _origin(element: ET.Element) -> Pose:
+    """Pose of an element's <origin>; URDF angles are roll, pitch, yaw about fixed axes."""
+    origin = element.find("origin")
+    if origin is None:
+        return Pose()
+    roll, pitch, yaw = np.array(_vector(origin.attrib.get("rpy", "0 0 0"))) / 2
+    turns = [
+        Pose(quaternion=(np.cos(yaw), 0.0, 0.0, np.sin(yaw))),
+        Pose(quaternion=(np.cos(pitch), 0.0, np.sin(pitch), 0.0)),
+        Pose(quaternion=(np.cos(roll), np.sin(roll), 0.0, 0.0)),
+    ]
+    quaternion = (turns[0] * turns[1] * turns[2]).quaternion
+    return Pose(_vector(origin.attrib.get("xyz", "0 0 0")), quaternion)
+
+
+def _spaced(values: Any) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def _write_origin(element: ET.Element, pose: Pose) -> None:
+    r = pose.rotation()
+    pitch = np.arcsin(np.clip(-r[2, 0], -1.0, 1.0))
+    roll, yaw = np.arctan2(r[2, 1], r[2, 2]), np.arctan2(r[1, 0], r[0, 0])
+    ET.SubElement(
+        element, "origin", xyz=_spaced(pose.position), rpy=_spaced((roll, pitch, yaw))
+    )
+
+
+def _write_inertial(element: ET.Element, link: Link) -> None:
+    inertial = ET.SubElement(element, "inertial")
+    ET.SubElement(inertial, "origin", xyz=_spaced(link.centre), rpy="0 0 0")
+    ET.SubElement(inertial, "mass", value=repr(float(link.mass)))
+    i = link.inertia
+    names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+    ET.SubElement(inertial, "inertia", {n: repr(float(i[at])) for n, at in names.items()})
+
+
+def _write_shape(element: ET.Element, shape: Shape) -> None:
+    _write_origin(element, shape.pose)
+    geometry = ET.SubElement(element, "geometry")
+    if shape.size is not None:
+        ET.SubElement(geometry, "box", size=_spaced(shape.size))
+    elif shape.mesh is not None:
+        ET.SubElement(geometry, "mesh", filename=shape.mesh)

@@ -1,0 +1,171 @@
+"""The request loop in the simulator's process.
+
+Imports nothing but the rooms `scene` and `simulator`, numpy and the standard library, so that it
+runs in an interpreter that holds nothing but the engine. Each request is a dict
+`{"op": name, ...}`; the answer is `{"ok": result}` or `{"error": {type, message, traceback}}`, and in
+between `{"alive": simulated time}` may come any number of times.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+import traceback
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+
+from pytest_simbench import __version__
+from pytest_simbench.scene import Scene, Trajectory
+from pytest_simbench.simulator import Simulator, SimulatorError
+from pytest_simbench.simulator.parity import check, expected_quantities
+from pytest_simbench.simulator.settings import changed
+from pytest_simbench.worker.stepping import Stepper
+from pytest_simbench.worker.wire import pack, unpack
+
+
+def peak_rss_mb() -> float | None:
+    """Largest resident set of this process so far [MB], exact, from the kernel.
+
+    VmHWM belongs to the address space; `getrusage` would report the parent's peak, which a
+    forked child inherits.
+    """
+    try:
+        with open("/proc/self/status", encoding="ascii") as status:
+            for line in status:
+                if line.startswith("VmHWM:"):
+                    return int(line.split()[1]) * 1024 / 1e6
+    except OSError:
+        pass
+    return None
+
+
+class Server:
+    """Answers the requests of one client for one simulator."""
+
+    def __init__(self, send: Callable[[Any], None]) -> None:
+        self.send = send
+        self.simulator: Simulator | None = None
+        self.stepper: Stepper | None = None
+        self.saved: dict[str, Any] = {}
+
+    def answer(self, request: dict[str, Any]) -> None:
+        """Carry out one request and send its answer, whatever happens."""
+        try:
+            operation = getattr(self, f"do_{request.pop('op')}")
+            self.send({"ok": pack(operation(**unpack(request)))})
+        except SimulatorError as error:
+            self._send_error(type(error).__name__, str(error))
+        except MemoryError as error:
+            self._send_error("MemoryError", str(error) or "out of memory")
+        except Exception as error:
+            self._send_error("EngineError", f"{type(error).__name__}: {error}")
+
+    def _send_error(self, name: str, message: str) -> None:
+        trace = traceback.format_exc()
+        print(trace, file=sys.stderr, flush=True)
+        self.send({"error": {"type": name, "message": message, "traceback": trace}})
+
+    def do_hello(self) -> dict[str, Any]:
+        return {
+            "pid": os.getpid(),
+            "version": __version__,
+            "python": ".".join(map(str, sys.version_info[:3])),
+        }
+
+    def do_construct(
+        self, adapter: str, profile: str, changes: dict[str, Any], gui: bool, real_time: bool
+    ) -> dict[str, Any]:
+        """Import the adapter (`module:Class`) and give it its settings."""
+        module, _, name = adapter.partition(":")
+        cls: type[Simulator] = getattr(importlib.import_module(module), name)
+        for engine_module in cls.info.modules:
+            importlib.import_module(engine_module)
+        settings = changed(cls.profiles[profile], changes, cls.info.name)
+        self.simulator = cls(settings, gui=gui)
+        self.real_time = real_time
+        return {"settings": settings.to_wire(), "versions": self.simulator.versions()}
+
+    def do_load(self, scene: dict[str, Any], parity: bool) -> dict[str, Any]:
+        simulator = self._constructed()
+        world = Scene.from_wire(scene)
+        simulator.load(world)
+        self.stepper = Stepper(simulator, lambda at: self.send({"alive": at}))
+        self.stepper.real_time = self.real_time
+        excused: list[str] = []
+        if parity:
+            expected = expected_quantities(world, simulator.settings)
+            info = simulator.info
+            excused = check(expected, simulator.read_back(), info.deviations, info.name)
+        if simulator.gui:
+            simulator.refresh_window()
+        return {"excused": excused, **self.do_state()}
+
+    def do_read_back(self) -> dict[str, Any]:
+        return self._constructed().read_back()
+
+    def do_state(self) -> dict[str, Any]:
+        simulator = self._constructed()
+        return {
+            "time": simulator.time,
+            "joints": simulator.joint_state(),
+            "bodies": simulator.body_state(),
+        }
+
+    def do_follow(
+        self, tick: float, position: Any, velocity: Any, effort: Any, log_period: float | None
+    ) -> dict[str, Any]:
+        trajectory = Trajectory(tick, position, velocity, effort)
+        log = self._loaded().follow(trajectory, log_period)
+        return {"log": log, **self.do_state()}
+
+    def do_wait(self, duration: float, log_period: float | None) -> dict[str, Any]:
+        log = self._loaded().wait(duration, log_period)
+        return {"log": log, **self.do_state()}
+
+    def do_save(self, name: str) -> None:
+        self.saved[name] = self._constructed().save()
+
+    def do_restore(self, name: str) -> dict[str, Any]:
+        self._constructed().restore(self.saved[name])
+        return self.do_state()
+
+    def do_contact_count(self) -> int:
+        return self._constructed().contact_count()
+
+    def do_render(self, width: int, height: int) -> Any:
+        return self._constructed().render(width, height)
+
+    def do_stats(self) -> dict[str, Any]:
+        """Clocks of the stepping loop and the exact memory peak."""
+        clocks = {} if self.stepper is None else asdict(self.stepper.clocks)
+        return {"stepping": clocks, "peak_rss_mb": peak_rss_mb()}
+
+    def do_close(self) -> None:
+        if self.simulator is not None:
+            self.simulator.close()
+
+    def _constructed(self) -> Simulator:
+        if self.simulator is None:
+            raise SimulatorError("no simulator was constructed yet")
+        return self.simulator
+
+    def _loaded(self) -> Stepper:
+        if self.stepper is None:
+            raise SimulatorError("no scene was loaded yet")
+        return self.stepper
+
+
+def serve(receive: Callable[[], Any], send: Callable[[Any], None]) -> None:
+    """Answer requests until the client asks to close; `receive` raises EOFError when it is gone."""
+    server = Server(send)
+    while True:
+        try:
+            request = receive()
+        except EOFError:
+            return
+        closing = request.get("op") == "close"
+        server.answer(request)
+        if closing:
+            return

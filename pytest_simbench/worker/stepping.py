@@ -1,0 +1,147 @@
+"""The stepping loop: everything that happens between two messages, natively in the worker."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Trajectory
+from pytest_simbench.simulator import DivergedError, Simulator
+
+HEARTBEAT_PERIOD = 0.5
+"""Wall time between two signs of life while stepping [s]."""
+
+WINDOW_PERIOD = 1 / 30
+"""Wall time between two pictures in the window [s]."""
+
+CHECK_PERIOD = 0.1
+"""Simulated time between two looks at the state for values that are not finite [s]."""
+
+
+@dataclass
+class Clocks:
+    """What stepping has cost since the world was loaded.
+
+    Attributes:
+        steps: number of time steps.
+        simulated: [s].
+        wall: seconds in the stepping loop, without log, window and pacing [s].
+        cpu: CPU seconds of the whole process in that time [s].
+    """
+
+    steps: int = 0
+    simulated: float = 0.0
+    wall: float = 0.0
+    cpu: float = 0.0
+
+
+@dataclass
+class Log:
+    """States sampled while stepping; `arrays` stacks them."""
+
+    times: list[float] = field(default_factory=list)
+    joints: list[FloatArray] = field(default_factory=list)
+    bodies: list[FloatArray] = field(default_factory=list)
+
+    def sample(self, simulator: Simulator) -> None:
+        self.times.append(simulator.time)
+        self.joints.append(simulator.joint_state())
+        self.bodies.append(simulator.body_state())
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """time (n,), joints (n, 2, n_joints), bodies (n, n_free, 13)."""
+        return {
+            "time": np.array(self.times),
+            "joints": np.array(self.joints),
+            "bodies": np.array(self.bodies),
+        }
+
+
+class Stepper:
+    """Steps one simulator through trajectories and waits, and keeps its clocks.
+
+    Attributes:
+        clocks: totals since loading.
+        real_time: wait for the wall clock after each step, as the study's simulators did.
+    """
+
+    def __init__(self, simulator: Simulator, heartbeat: Callable[[float], None]) -> None:
+        self.simulator = simulator
+        self.heartbeat = heartbeat
+        self.clocks = Clocks()
+        self.real_time = False
+
+    def follow(self, trajectory: Trajectory, log_period: float | None) -> dict[str, Any]:
+        """Command the trajectory's set points step by step; see `_advance`."""
+        points = trajectory.resampled(self.simulator.settings.timestep)
+        rows = list(zip(points.position, points.velocity, points.effort, strict=True))
+        return self._advance(len(rows), rows, log_period)
+
+    def wait(self, duration: float, log_period: float | None) -> dict[str, Any]:
+        """Step for `duration` [s] under the last command; see `_advance`."""
+        steps = max(1, round(duration / self.simulator.settings.timestep))
+        return self._advance(steps, None, log_period)
+
+    def _advance(
+        self,
+        steps: int,
+        rows: list[tuple[FloatArray, FloatArray, FloatArray]] | None,
+        log_period: float | None,
+    ) -> dict[str, Any]:
+        """Advance by `steps`; a log sample every `log_period` [s] (0: every step; None: no log).
+
+        Raises:
+            DivergedError: joint or body state is not finite.
+        """
+        simulator, timestep = self.simulator, self.simulator.settings.timestep
+        log_every = 0 if log_period is None else max(1, round(log_period / timestep))
+        check_every = max(1, round(CHECK_PERIOD / timestep))
+        look_every = max(1, round(0.01 / timestep))
+        log = Log()
+        step, command, now = simulator.step, simulator.command, time.perf_counter
+        began, cpu_began = now(), time.process_time()
+        beat = window = began
+        idle_wall = idle_cpu = 0.0
+        for k in range(1, steps + 1):
+            if rows is not None:
+                command(*rows[k - 1])
+            step()
+            logs = log_every and k % log_every == 0
+            if not logs and k % look_every and k % check_every:
+                continue
+            stopped, cpu_stopped = now(), time.process_time()
+            if logs:
+                log.sample(simulator)
+            if k % check_every == 0:
+                self._check_finite()
+            if stopped - beat > HEARTBEAT_PERIOD:
+                beat = stopped
+                self.heartbeat(simulator.time)
+            if simulator.gui and stopped - window > WINDOW_PERIOD:
+                window = stopped
+                simulator.refresh_window()
+            if self.real_time:
+                ahead = k * timestep - (now() - began)
+                if ahead > 0:
+                    time.sleep(ahead)
+            idle_wall += now() - stopped
+            idle_cpu += time.process_time() - cpu_stopped
+        self.clocks.wall += now() - began - idle_wall
+        self.clocks.cpu += time.process_time() - cpu_began - idle_cpu
+        self.clocks.steps += steps
+        self.clocks.simulated += steps * timestep
+        self._check_finite()
+        return log.arrays() if log_every else {}
+
+    def _check_finite(self) -> None:
+        simulator = self.simulator
+        for what, state in (("joints", simulator.joint_state()), ("bodies", simulator.body_state())):
+            if not np.isfinite(state).all():
+                raise DivergedError(
+                    f"the state of the {what} is not finite at t = {simulator.time:.3f} s with "
+                    f"{simulator.settings}; a smaller timestep may help"
+                )
