@@ -1,0 +1,221 @@
+"""The repetitions of one task on one simulator in one mode, and what may be asserted of them."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Sequence
+
+from pytest_simbench.measure.intervals import Interval, interval, wilson
+from pytest_simbench.measure.metrics import COSTS, Metric, UnknownMetric
+from pytest_simbench.measure.record import Record
+from pytest_simbench.measure.verdicts import Claim, Judgement, Verdict, at_least, at_most, judge
+
+
+class InconclusiveWarning(UserWarning):
+    """The repetitions decide a claim neither way; the message says how many more would."""
+
+
+class ResultSet:
+    """Records with the metrics of their task.
+
+    A failed repetition is left out of every metric, as in the reference study, and counted by
+    itself. An assertion on a metric *fails* when the 95 % interval of its mean lies wholly on the
+    wrong side of the threshold, *passes* when it lies wholly on the right side, and else passes
+    with an `InconclusiveWarning`.
+
+    Args:
+        records: of one task, simulator, mode and profile.
+        metrics: that the task declares; the costs of `metrics.COSTS` are known besides.
+    """
+
+    def __init__(self, records: Iterable[Record], metrics: Iterable[Metric]) -> None:
+        self.records: tuple[Record, ...] = tuple(records)
+        self.metrics: dict[str, Metric] = {metric.name: metric for metric in metrics}
+        self._costs = {metric.name: metric for metric in COSTS if metric.name not in self.metrics}
+        self._intervals: dict[str, Interval] = {}
+
+    def __len__(self) -> int:
+        return len(self.records)
+
+    def __repr__(self) -> str:
+        return f"<ResultSet {self.label}: {len(self.ok)} ok, {len(self.failures)} failed>"
+
+    @property
+    def label(self) -> str:
+        """Task, simulator, mode and profile, as messages name them."""
+        if not self.records:
+            return "no repetition"
+        first = self.records[0]
+        return f"{first.task} on {first.label}"
+
+    @property
+    def ok(self) -> tuple[Record, ...]:
+        """The repetitions that ended as they should."""
+        return tuple(record for record in self.records if record.ok)
+
+    @property
+    def failures(self) -> tuple[Record, ...]:
+        """The repetitions that failed; each has its `error`."""
+        return tuple(record for record in self.records if record.status == "failed")
+
+    @property
+    def interrupted(self) -> tuple[Record, ...]:
+        """The repetitions that the user ended; neither ok nor failed."""
+        return tuple(record for record in self.records if record.status == "interrupted")
+
+    def causes(self) -> dict[str, list[Record]]:
+        """The failures by cause (`WorkerHung in settle`), the most frequent first."""
+        found: dict[str, list[Record]] = {}
+        for record in self.failures:
+            cause = record.error.cause if record.error else "unknown cause"
+            found.setdefault(cause, []).append(record)
+        return dict(sorted(found.items(), key=lambda item: -len(item[1])))
+
+    def metric(self, name: str) -> Metric:
+        """The metric (or cost) of that name.
+
+        Raises:
+            UnknownMetric: there is none; the message lists the valid names.
+        """
+        found = self.metrics.get(name) or self._costs.get(name)
+        if found is None:
+            where = f" in {self.label}" if self.records else ""
+            raise UnknownMetric(name, [*self.metrics, *self._costs], where)
+        return found
+
+    def value(self, record: Record, name: str) -> float | None:
+        """A metric's value in one record; None where it is not available."""
+        metric = self.metric(name)
+        found = record.metrics.get(name) if metric.name in self.metrics else record.cost(name)
+        return None if found is None else float(found)
+
+    def values(self, name: str) -> list[float]:
+        """A metric's values, one for each ok repetition that has it, in their order."""
+        found = (self.value(record, name) for record in self.ok)
+        return [value for value in found if value is not None]
+
+    def by_seed(self, name: str) -> dict[int, float]:
+        """A metric's values by seed, for pairing with another set; ok repetitions only."""
+        found = {record.seed: self.value(record, name) for record in self.ok}
+        return {seed: value for seed, value in found.items() if value is not None}
+
+    def interval(self, name: str) -> Interval:
+        """The 95 % interval of a metric's mean; without values its mean is nan and n is 0."""
+        if name not in self._intervals:
+            bounded = self.metric(name).bounded
+            self._intervals[name] = interval(self.values(name), bounded=bounded)
+        return self._intervals[name]
+
+    def failure_interval(self) -> Interval:
+        """The 95 % interval of the share of repetitions that fail, interrupted ones left out.
+
+        Raises:
+            ValueError: no repetition has ended.
+        """
+        return wilson(len(self.failures), len(self.ok) + len(self.failures))
+
+    def judge(self, name: str, claim: Claim) -> Judgement:
+        """What the repetitions say of a claim about a metric's true mean."""
+        return judge(claim, self.interval(name))
+
+    def assert_at_least(self, name: str, threshold: float) -> None:
+        """Fail when the true mean is below `threshold`; shares are in 0..1."""
+        __tracebackhide__ = True
+        self._assert(name, at_least(threshold))
+
+    def assert_at_most(self, name: str, threshold: float) -> None:
+        """Fail when the true mean is above `threshold`; shares are in 0..1."""
+        __tracebackhide__ = True
+        self._assert(name, at_most(threshold))
+
+    def assert_between(self, name: str, low: float, high: float) -> None:
+        """Fail when the true mean is outside `low`..`high`; shares are in 0..1."""
+        __tracebackhide__ = True
+        if low > high:
+            raise ValueError(f"{name} cannot lie between {low:g} and {high:g}: low is above high")
+        self._assert(name, at_least(low), at_most(high))
+
+    def assert_no_failures(self) -> None:
+        """Fail when a repetition failed, or when none was recorded."""
+        __tracebackhide__ = True
+        self._assert_recorded()
+        if self.failures:
+            raise AssertionError(self._failed())
+
+    def assert_failures_at_most(self, share: float) -> None:
+        """Fail when more than `share` (0..1) of all repetitions ever made would fail."""
+        __tracebackhide__ = True
+        if not 0 <= share <= 1:
+            raise ValueError(f"a share of failures lies in 0..1, not {share:g}")
+        self._assert_recorded()
+        found = judge(at_most(share), self.failure_interval())
+        sentence = f"{self._failed()}; 95 % interval {_percents(found.interval)}"
+        if found.verdict is Verdict.REFUTED:
+            raise AssertionError(f"{sentence}, which is above {100 * share:g} %")
+        if found.verdict is Verdict.INCONCLUSIVE:
+            warnings.warn(
+                f"{sentence}: inconclusive whether at most {100 * share:g} %, {found.advice}",
+                InconclusiveWarning,
+                stacklevel=2,
+            )
+
+    def _assert(self, name: str, *claims: Claim) -> None:
+        __tracebackhide__ = True
+        metric = self.metric(name)
+        self._assert_recorded()
+        if not self.ok:
+            raise AssertionError(f"{name} cannot be judged: {self._failed()}")
+        if not self.values(name):
+            raise AssertionError(
+                f"{self.label}: {name} is not available in any of {len(self.ok)} repetitions"
+            )
+        found = [self.judge(name, claim) for claim in claims]
+        for judgement in found:
+            if judgement.verdict is Verdict.REFUTED:
+                wrong = "below" if judgement.claim.relation == "at least" else "above"
+                limit = metric.format(judgement.claim.value)
+                raise AssertionError(f"{self._measured(metric)}, which is {wrong} {limit}")
+        for judgement in found:
+            if judgement.verdict is Verdict.INCONCLUSIVE:
+                claim = f"{judgement.claim.relation} {metric.format(judgement.claim.value)}"
+                warnings.warn(
+                    f"{self._measured(metric)}: inconclusive whether {claim}, {judgement.advice}",
+                    InconclusiveWarning,
+                    stacklevel=3,
+                )
+
+    def _assert_recorded(self) -> None:
+        __tracebackhide__ = True
+        if len(self.interrupted) == len(self.records):
+            raise AssertionError(f"{self.label}: no repetition has ended, nothing can be judged")
+
+    def _measured(self, metric: Metric) -> str:
+        """What was measured, with simulator, mode, profile, interval and number of repetitions."""
+        found = self.interval(metric.name)
+        failed = f", {len(self.failures)} failed" if self.failures else ""
+        return (
+            f"{self.label}: {metric.name} is {metric.format(found.mean)} on average (95 % interval "
+            f"{metric.format(found.low)} to {metric.format(found.high)}, "
+            f"{found.n} repetition{'s' if found.n > 1 else ''}{failed})"
+        )
+
+    def _failed(self) -> str:
+        """How many failed and why, the most frequent cause first, with its first message."""
+        total = len(self.ok) + len(self.failures)
+        text = f"{self.label}: {len(self.failures)} of {total} repetitions failed"
+        reasons = [
+            f"{len(records)} x {cause}{_example(records)}"
+            for cause, records in self.causes().items()
+        ]
+        return text + (f": {'; '.join(reasons)}" if reasons else "")
+
+
+def _example(records: Sequence[Record]) -> str:
+    first = records[0]
+    message = first.error.message if first.error else ""
+    place = f"repetition {first.repetition}, seed {first.seed}"
+    return f" ({place}: {message})" if message else f" ({place})"
+
+
+def _percents(found: Interval) -> str:
+    return f"{100 * found.low:.3g} % to {100 * found.high:.3g} %"

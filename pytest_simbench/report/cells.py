@@ -1,0 +1,80 @@
+"""Numbers as a reader sees them, in plain ASCII: a log's encoding may know nothing else."""
+
+from __future__ import annotations
+
+from pytest_simbench.measure.metrics import Metric
+from pytest_simbench.report.summary import Row, Sampled, Spread
+
+MISSING = "-"
+
+
+def number(value: float, digits: int = 3) -> str:
+    """So many significant digits, zeros kept: 1.35, 0.80, 161."""
+    if value == 0:
+        return "0"
+    if abs(value) >= 10**digits:
+        return f"{value:.0f}"
+    text = f"{value:#.{digits}g}"
+    return f"{value:.0e}" if "e" in text else text.rstrip(".")
+
+
+def metric_value(value: float, metric: Metric) -> str:
+    """Without its unit: percent for shares and yes-or-no, else to the millimetre of a metre."""
+    if metric.bounded:
+        return f"{100 * value:.0f}"
+    return f"{value:.4g}" if abs(value) >= 1 else f"{value:.2g}"
+
+
+def interval(found: Spread, metric: Metric) -> str:
+    """The 95 % interval of the mean, for instance `[97, 100]`; nothing where there is none."""
+    if found.low is None or found.high is None:
+        return ""
+    return f"[{metric_value(found.low, metric)}, {metric_value(found.high, metric)}]"
+
+
+def spread(found: Spread | None, metric: Metric) -> list[str]:
+    """Two lines: min / mean / max (for yes-or-no: how many of how many), and the interval."""
+    if found is None:
+        return [MISSING]
+    if metric.kind == "yes_no":
+        yes = round(found.mean * found.count)
+        return [
+            f"{yes} of {found.count}",
+            f"{metric_value(found.mean, metric)} {interval(found, metric)}".rstrip(),
+        ]
+    parts = (found.min, found.mean, found.max)
+    return [" / ".join(metric_value(part, metric) for part in parts), interval(found, metric)]
+
+
+def mean_interval(found: Spread | None, metric: Metric) -> list[str]:
+    """Two lines: the mean, and the interval."""
+    if found is None:
+        return [MISSING]
+    return [metric_value(found.mean, metric), interval(found, metric)]
+
+
+def deviation(found: Spread | None, digits: int = 2) -> list[str]:
+    """Two lines: mean, and deviation between repetitions."""
+    if found is None:
+        return [MISSING]
+    return [number(found.mean, digits), f"+- {number(found.std, digits)}"]
+
+
+def sampled(found: Sampled | None) -> list[str]:
+    """Two lines: mean +- deviation over all samples, and the peak where there is one."""
+    if found is None:
+        return [MISSING]
+    peak = "" if found.peak is None else f"(peak {found.peak:.0f})"
+    return [f"{found.mean:.0f} +- {found.std:.0f}", peak]
+
+
+def failures(row: Row) -> list[str]:
+    """Failed repetitions of those that count, and the interrupted ones below."""
+    more = f"{row.interrupted} cut" if row.interrupted else ""
+    return [f"{row.failed} of {row.attempts}", more]
+
+
+def heading(metric: Metric) -> str:
+    """Title and unit of a metric."""
+    unit = "%" if metric.bounded else metric.unit
+    return f"{metric.title} {unit}".rstrip()

@@ -1,0 +1,152 @@
+"""The columns of every table, for the terminal and Markdown alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pytest_simbench.report import cells
+from pytest_simbench.report.grid import Column
+from pytest_simbench.report.summary import PHASES, Row, TaskSummary
+
+LEGEND = (
+    "min / mean / max over the finished repetitions, [95 % interval of the mean]. CPU in % of one "
+    "core and RAM in MB: mean +- deviation over all samples of worker and children. x real time: "
+    "simulated over wall seconds of stepping; at full speed, compare CPU s per simulated s. Start "
+    "and end of the task: seconds from launch."
+)
+"""How to read the tables, in one paragraph."""
+
+
+def study(summary: TaskSummary) -> list[Column]:
+    """The study's table: failures, its metrics, CPU, RAM, speed, start and end."""
+    rows = summary.rows
+    return [
+        labels(rows),
+        Column("failed", [cells.failures(row) for row in rows], "outcome"),
+        *(
+            Column(
+                cells.heading(metric),
+                [cells.spread(row.metrics.get(metric.name), metric) for row in rows],
+                "outcome",
+            )
+            for metric in summary.study
+        ),
+        Column("CPU %", [cells.sampled(row.cpu_percent) for row in rows], "cost"),
+        Column("RAM MB", [cells.sampled(row.rss_mb) for row in rows], "cost"),
+        Column("x real time", [cells.deviation(row.real_time_factor) for row in rows], "cost"),
+        Column("CPU s/sim s", [cells.deviation(row.cpu_cost) for row in rows], "cost"),
+        Column("start s", [cells.deviation(row.start) for row in rows], "cost"),
+        Column("end s", [cells.deviation(row.end) for row in rows], "cost"),
+    ]
+
+
+def stricter(summary: TaskSummary) -> list[Column]:
+    """The other metrics: mean and interval, with the reference of a perfect run as first row."""
+    rows = summary.rows
+    shown = [m for m in summary.stricter if any(row.metrics.get(m.name) for row in rows)]
+    if not shown:
+        return []
+    known = any(metric.name in summary.references for metric in shown)
+    columns = [labels(rows, first="reference" if known else "")]
+    for metric in shown:
+        values = [cells.mean_interval(row.metrics.get(metric.name), metric) for row in rows]
+        if known:
+            reference = summary.references.get(metric.name)
+            text = "" if reference is None else cells.metric_value(reference, metric)
+            values.insert(0, [text])
+        columns.append(Column(cells.heading(metric), values, "stricter"))
+    return columns
+
+
+def time_spent(summary: TaskSummary) -> list[Column]:
+    """Where the wall time went: mean seconds and share of the total, by phase."""
+    rows = [row for row in summary.rows if row.seconds.get("total")]
+    if not rows:
+        return []
+    columns = [labels(rows)]
+    for phase in PHASES:
+        texts = []
+        for row in rows:
+            seconds = row.seconds.get(phase)
+            share = 0.0 if seconds is None else 100 * seconds / row.seconds["total"]
+            texts.append(
+                [cells.MISSING]
+                if seconds is None
+                else [cells.number(seconds, 2), f"({share:.0f} %)"]
+            )
+        columns.append(Column(f"{phase} s", texts, "time"))
+    totals = [[cells.number(row.seconds["total"], 3)] for row in rows]
+    return [*columns, Column("total s", totals, "time")]
+
+
+def failures(summary: TaskSummary) -> list[Column]:
+    """What went wrong: count, type, phase, message, and where to read on."""
+    found = [(row, cause) for row in summary.rows for cause in row.causes]
+    if not found:
+        return []
+    causes = [cause for _, cause in found]
+    shown = [
+        "; ".join(
+            [cause.message or cause.type]
+            + ([f"last line of its log: {cause.last_line}"] if cause.last_line else [])
+            + ([f"log: {cause.log}"] if cause.log else [])
+        )
+        for cause in causes
+    ]
+    return [
+        Column("simulator", [[row.label] for row, _ in found], left=True, wrap=True),
+        Column("count", [[str(len(cause.repetitions))] for cause in causes]),
+        Column("failure", [[cause.type] for cause in causes], left=True),
+        Column("phase", [[cause.phase or cells.MISSING] for cause in causes], left=True),
+        Column("repetitions", [[numbers(cause.repetitions)] for cause in causes], left=True),
+        Column("message", [[text] for text in shown], left=True, wrap=True),
+    ]
+
+
+def details(summary: TaskSummary) -> list[tuple[str, list[Column]]]:
+    """The tables below the study's, each with its title; a table without columns is left out."""
+    found = [
+        ("failures", failures(summary)),
+        ("beyond the study: mean [95 % interval]", stricter(summary)),
+        ("where the time went: mean wall seconds and share", time_spent(summary)),
+    ]
+    return [(name, columns) for name, columns in found if columns]
+
+
+def title(summary: TaskSummary) -> str:
+    """Task, number of repetitions and protocol in one line."""
+    counts = sorted({row.attempts for row in summary.rows})
+    many = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+    plural = "" if counts[-1] == 1 else "s"
+    each = " each" if len(summary.rows) > 1 else ""
+    return f"{summary.task}: {many} repetition{plural}{each}, protocol {summary.protocol}"
+
+
+def notes(summary: TaskSummary) -> list[str]:
+    """What a reader must know of single rows."""
+    return [f"{row.label}: {text}" for row in summary.rows for text in row.notes]
+
+
+def deviations(summaries: Sequence[TaskSummary]) -> list[tuple[str, str]]:
+    """What each simulator cannot express of the scene, as its adapter declares it."""
+    found = {
+        (row.simulator, text)
+        for summary in summaries
+        for row in summary.rows
+        for text in row.deviations
+    }
+    return sorted(found)
+
+
+def labels(rows: Sequence[Row], first: str = "") -> Column:
+    """The column that names the rows."""
+    texts = [[row.simulator, row.variant] for row in rows]
+    if first:
+        texts.insert(0, [first])
+    return Column("simulator", texts, left=True)
+
+
+def numbers(values: Sequence[int], most: int = 4) -> str:
+    """The first few of them: `3, 7, 8, ...`."""
+    shown = ", ".join(str(value) for value in values[:most])
+    return f"{shown}, ..." if len(values) > most else shown

@@ -1,0 +1,146 @@
+"""Pictures of a run: metrics with intervals, start and end times, CPU and memory.
+
+matplotlib is an optional extra and is imported only when a picture is drawn.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pytest_simbench.measure.metrics import Metric
+from pytest_simbench.report.answer import short_labels
+from pytest_simbench.report.summary import Row, Spread, TaskSummary
+
+DPI = 120
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+"""Okabe and Ito's palette: told apart by colour-blind readers too (jfly.uni-koeln.de/color)."""
+
+
+class FiguresUnavailable(RuntimeError):
+    """Pictures cannot be drawn here; the message says what to install."""
+
+
+def write_figures(folder: Path, summaries: Sequence[TaskSummary]) -> list[Path]:
+    """Draw all pictures of a run as PNG files in `folder` and return their paths.
+
+    Raises:
+        FiguresUnavailable: matplotlib is not installed.
+        OSError: the folder cannot be written to.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise FiguresUnavailable(
+            "no pictures: matplotlib is missing; pip install 'pytest-simbench[figures]'"
+        ) from error
+    paths = []
+    for summary in summaries:
+        rows = [row for row in summary.rows if row.finished]
+        if not rows:
+            continue
+        for name, draw, panels in (
+            ("metrics", _metrics, max(1, len(summary.study))),
+            ("times", _times, 1),
+            ("resources", _resources, 2),
+        ):
+            # Figure without pyplot: no window, no display, no global state.
+            figure: Any = Figure(
+                figsize=(max(7, 2 + 3.5 * panels), 1.6 + 0.4 * len(rows)), layout="constrained"
+            )
+            axes = figure.subplots(1, panels, sharey=True, squeeze=False)[0]
+            draw(axes, summary, rows)
+            axes[0].set_yticks(range(len(rows)), short_labels(rows))
+            axes[0].set_ylim(len(rows) - 0.5, -0.5)
+            figure.suptitle(_title(summary, rows, name), fontsize="medium")
+            path = folder / f"{summary.task}_{name}.png"
+            figure.savefig(path, dpi=DPI)
+            paths.append(path)
+    return paths
+
+
+def _title(summary: TaskSummary, rows: Sequence[Row], name: str) -> str:
+    what = {
+        "metrics": "mean with 95 % interval, min to max in grey",
+        "times": "start and end of the task, with deviation",
+        "resources": "CPU and RAM, mean and deviation over samples",
+    }[name]
+    shared = [
+        values.pop()
+        for values in ({row.mode for row in rows}, {row.profile for row in rows})
+        if len(values) == 1
+    ]
+    return f"{summary.task} ({', '.join([*shared, summary.protocol])}): {what}"
+
+
+def _metrics(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -> None:
+    """A dot for each row and metric; the line is the interval, the grey one min to max."""
+    for axis, metric in zip(axes, summary.study, strict=False):
+        for y, row in enumerate(rows):
+            found = row.metrics.get(metric.name)
+            if found is None:
+                continue
+            scale = 100 if metric.bounded else 1
+            if metric.kind != "yes_no":
+                axis.plot(
+                    [scale * found.min, scale * found.max],
+                    [y, y],
+                    color="0.8",
+                    lw=6,
+                    solid_capstyle="butt",
+                    zorder=1,
+                )
+            if found.low is not None and found.high is not None:
+                axis.plot([scale * found.low, scale * found.high], [y, y], color=COLOURS[0], lw=2)
+            axis.plot(scale * found.mean, y, "o", color=COLOURS[0])
+        axis.set_xlabel(_heading(metric))
+        if metric.bounded:
+            axis.set_xlim(-3, 103)
+        axis.grid(axis="x", alpha=0.4)
+        if metric.name in summary.references:
+            axis.axvline(summary.references[metric.name], color="0.4", ls="--", lw=1)
+
+
+def _times(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -> None:
+    """A bar from the start of the task to its end, with the deviation of both."""
+    (axis,) = axes
+    for y, row in enumerate(rows):
+        if row.start is None or row.end is None:
+            continue
+        axis.barh(
+            y, row.end.mean - row.start.mean, left=row.start.mean, height=0.5, color=COLOURS[5]
+        )
+        for found, colour in ((row.start, COLOURS[2]), (row.end, COLOURS[1])):
+            _error_bar(axis, found, y, colour)
+    axis.set_xlim(left=0)
+    axis.set_xlabel("seconds from launch")
+    axis.grid(axis="x", alpha=0.4)
+
+
+def _error_bar(axis: Any, found: Spread, y: float, colour: str) -> None:
+    axis.errorbar(found.mean, y, xerr=found.std, fmt="o", color=colour, capsize=3, ms=4)
+
+
+def _resources(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -> None:
+    """Bars of CPU and resident memory; a tick marks the peak of the memory."""
+    for axis, name, label in (
+        (axes[0], "cpu_percent", "CPU, % of a core"),
+        (axes[1], "rss_mb", "RAM, MB (| is the peak)"),
+    ):
+        for y, row in enumerate(rows):
+            found = getattr(row, name)
+            if found is None or not math.isfinite(found.mean):
+                continue
+            axis.barh(y, found.mean, xerr=found.std, height=0.5, color=COLOURS[5], capsize=3)
+            if found.peak is not None:
+                axis.plot(found.peak, y, "|", color=COLOURS[1], ms=16, mew=2)
+        axis.set_xlim(left=0)
+        axis.set_xlabel(label)
+        axis.grid(axis="x", alpha=0.4)
+
+
+def _heading(metric: Metric) -> str:
+    unit = "%" if metric.bounded else metric.unit
+    return f"{metric.title}, {unit}" if unit else metric.title

@@ -1,0 +1,65 @@
+"""The same report as GitHub Markdown: for the run folder, docs and the summary page of a CI job."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pytest_simbench.report import columns
+from pytest_simbench.report.answer import sentences
+from pytest_simbench.report.grid import Column
+from pytest_simbench.report.summary import TaskSummary
+
+
+def render_run(summaries: Sequence[TaskSummary], pictures: Sequence[str] = ()) -> str:
+    """The whole report; ends with a newline.
+
+    Args:
+        summaries: from `summary.summarise`.
+        pictures: addresses of pictures to show at the end, relative to the report.
+    """
+    if not summaries:
+        return "No repetition was recorded.\n"
+    parts = [render_task(summary) for summary in summaries]
+    parts.append(f"How to read it: {escape(columns.LEGEND)}")
+    deviations = columns.deviations(summaries)
+    if deviations:
+        lines = [f"- {escape(name)}: {escape(text)}" for name, text in deviations]
+        parts.append("\n".join(["## Declared deviations from the scene", "", *lines]))
+    if pictures:
+        parts.append("\n".join(["## Pictures", "", *(f"![{name}]({name})" for name in pictures)]))
+    return "\n\n".join(parts) + "\n"
+
+
+def render_task(summary: TaskSummary, level: int = 2) -> str:
+    """One task under a heading of that level."""
+    title = f"{'#' * level} {columns.title(summary)}"
+    parts = [title, "\n".join(f"- {escape(text)}" for text in sentences(summary))]
+    parts.append(table(columns.study(summary)))
+    for name, found in columns.details(summary):
+        if found:
+            parts.append(f"{'#' * (level + 1)} {name[0].upper()}{name[1:]}\n\n{table(found)}")
+    notes = columns.notes(summary)
+    if notes:
+        parts.append("\n".join(f"- note: {escape(text)}" for text in notes))
+    return "\n\n".join(part for part in parts if part)
+
+
+def table(found: Sequence[Column]) -> str:
+    """One table with a line for each row."""
+    single = [column.joined() for column in found]
+    lines = [
+        [escape(column.heading) for column in single],
+        [":--" if column.left else "--:" for column in single],
+        *(
+            [escape(" ".join(cell)) for cell in row]
+            for row in zip(*(column.cells for column in single), strict=True)
+        ),
+    ]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def escape(text: str) -> str:
+    """`text` so that Markdown shows it as it is, in a table's cell too."""
+    for char in "\\|*_<>`":
+        text = text.replace(char, f"\\{char}")
+    return " ".join(text.split())

@@ -1,0 +1,296 @@
+"""From records to the rows of a table: one row per simulator, mode and profile of a task.
+
+Every renderer (terminal, Markdown, pictures) reads these rows, so that all of them tell the same
+numbers. Failed and interrupted repetitions are counted and left out of everything else, as in the
+reference study.
+"""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from pytest_simbench.measure.intervals import interval
+from pytest_simbench.measure.metrics import Metric
+from pytest_simbench.measure.record import Record
+
+PHASES = ("launch", "load", "plan", "step", "other")
+"""Where the wall time of a repetition goes, in order."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A number over the repetitions of a row.
+
+    Attributes:
+        count: repetitions that have it.
+        std: deviation between repetitions; 0 for a single one.
+        low, high: the 95 % interval of the mean, or None where too few repetitions tell one.
+    """
+
+    count: int
+    min: float
+    mean: float
+    max: float
+    std: float = 0.0
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """A resource over all samples of all repetitions of a row: mean, deviation, largest value."""
+
+    mean: float
+    std: float
+    peak: float | None = None
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Failures that share type and phase.
+
+    Attributes:
+        message: that of the first of them, in one line.
+        last_line: the last line of that one's log.
+        repetitions: their numbers, with `seeds` in the same order.
+    """
+
+    type: str
+    phase: str
+    message: str
+    last_line: str
+    repetitions: tuple[int, ...]
+    seeds: tuple[int, ...]
+    log: str = ""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One simulator in one mode with one profile at one task.
+
+    Attributes:
+        test: the test's function name, where rows differ in it alone; else empty.
+        finished, failed, interrupted: counts of repetitions.
+        metrics: by metric name; None where no repetition has the value.
+        start, end: seconds from launch to the start and the end of the task.
+        seconds: mean wall seconds by phase (`PHASES`, `total`).
+        notes: what a reader must know of these numbers (parallel repetitions, reused worker).
+    """
+
+    task: str
+    simulator: str
+    mode: str
+    profile: str
+    test: str = ""
+    finished: int = 0
+    failed: int = 0
+    interrupted: int = 0
+    metrics: Mapping[str, Spread | None] = field(default_factory=dict)
+    cpu_percent: Sampled | None = None
+    rss_mb: Sampled | None = None
+    real_time_factor: Spread | None = None
+    cpu_cost: Spread | None = None
+    start: Spread | None = None
+    end: Spread | None = None
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    causes: tuple[Cause, ...] = ()
+    deviations: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def attempts(self) -> int:
+        """Repetitions that count: interrupted ones say nothing about the simulator."""
+        return self.finished + self.failed
+
+    @property
+    def variant(self) -> str:
+        """Mode and profile, and the test where it is needed, for instance `headless tuned`."""
+        return " ".join(part for part in (self.mode, self.profile, self.test) if part)
+
+    @property
+    def label(self) -> str:
+        return f"{self.simulator} {self.variant}"
+
+
+@dataclass(frozen=True)
+class TaskSummary:
+    """All rows of one task.
+
+    Attributes:
+        metrics: what the task declares; those with `study` make its first table.
+        references: the value a perfect run would give, by metric name.
+        protocol: the protocol of its records; several are joined by commas.
+    """
+
+    task: str
+    metrics: tuple[Metric, ...]
+    rows: tuple[Row, ...]
+    references: Mapping[str, float] = field(default_factory=dict)
+    protocol: str = ""
+
+    @property
+    def study(self) -> tuple[Metric, ...]:
+        """What the reference study reports too."""
+        return tuple(metric for metric in self.metrics if metric.study)
+
+    @property
+    def stricter(self) -> tuple[Metric, ...]:
+        """What this project measures beside it."""
+        return tuple(metric for metric in self.metrics if not metric.study)
+
+
+def summarise(
+    records: Iterable[Record],
+    metrics: Mapping[str, Sequence[Metric]],
+    references: Mapping[str, Mapping[str, float]] | None = None,
+) -> list[TaskSummary]:
+    """The records as one summary per task, tasks in order of appearance.
+
+    Args:
+        records: of one run, in any order.
+        metrics: what each task declares, by its name; of a task that is missing here, the record's
+            metrics are shown as plain values.
+        references: by task, then by metric.
+    """
+    by_task: dict[str, list[Record]] = {}
+    for record in records:
+        by_task.setdefault(record.task, []).append(record)
+    summaries = []
+    for task, found in by_task.items():
+        declared = tuple(metrics.get(task) or _undeclared(found))
+        groups: dict[tuple[str, ...], list[Record]] = {}
+        for record in sorted(found, key=lambda r: (_row_key(r), r.repetition)):
+            groups.setdefault(_row_key(record), []).append(record)
+        same = Counter(key[:4] for key in groups)
+        rows = tuple(
+            _row(group, declared, key[4] if same[key[:4]] > 1 else "")
+            for key, group in groups.items()
+        )
+        protocols = ", ".join(sorted({record.protocol for record in found}))
+        summaries.append(
+            TaskSummary(task, declared, rows, dict((references or {}).get(task, {})), protocols)
+        )
+    return summaries
+
+
+def _row_key(record: Record) -> tuple[str, ...]:
+    # Headless before gui, as in the study's table; the test's name without its parameters.
+    shown = "1" if record.mode == "gui" else "0"
+    return (record.simulator, shown + record.mode, record.profile, "", record.test.split("[")[0])
+
+
+def _undeclared(records: Sequence[Record]) -> list[Metric]:
+    names = dict.fromkeys(name for record in records for name in record.metrics)
+    return [Metric(name, name, better=None, study=True) for name in names]
+
+
+def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str) -> Row:
+    first = records[0]
+    done = [record for record in records if record.status == "ok"]
+    notes = []
+    if any(record.contended for record in done):
+        notes.append("repetitions ran in parallel: its times and CPU are contended")
+    if any(record.reused_worker for record in done):
+        notes.append("one worker served several repetitions: launch and memory are not fresh")
+    return Row(
+        first.task,
+        first.simulator,
+        first.mode,
+        first.profile,
+        test,
+        finished=len(done),
+        failed=sum(record.status == "failed" for record in records),
+        interrupted=sum(record.status == "interrupted" for record in records),
+        metrics={
+            metric.name: spread([r.metrics.get(metric.name) for r in done], metric)
+            for metric in metrics
+        },
+        cpu_percent=_sampled(done, "cpu_percent"),
+        rss_mb=_sampled(done, "rss_mb"),
+        real_time_factor=spread([r.cost("rtf") for r in done]),
+        cpu_cost=spread([r.cost("cpu_cost") for r in done]),
+        start=spread([r.cost("start") for r in done]),
+        end=spread([r.cost("end") for r in done]),
+        seconds=_seconds(done),
+        causes=_causes(records),
+        deviations=tuple(dict.fromkeys(text for r in records for text in r.deviations)),
+        notes=tuple(notes),
+    )
+
+
+def spread(values: Iterable[float | None], metric: Metric | None = None) -> Spread | None:
+    """Smallest, mean and largest of the values that are there, with the interval of the mean.
+
+    `metric` says which interval fits (see `measure.intervals`); without it none is computed.
+    """
+    found = [float(value) for value in values if value is not None and math.isfinite(value)]
+    if not found:
+        return None
+    low = high = None
+    if metric is not None and all(0 <= value <= 1 for value in found if metric.bounded):
+        ends = interval(found, bounded=metric.bounded)
+        if math.isfinite(ends.low) and math.isfinite(ends.high):
+            low, high = ends.low, ends.high
+    std = statistics.stdev(found) if len(found) > 1 else 0.0
+    return Spread(len(found), min(found), statistics.fmean(found), max(found), std, low, high)
+
+
+def _sampled(records: Sequence[Record], name: str) -> Sampled | None:
+    """Mean and deviation over all samples, as if they had been taken in one go.
+
+    The deviation is within and between repetitions: n samples of mean m_i and deviation s_i add
+    n (s_i^2 + (m_i - m)^2) to the sum of squares.
+    """
+    parts = []
+    peaks = []
+    for record in records:
+        found = record.resources.get(name) or {}
+        mean, count = found.get("mean"), record.resources.get("samples") or 0
+        if mean is not None and count > 0:
+            parts.append((count, mean, found.get("std") or 0.0))
+        if found.get("peak") is not None:
+            peaks.append(float(found["peak"]))
+    if not parts:
+        return None
+    total = sum(count for count, _, _ in parts)
+    mean = sum(count * m for count, m, _ in parts) / total
+    variance = sum(count * (s**2 + (m - mean) ** 2) for count, m, s in parts) / total
+    return Sampled(mean, math.sqrt(variance), max(peaks, default=None))
+
+
+def _seconds(records: Sequence[Record]) -> dict[str, float]:
+    means = {}
+    for name in (*PHASES, "total"):
+        found = [r.seconds[name] for r in records if r.seconds.get(name) is not None]
+        if found:
+            means[name] = statistics.fmean(found)
+    return means
+
+
+def _causes(records: Sequence[Record]) -> tuple[Cause, ...]:
+    groups: dict[tuple[str, str], list[Record]] = {}
+    for record in records:
+        if record.status == "failed":
+            error = record.error
+            key = (error.type, error.phase) if error else ("unknown", "")
+            groups.setdefault(key, []).append(record)
+    causes = []
+    for (kind, phase), group in sorted(groups.items(), key=lambda item: -len(item[1])):
+        error = group[0].error
+        tail = error.log_tail.strip().splitlines() if error else []
+        causes.append(
+            Cause(
+                kind,
+                phase,
+                " ".join(error.message.split()) if error else "the record names no cause",
+                tail[-1].strip() if tail else "",
+                tuple(record.repetition for record in group),
+                tuple(record.seed for record in group),
+                str(group[0].details.get("log") or ""),
+            )
+        )
+    return tuple(causes)

@@ -1,0 +1,52 @@
+"""The result in the terminal: for each task the answer, the study's table, and what explains it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from pytest_simbench.report import columns
+from pytest_simbench.report.answer import sentences
+from pytest_simbench.report.grid import fill, render
+from pytest_simbench.report.summary import TaskSummary
+
+NARROWEST = 40
+"""Tables are laid out for at least so many columns; in fewer, lines run over."""
+
+
+def render_run(
+    summaries: Sequence[TaskSummary], width: int = 80, folder: Path | str | None = None
+) -> str:
+    """Everything the terminal shows of a run, as plain lines of at most `width` columns.
+
+    No colours and nothing but ASCII of our own, so that any log holds it.
+
+    Args:
+        summaries: from `summary.summarise`; without one, the text is empty.
+        width: of the terminal; 80 to 140 read well.
+        folder: the run folder, named where the reader should look on.
+    """
+    if not summaries:
+        return ""
+    width = max(width, NARROWEST)
+    parts = [render_task(summary, width) for summary in summaries]
+    parts.append(fill(columns.LEGEND, width))
+    deviations = [f"{name}: {text}" for name, text in columns.deviations(summaries)]
+    if deviations:
+        lines = [f"  {fill(text, width, '    ')}" for text in deviations]
+        parts.append("\n".join(["declared deviations from the scene", *lines]))
+    if folder is not None:
+        parts.append(f"records, logs and report: {folder}")
+    return "\n\n".join(parts)
+
+
+def render_task(summary: TaskSummary, width: int = 80) -> str:
+    """One task: title, answer, table, failures, further metrics, where the time went."""
+    title = columns.title(summary)
+    answer = [fill(sentence, width, "  ") for sentence in sentences(summary)]
+    parts = ["\n".join([title, "=" * len(title), *answer])]
+    parts.append(render(columns.study(summary), width))
+    for name, found in columns.details(summary):
+        parts.append(f"{summary.task}, {name}\n{render(found, width)}")
+    notes = [fill(f"note: {text}", width, "  ") for text in columns.notes(summary)]
+    return "\n\n".join([*parts, "\n".join(notes)] if notes else parts)

@@ -1,0 +1,109 @@
+"""What a task is: a scene, a procedure and a score, the same for every simulator."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pytest_simbench.client.world import World
+from pytest_simbench.measure.metrics import Metric
+from pytest_simbench.scene import Box, Pose, Scene
+
+CUBE_SIZE = 0.05
+"""Edge of every cube [m] (the study)."""
+
+CUBE_MASS = 0.1
+"""[kg]. The study's simulators disagreed, 0.125 to 1.0; here it is the same everywhere."""
+
+STUDY_TOLERANCE = 0.05
+"""The study counts a cube as in its place within this distance in x and in y [m]."""
+
+
+@dataclass(frozen=True)
+class Jitter:
+    """Largest disturbance of each cube's start, drawn uniformly: without it, repetitions of a
+    deterministic simulator would all be the same.
+
+    Attributes:
+        distance: in x and in y [m].
+        angle: about the vertical [rad].
+    """
+
+    distance: float = 0.001
+    angle: float = float(np.deg2rad(1.0))
+
+    def disturbed(self, pose: Pose, rng: np.random.Generator) -> Pose:
+        """`pose`, moved and turned; draws three numbers whatever the amplitudes."""
+        x, y, turn = rng.uniform(-1.0, 1.0, 3)
+        turned = Pose.at(0.0, 0.0, 0.0, yaw=turn * self.angle)
+        moved = pose.translated(x * self.distance, y * self.distance)
+        return Pose(moved.position, (turned * Pose(quaternion=pose.quaternion)).quaternion)
+
+
+@dataclass
+class Outcome:
+    """Score of a repetition.
+
+    Attributes:
+        metrics: value of each of the task's metrics; None where there is none.
+        details: whatever explains the score, as plain data.
+        timeline: simulated seconds at which the task started and ended.
+    """
+
+    metrics: dict[str, float | None] = field(default_factory=dict)
+    details: dict[str, Any] = field(default_factory=dict)
+
+
+Count = Callable[[int, int], None]
+"""Progress: called with the number of cubes done and of all."""
+
+
+class Task(ABC):
+    """A task. Subclasses are frozen dataclasses whose fields are the task's parameters.
+
+    Attributes:
+        name: in records and tables.
+        metrics: what it measures.
+        study_timeout: the reference study's time-out from launch, real time [s].
+        references: metric name to the value of a perfect simulator, where there is one.
+    """
+
+    name: ClassVar[str]
+    study_timeout: ClassVar[float]
+    references: ClassVar[Mapping[str, float]] = {}
+
+    @property
+    @abstractmethod
+    def metrics(self) -> tuple[Metric, ...]:
+        """What it measures, the study's metrics first."""
+
+    @abstractmethod
+    def scene(self, seed: int, jitter: Jitter) -> Scene:
+        """The scene of a repetition; the same seed gives the same scene on every simulator."""
+
+    @abstractmethod
+    def perform(self, world: World, seed: int, count: Count) -> Outcome:
+        """Carry out the task in a freshly loaded world, wait for things to settle, score.
+
+        Enter a phase (`world.phase`) for every stage, and measure what is planning
+        with `world.stopwatch.measuring("plan")`.
+        """
+
+
+def cube(name: str, pose: Pose, colour: tuple[float, float, float, float]) -> Box:
+    """One of the study's cubes."""
+    return Box(name, (CUBE_SIZE,) * 3, pose, mass=CUBE_MASS, colour=colour)
+
+
+def generators(seed: int) -> tuple[np.random.Generator, np.random.Generator, np.random.Generator]:
+    """Independent random generators of a repetition: start jitter, cube order, planner."""
+    jitter, order, planner = np.random.SeedSequence(seed).spawn(3)
+    return (
+        np.random.default_rng(jitter),
+        np.random.default_rng(order),
+        np.random.default_rng(planner),
+    )

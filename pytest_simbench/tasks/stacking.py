@@ -1,0 +1,249 @@
+"""Task 1 of the reference study: 21 cubes on a table, 15 of them to be stacked in 3 towers of 5."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pytest_simbench.client.world import World
+from pytest_simbench.measure.metrics import Metric
+from pytest_simbench.robot.panda import panda
+from pytest_simbench.robot.planning import PlanningError
+from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.tasks.base import (
+    CUBE_SIZE,
+    STUDY_TOLERANCE,
+    Count,
+    Jitter,
+    Outcome,
+    Task,
+    cube,
+    generators,
+)
+from pytest_simbench.tasks.manipulator import LostCube, Manipulator
+
+TABLE_TOP = 0.30
+"""Height of the table top [m] (study code, Webots)."""
+
+TABLE = Box("table", (0.914, 0.914, TABLE_TOP), Pose.at(0.6, 0.0, TABLE_TOP / 2))
+"""0.914 x 0.914 m, centred at x = 0.6 (study code, Webots), as a solid block."""
+
+GRID = tuple(product((0.2, 0.3, 0.4), (-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3)))
+"""x and y of the 21 cubes [m] (study code)."""
+
+TOWERS = ((0.5, -0.2), (0.5, 0.0), (0.5, 0.2))
+"""x and y of the towers [m] (study code)."""
+
+STRICT_DISTANCE = 0.01
+STRICT_TILT = float(np.deg2rad(5.0))
+"""A cube is strictly in its place within 1 cm in x, y and z, tilted by less than 5 degrees."""
+
+UNTOUCHED_DISTANCE = 0.01
+"""A cube that nobody handled counts as moved beyond this distance [m]."""
+
+BLUE, RED = (0.20, 0.40, 0.75, 1.0), (0.80, 0.25, 0.20, 1.0)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a cube is to stand: its tower and level, counted from 0, and the pose."""
+
+    tower: int
+    level: int
+    pose: Pose
+
+
+@dataclass(frozen=True)
+class Stacking(Task):
+    """Stack `towers` towers of `levels` cubes.
+
+    Attributes:
+        towers: how many of the three.
+        levels: cubes in each.
+        release_height: how far above its resting height a cube is let go [m]. The study dropped
+            from about 0.02, which measures bouncing rather than placing.
+        check_delay: from release to the count of *placed* [s] (study).
+        settle: from the end of the task to the count at the end [s] (study: 60).
+    """
+
+    name: ClassVar[str] = "stacking"
+    study_timeout: ClassVar[float] = 900.0
+
+    towers: int = 3
+    levels: int = 5
+    release_height: float = 0.005
+    check_delay: float = 0.5
+    settle: float = 60.0
+
+    @property
+    def cubes(self) -> int:
+        """How many cubes are to be stacked."""
+        return self.towers * self.levels
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]:
+        n = self.cubes
+        return (
+            Metric("placed", "placed", kind="share", of=n, study=True,
+                   doc="within 5 cm in x and y of the target, 0.5 s after release"),
+            Metric("at_end", "at the end", kind="share", of=n, study=True,
+                   doc=f"the same, {self.settle:g} s after the task ended"),
+            Metric("placed_strict", "placed, strict", kind="share", of=n,
+                   doc="within 1 cm in x, y and z of the target and tilted by less than 5 degrees"),
+            Metric("at_end_strict", "at the end, strict", kind="share", of=n,
+                   doc=f"the same, {self.settle:g} s after the task ended"),
+            Metric("towers", "towers complete", kind="share", of=self.towers,
+                   doc="towers all of whose cubes are strictly in place at the end"),
+            Metric("untouched_moved", "untouched moved", unit="cubes", better="lower",
+                   doc="cubes nobody handled that are more than 1 cm away from their start"),
+            Metric("failed_picks", "failed picks", unit="picks", better="lower",
+                   doc="cubes that could not be reached, planned for, or held"),
+        )  # fmt: skip
+
+    def scene(self, seed: int, jitter: Jitter) -> Scene:
+        rng = generators(seed)[0]
+        cubes = [
+            cube(
+                f"cube_{number:02d}",
+                jitter.disturbed(Pose.at(x, y, TABLE_TOP + CUBE_SIZE / 2), rng),
+                BLUE if number % 2 else RED,
+            )
+            for number, (x, y) in enumerate(GRID, start=1)
+        ]
+        return Scene("stacking", (TABLE, *cubes), panda())
+
+    def places(self) -> list[Place]:
+        """Targets in the order in which they are filled."""
+        return [
+            Place(tower, level, Pose.at(*TOWERS[tower], TABLE_TOP + CUBE_SIZE * (level + 0.5)))
+            for tower in range(self.towers)
+            for level in range(self.levels)
+        ]
+
+    def perform(self, world: World, seed: int, count: Count) -> Outcome:
+        _, order_rng, planner_rng = generators(seed)
+        with world.phase("settle start"):
+            world.wait(0.2)
+        start = world.poses()
+        unused = [str(name) for name in order_rng.permutation(sorted(start))]
+        manipulator = Manipulator(world, planner_rng)
+        picks = _Picks()
+        world.mark("start")
+        for place in self.places():
+            while unused and not self._stack(manipulator, unused.pop(0), place, picks):
+                pass
+            count(len(picks.stacked), self.cubes)
+        with world.phase("go home"):
+            picks.note_motion(manipulator.try_go_home())
+        world.mark("end")
+        with world.phase("settle"):
+            world.wait(self.settle)
+        return self._score(start, world.poses(), picks)
+
+    def _stack(self, manipulator: Manipulator, name: str, place: Place, picks: _Picks) -> bool:
+        """Bring one cube to its place; False when it could not be done."""
+        world = manipulator.world
+        where = f"cube {len(picks.stacked) + 1} of {self.cubes}"
+        try:
+            with world.phase(f"pick {where}"):
+                manipulator.pick(name)
+            picks.handled.add(name)
+            with world.phase(f"place {where}"):
+                manipulator.place(place.pose.translated(z=self.release_height))
+            with world.phase(f"check {where}"):
+                world.wait(max(0.0, self.check_delay - manipulator.time_since_release()))
+        except (PlanningError, LostCube) as error:
+            picks.fail(name, place, error)
+            with world.phase(f"recover from {where}"):
+                picks.note_motion(manipulator.recover())
+            if isinstance(error, LostCube):
+                picks.handled.add(name)
+            return False
+        picks.stacked[name] = (place, world.pose(name))
+        with world.phase(f"retreat {where}"):
+            picks.note_motion(manipulator.try_retreat())
+        return True
+
+    def _score(self, start: Mapping[str, Pose], end: Mapping[str, Pose], picks: _Picks) -> Outcome:
+        stacked, n = picks.stacked, self.cubes
+        ends = {name: (place, end[name]) for name, (place, _) in stacked.items()}
+        complete = [
+            sum(_strict(place, pose) for place, pose in ends.values() if place.tower == tower)
+            == self.levels
+            for tower in range(self.towers)
+        ]
+        untouched = {
+            name: distance(pose, start[name]) for name, pose in end.items() if name not in picks.handled
+        }
+        moved = {name: d for name, d in untouched.items() if d > UNTOUCHED_DISTANCE}
+        return Outcome(
+            {
+                "placed": sum(_placed(*item) for item in stacked.values()) / n,
+                "at_end": sum(_placed(*item) for item in ends.values()) / n,
+                "placed_strict": sum(_strict(*item) for item in stacked.values()) / n,
+                "at_end_strict": sum(_strict(*item) for item in ends.values()) / n,
+                "towers": sum(complete) / self.towers,
+                "untouched_moved": float(len(moved)),
+                "failed_picks": float(len(picks.failed)),
+            },
+            {
+                "picks": [
+                    {
+                        "cube": name,
+                        "tower": place.tower,
+                        "level": place.level,
+                        "placed_error": error_of(place.pose, pose),
+                        "end_error": error_of(place.pose, end[name]),
+                    }
+                    for name, (place, pose) in stacked.items()
+                ],
+                "failed_picks": picks.failed,
+                "untouched_moved": moved,
+                "notes": picks.notes,
+            },
+        )
+
+
+@dataclass
+class _Picks:
+    """What happened to which cube."""
+
+    stacked: dict[str, tuple[Place, Pose]] = field(default_factory=dict)
+    handled: set[str] = field(default_factory=set)
+    failed: list[dict[str, Any]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def fail(self, name: str, place: Place, error: Exception) -> None:
+        self.failed.append(
+            {"cube": name, "tower": place.tower, "level": place.level, "reason": str(error)}
+        )
+
+    def note_motion(self, problem: str | None) -> None:
+        if problem:
+            self.notes.append(problem)
+
+
+def _placed(place: Place, pose: Pose) -> bool:
+    """As the study counts: height and order do not matter."""
+    x, y, _ = np.abs(np.subtract(pose.position, place.pose.position))
+    return bool(x <= STUDY_TOLERANCE and y <= STUDY_TOLERANCE)
+
+
+def _strict(place: Place, pose: Pose) -> bool:
+    offset = np.abs(np.subtract(pose.position, place.pose.position))
+    return bool((offset <= STRICT_DISTANCE).all() and pose.tilt() < STRICT_TILT)
+
+
+def distance(a: Pose, b: Pose) -> float:
+    """Between two positions [m]."""
+    return float(np.linalg.norm(np.subtract(a.position, b.position)))
+
+
+def error_of(target: Pose, pose: Pose) -> Sequence[float]:
+    """Offset in x, y, z [m] and tilt [rad], rounded for the record."""
+    offset = np.subtract(pose.position, target.position)
+    return [*(round(float(value), 6) for value in offset), round(pose.tilt(), 5)]

@@ -1,0 +1,153 @@
+"""The result set: what is counted, and every assertion green, red and inconclusive."""
+
+from __future__ import annotations
+
+import warnings
+
+import pytest
+
+from pytest_simbench.measure.metrics import UnknownMetric
+from pytest_simbench.measure.results import InconclusiveWarning, ResultSet
+
+from .build import METRICS, failed, record, records
+
+
+def placed(*values: float, also: int = 0) -> ResultSet:
+    """A result set with these shares, and some failures."""
+    made = records("placed", values)
+    made += [failed(len(values) + k) for k in range(also)]
+    return ResultSet(made, METRICS)
+
+
+GOOD = [14 / 15, 1.0] * 10
+MIXED = [0.8, 1.0] * 10
+
+
+def test_failed_repetitions_are_left_out_of_metrics_and_counted() -> None:
+    result = placed(0.5, 1.0, also=3)
+    assert result.values("placed") == [0.5, 1.0]
+    assert (len(result), len(result.ok), len(result.failures)) == (5, 2, 3)
+    assert result.by_seed("placed") == {1000: 0.5, 1001: 1.0}
+
+
+def test_a_metric_that_is_not_available_is_left_out() -> None:
+    made = [record(0, metrics={"placed": None}), record(1, metrics={"placed": 0.5}), record(2)]
+    assert ResultSet(made, METRICS).values("placed") == [0.5]
+
+
+def test_costs_are_metrics_too() -> None:
+    result = placed(1.0, 0.5)
+    assert result.values("rtf") == [17.5, 17.5]
+    result.assert_at_least("rtf", 10)
+    with pytest.raises(AssertionError, match=r"ram_peak is 161 MB on average .* above 100 MB"):
+        result.assert_at_most("ram_peak", 100)
+
+
+def test_an_unknown_metric_lists_the_valid_ones() -> None:
+    with pytest.raises(UnknownMetric, match=r"no metric is named 'place'.*valid names: .*placed"):
+        placed(1.0).assert_at_least("place", 0.5)
+
+
+def test_at_least_passes_without_a_word_when_the_interval_is_above() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        placed(*GOOD).assert_at_least("placed", 0.9)
+        placed(*GOOD).assert_at_most("placed", 1.0)
+        placed(*GOOD).assert_between("placed", 0.9, 1.0)
+
+
+def test_at_least_fails_with_one_sentence_that_says_all() -> None:
+    with pytest.raises(AssertionError) as caught:
+        placed(*MIXED, also=1).assert_at_least("placed", 0.97)
+    message = str(caught.value)
+    assert message.startswith(
+        "stacking on engine headless (tuned): placed is 90 % on average (95 % interval 8"
+    )
+    assert message.endswith("20 repetitions, 1 failed), which is below 97 %")
+
+
+def test_at_most_fails_when_the_interval_is_above() -> None:
+    with pytest.raises(AssertionError, match="which is above 80 %"):
+        placed(*MIXED).assert_at_most("placed", 0.8)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "wrong"), [(0.96, 1.0, "below 96"), (0.1, 0.8, "above 80")]
+)
+def test_between_fails_on_either_side(low: float, high: float, wrong: str) -> None:
+    with pytest.raises(AssertionError, match=f"which is {wrong} %"):
+        placed(*MIXED).assert_between("placed", low, high)
+
+
+def test_between_needs_its_ends_in_order() -> None:
+    with pytest.raises(ValueError, match="low is above high"):
+        placed(*MIXED).assert_between("placed", 0.9, 0.8)
+
+
+def test_a_claim_that_is_not_decided_warns_with_the_repetitions_needed() -> None:
+    with pytest.warns(InconclusiveWarning) as caught:
+        placed(*[1.0] * 20).assert_at_least("placed", 0.9)
+    assert str(caught[0].message).endswith(
+        "20 repetitions): inconclusive whether at least 90 %, about 15 more repetitions needed"
+    )
+    assert caught[0].filename == __file__
+
+
+def test_without_a_good_repetition_a_metric_fails_with_the_causes() -> None:
+    made = [failed(0), failed(1), failed(2, "WorkerDied", "step")]
+    with pytest.raises(AssertionError) as caught:
+        ResultSet(made, METRICS).assert_at_least("placed", 0.5)
+    assert str(caught.value) == (
+        "placed cannot be judged: stacking on engine headless (tuned): 3 of 3 repetitions failed: "
+        "2 x WorkerHung in settle (repetition 0, seed 1000: no answer for 30 s); "
+        "1 x WorkerDied in step (repetition 2, seed 1002: no answer for 30 s)"
+    )
+
+
+def test_without_any_repetition_everything_fails() -> None:
+    for made in ([], [record(0, status="interrupted")]):
+        result = ResultSet(made, METRICS)
+        for check in (
+            lambda r=result: r.assert_at_least("placed", 0.5),
+            result.assert_no_failures,
+            lambda r=result: r.assert_failures_at_most(0.5),
+        ):
+            with pytest.raises(AssertionError, match="no repetition has ended"):
+                check()
+
+
+def test_a_metric_that_no_repetition_has_fails() -> None:
+    with pytest.raises(AssertionError, match="landing_x is not available in any of 1 repetitions"):
+        placed(1.0).assert_at_least("landing_x", 1.0)
+
+
+def test_no_failures_is_strict() -> None:
+    placed(*GOOD).assert_no_failures()
+    with pytest.raises(
+        AssertionError, match=r"1 of 21 repetitions failed: 1 x WorkerHung in settle"
+    ):
+        placed(*GOOD, also=1).assert_no_failures()
+
+
+def test_failures_at_most_is_judged_by_its_interval() -> None:
+    placed(*GOOD, also=1).assert_failures_at_most(0.3)
+    with pytest.raises(AssertionError, match="which is above 10 %"):
+        placed(*GOOD, also=20).assert_failures_at_most(0.1)
+    with pytest.warns(InconclusiveWarning, match="inconclusive whether at most 10 %"):
+        placed(*GOOD, also=1).assert_failures_at_most(0.1)
+    with pytest.raises(ValueError, match=r"lies in 0\.\.1, not 5"):
+        placed(*GOOD).assert_failures_at_most(5)
+
+
+def test_interrupted_repetitions_count_as_neither() -> None:
+    made = [*records("placed", GOOD), record(20, status="interrupted")]
+    result = ResultSet(made, METRICS)
+    result.assert_no_failures()
+    assert result.failure_interval().n == 20
+    assert len(result.interrupted) == 1
+
+
+def test_the_summary_is_readable() -> None:
+    assert repr(placed(1.0, also=2)) == (
+        "<ResultSet stacking on engine headless (tuned): 1 ok, 2 failed>"
+    )

@@ -1,0 +1,120 @@
+"""The files of a run: Markdown, CSV, pictures."""
+
+from __future__ import annotations
+
+import csv
+import re
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pytest_simbench.report import markdown
+from pytest_simbench.report.figures import FiguresUnavailable, write_figures
+from pytest_simbench.report.files import write_csv, write_report
+from pytest_simbench.report.summary import summarise
+
+from .samples import METRICS, REFERENCES, failed, record, stacking_run, throwing_run
+
+
+def test_markdown_tables_hold_one_line_per_row() -> None:
+    (summary,) = summarise(stacking_run(), METRICS)
+    lines = markdown.render_task(summary).splitlines()
+    assert lines[0] == "## stacking: 20 repetitions each, protocol fast"
+    assert lines[2] == "- placed: mujoco 99 % [97, 100] is ahead of pybullet 77 % [73, 80]."
+    assert lines[6:10] == [
+        "| simulator | failed | placed % | at the end % | CPU % | RAM MB | x real time "
+        "| CPU s/sim s | start s | end s |",
+        "| :-- | --: | --: | --: | --: | --: | --: | --: | --: | --: |",
+        "| mujoco headless tuned | 0 of 20 | 93 / 99 / 100 [97, 100] | 87 / 97 / 100 [94, 99] "
+        "| 99 +- 3 | 150 +- 2 (peak 161) | 20 +- 0 | 0.048 +- 0 | 0.80 +- 0 | 9.8 +- 0 |",
+        "| pybullet headless tuned | 3 of 20 | 67 / 77 / 87 [73, 80] | 80 / 90 / 100 [87, 94] "
+        "| 99 +- 3 | 150 +- 2 (peak 161) | 20 +- 0 | 0.048 +- 0 | 0.80 +- 0 | 9.8 +- 0 |",
+    ]
+
+
+def test_markdown_tables_are_rectangular_whatever_a_message_holds() -> None:
+    records = [failed("WorkerDied", "load", "a | b\n<script> `c` *d*"), *throwing_run()]
+    report = markdown.render_run(summarise(records, METRICS, REFERENCES), ["a.png"])
+    assert "<script>" not in report.replace("\\<", "")
+    assert report.endswith("![a.png](a.png)\n")
+    for table in re.findall(r"(?:^\|.*\n?)+", report, re.MULTILINE):
+        bars = {len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}
+        assert len(bars) == 1
+
+
+def test_markdown_of_nothing() -> None:
+    assert markdown.render_run([]) == "No repetition was recorded.\n"
+
+
+def test_csv_has_one_line_per_repetition(tmp_path: Path) -> None:
+    records = [
+        record(metrics={"placed": 0.8, "at_end": None}),
+        failed("WorkerHung", "settle", "no answer", repetition=2),
+    ]
+    write_csv(tmp_path / "a.csv", records)
+    with (tmp_path / "a.csv").open(newline="") as file:
+        first, second = csv.DictReader(file)
+    assert (first["simulator"], first["repetition"], first["seed"]) == ("mujoco", "1", "1001")
+    assert (first["metrics.placed"], first["metrics.at_end"]) == ("0.8", "")
+    assert (first["cost.rtf"], first["seconds.step"], first["error.type"]) == ("20.0", "8.0", "")
+    assert (second["status"], second["error.type"]) == ("failed", "WorkerHung")
+    assert second["error.message"] == "no answer"
+
+
+def test_report_folder(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
+    records = stacking_run() + throwing_run()
+    assert write_report(tmp_path, summarise(records, METRICS, REFERENCES), records) == []
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "report.csv",
+        "report.md",
+        "stacking_metrics.png",
+        "stacking_resources.png",
+        "stacking_times.png",
+        "throwing_metrics.png",
+        "throwing_resources.png",
+        "throwing_times.png",
+    ]
+    report = (tmp_path / "report.md").read_text()
+    for picture in tmp_path.glob("*.png"):
+        head = picture.read_bytes()[:24]
+        width, height = struct.unpack(">II", head[16:24])
+        assert head.startswith(b"\x89PNG")
+        assert 600 < width < 3000
+        assert 150 < height < 2000
+        assert f"]({picture.name})" in report
+
+
+def test_only_failures_draw_no_picture(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
+    summaries = summarise([failed("WorkerDied", "load", "gone")], METRICS)
+    assert write_figures(tmp_path, summaries) == []
+
+
+def test_without_matplotlib_one_line_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in [name for name in sys.modules if name.split(".")[0] == "matplotlib"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    records = throwing_run()
+    summaries = summarise(records, METRICS)
+    with pytest.raises(FiguresUnavailable, match=r"pip install 'pytest-simbench\[figures\]'"):
+        write_figures(tmp_path, summaries)
+    (line,) = write_report(tmp_path, summaries, records)
+    assert line.startswith("no pictures: matplotlib is missing")
+    assert (tmp_path / "report.md").exists()
+    assert not list(tmp_path.glob("*.png"))
+
+
+def test_matplotlib_is_imported_only_when_drawing() -> None:
+    code = (
+        "import sys, pytest_simbench.report.files, pytest_simbench.report.tables;"
+        "print('matplotlib' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"

@@ -1,0 +1,248 @@
+"""The live line, as a terminal and as a log see it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pytest_simbench.report.progress import HEARTBEAT_SECONDS, Progress, duration
+
+TEST = "test_stacking[mujoco-headless]"
+
+
+class Desk:
+    """A clock to turn, a screen that keeps what is written."""
+
+    def __init__(self, is_tty: bool, width: int = 120) -> None:
+        self.now = 0.0
+        self.written: list[str] = []
+        self.progress = Progress(self.written.append, is_tty, width, clock=lambda: self.now)
+
+    @property
+    def text(self) -> str:
+        return "".join(self.written)
+
+    @property
+    def screen(self) -> str:
+        """What a terminal shows in the present line after all that was written."""
+        cells: list[str] = []
+        column = 0
+        for char in self.text:
+            if char == "\r":
+                column = 0
+                continue
+            cells[column : column + 1] = [char]
+            column += 1
+        return "".join(cells).rstrip()
+
+    def repeat(self, number: int, seconds: float, status: str = "ok") -> None:
+        self.progress.repetition(number, seed=1000 + number)
+        self.now += seconds
+        self.progress.end_repetition(status, seconds)
+
+
+def test_a_terminal_line_tells_where_the_run_is_and_how_long_it_takes() -> None:
+    desk = Desk(is_tty=True)
+    desk.progress.start_test(TEST, 16)
+    assert desk.screen == f"{TEST}  0 of 16 repetitions done"
+    desk.repeat(1, 10.0)
+    desk.repeat(2, 10.0)
+    desk.progress.repetition(3, seed=7)
+    desk.progress.phase("place")
+    desk.now += 2.0
+    desk.progress.count(9, 15, "cubes")
+    assert desk.screen == f"{TEST}  repetition 3 of 16  place  9/15 cubes  about 2 min 20 s left"
+
+
+def test_a_narrow_terminal_gets_the_short_form_and_then_a_cut_one() -> None:
+    lines = {}
+    for width in (80, 50):
+        desk = Desk(is_tty=True, width=width)
+        desk.progress.start_test(TEST, 16)
+        desk.repeat(1, 10.0)
+        desk.progress.repetition(2, seed=7)
+        desk.progress.phase("place")
+        desk.now += 1.0
+        desk.progress.count(9, 15, "cubes")
+        lines[width] = desk.screen
+    assert lines == {
+        80: f"{TEST}  2/16  place 9/15 cubes  2m30s left",
+        50: f"{TEST}  2/16  place 9/...",
+    }
+
+
+def test_a_shorter_line_leaves_nothing_of_the_longer_one() -> None:
+    desk = Desk(is_tty=True)
+    desk.progress.start_test(TEST, 2)
+    desk.progress.repetition(1, seed=7)
+    desk.now += 1
+    desk.progress.phase("a very long name of a phase")
+    desk.now += 1
+    desk.progress.phase("x")
+    assert desk.screen == f"{TEST}  repetition 1 of 2  x"
+
+
+def test_clear_leaves_an_empty_line_once() -> None:
+    desk = Desk(is_tty=True)
+    desk.progress.start_test(TEST, 2)
+    desk.progress.clear()
+    assert desk.screen == ""
+    assert desk.text.endswith("\r")
+    before = len(desk.written)
+    desk.progress.clear()
+    assert len(desk.written) == before
+
+
+def test_a_terminal_is_redrawn_ten_times_a_second_at_most() -> None:
+    desk = Desk(is_tty=True)
+    desk.progress.start_test(TEST, 1)
+    desk.progress.repetition(1, seed=7)
+    for step in range(1000):  # 1 ms apart
+        desk.now = step / 1000
+        desk.progress.count(step, 1000, "steps")
+    assert 9 <= len(desk.written) <= 12
+
+
+def test_a_log_has_one_plain_line_for_each_repetition() -> None:
+    desk = Desk(is_tty=False)
+    desk.progress.start_test(TEST, 3)
+    desk.progress.repetition(1, seed=7)
+    desk.progress.count(15, 15, "cubes")
+    desk.now += 9.5
+    desk.progress.end_repetition("ok", 9.5)
+    desk.repeat(2, 10.5, "failed")
+    desk.repeat(3, 10.0)
+    desk.progress.end_test()
+    assert desk.text.splitlines() == [
+        f"{TEST}  repetition 1 of 3  ok after 9.5 s  15/15 cubes  about 19 s left",
+        f"{TEST}  repetition 2 of 3  failed after 10.5 s  about 10 s left",
+        f"{TEST}  repetition 3 of 3  ok after 10.0 s",
+    ]
+
+
+def test_a_log_of_a_long_repetition_shows_that_it_lives() -> None:
+    desk = Desk(is_tty=False)
+    desk.progress.start_test(TEST, 1)
+    desk.progress.repetition(1, seed=7)
+    desk.progress.phase("pick")
+    for second in range(100):
+        desk.now = float(second)
+        desk.progress.count(second // 10, 15, "cubes")
+    assert len(desk.written) == int(99 // HEARTBEAT_SECONDS)
+    assert desk.written[0] == f"{TEST}  repetition 1 of 1  pick  3/15 cubes\n"
+
+
+def test_failures_stay_in_sight() -> None:
+    desk = Desk(is_tty=True)
+    desk.progress.start_test(TEST, 4)
+    desk.repeat(1, 10.0, "failed")
+    desk.now += 1
+    desk.progress.repetition(2, seed=7)
+    assert desk.screen == f"{TEST}  repetition 2 of 4  1 failed  about 30 s left"
+
+
+def test_parallel_repetitions_report_each_for_itself() -> None:
+    desk = Desk(is_tty=True, width=140)
+    desk.progress.start_test(TEST, 20)
+    both = threading.Barrier(2)
+
+    def repetition(number: int) -> None:
+        desk.progress.repetition(number, seed=number)
+        both.wait(10)
+        desk.progress.phase(f"phase{number}")
+        desk.progress.count(number, 15, "cubes")
+        both.wait(10)
+
+    threads = [threading.Thread(target=repetition, args=(number,)) for number in (3, 4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    line = desk.progress.line()
+    assert line == f"{TEST}  repetitions 3, 4 of 20  phase3  3/15 cubes | phase4  4/15 cubes"
+
+
+def test_two_jobs_halve_the_time_left() -> None:
+    lines = {}
+    for jobs in (1, 2):
+        desk = Desk(is_tty=True)
+        desk.progress.start_test(TEST, 20)
+        barrier = threading.Barrier(jobs)
+
+        def repetition(
+            number: int, desk: Desk = desk, barrier: threading.Barrier = barrier
+        ) -> None:
+            desk.progress.repetition(number, seed=number)
+            barrier.wait(10)
+            desk.progress.end_repetition("ok", 10.0)
+
+        threads = [threading.Thread(target=repetition, args=(k,)) for k in range(jobs)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        lines[jobs] = desk.progress.line().split("  ")[-1]
+    assert lines == {1: "about 3 min 10 s left", 2: "about 1 min 30 s left"}
+
+
+def test_reports_outside_a_test_are_ignored() -> None:
+    desk = Desk(is_tty=True)
+    desk.progress.phase("launch")
+    desk.progress.count(1, 2)
+    desk.progress.repetition(1, seed=7)
+    desk.progress.end_repetition("ok", 1.0)
+    desk.progress.end_test()
+    assert desk.text == ""
+    assert desk.progress.line() == ""
+
+
+@given(
+    st.integers(2, 200),
+    st.text("abcdefghij[]-_", min_size=1, max_size=80),
+    st.lists(st.tuples(st.text("abc ", max_size=30), st.integers(0, 10**6)), max_size=6),
+)
+def test_no_line_is_wider_than_the_terminal(
+    width: int, name: str, events: list[tuple[str, int]]
+) -> None:
+    desk = Desk(is_tty=True, width=width)
+    desk.progress.start_test(name, 20)
+    for number, (phase, done) in enumerate(events, start=1):
+        desk.progress.repetition(number, seed=0)
+        desk.progress.phase(phase)
+        desk.now += 0.2
+        desk.progress.count(done, 10**6, "things")
+        assert len(desk.progress.line()) < width
+        desk.progress.end_repetition("ok", float(done))
+        desk.now += 0.2
+    assert all(len(part) < width for part in desk.text.split("\r"))
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.0, "1 s"),
+        (45.4, "45 s"),
+        (59.7, "1 min"),
+        (60.0, "1 min"),
+        (128.0, "2 min 10 s"),
+        (3569.0, "59 min 30 s"),
+        (3570.0, "1 h"),
+        (4800.0, "1 h 20 min"),
+    ],
+)
+def test_duration(seconds: float, text: str) -> None:
+    assert duration(seconds) == text
+
+
+def test_it_loads_no_heavy_library() -> None:
+    code = (
+        "import sys, pytest_simbench.report.progress;"
+        "print(sorted({'numpy', 'scipy', 'rich', 'matplotlib', 'psutil'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
