@@ -53,6 +53,7 @@ class World:
         excused: differences from the scene that the adapter declares.
         trace: samples at `trace_period` of everything since loading, if asked for.
         stopwatch: wall seconds of this repetition by kind; `plan` is the task's to measure.
+        timeline: wall seconds from launch of the moments that the task marked.
     """
 
     def __init__(
@@ -69,6 +70,7 @@ class World:
         self.process = process
         self.scene = scene
         self.stopwatch = stopwatch or Stopwatch()
+        self.timeline: dict[str, float] = {}
         self.trace: list[Motion] = []
         self._trace_period = trace_period
         self._on_phase = on_phase
@@ -96,6 +98,10 @@ class World:
     def _enter(self, name: str) -> None:
         self.process.where.phase = name
         self._on_phase(name)
+
+    def mark(self, moment: str) -> None:
+        """Note the wall time since launch under the name of this moment ("start", "end")."""
+        self.timeline[moment] = self.stopwatch.elapsed()
 
     def pose(self, name: str) -> Pose:
         """Present pose of a free body, by name."""

@@ -10,12 +10,15 @@ from __future__ import annotations
 import math
 import statistics
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from pytest_simbench.measure.intervals import interval
 from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.measure.record import Record
+
+Ends = Callable[[Sequence[float], Metric], tuple[float, float]]
+"""Gives the lower and upper end of the interval of a metric's mean; infinite where not known."""
 
 PHASES = ("launch", "load", "plan", "step", "other")
 """Where the wall time of a repetition goes, in order."""
@@ -143,10 +146,17 @@ class TaskSummary:
         return tuple(metric for metric in self.metrics if not metric.study)
 
 
+def interval_ends(values: Sequence[float], metric: Metric) -> tuple[float, float]:
+    """Ends of the 95 % interval that the assertions use, see `measure.intervals`."""
+    found = interval(values, bounded=metric.bounded)
+    return found.low, found.high
+
+
 def summarise(
     records: Iterable[Record],
     metrics: Mapping[str, Sequence[Metric]],
     references: Mapping[str, Mapping[str, float]] | None = None,
+    ends: Ends = interval_ends,
 ) -> list[TaskSummary]:
     """The records as one summary per task, tasks in order of appearance.
 
@@ -155,6 +165,7 @@ def summarise(
         metrics: what each task declares, by its name; of a task that is missing here, the record's
             metrics are shown as plain values.
         references: by task, then by metric.
+        ends: the intervals to show.
     """
     by_task: dict[str, list[Record]] = {}
     for record in records:
@@ -167,7 +178,7 @@ def summarise(
             groups.setdefault(_row_key(record), []).append(record)
         same = Counter(key[:4] for key in groups)
         rows = tuple(
-            _row(group, declared, key[4] if same[key[:4]] > 1 else "")
+            _row(group, declared, key[4] if same[key[:4]] > 1 else "", ends)
             for key, group in groups.items()
         )
         protocols = ", ".join(sorted({record.protocol for record in found}))
@@ -188,7 +199,7 @@ def _undeclared(records: Sequence[Record]) -> list[Metric]:
     return [Metric(name, name, better=None, study=True) for name in names]
 
 
-def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str) -> Row:
+def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str, ends: Ends) -> Row:
     first = records[0]
     done = [record for record in records if record.status == "ok"]
     notes = []
@@ -206,7 +217,7 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str) -> Row
         failed=sum(record.status == "failed" for record in records),
         interrupted=sum(record.status == "interrupted" for record in records),
         metrics={
-            metric.name: spread([r.metrics.get(metric.name) for r in done], metric)
+            metric.name: spread([r.metrics.get(metric.name) for r in done], metric, ends)
             for metric in metrics
         },
         cpu_percent=_sampled(done, "cpu_percent"),
@@ -222,19 +233,23 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str) -> Row
     )
 
 
-def spread(values: Iterable[float | None], metric: Metric | None = None) -> Spread | None:
+def spread(
+    values: Iterable[float | None], metric: Metric | None = None, ends: Ends = interval_ends
+) -> Spread | None:
     """Smallest, mean and largest of the values that are there, with the interval of the mean.
 
-    `metric` says which interval fits (see `measure.intervals`); without it none is computed.
+    Without a metric no interval is computed, nor where a share lies outside 0..1: a report shows
+    a wrong record rather than fail on it.
     """
     found = [float(value) for value in values if value is not None and math.isfinite(value)]
     if not found:
         return None
-    low = high = None
-    if metric is not None and all(0 <= value <= 1 for value in found if metric.bounded):
-        ends = interval(found, bounded=metric.bounded)
-        if math.isfinite(ends.low) and math.isfinite(ends.high):
-            low, high = ends.low, ends.high
+    low: float | None = None
+    high: float | None = None
+    if metric is not None and (not metric.bounded or (min(found) >= 0 and max(found) <= 1)):
+        low, high = ends(found, metric)
+        if not (math.isfinite(low) and math.isfinite(high)):
+            low = high = None
     std = statistics.stdev(found) if len(found) > 1 else 0.0
     return Spread(len(found), min(found), statistics.fmean(found), max(found), std, low, high)
 

@@ -51,7 +51,6 @@ class Outcome:
     Attributes:
         metrics: value of each of the task's metrics; None where there is none.
         details: whatever explains the score, as plain data.
-        timeline: simulated seconds at which the task started and ended.
     """
 
     metrics: dict[str, float | None] = field(default_factory=dict)
@@ -80,6 +79,10 @@ class Task(ABC):
     @abstractmethod
     def metrics(self) -> tuple[Metric, ...]:
         """What it measures, the study's metrics first."""
+
+    def smoke(self) -> Task:
+        """The smallest version of the task that still exercises every part of it."""
+        return self
 
     @abstractmethod
     def scene(self, seed: int, jitter: Jitter) -> Scene:

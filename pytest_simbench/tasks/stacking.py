@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any, ClassVar
 
@@ -103,6 +103,9 @@ class Stacking(Task):
             Metric("failed_picks", "failed picks", unit="picks", better="lower",
                    doc="cubes that could not be reached, planned for, or held"),
         )  # fmt: skip
+
+    def smoke(self) -> Stacking:
+        return replace(self, towers=1, levels=2, settle=2.0)
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         rng = generators(seed)[0]

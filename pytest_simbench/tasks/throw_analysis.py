@@ -9,11 +9,15 @@ import numpy as np
 from pytest_simbench.scene import FloatArray
 
 FREE_FALL_TOLERANCE = 2.0
-"""A cube whose acceleration is within this of gravity flies freely [m/s^2]. In the hand it is
-swung at 20 m/s^2 and more; in flight, engines' air damping makes 0.1 m/s^2."""
+"""A released cube whose acceleration is within this of gravity flies freely [m/s^2]; engines' air
+damping makes 0.1 m/s^2. The swing itself accelerates the hand by chance almost as gravity
+does, so this alone does not tell a held cube from a flying one."""
 
 OUT_OF_HAND = 0.06
 """Farther than this from the tool centre point, a cube is certainly not held [m]."""
+
+UNCLENCHED = 0.0005
+"""The fingers do not press any more when both have opened by this [m]."""
 
 
 @dataclass(frozen=True)
@@ -30,33 +34,37 @@ class Flight:
 
 
 def free_flight(
-    time: FloatArray, position: FloatArray, velocity: FloatArray, tool: FloatArray, gravity: FloatArray
+    time: FloatArray,
+    position: FloatArray,
+    velocity: FloatArray,
+    tool: FloatArray,
+    fingers: FloatArray,
+    gravity: FloatArray,
 ) -> Flight | None:
-    """The cube's first free flight after it left the hand, or None if it never flew.
+    """The cube's first free flight after the hand let it go or lost it, or None.
 
     Args:
         time: of each sample [s], (n,), evenly spaced.
         position: of the cube [m], (n, 3).
         velocity: of the cube [m/s], (n, 3).
         tool: position of the tool centre point [m], (n, 3).
+        fingers: positions of the finger joints [m], (n, 2).
         gravity: [m/s^2], (3,).
     """
-    outside = np.flatnonzero(np.linalg.norm(position - tool, axis=1) > OUT_OF_HAND)
-    if not len(outside) or len(time) < 3:
+    if len(time) < 3:
         return None
+    gone = np.linalg.norm(position - tool, axis=1) > OUT_OF_HAND
+    gone |= (fingers - fingers[0] > UNCLENCHED).all(axis=1)
     acceleration = np.diff(velocity, axis=0) / np.diff(time)[:, None]
-    free = np.linalg.norm(acceleration - gravity, axis=1) < FREE_FALL_TOLERANCE
-    start = int(outside[0])
-    flying = np.flatnonzero(free[start:])
-    if not len(flying):
+    flying = np.linalg.norm(acceleration - gravity, axis=1) < FREE_FALL_TOLERANCE
+    starts = np.flatnonzero(flying & gone[:-1])
+    if not len(starts):
         return None
-    anchor = first = last = start + int(flying[0])
-    while first > 0 and free[first - 1]:
-        first -= 1
-    while last + 1 < len(free) and free[last + 1]:
+    first = last = int(starts[0])
+    while last + 1 < len(flying) and flying[last + 1]:
         last += 1
-    # free[k] speaks of the time from sample k to k + 1
-    return Flight(first, last + 1) if last + 1 > anchor else None
+    # flying[k] speaks of the time from sample k to k + 1
+    return Flight(first, last + 1)
 
 
 def landing_x(position: FloatArray, velocity: FloatArray, gravity: FloatArray, height: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -61,7 +61,7 @@ class Throwing(Task):
     references: ClassVar[Mapping[str, float]] = {"landing_x": REFERENCE_LANDING_X}
 
     release_fraction: float = 0.5
-    wind_up_speed: float = 0.5
+    wind_up_speed: float = 0.25
     settle: float = 60.0
 
     @property
@@ -85,6 +85,9 @@ class Throwing(Task):
             Metric("release_time_error", "release late by", unit="s", better="lower",
                    doc="start of the free flight after the commanded opening"),
         )  # fmt: skip
+
+    def smoke(self) -> Throwing:
+        return replace(self, settle=2.0)
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         rng = generators(seed)[0]
@@ -128,6 +131,7 @@ class Throwing(Task):
         self, manipulator: Manipulator, details: dict[str, object]
     ) -> dict[str, float | None]:
         world = manipulator.world
+        assert world.scene.robot is not None
         started = world.time
         trajectory, reference = manipulator.plan_throw(np.array(THROW_END), self.release_fraction)
         motion = Motion.joined(
@@ -149,14 +153,13 @@ class Throwing(Task):
         early = (apart > OUT_OF_HAND) & (time < reference.time)
         if early.any():
             details["lost"] = f"left the hand {time[np.argmax(early)]:.3f} s into the throw"
-        flight = free_flight(time, cube_states[:, :3], cube_states[:, 7:10], tool, gravity)
+        fingers = motion.joints[:, 0, world.scene.robot.finger_indices]
+        flight = free_flight(time, cube_states[:, :3], cube_states[:, 7:10], tool, fingers, gravity)
         if flight is None:
             return {}
         position, velocity = cube_states[flight.first, :3], cube_states[flight.first, 7:10]
         last = cube_states[flight.last]
         landing = landing_x(last[:3], last[7:10], gravity, LANDING_HEIGHT)
-        # At the reference's time the real cube is where the hand was; compare with that of the
-        # perfect follower's hand at the moment of this release.
         details["release"] = {
             "time": float(time[flight.first]),
             "position": position,

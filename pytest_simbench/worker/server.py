@@ -83,6 +83,10 @@ class Server:
         for engine_module in cls.info.modules:
             importlib.import_module(engine_module)
         settings = changed(cls.profiles[profile], changes, cls.info.name)
+        if self.simulator is not None:
+            self.simulator.close()  # a reused worker starts each world anew
+        self.stepper = None
+        self.saved.clear()
         self.simulator = cls(settings, gui=gui)
         self.real_time = real_time
         return {"settings": settings.to_wire(), "versions": self.simulator.versions()}

@@ -16,11 +16,11 @@ from pytest_simbench.report.figures import FiguresUnavailable, write_figures
 from pytest_simbench.report.files import write_csv, write_report
 from pytest_simbench.report.summary import summarise
 
-from .samples import METRICS, REFERENCES, failed, record, stacking_run, throwing_run
+from .samples import METRICS, REFERENCES, failed, record, stacking_run, throwing_run, two_errors
 
 
 def test_markdown_tables_hold_one_line_per_row() -> None:
-    (summary,) = summarise(stacking_run(), METRICS)
+    (summary,) = summarise(stacking_run(), METRICS, ends=two_errors)
     lines = markdown.render_task(summary).splitlines()
     assert lines[0] == "## stacking: 20 repetitions each, protocol fast"
     assert lines[2] == "- placed: mujoco 99 % [97, 100] is ahead of pybullet 77 % [73, 80]."

@@ -49,7 +49,8 @@ def test_failed_and_interrupted_repetitions_are_counted_and_left_out() -> None:
     assert (row.finished, row.failed, row.interrupted, row.attempts) == (2, 3, 1, 5)
     placed = row.metrics["placed"]
     assert placed is not None
-    assert (placed.count, placed.min, placed.mean, placed.max) == (2, 0.6, pytest.approx(0.7), 0.8)
+    assert (placed.count, placed.min, placed.max) == (2, 0.6, 0.8)
+    assert placed.mean == pytest.approx(0.7)
     hung, died = row.causes
     assert (hung.type, hung.phase, hung.message) == ("WorkerHung", "settle", "no answer")
     assert (hung.repetitions, hung.seeds, hung.last_line) == ((3, 5), (1003, 1005), "died")
@@ -63,11 +64,8 @@ def test_intervals_are_those_the_assertions_use() -> None:
     for metric in STACKING:
         found, expected = row.metrics[metric.name], results.interval(metric.name)
         assert found is not None
-        assert (found.mean, found.low, found.high) == (
-            pytest.approx(expected.mean),
-            expected.low,
-            expected.high,
-        )
+        assert found.mean == pytest.approx(expected.mean)
+        assert (found.low, found.high) == (expected.low, expected.high)
 
 
 def test_costs_come_from_the_stepping_clocks() -> None:

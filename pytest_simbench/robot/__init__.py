@@ -1,0 +1,1 @@
+"""The Panda: model, inverse kinematics, collision checking, motion planning, timing."""

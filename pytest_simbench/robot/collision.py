@@ -1,0 +1,169 @@
+"""The planning scene: robot, obstacles and held cube, checked for collision by Coal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.scene import FloatArray, Pose, Scene
+
+MARGIN = 0.012
+"""Distance kept from obstacles in free motions [m]; straight approaches may touch."""
+
+HELD_SLACK = 0.002
+"""The held cube is checked smaller by this on each face [m]: it may rest where it stands."""
+
+GROUND = "ground"
+
+
+class PlanningScene:
+    """Where the robot would touch what.
+
+    Meshes of the links are checked as their convex hulls, which is what the engines collide too.
+    Link pairs listed in the SRDF are not checked. The root link is fixed and not checked
+    against the world.
+
+    Attributes:
+        opening: position of each finger that is assumed in every check [m].
+        held: name of the cube in the hand, or None.
+    """
+
+    def __init__(self, model: RobotModel, scene: Scene) -> None:
+        self.model = model
+        self.opening = model.robot.gripper.opened
+        self.held: str | None = None
+        robot = model.robot
+        geometry = pin.buildGeomFromUrdf(
+            model.pin,
+            robot.urdf,
+            pin.GeometryType.COLLISION,
+            package_dirs=sorted({_parent(folder) for folder in robot.packages.values()}),
+        )
+        for shape in geometry.geometryObjects:
+            if isinstance(shape.geometry, coal.BVHModelBase):
+                shape.geometry.buildConvexRepresentation(False)
+                shape.geometry = shape.geometry.convex
+        self._links = list(range(len(geometry.geometryObjects)))
+        geometry.addAllCollisionPairs()
+        pin.removeCollisionPairs(model.pin, geometry, robot.srdf)
+        inverse = model.base.inverse()
+        self._bodies: dict[str, int] = {}
+        for body in scene.bodies:
+            shape = coal.Box(*body.size)
+            placement = inverse * pin.SE3(body.pose.matrix())
+            obstacle = pin.GeometryObject(body.name, 0, placement, shape)
+            self._bodies[body.name] = geometry.addGeometryObject(obstacle)
+        half_space = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+        ground = geometry.addGeometryObject(pin.GeometryObject(GROUND, 0, inverse, half_space))
+        moving = [i for i in self._links if geometry.geometryObjects[i].parentJoint > 0]
+        for obstacle_index in [*self._bodies.values(), ground]:
+            for link in moving:
+                geometry.addCollisionPair(pin.CollisionPair(link, obstacle_index))
+        self._add_held_cubes(scene, geometry, ground)
+        self._geometry = geometry
+        self._pairs = [(pair.first, pair.second) for pair in geometry.collisionPairs]
+        self._exact, self._wide = pin.GeometryData(geometry), pin.GeometryData(geometry)
+        for request, (_, second) in zip(self._wide.collisionRequests, self._pairs, strict=True):
+            request.security_margin = MARGIN if second >= len(self._links) else 0.0
+        self.update({body.name: body.pose for body in scene.free_bodies})
+
+    def _add_held_cubes(self, scene: Scene, geometry: pin.GeometryModel, ground: int) -> None:
+        """Every free cube once more, riding on the hand; checked only while it is held."""
+        tool = self.model.pin.frames[self.model.tool]
+        hand_links = {
+            i for i in self._links if geometry.geometryObjects[i].parentJoint >= tool.parentJoint
+        }
+        self._riding: dict[str, int] = {}
+        self._tool_in_joint = tool.placement
+        for body in scene.free_bodies:
+            rider = pin.GeometryObject(
+                f"held {body.name}",
+                tool.parentJoint,
+                tool.placement,
+                coal.Box(*(edge - 2 * HELD_SLACK for edge in body.size)),
+            )
+            index = geometry.addGeometryObject(rider)
+            self._riding[body.name] = index
+            for link in self._links:
+                if link not in hand_links:
+                    geometry.addCollisionPair(pin.CollisionPair(link, index))
+            for other, obstacle in [*self._bodies.items(), (GROUND, ground)]:
+                if other != body.name:
+                    geometry.addCollisionPair(pin.CollisionPair(index, obstacle))
+
+    def update(self, poses: Mapping[str, Pose]) -> None:
+        """Take over the cubes' present poses in the world."""
+        inverse = self.model.base.inverse()
+        for name, pose in poses.items():
+            shape = self._geometry.geometryObjects[self._bodies[name]]
+            shape.placement = inverse * pin.SE3(pose.matrix())
+        self._activate()
+
+    def attach(self, name: str, in_tool: Pose) -> None:
+        """From now on cube `name` moves with the hand, at `in_tool` in the tool frame."""
+        self.held = name
+        rider = self._geometry.geometryObjects[self._riding[name]]
+        rider.placement = self._tool_in_joint * pin.SE3(in_tool.matrix())
+        self._activate()
+
+    def detach(self) -> None:
+        """The hand is empty again."""
+        self.held = None
+        self._activate()
+
+    def _activate(self, ignored: Iterable[str] = ()) -> None:
+        """Switch off the pairs of ignored bodies, of the held cube's place, of cubes not held."""
+        off = {self._bodies[name] for name in ignored}
+        if self.held is not None:
+            off.add(self._bodies[self.held])
+        off |= {index for name, index in self._riding.items() if name != self.held}
+        active = [first not in off and second not in off for first, second in self._pairs]
+        for data in (self._exact, self._wide):
+            data.activeCollisionPairs = active
+
+    def collision(
+        self, arm: FloatArray, *, ignored: Iterable[str] = (), margin: bool = True
+    ) -> tuple[str, str] | None:
+        """The first two things that touch at arm joints `arm`, or None.
+
+        Args:
+            ignored: bodies that may be touched, the cube to be grasped for instance.
+            margin: keep `MARGIN` from obstacles.
+        """
+        return self.first_collision(np.asarray(arm)[None], ignored=ignored, margin=margin)
+
+    def first_collision(
+        self, path: FloatArray, *, ignored: Iterable[str] = (), margin: bool = True
+    ) -> tuple[str, str] | None:
+        """The same for positions along a path, (n, arm)."""
+        ignored = tuple(ignored)
+        if ignored:
+            self._activate(ignored)
+        try:
+            return self._first(path, self._wide if margin else self._exact)
+        finally:
+            if ignored:
+                self._activate()
+
+    def _first(self, path: FloatArray, data: pin.GeometryData) -> tuple[str, str] | None:
+        model, geometry = self.model, self._geometry
+        fingers = np.full(len(model.robot.joints) - model.arm, self.opening)
+        for arm in path:
+            q = np.concatenate([arm, fingers])
+            if pin.computeCollisions(model.pin, model.data, geometry, data, q, True):
+                for index, (first, second) in enumerate(self._pairs):
+                    if data.activeCollisionPairs[index] and data.collisionResults[
+                        index
+                    ].isCollision():
+                        objects = geometry.geometryObjects
+                        return objects[first].name, objects[second].name
+                return "robot", "obstacle"
+        return None
+
+
+def _parent(folder: str) -> str:
+    return folder.rstrip("/").rsplit("/", 1)[0]

@@ -1,0 +1,19 @@
+"""Why a motion could not be planned."""
+
+from __future__ import annotations
+
+
+class PlanningError(Exception):
+    """A motion that cannot be planned; the message is the counted reason of a failed pick."""
+
+
+class Unreachable(PlanningError):
+    """No joint position within the limits brings the tool to the pose."""
+
+
+class InCollision(PlanningError):
+    """The start or the goal of a motion is in collision, or every straight way to it is."""
+
+
+class NoPath(PlanningError):
+    """The planner found no way between two free positions."""

@@ -1,0 +1,116 @@
+"""Inverse kinematics: damped least squares on Pinocchio, with restarts."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+
+from pytest_simbench.robot.errors import Unreachable
+from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.scene import FloatArray, Pose
+
+TOLERANCE = 1e-6
+"""Largest remaining error of a solution, in [m] and [rad] together."""
+
+LIMIT_MARGIN = 0.02
+"""Distance that solutions keep from the joint limits [rad]."""
+
+DOWNWARD = Pose(quaternion=(0.0, 1.0, 0.0, 0.0))
+"""A tool that points down, its y axis (the fingers' opening direction) along minus world y."""
+
+
+def top_down_grasps(cube: Pose) -> list[Pose]:
+    """Tool poses that grasp a cube from above, one for each of its four symmetric turns.
+
+    The cube may lie on any face; its yaw is that of the horizontal body axis nearest to x.
+    """
+    axes = cube.rotation()
+    flat = [axes[:, i] for i in range(3) if abs(axes[2, i]) < np.sqrt(0.5)]
+    yaw = float(np.arctan2(flat[0][1], flat[0][0])) if flat else 0.0
+    return [tool_over(cube, yaw + quarter * np.pi / 2) for quarter in range(-2, 2)]
+
+
+def tool_over(place: Pose, yaw: float) -> Pose:
+    """Downward tool pose at a place's position, turned by `yaw` about the vertical [rad]."""
+    return Pose(place.position, (Pose.at(0, 0, 0, yaw=yaw) * DOWNWARD).quaternion)
+
+
+def inverse_kinematics(
+    model: RobotModel,
+    target: Pose,
+    near: FloatArray,
+    rng: np.random.Generator | None = None,
+    restarts: int = 10,
+) -> FloatArray:
+    """Arm joints (arm,) [rad] that bring the tool to `target`.
+
+    Args:
+        near: where the search starts; solutions near it are found first.
+        rng: draws further starts within the limits; None for no restarts.
+        restarts: how many of them.
+
+    Raises:
+        Unreachable: no start led to the target.
+    """
+    goal = model.base.actInv(pin.SE3(target.matrix()))
+    starts = [np.asarray(near, dtype=float)]
+    if rng is not None:
+        starts += list(rng.uniform(model.lower, model.upper, (restarts, model.arm)))
+    for start in starts:
+        solution = _descend(model, goal, start)
+        if solution is not None:
+            return solution
+    x, y, z = target.position
+    raise Unreachable(f"unreachable: tool at ({x:.3f}, {y:.3f}, {z:.3f})")
+
+
+def _descend(model: RobotModel, goal: pin.SE3, start: FloatArray) -> FloatArray | None:
+    """Damped least squares from one start; None when it does not arrive within the limits."""
+    low, high = model.lower + LIMIT_MARGIN, model.upper - LIMIT_MARGIN
+    q = np.clip(start, low, high)
+    for _ in range(100):
+        transform = model.base.actInv(model.tool_transform(q))
+        error = pin.log6(transform.actInv(goal)).vector
+        size = float(np.linalg.norm(error))
+        if size < TOLERANCE:
+            return q
+        jacobian = pin.Jlog6(transform.actInv(goal)) @ model.tool_jacobian(q)
+        damping = 1e-9 + 1e-3 * min(size, 0.1) ** 2
+        step = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + damping * np.eye(6), error)
+        step *= min(1.0, 0.5 / max(float(np.abs(step).max()), 1e-12))
+        q = np.clip(q + step, low, high)
+    return None
+
+
+def straight_line(
+    model: RobotModel, start: FloatArray, target: Pose, spacing: float = 0.01
+) -> FloatArray:
+    """Joint positions along the straight tool path from `start` to `target`, (n, arm).
+
+    Args:
+        start: arm joints at the beginning.
+        target: tool pose at the end; the orientation turns evenly on the way.
+        spacing: of the tool positions [m].
+
+    Raises:
+        Unreachable: the line leaves the workspace or jumps to another arm configuration.
+    """
+    first = model.tool_transform(start)
+    last = pin.SE3(target.matrix())
+    turn = pin.log3(first.rotation.T @ last.rotation)
+    length = float(np.linalg.norm(last.translation - first.translation))
+    steps = max(2, int(np.ceil(max(length / spacing, np.linalg.norm(turn) / 0.1))))
+    path = [np.asarray(start, dtype=float)]
+    for share in np.linspace(0, 1, steps + 1)[1:]:
+        rotation = first.rotation @ pin.exp3(share * turn)
+        position = (1 - share) * first.translation + share * last.translation
+        goal = model.base.actInv(pin.SE3(rotation, position))
+        solution = _descend(model, goal, path[-1])
+        if solution is None:
+            raise Unreachable(f"unreachable: straight line to {tuple(np.round(position, 3).tolist())}")
+        path.append(solution)
+    if max(np.abs(b - a).max() for a, b in pairwise(path)) > 0.5:
+        raise Unreachable("unreachable: the straight line needs a jump of the arm's configuration")
+    return np.array(path)

@@ -1,0 +1,81 @@
+"""Kinematics and dynamics of the robot, by Pinocchio."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from pytest_simbench.scene import FloatArray, Pose, Robot
+from pytest_simbench.simulator import DescriptionError
+
+
+class RobotModel:
+    """The robot's model; joint vectors are in the order of `robot.joints`, arm first.
+
+    Attributes:
+        robot: as described in the scene.
+        arm: number of arm joints.
+        lower, upper: position limits of the arm joints [rad], (arm,).
+
+    Raises:
+        DescriptionError: the URDF cannot be read.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        try:
+            self.pin = pin.buildModelFromUrdf(robot.urdf, mimic=False)
+        except TypeError:
+            self.pin = pin.buildModelFromUrdf(robot.urdf)
+        except Exception as error:
+            raise DescriptionError(f"cannot use the robot description {robot.urdf}: {error}") from None
+        names = list(self.pin.names)[1:]
+        if names != list(robot.joint_names):
+            raise DescriptionError(f"{robot.urdf} has joints {names}, not {robot.joint_names}")
+        self.pin.gravity.linear = np.zeros(3)
+        self.data = self.pin.createData()
+        self.arm = len(robot.arm_joints)
+        self.lower = np.array(self.pin.lowerPositionLimit[: self.arm])
+        self.upper = np.array(self.pin.upperPositionLimit[: self.arm])
+        self.tool = self.pin.getFrameId(robot.tool_frame)
+        self.base = pin.SE3(robot.base.matrix())
+        self.pin.armature = robot.column("armature")
+        self._fingers = np.array([joint.initial_position for joint in robot.joints[self.arm :]])
+
+    def full(self, arm: FloatArray) -> FloatArray:
+        """Arm joints (arm,) with the fingers at their start appended, (n_joints,)."""
+        return np.concatenate([arm[: self.arm], self._fingers])
+
+    def tool_transform(self, arm: FloatArray) -> pin.SE3:
+        """Tool frame in the world as a Pinocchio transform."""
+        pin.forwardKinematics(self.pin, self.data, self.full(arm))
+        return self.base * pin.updateFramePlacement(self.pin, self.data, self.tool)
+
+    def tool_pose(self, arm: FloatArray) -> Pose:
+        """Pose of the tool centre point in the world."""
+        transform = self.tool_transform(arm)
+        x, y, z, w = pin.Quaternion(transform.rotation).coeffs()
+        px, py, pz = transform.translation
+        return Pose((float(px), float(py), float(pz)), (float(w), float(x), float(y), float(z)))
+
+    def tool_jacobian(self, arm: FloatArray) -> FloatArray:
+        """Jacobian of the tool, its own axes, rows linear then angular, (6, arm)."""
+        jacobian = pin.computeFrameJacobian(
+            self.pin, self.data, self.full(arm), self.tool, pin.ReferenceFrame.LOCAL
+        )
+        return np.asarray(jacobian[:, : self.arm])
+
+    def tool_velocity(self, arm: FloatArray, arm_velocity: FloatArray) -> FloatArray:
+        """Linear velocity of the tool centre point in the world [m/s], (3,)."""
+        rotation = self.tool_transform(arm).rotation
+        return np.asarray(rotation @ (self.tool_jacobian(arm)[:3] @ arm_velocity))
+
+    def inverse_dynamics(
+        self, gravity: FloatArray, q: FloatArray, v: FloatArray, a: FloatArray
+    ) -> FloatArray:
+        """Joint efforts of a motion, rows of (n, n_joints), rotor inertia included [N m, N]."""
+        self.pin.gravity.linear = self.base.rotation.T @ np.asarray(gravity, dtype=float)
+        data = self.data
+        return np.array(
+            [pin.rnea(self.pin, data, *row).copy() for row in zip(q, v, a, strict=True)]
+        )

@@ -1,0 +1,232 @@
+"""Motion planning: joint moves, straight lines, finger motions and the throw, as trajectories.
+
+A joint move is tried directly; when it collides, OMPL's RRTConnect searches a path and way points that
+are not needed are cut out. OMPL draws from generators that its own global seed
+generator seeds, and its simplifier stops by the clock, so for the same plan from the same seed
+every time the global seed is set anew before each search, searches end by a counted number
+of checks, and the shortcuts are our own.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from ompl import base, geometric, util
+
+from pytest_simbench.robot.collision import PlanningScene
+from pytest_simbench.robot.errors import InCollision, NoPath, PlanningError
+from pytest_simbench.robot.kinematics import straight_line
+from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.robot.panda import FINGER_SPEED
+from pytest_simbench.robot.timing import TICK, Timed, along_path, point_to_point
+from pytest_simbench.scene import FloatArray, Pose, Trajectory
+
+__all__ = ["MotionPlanner", "PlanningError", "Release"]
+
+CHECK_SPACING = 0.025
+"""Largest joint distance between two collision checks of a path [rad]: about 1.5 cm at the hand."""
+
+MAX_CHECKS = 20_000
+"""Collision checks after which a search gives up, about 2 s."""
+
+_OMPL = threading.Lock()
+"""OMPL's seed is global: one search at a time."""
+
+
+@dataclass(frozen=True)
+class Release:
+    """Where and how a perfect follower releases the throw: time since its start [s], position [m]
+    and velocity [m/s] of the tool centre point in the world."""
+
+    time: float
+    position: FloatArray
+    velocity: FloatArray
+
+
+class MotionPlanner:
+    """Plans trajectories of one robot in one planning scene.
+
+    Args:
+        rng: of the repetition; drives everything random in planning.
+        gravity: for the feed-forward [m/s^2].
+    """
+
+    def __init__(
+        self,
+        model: RobotModel,
+        scene: PlanningScene,
+        rng: np.random.Generator,
+        gravity: Iterable[float],
+    ) -> None:
+        self.model = model
+        self.scene = scene
+        self.rng = rng
+        self.gravity = np.array(list(gravity))
+
+    def move_to(
+        self, start: FloatArray, goal: FloatArray, fingers: float, *, speed: float = 1.0
+    ) -> Trajectory:
+        """Collision-free motion between two arm positions, fingers commanded to stay.
+
+        Raises:
+            InCollision: start or goal touch something.
+            NoPath: none found.
+        """
+        direct, _ = point_to_point(start, goal, speed=speed)
+        if self.scene.first_collision(_thinned(direct.position)) is None:
+            return self._trajectory(direct, fingers)
+        for what, arm in (("start", start), ("goal", goal)):
+            touching = self.scene.collision(arm)
+            if touching is not None:
+                raise InCollision(f"{what} in collision: {' and '.join(touching)}")
+        path = self._shortened(self._search(start, goal))
+        parts = [point_to_point(a, b, speed=speed)[0] for a, b in zip(path, path[1:], strict=False)]
+        return self._trajectory(
+            Timed(
+                np.concatenate([part.position for part in parts]),
+                np.concatenate([part.velocity for part in parts]),
+                np.concatenate([part.acceleration for part in parts]),
+            ),
+            fingers,
+        )
+
+    def move_linear(
+        self,
+        start: FloatArray,
+        target: Pose,
+        fingers: float,
+        *,
+        ignored: Iterable[str] = (),
+        speed: float = 1.0,
+    ) -> Trajectory:
+        """The tool on a straight line to a pose; `ignored` bodies may be touched.
+
+        Raises:
+            Unreachable: the line leaves the workspace.
+            InCollision: something else is in the way.
+        """
+        timed = along_path(straight_line(self.model, start, target), speed=speed)
+        touching = self.scene.first_collision(
+            _thinned(timed.position), ignored=ignored, margin=False
+        )
+        if touching is not None:
+            raise InCollision(f"straight line blocked: {' and '.join(touching)}")
+        return self._trajectory(timed, fingers)
+
+    def move_fingers(
+        self, arm: FloatArray, opening: float, target: float, hold: float
+    ) -> Trajectory:
+        """Fingers from `opening` to `target` [m] at their speed, then `hold` [s] more."""
+        steps = int(np.ceil(abs(target - opening) / FINGER_SPEED / TICK))
+        rows = steps + int(np.ceil(hold / TICK)) + 1
+        ramp = np.interp(np.arange(rows), [0, max(1, steps)], [opening, target])
+        still = np.zeros((rows, self.model.arm))
+        timed = Timed(np.tile(arm[: self.model.arm], (rows, 1)), still, still)
+        return self._trajectory(timed, ramp)
+
+    def throw(
+        self, start: FloatArray, goal: FloatArray, closed: float, opened: float, fraction: float
+    ) -> tuple[Trajectory, Release]:
+        """Full speed from start to goal, the fingers opened at `fraction` of its duration.
+
+        The joints start and end together but each on its own profile. Also returns how a
+        perfect follower would release.
+        """
+        timed, duration = point_to_point(start, goal, straight=False)
+        release = fraction * duration
+        fingers = np.where(TICK * np.arange(len(timed.position)) >= release, opened, closed)
+        row = min(int(release / TICK), len(timed.position) - 2)
+        share = release / TICK - row
+        arm, velocity = (
+            rows[row] * (1 - share) + rows[row + 1] * share
+            for rows in (timed.position, timed.velocity)
+        )
+        position = np.array(self.model.tool_pose(arm).position)
+        speed = self.model.tool_velocity(arm, velocity)
+        return self._trajectory(timed, fingers), Release(release, position, speed)
+
+    def _trajectory(self, timed: Timed, fingers: float | FloatArray) -> Trajectory:
+        """Set points of all joints with feed-forward efforts."""
+        rows = len(timed.position)
+        others = len(self.model.robot.joints) - self.model.arm
+        column = np.broadcast_to(np.asarray(fingers, dtype=float), (rows,))[:, None]
+        position = np.hstack([timed.position, np.repeat(column, others, axis=1)])
+        padding = np.zeros((rows, others))
+        velocity = np.hstack([timed.velocity, padding])
+        acceleration = np.hstack([timed.acceleration, padding])
+        effort = self.model.inverse_dynamics(self.gravity, position, velocity, acceleration)
+        effort[:, self.model.arm :] = 0.0  # the squeeze is the fingers' own drive alone
+        return Trajectory(TICK, position, velocity, effort)
+
+    def _search(self, start: FloatArray, goal: FloatArray) -> FloatArray:
+        """RRTConnect from start to goal, way points (n, arm)."""
+        with _OMPL:
+            return self._search_alone(start, goal, int(self.rng.integers(1, 2**31)))
+
+    def _search_alone(self, start: FloatArray, goal: FloatArray, seed: int) -> FloatArray:
+        util.setLogLevel(util.LogLevel.LOG_NONE)
+        util.RNG.setSeed(seed)
+        arm = self.model.arm
+        space = base.RealVectorStateSpace(arm)
+        bounds = base.RealVectorBounds(arm)
+        for i in range(arm):
+            bounds.setLow(i, float(self.model.lower[i]))
+            bounds.setHigh(i, float(self.model.upper[i]))
+        space.setBounds(bounds)
+        information = base.SpaceInformation(space)
+        checks = 0
+
+        def valid(state: base.State) -> bool:
+            nonlocal checks
+            checks += 1
+            return self.scene.collision(np.array([state[i] for i in range(arm)])) is None
+
+        information.setStateValidityChecker(valid)
+        information.setStateValidityCheckingResolution(CHECK_SPACING / space.getMaximumExtent())
+        information.setup()
+        problem = base.ProblemDefinition(information)
+        states = [information.allocState() for _ in range(2)]
+        for state, values in zip(states, (start, goal), strict=True):
+            for i in range(arm):
+                state[i] = float(values[i])
+        problem.setStartAndGoalStates(*states)
+        planner = geometric.RRTConnect(information)
+        planner.setRange(0.8)
+        planner.setProblemDefinition(problem)
+        planner.setup()
+        planner.solve(base.PlannerTerminationCondition(lambda: checks > MAX_CHECKS))
+        path = problem.getSolutionPath()
+        if path is None or problem.hasApproximateSolution():
+            raise NoPath(f"no path found in {checks} checks")
+        count = path.getStateCount()
+        return np.array([[path.getState(k)[i] for i in range(arm)] for k in range(count)])
+
+    def _shortened(self, path: FloatArray) -> FloatArray:
+        """The path without the way points that a straight, free segment can skip."""
+        points = list(path)
+        at = 0
+        while at < len(points) - 2:
+            for skip in range(len(points) - 1, at + 1, -1):
+                segment = _segment(points[at], points[skip])
+                if self.scene.first_collision(segment) is None:
+                    del points[at + 1 : skip]
+                    break
+            at += 1
+        return np.array(points)
+
+
+def _segment(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Positions between a and b to check, both ends among them."""
+    steps = max(1, int(np.ceil(np.abs(b - a).max() / CHECK_SPACING)))
+    return a + np.linspace(0.0, 1.0, steps + 1)[:, None] * (b - a)
+
+
+def _thinned(rows: FloatArray) -> FloatArray:
+    """Rows about `CHECK_SPACING` apart, first and last among them."""
+    travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(rows, axis=0)).max(axis=1))])
+    wanted = np.arange(0.0, travelled[-1], CHECK_SPACING)
+    picked = np.unique(np.searchsorted(travelled, wanted))
+    return np.vstack([rows[picked], rows[-1:]])

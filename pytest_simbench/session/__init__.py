@@ -1,0 +1,1 @@
+"""Runs repetitions: launch, sample, perform, score, record. Knows every room but pytest's."""

@@ -1,0 +1,52 @@
+"""A case: one simulator in one mode with its settings, and how its repetitions are to be run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pytest_simbench.session.protocol import PROTOCOLS, Protocol
+
+
+@dataclass(frozen=True)
+class Case:
+    """What a test's repetitions have in common.
+
+    Attributes:
+        test: id of the test, for records.
+        simulator, mode, profile: which simulator, `headless` or `gui`, which settings profile.
+        adapter: `module:Class` of the simulator's adapter.
+        changes: single settings changed by the user, by name.
+        python, spec: interpreter or execnet specification of the worker.
+        environment: of the worker, DISPLAY for instance.
+        protocol: how repetitions are run.
+        timeout: of a repetition from launch [s]; None for the task's own.
+        stall_timeout: longest silence of a worker [s].
+        memory_limit: of a worker and its children [MB]; None for no limit.
+        seed: base seed; repetition k has seed + k - 1.
+        jitter: scale of the start jitter; 1 is 1 mm and 1 degree.
+        trace: `off`, `on` or `retain-on-failure`: write the motion of every repetition.
+        contended: repetitions run side by side, so their times are not comparable.
+        folder: the run folder.
+    """
+
+    test: str
+    simulator: str
+    mode: str
+    profile: str
+    adapter: str
+    folder: Path
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    python: str | None = None
+    spec: str | None = None
+    environment: Mapping[str, str] = field(default_factory=dict)
+    protocol: Protocol = PROTOCOLS["fast"]
+    timeout: float | None = None
+    stall_timeout: float = 60.0
+    memory_limit: float | None = None
+    seed: int = 2022
+    jitter: float = 1.0
+    trace: str = "off"
+    contended: bool = False

@@ -1,0 +1,263 @@
+"""One repetition, from launching a worker to its record."""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench import __version__
+from pytest_simbench.client.errors import Where, WorkerError
+from pytest_simbench.client.process import Launch, WorkerProcess
+from pytest_simbench.client.stopwatch import Stopwatch
+from pytest_simbench.client.world import Motion, World
+from pytest_simbench.measure.record import Failure, Record
+from pytest_simbench.measure.resources import ResourceSampler
+from pytest_simbench.session.case import Case
+from pytest_simbench.tasks.base import Jitter, Outcome, Task
+
+TRACE_PERIOD = 0.02
+"""Sampling of `--sim-trace` [s]: 50 Hz."""
+
+
+class Repetition:
+    """One repetition of a task in a fresh worker. `run` once; `kill` from any thread.
+
+    Args:
+        case: simulator, settings and limits.
+        task: what to do.
+        number: of the repetition, from 1.
+        on_phase, on_count: progress, see `tasks.base`.
+    """
+
+    def __init__(
+        self,
+        case: Case,
+        task: Task,
+        number: int,
+        *,
+        on_phase: Callable[[str], None] = lambda name: None,
+        on_count: Callable[[int, int], None] = lambda done, total: None,
+    ) -> None:
+        self.case = case
+        self.task = task.smoke() if case.protocol.smallest else task
+        self.number = number
+        self.seed = case.seed + number - 1
+        self.where = Where(case.simulator, case.mode, number, self.seed)
+        self.stopwatch = Stopwatch()
+        self._on_phase = on_phase
+        self._on_count = on_count
+        self._process: WorkerProcess | None = None
+        self._sampler: ResourceSampler | None = None
+        self._world: World | None = None
+        self._constructed: dict[str, Any] = {}
+        self._stats: dict[str, Any] = {}
+        self._closing: str | None = None
+
+    def kill(self) -> None:
+        """End the worker at once; `run` then returns the record of a failure."""
+        if self._process is not None:
+            self._process.kill()
+
+    def run(self) -> tuple[Record, BaseException | None]:
+        """Carry it out; the record, and what ended it early if anything did."""
+        error: BaseException | None = None
+        outcome = Outcome()
+        try:
+            outcome = self._perform()
+        except BaseException as raised:
+            error = raised
+        finally:
+            resources = self._finish(error)
+        self._write_trace(failed=error is not None)
+        return self._record(outcome, error, resources), error
+
+    def _perform(self) -> Outcome:
+        case = self.case
+        deadline = time.monotonic() + (case.timeout or self.task.study_timeout)
+        self._enter("launch")
+        with self.stopwatch.measuring("launch"):
+            process = self._process = self._launch()
+            process.deadline = deadline
+            self._sample(process)
+            if case.protocol.before:
+                self._enter("before")
+                time.sleep(case.protocol.before)
+                self._enter("launch")
+            self._constructed = process.request(
+                "construct",
+                timeout=process.launch.start_timeout,
+                adapter=case.adapter,
+                profile=case.profile,
+                changes=dict(case.changes),
+                gui=case.mode == "gui",
+                real_time=case.protocol.real_time,
+            )
+        scene = self.task.scene(self.seed, _scaled(case.jitter))
+        world = self._world = World(
+            process,
+            scene,
+            stopwatch=self.stopwatch,
+            on_phase=self._enter,
+            trace_period=None if case.trace == "off" else TRACE_PERIOD,
+        )
+        outcome = self.task.perform(world, self.seed, self._on_count)
+        self._stats = world.stats()
+        return outcome
+
+    def _launch(self) -> WorkerProcess:
+        case = self.case
+        name = re.sub(r"[^A-Za-z0-9_.=-]+", "_", case.test.rpartition("::")[2]).strip("_")
+        log = case.folder / "logs" / f"{name}-{self.number}.log"
+        try:
+            log.parent.mkdir(parents=True, exist_ok=True)
+            log.unlink(missing_ok=True)
+        except OSError:  # a full disk must not stop the repetition
+            log = Path(os.devnull)
+        return WorkerProcess(
+            Launch(
+                adapter=case.adapter,
+                python=case.python,
+                spec=case.spec,
+                environment=case.environment,
+                log=log,
+                start_timeout=max(case.stall_timeout, 1.0),
+                stall_timeout=case.stall_timeout,
+            ),
+            self.where,
+        )
+
+    def _sample(self, process: WorkerProcess) -> None:
+        limit = self.case.memory_limit
+        if process.pid is not None and (self.case.spec or "popen").startswith("popen"):
+            self._sampler = ResourceSampler(
+                process.pid,
+                limit_mb=limit,
+                on_limit=lambda used: process.kill_for_memory(used, limit or 0.0),
+            )
+
+    def _enter(self, phase: str) -> None:
+        self.where.phase = phase
+        if self._sampler is not None:
+            self._sampler.phase = phase.split(" ")[0]
+        self._on_phase(phase)
+
+    def _finish(self, error: BaseException | None) -> dict[str, Any]:
+        """End sampling and worker; resource use for the record."""
+        use: dict[str, Any] = {}
+        if self._process is not None and error is not None and not self._stats:
+            self._stats = {}
+        if self._sampler is not None:
+            use = self._sampler.stop(self._stats.get("peak_rss_mb")).to_wire()
+        if self._process is not None:
+            if error is None:
+                self._closing = self._process.close()
+            else:
+                self._process.kill()
+        return use
+
+    def _record(
+        self, outcome: Outcome, error: BaseException | None, resources: dict[str, Any]
+    ) -> Record:
+        case, total = self.case, self.stopwatch.elapsed()
+        stepping = self._stats.get("stepping", {})
+        seconds = {k: self.stopwatch.seconds.get(k, 0.0) for k in ("launch", "load", "plan")}
+        seconds["step"] = stepping.get("wall", 0.0)
+        seconds["other"] = max(0.0, total - sum(seconds.values()))
+        seconds["total"] = total
+        details = {**outcome.details, "log": self._log_name()}
+        if self._closing:
+            details["closing"] = self._closing
+        return Record(
+            test=case.test,
+            task=self.task.name,
+            simulator=case.simulator,
+            mode=case.mode,
+            profile=case.profile,
+            repetition=self.number,
+            seed=self.seed,
+            status=_status(error),
+            protocol=case.protocol.name,
+            jitter=case.jitter,
+            error=None if error is None else _failure(error, self.where),
+            metrics=outcome.metrics,
+            details=details,
+            seconds=seconds,
+            stepping=stepping,
+            timeline={} if self._world is None else self._world.timeline,
+            resources=resources,
+            settings={**self._constructed.get("settings", {}), **_parameters(self.task)},
+            versions={
+                "pytest-simbench": __version__,
+                **({"python": self._process.python_version} if self._process else {}),
+                **self._constructed.get("versions", {}),
+            },
+            host=host(),
+            deviations=tuple(self._world.excused if self._world else ()),
+            contended=case.contended,
+        )
+
+    def _log_name(self) -> str:
+        log = self._process.launch.log if self._process else None
+        return str(log.relative_to(self.case.folder)) if log and self.case.folder in log.parents else ""
+
+    def _write_trace(self, *, failed: bool) -> None:
+        """Joint and body states over time, as arrays of a .npz file in the run folder."""
+        world, case = self._world, self.case
+        if world is None or not world.trace or (case.trace == "retain-on-failure" and not failed):
+            return
+        motion = Motion.joined(world.trace)
+        name = self._log_name().removeprefix("logs/").removesuffix(".log")
+        folder = case.folder / "traces"
+        folder.mkdir(parents=True, exist_ok=True)
+        np.savez_compressed(
+            folder / f"{name}.npz",
+            time=motion.time,
+            joints=motion.joints,
+            bodies=motion.bodies,
+            joint_names=list(world.scene.robot.joint_names if world.scene.robot else ()),
+            body_names=[body.name for body in world.scene.free_bodies],
+        )
+
+
+def _scaled(jitter: float) -> Jitter:
+    one = Jitter()
+    return Jitter(one.distance * jitter, one.angle * jitter)
+
+
+def _status(error: BaseException | None) -> Any:
+    if error is None:
+        return "ok"
+    return "failed" if isinstance(error, Exception) else "interrupted"
+
+
+def _failure(error: BaseException, where: Where) -> Failure:
+    if isinstance(error, WorkerError):
+        return Failure(type(error).__name__, error.what, error.phase, error.log_tail)
+    return Failure(type(error).__name__, str(error), where.phase)
+
+
+def _parameters(task: Task) -> dict[str, Any]:
+    return {f"task.{key}": value for key, value in asdict(task).items()}  # type: ignore[call-overload]
+
+
+@cache
+def host() -> dict[str, Any]:
+    """The machine, as far as it bears on times."""
+    model = platform.processor() or platform.machine()
+    try:
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                model = line.partition(":")[2].strip()
+                break
+    except OSError:
+        pass
+    return {"system": platform.system(), "cpu": model, "cores": os.cpu_count() or 0}

@@ -1,0 +1,258 @@
+"""Pick and place with one arm in one world: plan, send, follow, look again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+import numpy as np
+
+from pytest_simbench.client.world import World
+from pytest_simbench.robot.collision import PlanningScene
+from pytest_simbench.robot.errors import PlanningError, Unreachable
+from pytest_simbench.robot.kinematics import inverse_kinematics, tool_over, top_down_grasps
+from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.robot.planning import MotionPlanner, Release
+from pytest_simbench.scene import FloatArray, Pose, Trajectory
+
+APPROACH = 0.10
+"""Height above a grasp or a place from which the tool comes straight down [m] (study code)."""
+
+GRASP_TIME = 0.3
+"""From closing the fingers to lifting [s]."""
+
+RELEASE_TIME = 0.2
+"""From opening the fingers to retreating [s]."""
+
+IN_HAND = 0.04
+"""A cube whose centre is farther than this from the tool centre point is not held [m]."""
+
+FREE_SPEED, CARRY_SPEED, CONTACT_SPEED = 1.0, 0.6, 0.3
+"""Shares of the joint velocity limits: empty hand, cube in hand, straight down to a cube or place."""
+
+T = TypeVar("T")
+
+
+class LostCube(Exception):
+    """The cube is not in the hand where it should be; the message is the counted reason."""
+
+
+class Manipulator:
+    """The arm, its planner and what it holds.
+
+    Motions start from the commanded set points, as a controller's do, and are planned against the
+    cubes as the simulator has them now.
+
+    Attributes:
+        world: the simulated world.
+        arm: commanded arm joints, (arm,) [rad].
+        fingers: commanded finger position [m].
+        held: name of the cube in the hand, or None.
+    """
+
+    def __init__(self, world: World, rng: np.random.Generator) -> None:
+        robot = world.scene.robot
+        if robot is None:
+            raise ValueError(f"scene {world.scene.name!r} has no robot")
+        self.world = world
+        self.gripper = robot.gripper
+        self.rng = rng
+        with world.stopwatch.measuring("plan"):
+            self.model = RobotModel(robot)
+            self.planning = PlanningScene(self.model, world.scene)
+            self.planner = MotionPlanner(self.model, self.planning, rng, world.scene.gravity)
+        self.arm = robot.column("initial_position")[: self.model.arm]
+        self.home = self.arm.copy()
+        self.fingers = self.gripper.opened
+        self.held: str | None = None
+        self._origin: Pose | None = None
+        self._grip = Pose()
+        self._released_at = world.time
+
+    def pick(self, name: str) -> None:
+        """Grasp a cube from above and lift it by `APPROACH`.
+
+        Raises:
+            PlanningError: it cannot be reached.
+            LostCube: it is not in the hand after lifting.
+        """
+        cube = self.world.pose(name)
+        grasp, above = self._plan_choice(
+            [tool_over(cube, pose.yaw) for pose in top_down_grasps(cube)], ignored=(name,)
+        )
+        self.go_to(above, speed=FREE_SPEED)
+        self._linear(grasp, ignored=(name,), speed=CONTACT_SPEED)
+        self._move_fingers(self.gripper.closed, GRASP_TIME)
+        self.held, self._origin = name, cube
+        tool = self.model.tool_pose(self.arm)
+        self._grip = tool.inverse() * cube
+        self._linear(grasp.translated(z=APPROACH), ignored=(name,), speed=CARRY_SPEED)
+        self._check_held()
+
+    def place(self, target: Pose) -> None:
+        """Bring the held cube to `target` [pose of its centre] and let it go there.
+
+        The target's yaw may turn by quarters. Where the cube slipped in the hand it is
+        not corrected for: that error is the simulator's.
+
+        Raises:
+            PlanningError: the place cannot be reached.
+            LostCube: the cube fell on the way.
+        """
+        grips = [target * Pose.at(0, 0, 0, yaw=k * np.pi / 2) for k in range(-2, 2)]
+        tools = [grip * self._grip.inverse() for grip in grips]
+        down, above = self._plan_choice(tools)
+        self.go_to(above, speed=CARRY_SPEED)
+        self._check_held()
+        self._linear(down, speed=CONTACT_SPEED)
+        self._open()
+
+    def go_to(self, goal: FloatArray, *, speed: float) -> None:
+        """Collision-free motion to arm joints `goal`."""
+        self._refresh()
+        self._follow(
+            self._planned(lambda: self.planner.move_to(self.arm, goal, self.fingers, speed=speed))
+        )
+
+    def plan_throw(self, goal: FloatArray, fraction: float) -> tuple[Trajectory, Release]:
+        """Full-speed motion to `goal`, fingers open at `fraction` of it; not yet followed."""
+        gripper = self.gripper
+        planned = self._planned(
+            lambda: self.planner.throw(self.arm, goal, gripper.closed, gripper.opened, fraction)
+        )
+        self._note_end(planned[0])
+        self.held = None
+        self.planning.detach()
+        return planned
+
+    def tool_positions(self, joints: FloatArray) -> FloatArray:
+        """Positions of the tool centre point for rows of joint positions, (n, 3) [m]."""
+        return np.array([self.model.tool_pose(row[: self.model.arm]).position for row in joints])
+
+    def time_since_release(self) -> float:
+        """Simulated seconds since the fingers were told to open."""
+        return self.world.time - self._released_at
+
+    def try_retreat(self) -> str | None:
+        """Straight up from where a cube was let go; a sentence when that is not possible."""
+        tool = self.model.tool_pose(self.arm)
+        return self._attempt(
+            "retreat", lambda: self._linear(tool.translated(z=APPROACH), speed=FREE_SPEED)
+        )
+
+    def try_go_home(self) -> str | None:
+        """Back to the start position; a sentence when that is not possible."""
+        return self._attempt("go home", lambda: self.go_to(self.home, speed=FREE_SPEED))
+
+    def recover(self) -> str | None:
+        """After a failure: put a held cube back where it came from, and open the hand."""
+        problem = None
+        if self.held is not None and self._origin is not None:
+            if self._in_hand():
+                origin = self._origin
+                problem = self._attempt("put back", lambda: self.place(origin.translated(z=0.005)))
+            if self.held is not None:
+                self._open()
+            return problem or self.try_retreat()
+        if self.fingers != self.gripper.opened:
+            self._open()
+        return None
+
+    def _attempt(self, what: str, motion: Callable[[], None]) -> str | None:
+        try:
+            motion()
+        except (PlanningError, LostCube) as error:
+            return f"could not {what}: {error}"
+        return None
+
+    def _plan_choice(
+        self, tools: list[Pose], ignored: tuple[str, ...] = ()
+    ) -> tuple[Pose, FloatArray]:
+        """The tool pose among equivalent ones that needs the least joint travel and is free, and
+        the arm joints `APPROACH` above it."""
+        self._refresh()
+        with self.world.stopwatch.measuring("plan"):
+            found: list[tuple[float, Pose, FloatArray]] = []
+            reason: PlanningError = Unreachable("unreachable")
+            for tool in tools:
+                try:
+                    above = inverse_kinematics(
+                        self.model, tool.translated(z=APPROACH), self.home, self.rng
+                    )
+                    at = inverse_kinematics(self.model, tool, above)
+                except Unreachable as error:
+                    reason = error
+                    continue
+                for arm, margin in ((at, False), (above, True)):
+                    touching = self.planning.collision(arm, ignored=ignored, margin=margin)
+                    if touching is not None:
+                        reason = PlanningError(f"in collision: {' and '.join(touching)}")
+                        break
+                else:
+                    found.append((float(np.abs(above - self.arm).max()), tool, above))
+            if not found:
+                raise reason
+            _, tool, above = min(found, key=lambda option: option[0])
+            return tool, above
+
+    def _linear(self, target: Pose, *, ignored: tuple[str, ...] = (), speed: float) -> None:
+        self._refresh()
+        self._follow(
+            self._planned(
+                lambda: self.planner.move_linear(
+                    self.arm, target, self.fingers, ignored=ignored, speed=speed
+                )
+            )
+        )
+
+    def _open(self) -> None:
+        self._released_at = self.world.time
+        self.held = None
+        self.planning.detach()
+        self._move_fingers(self.gripper.opened, RELEASE_TIME)
+
+    def _move_fingers(self, target: float, hold: float) -> None:
+        self._follow(
+            self._planned(
+                lambda: self.planner.move_fingers(self.arm, self.fingers, target, hold)
+            )
+        )
+
+    def _planned(self, plan: Callable[[], T]) -> T:
+        with self.world.stopwatch.measuring("plan"):
+            return plan()
+
+    def _follow(self, trajectory: Trajectory) -> None:
+        self.world.follow(trajectory)
+        self._note_end(trajectory)
+
+    def _note_end(self, trajectory: Trajectory) -> None:
+        self.arm = trajectory.position[-1, : self.model.arm].copy()
+        self.fingers = float(trajectory.position[-1, -1])
+
+    def _refresh(self) -> None:
+        """Take the cubes' present poses over into the planning scene."""
+        with self.world.stopwatch.measuring("plan"):
+            self.planning.update(self.world.poses())
+            opened = self.gripper.opened
+            self.planning.opening = opened if self.held is None else _held_opening()
+            if self.held is not None and self.planning.held != self.held:
+                self.planning.attach(self.held, self._grip)
+
+    def _in_hand(self) -> bool:
+        if self.held is None:
+            return False
+        joints = self.world.joints[0, : self.model.arm]
+        tool = np.array(self.model.tool_pose(joints).position)
+        return bool(np.linalg.norm(tool - self.world.pose(self.held).position) < IN_HAND)
+
+    def _check_held(self) -> None:
+        if not self._in_hand():
+            raise LostCube(f"{self.held} is not in the hand")
+
+
+def _held_opening() -> float:
+    """Finger position while a cube is held, half its width [m]."""
+    from pytest_simbench.tasks.base import CUBE_SIZE
+
+    return CUBE_SIZE / 2
