@@ -119,7 +119,10 @@ class MuJoCo(Simulator):
             for joint in scene.robot.joints:
                 _add_drive(spec, joint)
         ground = spec.worldbody.add_geom(
-            name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.5], rgba=[0.5, 0.5, 0.5, 1]
+            name="ground",
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            size=[0, 0, 0.5],
+            rgba=[0.5, 0.5, 0.5, 1],
         )
         self._set_surface(ground, scene.ground_friction, WORLD, WORLD | ROBOT)
         for box in scene.bodies:
@@ -255,7 +258,10 @@ class MuJoCo(Simulator):
         return int(self.data.ncon)
 
     def render(self, width: int, height: int) -> NDArray[np.uint8]:
-        if self._renderer is None or (self._renderer.width, self._renderer.height) != (width, height):
+        if self._renderer is None or (self._renderer.width, self._renderer.height) != (
+            width,
+            height,
+        ):
             self._renderer = mujoco.Renderer(self.model, height, width)
         self._renderer.update_scene(self.data, _camera())
         return np.array(self._renderer.render())
@@ -292,7 +298,9 @@ _INTEGRATORS = {
 
 def _mujoco_urdf(prepared: PreparedRobot) -> str:
     """The reduced URDF with MuJoCo's compiler element: paths kept, visuals dropped."""
-    compiler = '<mujoco><compiler strippath="false" discardvisual="true" fusestatic="false"/></mujoco>'
+    compiler = (
+        '<mujoco><compiler strippath="false" discardvisual="true" fusestatic="false"/></mujoco>'
+    )
     return prepared.to_urdf().replace("</robot>", f"{compiler}</robot>")
 
 

@@ -171,7 +171,9 @@ class WorkerProcess:
             answer = self._receive(started, timeout)
             if not isinstance(answer, dict):
                 self.kill()
-                raise ProtocolError(f"unreadable answer {answer!r:.80}", self.where, self.log_tail())
+                raise ProtocolError(
+                    f"unreadable answer {answer!r:.80}", self.where, self.log_tail()
+                )
             if "alive" in answer:
                 continue
             if "error" in answer:
@@ -258,6 +260,11 @@ class WorkerProcess:
             "(--sim-memory-limit), and was killed",
         )
         self._kill_tree()
+
+    @property
+    def alive(self) -> bool:
+        """Whether the worker's process still runs."""
+        return self._process is not None and self._process.is_running()
 
     def close(self, timeout: float = 10.0) -> str | None:
         """End the worker; returns what went wrong while closing, which fails nothing."""

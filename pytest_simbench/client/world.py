@@ -109,7 +109,9 @@ class World:
 
     def poses(self) -> dict[str, Pose]:
         """Present poses of all free bodies."""
-        return {name: Pose.from_array(row) for name, row in zip(self._names, self.bodies, strict=True)}
+        return {
+            name: Pose.from_array(row) for name, row in zip(self._names, self.bodies, strict=True)
+        }
 
     def follow(self, trajectory: Trajectory, *, log_period: float | None = None) -> Motion | None:
         """Have the robot follow a trajectory; the motion sampled every `log_period` [s] (0: each

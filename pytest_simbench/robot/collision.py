@@ -156,9 +156,10 @@ class PlanningScene:
             q = np.concatenate([arm, fingers])
             if pin.computeCollisions(model.pin, model.data, geometry, data, q, True):
                 for index, (first, second) in enumerate(self._pairs):
-                    if data.activeCollisionPairs[index] and data.collisionResults[
-                        index
-                    ].isCollision():
+                    if (
+                        data.activeCollisionPairs[index]
+                        and data.collisionResults[index].isCollision()
+                    ):
                         objects = geometry.geometryObjects
                         return objects[first].name, objects[second].name
                 return "robot", "obstacle"

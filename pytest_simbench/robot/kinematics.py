@@ -109,7 +109,9 @@ def straight_line(
         goal = model.base.actInv(pin.SE3(rotation, position))
         solution = _descend(model, goal, path[-1])
         if solution is None:
-            raise Unreachable(f"unreachable: straight line to {tuple(np.round(position, 3).tolist())}")
+            raise Unreachable(
+                f"unreachable: straight line to {tuple(np.round(position, 3).tolist())}"
+            )
         path.append(solution)
     if max(np.abs(b - a).max() for a, b in pairwise(path)) > 0.5:
         raise Unreachable("unreachable: the straight line needs a jump of the arm's configuration")

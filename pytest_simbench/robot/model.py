@@ -28,7 +28,9 @@ class RobotModel:
         except TypeError:
             self.pin = pin.buildModelFromUrdf(robot.urdf)
         except Exception as error:
-            raise DescriptionError(f"cannot use the robot description {robot.urdf}: {error}") from None
+            raise DescriptionError(
+                f"cannot use the robot description {robot.urdf}: {error}"
+            ) from None
         names = list(self.pin.names)[1:]
         if names != list(robot.joint_names):
             raise DescriptionError(f"{robot.urdf} has joints {names}, not {robot.joint_names}")

@@ -46,7 +46,9 @@ class Scene:
         names = [body.name for body in self.bodies]
         for name in names:
             if names.count(name) > 1:
-                raise SceneError(f"scene {self.name!r}: {names.count(name)} bodies are named {name!r}")
+                raise SceneError(
+                    f"scene {self.name!r}: {names.count(name)} bodies are named {name!r}"
+                )
         for a, b in combinations(self.bodies, 2):
             if a.fixed and b.fixed:
                 continue
@@ -75,7 +77,9 @@ class Scene:
         for body in self.bodies:
             if body.name == name:
                 return body
-        raise KeyError(f"no body {name!r} in scene {self.name!r}; it has {[b.name for b in self.bodies]}")
+        raise KeyError(
+            f"no body {name!r} in scene {self.name!r}; it has {[b.name for b in self.bodies]}"
+        )
 
     def with_body(self, body: Box) -> Scene:
         """The same scene with one body replaced by its namesake."""

@@ -207,7 +207,11 @@ class Repetition:
 
     def _log_name(self) -> str:
         log = self._process.launch.log if self._process else None
-        return str(log.relative_to(self.case.folder)) if log and self.case.folder in log.parents else ""
+        return (
+            str(log.relative_to(self.case.folder))
+            if log and self.case.folder in log.parents
+            else ""
+        )
 
     def _write_trace(self, *, failed: bool) -> None:
         """Joint and body states over time, as arrays of a .npz file in the run folder."""

@@ -90,7 +90,9 @@ def check(
             wrong.append(text)
         else:
             excused.append(f"{text} (declared: {deviation.reason})")
-    wrong += [f"{name}: reported, but not part of the scene" for name in set(reported) - set(expected)]
+    wrong += [
+        f"{name}: reported, but not part of the scene" for name in set(reported) - set(expected)
+    ]
     if wrong:
         more = f"; and {len(wrong) - 10} more" if len(wrong) > 10 else ""
         raise ParityError(

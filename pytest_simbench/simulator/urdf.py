@@ -225,7 +225,9 @@ def _parse(path: str) -> ET.Element:
     try:
         return ET.parse(path).getroot()
     except OSError as error:
-        raise DescriptionError(f"cannot read the robot description {path}: {error.strerror}") from None
+        raise DescriptionError(
+            f"cannot read the robot description {path}: {error.strerror}"
+        ) from None
     except ET.ParseError as error:
         raise DescriptionError(f"the robot description {path} is not valid XML: {error}") from None
 
@@ -279,9 +281,7 @@ def _write_origin(element: ET.Element, pose: Pose) -> None:
     r = pose.rotation()
     pitch = np.arcsin(np.clip(-r[2, 0], -1.0, 1.0))
     roll, yaw = np.arctan2(r[2, 1], r[2, 2]), np.arctan2(r[1, 0], r[0, 0])
-    ET.SubElement(
-        element, "origin", xyz=_spaced(pose.position), rpy=_spaced((roll, pitch, yaw))
-    )
+    ET.SubElement(element, "origin", xyz=_spaced(pose.position), rpy=_spaced((roll, pitch, yaw)))
 
 
 def _write_inertial(element: ET.Element, link: Link) -> None:
@@ -289,7 +289,14 @@ def _write_inertial(element: ET.Element, link: Link) -> None:
     ET.SubElement(inertial, "origin", xyz=_spaced(link.centre), rpy="0 0 0")
     ET.SubElement(inertial, "mass", value=repr(float(link.mass)))
     i = link.inertia
-    names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+    names = {
+        "ixx": (0, 0),
+        "ixy": (0, 1),
+        "ixz": (0, 2),
+        "iyy": (1, 1),
+        "iyz": (1, 2),
+        "izz": (2, 2),
+    }
     ET.SubElement(inertial, "inertia", {n: repr(float(i[at])) for n, at in names.items()})
 
 

@@ -213,9 +213,7 @@ class Manipulator:
 
     def _move_fingers(self, target: float, hold: float) -> None:
         self._follow(
-            self._planned(
-                lambda: self.planner.move_fingers(self.arm, self.fingers, target, hold)
-            )
+            self._planned(lambda: self.planner.move_fingers(self.arm, self.fingers, target, hold))
         )
 
     def _planned(self, plan: Callable[[], T]) -> T:

@@ -180,7 +180,9 @@ class Stacking(Task):
             for tower in range(self.towers)
         ]
         untouched = {
-            name: distance(pose, start[name]) for name, pose in end.items() if name not in picks.handled
+            name: distance(pose, start[name])
+            for name, pose in end.items()
+            if name not in picks.handled
         }
         moved = {name: d for name, d in untouched.items() if d > UNTOUCHED_DISTANCE}
         return Outcome(

@@ -67,7 +67,9 @@ def free_flight(
     return Flight(first, last + 1)
 
 
-def landing_x(position: FloatArray, velocity: FloatArray, gravity: FloatArray, height: float) -> float:
+def landing_x(
+    position: FloatArray, velocity: FloatArray, gravity: FloatArray, height: float
+) -> float:
     """Where a free body crosses `height` on its way down, in x [m]: z + v t - g t^2 / 2 = height.
 
     Args:

@@ -139,7 +139,10 @@ class Stepper:
 
     def _check_finite(self) -> None:
         simulator = self.simulator
-        for what, state in (("joints", simulator.joint_state()), ("bodies", simulator.body_state())):
+        for what, state in (
+            ("joints", simulator.joint_state()),
+            ("bodies", simulator.body_state()),
+        ):
             if not np.isfinite(state).all():
                 raise DivergedError(
                     f"the state of the {what} is not finite at t = {simulator.time:.3f} s with "

@@ -94,7 +94,7 @@ def test_the_interval_of_a_mean_covers_the_truth(
     monkeypatch.setattr("pytest_simbench.measure.intervals.RESAMPLES", 499)
     rng = np.random.default_rng(1)
     samples = [draw(rng, n) for _ in range(400)]
-    bounded = all(0 <= sample.min() and sample.max() <= 1 for sample in samples)
+    bounded = all(sample.min() >= 0 and sample.max() <= 1 for sample in samples)
     held = sum(truth in interval(list(sample), bounded=bounded) for sample in samples)
     assert held / 400 >= least - 2 * (least * (1 - least) / 400) ** 0.5
 

@@ -1,0 +1,184 @@
+"""The fixtures: `repeat`, `sim`, `simulator` and what they are made of. Imports heavy parts late."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from pytest_simbench import options
+from pytest_simbench.plugin import run, selection
+
+if TYPE_CHECKING:
+    from pytest_simbench.client.world import World
+    from pytest_simbench.measure.results import ResultSet
+    from pytest_simbench.scene import Scene
+    from pytest_simbench.session.case import Case
+    from pytest_simbench.session.handle import SimulatorHandle
+    from pytest_simbench.tasks.base import Task
+
+
+class WorkerClock:
+    """pytest-benchmark's timer: it advances by the seconds that a worker spent stepping."""
+
+    __name__ = "simbench_worker_seconds"
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+
+    def __call__(self) -> float:
+        return self.seconds
+
+
+worker_clock = WorkerClock()
+
+
+@pytest.fixture(scope="session")
+def sim_case(request: pytest.FixtureRequest) -> tuple[str, str]:
+    """Name and mode of the parametrised simulator."""
+    name, mode = request.param
+    return name, mode
+
+
+@pytest.fixture
+def sim_name(sim_case: tuple[str, str]) -> str:
+    """Name of the simulator under test."""
+    return sim_case[0]
+
+
+@pytest.fixture
+def sim_mode(sim_case: tuple[str, str]) -> str:
+    """`headless` or `gui`."""
+    return sim_case[1]
+
+
+@pytest.fixture
+def sim_settings() -> dict[str, Any]:
+    """Settings to change, by name; override it in a module or class. `--sim-set` goes on top."""
+    return {}
+
+
+@pytest.fixture
+def output_path(request: pytest.FixtureRequest) -> Path:
+    """The run folder; it exists when the fixture is used."""
+    folder = run(request.config).folder
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+@pytest.fixture
+def simbench_case(
+    request: pytest.FixtureRequest, sim_case: tuple[str, str], sim_settings: dict[str, Any]
+) -> Case:
+    """Everything that the repetitions of this test have in common."""
+    from pytest_simbench.selection import number_mark
+    from pytest_simbench.session.case import Case
+    from pytest_simbench.session.protocol import PROTOCOLS
+    from pytest_simbench.simulator.registry import registered
+
+    config, (name, mode) = request.config, sim_case
+    chosen, this = selection(config), run(config)
+    given = options.value(config, "sim_timeout")
+    return Case(
+        test=request.node.nodeid,
+        simulator=name,
+        mode=mode,
+        profile=chosen.profile,
+        adapter=registered()[name].value,
+        folder=this.folder,
+        changes={**sim_settings, **chosen.changes.get(name, {})},
+        python=chosen.pythons.get(name),
+        spec=chosen.specs.get(name),
+        environment=this.displays.environment() if mode == "gui" else {},
+        protocol=PROTOCOLS[options.value(config, "protocol")],
+        timeout=given if given is not None else number_mark(request.node, "sim_timeout"),
+        stall_timeout=options.value(config, "sim_stall_timeout"),
+        memory_limit=options.value(config, "sim_memory_limit"),
+        seed=options.value(config, "sim_seed"),
+        jitter=options.value(config, "jitter"),
+        trace=options.value(config, "sim_trace"),
+    )
+
+
+@pytest.fixture
+def repeat(
+    request: pytest.FixtureRequest, simbench_case: Case, benchmark: Any
+) -> Callable[[Task], ResultSet]:
+    """Runs a task `--reps` times: `result = repeat(Stacking())`."""
+    from pytest_simbench.selection import number_mark
+    from pytest_simbench.session.repeat import Repeater
+
+    config, this = request.config, run(request.config)
+    reps = (
+        options.value(config, "reps")
+        or number_mark(request.node, "reps")
+        or simbench_case.protocol.repetitions
+    )
+
+    def repeat_task(task: Task) -> ResultSet:
+        this.declare(task.smoke() if simbench_case.protocol.smallest else task)
+        this.begin_lines()
+        repeater = Repeater(
+            simbench_case, options.value(config, "sim_jobs"), this.progress, this.keep
+        )
+        result = repeater.run(task, range(1, int(reps) + 1))
+        _benchmark(benchmark, result)
+        return result
+
+    return repeat_task
+
+
+def _benchmark(benchmark: Any, result: ResultSet) -> None:
+    """Hand the finished repetitions to pytest-benchmark as rounds of worker seconds."""
+    if not result.ok:
+        return
+    seconds = iter([record.stepping["wall"] for record in result.ok])
+
+    def advance() -> None:
+        worker_clock.seconds += next(seconds, 0.0)
+
+    first = result.ok[0]
+    benchmark.extra_info.update(
+        {
+            "simulator": first.simulator,
+            "mode": first.mode,
+            "profile": first.profile,
+            "protocol": first.protocol,
+            "settings": dict(first.settings),
+            "versions": dict(first.versions),
+            "failures": len(result.failures),
+            "metrics": {name: result.values(name) for name in result.metrics},
+            "seeds": [record.seed for record in result.ok],
+            "costs": {
+                name: [record.cost(name) for record in result.ok]
+                for name in ("rtf", "cpu", "ram", "ram_peak", "cpu_cost", "start", "end", "total")
+            },
+        }
+    )
+    benchmark.pedantic(advance, rounds=len(result.ok), iterations=1, warmup_rounds=0)
+
+
+@pytest.fixture
+def threshold(request: pytest.FixtureRequest) -> Callable[[str, float], float]:
+    """`threshold("placed", 0.9)`: the suite's value, unless `--sim-threshold` changes it."""
+    given = options.assignments(request.config, "sim_threshold")
+    return lambda metric, default: float(given.get(metric, default))
+
+
+@pytest.fixture
+def simulator(simbench_case: Case) -> Iterator[SimulatorHandle]:
+    """Handle of the simulator, safe under Hypothesis: `with simulator.episode(scene) as world`."""
+    from pytest_simbench.session.handle import SimulatorHandle
+
+    handle = SimulatorHandle(simbench_case)
+    yield handle
+    handle.close()
+
+
+@pytest.fixture
+def sim(simulator: SimulatorHandle) -> Iterator[Callable[[Scene], World]]:
+    """Loads a scene into a fresh world of the simulator: `world = sim(scene)`."""
+    with simulator.episodes() as start:
+        yield start

@@ -1,0 +1,217 @@
+"""Which simulators and modes a run covers, from options and marks; all checks of user input."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from typing import Any
+
+import pytest
+
+from pytest_simbench import options
+
+MODES = ("headless", "gui")
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What the user asked for, checked.
+
+    Attributes:
+        simulators: names, in order.
+        explicit: the names that were asked for one by one; a missing one is an error.
+        modes: `headless`, `gui`.
+        profile: settings profile.
+        changes: simulator name to changed settings, as texts.
+        pythons, specs: simulator name to interpreter or execnet specification.
+    """
+
+    simulators: tuple[str, ...]
+    explicit: frozenset[str]
+    modes: tuple[str, ...]
+    profile: str
+    changes: dict[str, dict[str, str]] = field(default_factory=dict)
+    pythons: dict[str, str] = field(default_factory=dict)
+    specs: dict[str, str] = field(default_factory=dict)
+
+    def missing(self, name: str) -> str | None:
+        """Why a simulator cannot run here, with what mends it; None when it can."""
+        from pytest_simbench.simulator.registry import adapter
+
+        if name in self.pythons or name in self.specs:
+            return None
+        info = adapter(name).info
+        absent = [module for module in info.modules if not _importable(module)]
+        if absent:
+            return f"{name} is not installed (no module {absent[0]}); install it: {info.install}"
+        return None
+
+
+def _importable(module: str) -> bool:
+    try:
+        return find_spec(module) is not None
+    except (ImportError, ValueError):
+        return False
+
+
+def select(config: pytest.Config) -> Selection:
+    """The checked selection.
+
+    Raises:
+        pytest.UsageError: unknown simulator, setting, profile, or a malformed value.
+    """
+    from pytest_simbench.simulator.errors import SimulatorError
+
+    try:
+        return _select(config)
+    except SimulatorError as error:
+        raise pytest.UsageError(str(error)) from None
+
+
+def _select(config: pytest.Config) -> Selection:
+    from pytest_simbench.simulator.registry import adapter, check_names, registered
+    from pytest_simbench.simulator.settings import changed, profile
+
+    asked = options.value(config, "sim")
+    names = [name for name in asked if name != "all"]
+    check_names(names)
+    pythons = options.assignments(config, "sim_python")
+    specs = options.assignments(config, "sim_spec")
+    check_names([*pythons, *specs])
+    profile_name = options.value(config, "sim_profile")
+    changes: dict[str, dict[str, str]] = {}
+    for key, text in options.assignments(config, "sim_set").items():
+        name, dot, setting = key.partition(".")
+        if not dot:
+            raise pytest.UsageError(f"--sim-set {key}={text}: write it as SIM.SETTING=VALUE")
+        check_names([name])
+        changes.setdefault(name, {})[setting] = text
+    everything = tuple(registered()) if not names or "all" in asked else tuple(dict.fromkeys(names))
+    for name in {*everything, *changes}:
+        changed(profile(adapter(name).profiles, profile_name, name), changes.get(name, {}), name)
+    selection = Selection(
+        everything, frozenset(names), _modes(config), profile_name, changes, pythons, specs
+    )
+    for name in names:
+        reason = selection.missing(name)
+        if reason:
+            raise pytest.UsageError(reason)
+    if not asked:
+        here = tuple(name for name in everything if not selection.missing(name))
+        selection = Selection(
+            here, frozenset(), selection.modes, profile_name, changes, pythons, specs
+        )
+    return selection
+
+
+def _modes(config: pytest.Config) -> tuple[str, ...]:
+    gui, headless = options.value(config, "gui"), options.value(config, "headless")
+    if gui:
+        return MODES if headless else ("gui",)
+    return ("headless",)
+
+
+def check_numbers(config: pytest.Config) -> None:
+    """Check the plain numbers.
+
+    Raises:
+        pytest.UsageError: zero repetitions, a negative time-out and the like.
+    """
+    for name, least in (
+        ("reps", 1), ("sim_jobs", 1), ("jitter", 0), ("sim_seed", 0), ("sim_timeout", 1e-3),
+        ("sim_stall_timeout", 1e-3), ("sim_memory_limit", 1),
+    ):  # fmt: skip
+        number = options.value(config, name)
+        if number is not None and not number >= least:
+            flag = "--" + name.replace("_", "-")
+            raise pytest.UsageError(f"{flag} {number}: give at least {least:g}")
+    for name in ("protocol", "sim_trace"):
+        options.value(config, name)
+    for metric, text in options.assignments(config, "sim_threshold").items():
+        try:
+            float(text)
+        except ValueError:
+            raise pytest.UsageError(
+                f"--sim-threshold {metric}={text}: the value must be a number"
+            ) from None
+
+
+def parameters(metafunc: pytest.Metafunc, selection: Selection) -> list[Any]:
+    """Parameters `(simulator, mode)` of a test, with what its marks say of each.
+
+    Raises:
+        pytest.UsageError: a mark with an unknown simulator or capability.
+    """
+    node = metafunc.definition
+    names = [name for name in selection.simulators if _wanted(node, name)]
+    result = []
+    for name in names:
+        for mode in selection.modes:
+            marks = _marks(node, name, mode, selection)
+            result.append(pytest.param((name, mode), id=f"{name}-{mode}", marks=marks))
+    if not result:
+        skip = pytest.mark.skip(reason="no selected simulator fits the only_sim mark")
+        result.append(pytest.param(("none", "headless"), id="none", marks=[skip]))
+    return result
+
+
+def _wanted(node: Any, name: str) -> bool:
+    chosen: list[str] = []
+    for mark in node.iter_markers("only_sim"):
+        chosen += _names(mark, node)
+    return not chosen or name in chosen
+
+
+def _marks(node: Any, name: str, mode: str, selection: Selection) -> list[pytest.MarkDecorator]:
+    from pytest_simbench.simulator.info import Capability
+    from pytest_simbench.simulator.registry import adapter
+
+    marks = []
+    reason = selection.missing(name)
+    if reason:
+        marks.append(pytest.mark.skip(reason=reason))
+    info = adapter(name).info
+    if mode not in info.modes:
+        marks.append(pytest.mark.skip(reason=f"{name} has no window"))
+    for mark in node.iter_markers("skip_sim"):
+        if name in _names(mark, node):
+            marks.append(pytest.mark.skip(reason=mark.kwargs.get("reason", f"skip_sim({name})")))
+    for mark in node.iter_markers("xfail_sim"):
+        if name in _names(mark, node):
+            marks.append(pytest.mark.xfail(reason=mark.kwargs.get("reason", "")))
+    for mark in node.iter_markers("needs"):
+        for capability in mark.args:
+            if capability not in list(Capability):
+                raise pytest.UsageError(
+                    f"{node.nodeid}: needs({capability!r}): choose from {', '.join(Capability)}"
+                )
+            if capability not in info.capabilities:
+                marks.append(pytest.mark.skip(reason=f"{name} has no {capability}"))
+    return marks
+
+
+def _names(mark: pytest.Mark, node: Any) -> list[str]:
+    from pytest_simbench.simulator.registry import UnknownSimulatorError, check_names
+
+    if not mark.args:
+        raise pytest.UsageError(f"{node.nodeid}: {mark.name} needs the name of a simulator")
+    try:
+        check_names(mark.args)
+    except UnknownSimulatorError as error:
+        raise pytest.UsageError(f"{node.nodeid}: {mark.name}: {error}") from None
+    return list(mark.args)
+
+
+def number_mark(node: Any, name: str) -> Any:
+    """The positive number in a mark such as `reps(5)`, or None without the mark.
+
+    Raises:
+        pytest.UsageError: no argument, or not a positive number.
+    """
+    mark = node.get_closest_marker(name)
+    if mark is None:
+        return None
+    number = mark.args[0] if mark.args else None
+    if not isinstance(number, int | float) or isinstance(number, bool) or number <= 0:
+        raise pytest.UsageError(f"{node.nodeid}: {name}({number!r}): give a positive number")
+    return number
