@@ -12,6 +12,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from ompl import base, geometric, util
@@ -21,13 +22,24 @@ from pytest_simbench.robot.errors import InCollision, NoPath, PlanningError
 from pytest_simbench.robot.kinematics import straight_line
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import FINGER_SPEED
-from pytest_simbench.robot.timing import TICK, Timed, along_path, point_to_point
+from pytest_simbench.robot.timing import (
+    TICK,
+    Timed,
+    along_path,
+    straight_move,
+    synchronised_move,
+)
 from pytest_simbench.scene import FloatArray, Pose, Trajectory
 
 __all__ = ["MotionPlanner", "PlanningError", "Release"]
 
-CHECK_SPACING = 0.025
-"""Largest joint distance between two collision checks of a path [rad]: about 1.5 cm at the hand."""
+LEVERS = np.array([0.85, 0.85, 0.65, 0.65, 0.30, 0.30, 0.15])
+"""Largest distance of the fingertips from each arm joint's axis [m], rounded up: a turn of joint i
+by dq moves nothing of the hand farther than LEVERS[i] |dq|."""
+
+CHECK_SPACING = 0.02
+"""Farthest that the hand moves between two collision checks [m]. The planning scene's margin is
+more than half of it, so nothing is brushed in between."""
 
 MAX_CHECKS = 20_000
 """Collision checks after which a search gives up, about 2 s."""
@@ -75,7 +87,7 @@ class MotionPlanner:
             InCollision: start or goal touch something.
             NoPath: none found.
         """
-        direct, _ = point_to_point(start, goal, speed=speed)
+        direct = straight_move(start, goal, speed=speed)
         if self.scene.first_collision(_thinned(direct.position)) is None:
             return self._trajectory(direct, fingers)
         for what, arm in (("start", start), ("goal", goal)):
@@ -83,7 +95,7 @@ class MotionPlanner:
             if touching is not None:
                 raise InCollision(f"{what} in collision: {' and '.join(touching)}")
         path = self._shortened(self._search(start, goal))
-        parts = [point_to_point(a, b, speed=speed)[0] for a, b in zip(path, path[1:], strict=False)]
+        parts = [straight_move(a, b, speed=speed) for a, b in pairwise(path)]
         return self._trajectory(
             Timed(
                 np.concatenate([part.position for part in parts]),
@@ -135,7 +147,7 @@ class MotionPlanner:
         The joints start and end together but each on its own profile. Also returns how a
         perfect follower would release.
         """
-        timed, duration = point_to_point(start, goal, straight=False)
+        timed, duration = synchronised_move(start, goal)
         release = fraction * duration
         fingers = np.where(TICK * np.arange(len(timed.position)) >= release, opened, closed)
         row = min(int(release / TICK), len(timed.position) - 2)
@@ -185,7 +197,9 @@ class MotionPlanner:
             return self.scene.collision(np.array([state[i] for i in range(arm)])) is None
 
         information.setStateValidityChecker(valid)
-        information.setStateValidityCheckingResolution(CHECK_SPACING / space.getMaximumExtent())
+        information.setStateValidityCheckingResolution(
+            CHECK_SPACING / float(np.linalg.norm(LEVERS)) / space.getMaximumExtent()
+        )
         information.setup()
         problem = base.ProblemDefinition(information)
         states = [information.allocState() for _ in range(2)]
@@ -220,13 +234,13 @@ class MotionPlanner:
 
 def _segment(a: FloatArray, b: FloatArray) -> FloatArray:
     """Positions between a and b to check, both ends among them."""
-    steps = max(1, int(np.ceil(np.abs(b - a).max() / CHECK_SPACING)))
-    return a + np.linspace(0.0, 1.0, steps + 1)[:, None] * (b - a)
+    steps = max(1, int(np.ceil(LEVERS @ np.abs(b - a) / CHECK_SPACING)))
+    return np.asarray(a + np.linspace(0.0, 1.0, steps + 1)[:, None] * (b - a))
 
 
 def _thinned(rows: FloatArray) -> FloatArray:
-    """Rows about `CHECK_SPACING` apart, first and last among them."""
-    travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(rows, axis=0)).max(axis=1))])
+    """Rows between which the hand moves at most `CHECK_SPACING`, first and last among them."""
+    travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(rows, axis=0)) @ LEVERS)])
     wanted = np.arange(0.0, travelled[-1], CHECK_SPACING)
     picked = np.unique(np.searchsorted(travelled, wanted))
     return np.vstack([rows[picked], rows[-1:]])
