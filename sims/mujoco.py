@@ -118,6 +118,7 @@ class MuJoCo(Simulator):
                 self._set_surface(geom, scene.robot.friction, ROBOT, 0)
             for joint in scene.robot.joints:
                 _add_drive(spec, joint)
+            _couple_fingers(spec, scene.robot.gripper.joints)
         ground = spec.worldbody.add_geom(
             name="ground",
             type=mujoco.mjtGeom.mjGEOM_PLANE,
@@ -207,6 +208,11 @@ class MuJoCo(Simulator):
 
     def _read_back_robot(self, prepared: PreparedRobot, reported: dict[str, Any]) -> None:
         model = self.model
+        pairs = zip(model.eq_obj1id, model.eq_obj2id, model.eq_type, strict=True)
+        fingers = {model.joint(name).id for name in prepared.robot.gripper.joints}
+        reported["gripper/coupled"] = any(
+            {a, b} == fingers and kind == mujoco.mjtEq.mjEQ_JOINT for a, b, kind in pairs
+        )
         for name in prepared.robot.joint_names:
             joint, drive = model.joint(name), model.actuator(name)
             reported[f"joint/{name}/limits"] = joint.range
@@ -317,6 +323,19 @@ def _add_drive(spec: Any, joint: Any) -> None:
     drive.gainprm[0] = joint.stiffness
     drive.biasprm[1], drive.biasprm[2] = -joint.stiffness, -joint.damping
     spec.joint(joint.name).armature = joint.armature
+
+
+def _couple_fingers(spec: Any, fingers: tuple[str, ...]) -> None:
+    """Hold the fingers at equal positions, by an equality constraint as stiff as two steps allow."""
+    first, second = fingers
+    spec.add_equality(
+        type=mujoco.mjtEq.mjEQ_JOINT,
+        objtype=mujoco.mjtObj.mjOBJ_JOINT,
+        name1=second,
+        name2=first,
+        data=[0.0, 1.0, *[0.0] * 10],
+        solref=[2 * spec.option.timestep, 1.0],
+    )
 
 
 def _rotations(quaternions: FloatArray) -> FloatArray:

@@ -39,8 +39,11 @@ class Joint:
 class Gripper:
     """A parallel gripper.
 
+    Its fingers are coupled mechanically: they always stand equally far from the middle. Without
+    that, two fingers that both press with their largest force leave the object free between them.
+
     Attributes:
-        joints: names of its finger joints, commanded together.
+        joints: names of its finger joints, coupled and commanded together.
         opened: position of each finger, open [m].
         closed: position commanded to grasp, beyond the object's surface [m].
         squeeze: the force each finger then presses with [N]: its effort limit. The commanded

@@ -2,7 +2,7 @@
 
 Quantities have names: `gravity`, `timestep`, `ground/height`, `ground/friction`,
 `body/NAME/{mass,inertia,size,pose,friction}`, `joint/NAME/{limits,effort_limit,stiffness,damping,
-armature,initial_position}`, `link/NAME/{mass,inertia,friction}`. Links are those of the prepared
+armature,initial_position}`, `link/NAME/{mass,inertia,friction}`, and `gripper/coupled` (1 when the fingers are). Links are those of the prepared
 robot (`simulator.urdf`), in which fixed joints are merged. Inertias are principal moments,
 ascending for links, along x, y, z for boxes.
 """
@@ -48,7 +48,7 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
 
 def _robot_quantities(robot: Robot) -> dict[str, Any]:
     prepared = PreparedRobot(robot)
-    quantities: dict[str, Any] = {}
+    quantities: dict[str, Any] = {"gripper/coupled": 1.0}
     for joint in robot.joints:
         prefix = f"joint/{joint.name}"
         quantities[f"{prefix}/limits"] = prepared.limits[joint.name]

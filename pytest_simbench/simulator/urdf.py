@@ -3,7 +3,7 @@
 URDF importers differ in what they make of package paths, fixed joints, zero-mass frames, mimic
 joints, passive damping and visual meshes. So all of them get the same reduced description: mesh
 paths absolute, fixed joints merged into the link above (masses and inertias added), the base
-placed, no mimic joint (both fingers are driven), no passive damping, and the collision shapes
+placed, no mimic joint (adapters couple the fingers), no passive damping, and the collision shapes
 as visual shapes too.
 """
 
