@@ -1,4 +1,4 @@
-"""The fixtures: `repeat`, `sim`, `simulator` and what they are made of. Imports heavy parts late."""
+"""The fixtures: `repeat`, `sim`, `simulator` and their parts. Heavy imports happen late."""
 
 from __future__ import annotations
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 from collections.abc import Iterable
 from contextlib import suppress
@@ -59,7 +58,7 @@ class Run:
 
             reporter = self.config.pluginmanager.get_plugin("terminalreporter")
             width = reporter._tw.fullwidth if reporter else 80
-            tty = bool(reporter) and sys.__stdout__ is not None and reporter.isatty
+            tty = bool(reporter and reporter.isatty)
             self._progress = Progress(self._write, is_tty=tty, width=width)
         return self._progress
 

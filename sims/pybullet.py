@@ -57,7 +57,7 @@ class PyBulletSettings(Settings):
         friction_erp: the same for friction anchors.
         cone_friction: implicit friction cone instead of the pyramid.
         spinning_friction: torsional friction coefficient of the cubes [m].
-        friction_anchor: tie resting contacts to where they first touched, corrected by friction_erp.
+        friction_anchor: tie resting contacts to where they first touched, by friction_erp.
         sleeping: whether bodies at rest are frozen.
     """
 

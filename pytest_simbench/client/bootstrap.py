@@ -10,6 +10,8 @@ import importlib.util
 import os
 import signal
 import sys
+from importlib.machinery import ModuleSpec
+from typing import Any
 
 
 class PackageFinder:
@@ -18,10 +20,10 @@ class PackageFinder:
     Putting the client's site-packages on sys.path would mix two environments; this does not.
     """
 
-    def __init__(self, locations):
+    def __init__(self, locations: dict[str, str]) -> None:
         self.locations = locations
 
-    def find_spec(self, name, path=None, target=None):
+    def find_spec(self, name: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
         location = self.locations.get(name)
         if location is None:
             return None
@@ -31,7 +33,7 @@ class PackageFinder:
         )
 
 
-def redirect_output(path):
+def redirect_output(path: str) -> None:
     """Send stdout and stderr, also those of C code, to the log file."""
     log = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     sys.stdout.flush()
@@ -43,7 +45,7 @@ def redirect_output(path):
     faulthandler.enable(file=sys.stderr)
 
 
-def main(channel):
+def main(channel: Any) -> None:
     # Ctrl-C goes to the whole process group; the client decides what becomes of its workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     config = channel.receive()
@@ -62,4 +64,4 @@ def main(channel):
 
 
 if __name__ == "__channelexec__":
-    main(channel)  # noqa: F821 - execnet provides it
+    main(channel)  # type: ignore[name-defined]  # noqa: F821 - execnet provides it

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pinocchio as pin
 
@@ -113,6 +111,6 @@ def straight_line(
                 f"unreachable: straight line to {tuple(np.round(position, 3).tolist())}"
             )
         path.append(solution)
-    if max(np.abs(b - a).max() for a, b in pairwise(path)) > 0.5:
+    if np.abs(np.diff(np.array(path), axis=0)).max() > 0.5:
         raise Unreachable("unreachable: the straight line needs a jump of the arm's configuration")
     return np.array(path)

@@ -1,7 +1,7 @@
 """Motion planning: joint moves, straight lines, finger motions and the throw, as trajectories.
 
-A joint move is tried directly; when it collides, OMPL's RRTConnect searches a path and way points that
-are not needed are cut out. OMPL draws from generators that its own global seed
+A joint move is tried directly; when it collides, OMPL's RRTConnect searches a path, and way points
+that are not needed are cut out. OMPL draws from generators that its own global seed
 generator seeds, and its simplifier stops by the clock, so for the same plan from the same seed
 every time the global seed is set anew before each search, searches end by a counted number
 of checks, and the shortcuts are our own.

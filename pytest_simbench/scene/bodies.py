@@ -42,7 +42,7 @@ class Box:
     def inertia(self) -> FloatArray:
         """Principal moments about the centre (3,) [kg m^2]: m/12 (b^2 + c^2), homogeneous box."""
         squares = np.square(self.size)
-        return self.mass / 12.0 * (squares.sum() - squares)
+        return np.asarray(self.mass / 12.0 * (squares.sum() - squares))
 
     def moved_to(self, pose: Pose) -> Box:
         return replace(self, pose=pose)

@@ -96,10 +96,10 @@ class Simulator(ABC):
         """A picture of the world without a window, (height, width, 3), RGB."""
         raise self._missing("offscreen picture")
 
-    def refresh_window(self) -> None:
+    def refresh_window(self) -> None:  # noqa: B027 - a window may draw itself
         """Show the present state in the window; called about 30 times a second in GUI mode."""
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027 - there may be nothing to release
         """Release the engine's resources; the process ends right after."""
 
     def versions(self) -> dict[str, str]:

@@ -2,9 +2,9 @@
 
 Quantities have names: `gravity`, `timestep`, `ground/height`, `ground/friction`,
 `body/NAME/{mass,inertia,size,pose,friction}`, `joint/NAME/{limits,effort_limit,stiffness,damping,
-armature,initial_position}`, `link/NAME/{mass,inertia,friction}`, and `gripper/coupled` (1 when the fingers are). Links are those of the prepared
-robot (`simulator.urdf`), in which fixed joints are merged. Inertias are principal moments,
-ascending for links, along x, y, z for boxes.
+armature,initial_position}`, `link/NAME/{mass,inertia,friction}`, and `gripper/coupled` (1 when
+the fingers are). Links are those of the prepared robot (`simulator.urdf`), in which fixed joints
+are merged. Inertias are principal moments, ascending for links, along x, y, z for boxes.
 """
 
 from __future__ import annotations

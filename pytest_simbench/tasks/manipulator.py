@@ -28,7 +28,7 @@ IN_HAND = 0.04
 """A cube whose centre is farther than this from the tool centre point is not held [m]."""
 
 FREE_SPEED, CARRY_SPEED, CONTACT_SPEED = 1.0, 0.6, 0.3
-"""Shares of the joint velocity limits: empty hand, cube in hand, straight down to a cube or place."""
+"""Shares of the joint velocity limits: empty hand, cube in hand, straight down."""
 
 T = TypeVar("T")
 

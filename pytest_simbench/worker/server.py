@@ -2,8 +2,8 @@
 
 Imports nothing but the rooms `scene` and `simulator`, numpy and the standard library, so that it
 runs in an interpreter that holds nothing but the engine. Each request is a dict
-`{"op": name, ...}`; the answer is `{"ok": result}` or `{"error": {type, message, traceback}}`, and in
-between `{"alive": simulated time}` may come any number of times.
+`{"op": name, ...}`; the answer is `{"ok": result}` or `{"error": {type, message, traceback}}`, and
+in between `{"alive": simulated time}` may come any number of times.
 """
 
 from __future__ import annotations
