@@ -99,7 +99,7 @@ def straight_line(
     last = pin.SE3(target.matrix())
     turn = pin.log3(first.rotation.T @ last.rotation)
     length = float(np.linalg.norm(last.translation - first.translation))
-    steps = max(2, int(np.ceil(max(length / spacing, np.linalg.norm(turn) / 0.1))))
+    steps = max(2, int(np.ceil(max(length / spacing, float(np.linalg.norm(turn)) / 0.1))))
     path = [np.asarray(start, dtype=float)]
     for share in np.linspace(0, 1, steps + 1)[1:]:
         rotation = first.rotation @ pin.exp3(share * turn)
