@@ -226,7 +226,8 @@ class MuJoCo(Simulator):
             geoms = np.flatnonzero(model.geom_bodyid == body.id)
             reported[f"link/{link.name}/mass"] = body.mass[0]
             reported[f"link/{link.name}/inertia"] = np.sort(body.inertia)
-            reported[f"link/{link.name}/friction"] = model.geom_friction[geoms, 0].max()
+            values = np.unique(model.geom_friction[geoms, 0])
+            reported[f"link/{link.name}/friction"] = values[0] if len(values) == 1 else values
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self.data.ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness

@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import os
+import shlex
+import sys
 import threading
 import time
 import uuid
@@ -36,7 +38,7 @@ from pytest_simbench.worker.wire import pack, unpack
 TOKEN = "PYTEST_SIMBENCH_WORKER"
 """Environment variable by which a worker's process is found before it has told its pid."""
 
-LOG_TAIL_LINES = 15
+LOG_TAIL_LINES = 30
 
 
 @dataclass(frozen=True)
@@ -129,11 +131,11 @@ class WorkerProcess:
     def _spec(self) -> str:
         if self.launch.spec:
             return self.launch.spec
-        parts = ["popen", "execmodel=main_thread_only"]
-        if self.launch.python:
-            parts.append(f"python={self.launch.python}")
+        # Not execnet's own `env:`, which is set only once the interpreter answers.
         variables = {**self.launch.environment, TOKEN: self._token}
-        return "//".join(parts + [f"env:{key}={value}" for key, value in variables.items()])
+        command = ["env", *(f"{key}={value}" for key, value in variables.items())]
+        command.append(self.launch.python or sys.executable)
+        return f"popen//execmodel=main_thread_only//python={shlex.join(command)}"
 
     def _packages(self) -> dict[str, str]:
         """Where the packages that the worker needs lie: this one, the adapters, a third party's."""

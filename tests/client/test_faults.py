@@ -1,0 +1,140 @@
+"""Every way in which a worker can fail, on real processes: typed error, record, next repetition."""
+
+from __future__ import annotations
+
+import os
+import stat
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import psutil
+import pytest
+
+from pytest_simbench.measure.record import Record
+from pytest_simbench.session.case import Case
+from pytest_simbench.session.repeat import Repeater
+from pytest_simbench.session.repetition import Repetition
+from tests.tiny import Falling
+
+
+def run(case: Case, adapter: str | None = None, number: int = 1) -> Record:
+    if adapter is not None:
+        case = replace(case, adapter=f"tests.client.faulty:{adapter}")
+    record, _ = Repetition(case, Falling(), number).run()
+    assert Record.from_json(record.to_json()) == Record.from_json(record.to_json())
+    assert not [
+        child
+        for child in psutil.Process().children()
+        if child.status() != psutil.STATUS_ZOMBIE and "python" in child.name()
+    ], "a worker was left behind"
+    return record
+
+
+@pytest.mark.parametrize(
+    ("adapter", "error", "message"),
+    [
+        ("Killed", "WorkerExited", "was killed by SIGKILL"),
+        ("Crashed", "WorkerExited", "was killed by SIGSEGV"),
+        ("Stopped", "WorkerHung", "no sign of life"),
+        ("Hung", "WorkerHung", "no sign of life"),
+        ("Raising", "EngineFailed", "ValueError: the engine is unhappy"),
+        ("NotANumber", "Diverged", "not finite at t = 0.3"),
+    ],
+)
+def test_fault_while_stepping(case: Case, adapter: str, error: str, message: str) -> None:
+    case = replace(case, stall_timeout=3.0)
+    record = run(case, adapter)
+    assert record.status == "failed"
+    assert record.error is not None
+    assert (record.error.type, record.error.phase) == (error, "fall")
+    assert message in record.error.message
+    assert run(case, number=2).metrics == {"landed": 1.0}
+
+
+def test_the_log_tail_shows_where_it_crashed(case: Case) -> None:
+    record = run(case, "Crashed")
+    assert record.error is not None
+    assert "Segmentation fault" in record.error.log_tail
+    assert "in fault" in record.error.log_tail
+
+
+def test_a_worker_that_eats_memory_is_killed(case: Case) -> None:
+    record = run(replace(case, memory_limit=500.0), "Greedy")
+    assert record.error is not None
+    assert record.error.type == "OutOfMemory"
+    assert "limit of 500 MB" in record.error.message
+    assert record.resources["rss_mb"]["peak"] > 500
+
+
+def test_a_repetition_times_out(case: Case) -> None:
+    record = run(replace(case, timeout=2.0), "Hung")
+    assert record.error is not None
+    assert record.error.type == "RepetitionTimeout"
+
+
+def test_garbage_on_stdout_harms_nothing(case: Case) -> None:
+    record = run(case, "Chatty")
+    assert (record.status, record.metrics) == ("ok", {"landed": 1.0})
+
+
+def test_crash_while_closing_does_not_fail_a_finished_repetition(case: Case) -> None:
+    record = run(case, "CrashesClosing")
+    assert record.status == "ok"
+    assert "SIGSEGV" in record.details["closing"]
+
+
+def test_exit_at_import(case: Case) -> None:
+    record = run(replace(case, adapter="tests.client.dies_at_import:Nothing"))
+    assert record.error is not None
+    assert (record.error.type, record.error.phase) == ("WorkerExited", "launch")
+    assert "exited with status 3" in record.error.message
+
+
+def test_wrong_interpreter(case: Case) -> None:
+    record = run(replace(case, python="/nowhere/python"))
+    assert record.error is not None
+    assert record.error.type == "WorkerStartError"
+    assert "/nowhere/python" in record.error.message
+    assert "--sim-python" in record.error.message
+
+
+@pytest.mark.parametrize(
+    "script",
+    ['#!/bin/sh\necho garbage\nexec {python} "$@"\n', "#!/bin/sh\nsleep 60\n", "#!/bin/sh\n"],
+    ids=["prints garbage", "never answers", "ends at once"],
+)
+def test_interpreter_that_is_none(case: Case, tmp_path: Path, script: str) -> None:
+    wrapper = tmp_path / "python"
+    wrapper.write_text(script.format(python=sys.executable))
+    wrapper.chmod(wrapper.stat().st_mode | stat.S_IEXEC)
+    record = run(replace(case, python=str(wrapper), stall_timeout=3.0))
+    assert record.error is not None
+    assert record.error.type == "WorkerStartError"
+    assert str(wrapper) in record.error.message
+
+
+def test_missing_engine_module(case: Case) -> None:
+    record = run(replace(case, adapter="tests.client.no_such_module:Nothing"))
+    assert record.error is not None
+    assert "no_such_module" in record.error.message
+
+
+def test_another_world_stops_the_run(case: Case) -> None:
+    kept: list[Record] = []
+    case = replace(case, adapter="tests.client.faulty:WrongGravity")
+
+    class Silent:
+        def __getattr__(self, name: str) -> object:
+            return lambda *arguments: None
+
+    with pytest.raises(Exception, match="gravity: scene .*-9.80665.*mujoco .*-20"):
+        Repeater(case, 1, Silent(), kept.append).run(Falling(), range(1, 4))  # type: ignore[arg-type]
+    assert [record.error.type for record in kept if record.error] == ["WorldParityError"]
+
+
+def test_full_disk_for_logs_does_not_stop_the_repetition(case: Case, tmp_path: Path) -> None:
+    (tmp_path / "full").symlink_to("/dev/full")
+    record = run(replace(case, folder=tmp_path / "full"))
+    assert record.status == "ok"
+    assert os.path.islink(tmp_path / "full")
