@@ -212,6 +212,8 @@ class PreparedRobot:
                 effort=repr(drive.effort_limit),
                 velocity="100",
             )
+        # Bullet reads files in pieces of 1024 bytes a line and may cut an attribute in two.
+        ET.indent(root)
         return ET.tostring(root, encoding="unicode")
 
     def write_urdf(self, directory: str | Path) -> Path:

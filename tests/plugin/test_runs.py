@@ -1,0 +1,212 @@
+"""What users type and what they get, with a small task on the real MuJoCo."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+TEST = """
+    import pytest
+    from tests.tiny import Falling
+
+    def test_falling(repeat):
+        repeat(Falling()).assert_at_least("landed", 0.1)
+"""
+
+
+def records(folder: Path) -> list[dict[str, object]]:
+    return [json.loads(line) for line in (folder / "records.jsonl").read_text().splitlines()]
+
+
+def test_ids_table_records_and_logs(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(TEST)
+    result = pytester.runpytest_subprocess("--sim=all", "--reps=2", "--sim-output=out", "-v")
+    result.assert_outcomes(passed=2)
+    result.stdout.fnmatch_lines(
+        [
+            "*::test_falling[[]mujoco-headless[]]*",
+            "*::test_falling[[]pybullet-headless[]]*",
+            "*simulator comparison*",
+            "landed: *100 %*",
+        ]
+    )
+    kept = records(pytester.path / "out")
+    assert [(r["simulator"], r["repetition"], r["seed"], r["status"]) for r in kept] == [
+        ("mujoco", 1, 2022, "ok"),
+        ("mujoco", 2, 2023, "ok"),
+        ("pybullet", 1, 2022, "ok"),
+        ("pybullet", 2, 2023, "ok"),
+    ]
+    assert len(list((pytester.path / "out" / "logs").iterdir())) == 4
+
+
+def test_marks(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        """
+        import pytest
+        from tests.tiny import Falling
+
+        @pytest.mark.only_sim("pybullet")
+        @pytest.mark.reps(3)
+        def test_only(repeat):
+            assert len(repeat(Falling())) == 3
+
+        @pytest.mark.skip_sim("pybullet", reason="not today")
+        def test_skip(sim_name):
+            assert sim_name == "mujoco"
+
+        @pytest.mark.xfail_sim("mujoco", reason="known")
+        def test_xfail(sim_name):
+            assert sim_name == "pybullet"
+
+        @pytest.mark.needs("gpu")
+        def test_needs(sim_name):
+            raise AssertionError
+        """
+    )
+    result = pytester.runpytest_subprocess("--sim=all", "-rs")
+    result.assert_outcomes(passed=3, skipped=3, xfailed=1)
+    result.stdout.fnmatch_lines(["*pybullet has no gpu*"])
+
+
+def test_ini_twins(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(TEST)
+    pytester.makeini("[pytest]\nsim = mujoco\nreps = 2\nsim_output = here\n")
+    result = pytester.runpytest_subprocess()
+    result.assert_outcomes(passed=1)
+    assert len(records(pytester.path / "here")) == 2
+
+
+def test_xdist_merges_records_and_prints_one_table(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(TEST)
+    result = pytester.runpytest_subprocess(
+        "--sim=all", "--reps=2", "--sim-output=out", "-n2", "-p", "no:randomly"
+    )
+    result.assert_outcomes(passed=2)
+    assert len(records(pytester.path / "out")) == 4
+    assert result.stdout.str().count("simulator comparison") == 1
+    result.stdout.fnmatch_lines(["mujoco*", "*pybullet*"])
+
+
+def test_jobs_run_side_by_side_and_say_so(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(TEST)
+    result = pytester.runpytest_subprocess(
+        "--sim=mujoco", "--reps=4", "--sim-jobs=2", "--sim-output=out"
+    )
+    result.assert_outcomes(passed=1)
+    kept = records(pytester.path / "out")
+    assert sorted(r["repetition"] for r in kept) == [1, 2, 3, 4]  # type: ignore[type-var]
+    assert all(r["contended"] for r in kept)
+
+
+def test_benchmark_rounds_are_worker_seconds_and_compare(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(TEST)
+    arguments = ["--sim=mujoco", "--reps=3", "--sim-output=out", "--benchmark-autosave"]
+    pytester.runpytest_subprocess(*arguments, "--benchmark-json=b.json").assert_outcomes(passed=1)
+    (benchmark,) = json.loads((pytester.path / "b.json").read_text())["benchmarks"]
+    kept = records(pytester.path / "out")
+    seconds = [r["stepping"]["wall"] for r in kept]  # type: ignore[index]
+    assert benchmark["stats"]["rounds"] == 3
+    assert benchmark["stats"]["min"] == pytest.approx(min(seconds))
+    assert benchmark["stats"]["max"] == pytest.approx(max(seconds))
+    assert benchmark["extra_info"]["metrics"] == {"landed": [1.0, 1.0, 1.0]}
+    assert benchmark["extra_info"]["settings"]["timestep"] == 0.001
+    result = pytester.runpytest_subprocess(*arguments, "--benchmark-compare")
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines(["*(NOW)*", "*(0001_*"])
+
+
+def test_trace(pytester: pytest.Pytester) -> None:
+    import numpy as np
+
+    pytester.makepyfile(TEST)
+    pytester.runpytest_subprocess("--sim=mujoco", "--reps=1", "--sim-output=o", "--sim-trace=on")
+    (path,) = (pytester.path / "o" / "traces").iterdir()
+    trace = np.load(path)
+    assert trace["bodies"].shape == (30, 2, 13)
+    assert np.allclose(np.diff(trace["time"]), 0.02)
+    assert list(trace["body_names"]) == ["left", "right"]
+
+
+def test_full_disk_loses_nothing(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytester.makepyfile(TEST)
+    folder = pytester.mkdir("out")
+    (folder / "records.jsonl").symlink_to("/dev/full")
+    monkeypatch.setenv("TMPDIR", str(pytester.mkdir("spare")))
+    result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=2", "--sim-output=out")
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines(["*No space left on device*"])
+    (saved,) = (pytester.path / "spare").rglob("*.jsonl")
+    assert len(saved.read_text().splitlines()) == 2
+
+
+def test_interrupt_prints_the_table_and_keeps_the_records(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(TEST.replace("Falling()", "Falling(duration=200.0)"))
+    process = subprocess.Popen(
+        [sys.executable, "-m", "pytest", "--sim=mujoco", "--sim-output=out", "--reps=50"],
+        cwd=pytester.path,
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    path = pytester.path / "out" / "records.jsonl"
+    for _ in range(600):
+        if path.is_file() and len(path.read_text().splitlines()) >= 1:
+            break
+        time.sleep(0.1)
+    time.sleep(1.0)
+    children = psutil.Process(process.pid).children(recursive=True)
+    os.killpg(process.pid, signal.SIGINT)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == pytest.ExitCode.INTERRUPTED
+    assert "simulator comparison" in output
+    statuses = [r["status"] for r in records(pytester.path / "out")]
+    assert statuses[0] == "ok"
+    assert statuses[-1] == "interrupted"
+    _, alive = psutil.wait_procs(children, timeout=5)
+    assert not alive
+
+
+def test_plugin_load_is_light(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        """
+        import sys
+
+        def test_light():
+            heavy = {"numpy", "scipy", "psutil", "execnet", "pinocchio", "mujoco", "pybullet",
+                     "rich.console", "ruckig", "ompl", "matplotlib", "hypothesis.strategies"}
+            assert "pytest_simbench.plugin" in sys.modules
+            assert not heavy & set(sys.modules)
+        """
+    )
+    others = ("xdist", "xdist.looponfail", "benchmark", "hypothesispytest")
+    plugins = [part for name in others for part in ("-p", f"no:{name}")]
+    pytester.runpytest_subprocess(*plugins).assert_outcomes(passed=1)
+
+
+def test_sims_lists_and_exits(pytester: pytest.Pytester) -> None:
+    result = pytester.runpytest_subprocess("--sims")
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(["mujoco: MuJoCo (Apache-2.0)*", "*deviates: *", "pybullet: *"])
+
+
+def test_gui_without_any_display_is_a_skip(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytester.makepyfile(TEST)
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("PATH", str(pytester.mkdir("empty")))
+    result = pytester.runpytest_subprocess("--sim=mujoco", "--gui", "--reps=1", "-rs")
+    result.assert_outcomes(skipped=1)
+    result.stdout.fnmatch_lines(["*no display, and no Xvfb*"])
