@@ -1,0 +1,54 @@
+"""A simulator from another package runs both suites without a change in this one."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+ADAPTER = '''
+"""A third party's simulator: MuJoCo with a coarser step, under its own name."""
+
+from dataclasses import replace
+
+from pytest_simbench.sims.mujoco import MuJoCo, MuJoCoSettings
+
+
+class Elsewhere(MuJoCo):
+    info = replace(MuJoCo.info, name="elsewhere", title="Elsewhere")
+    profiles = {
+        "default": MuJoCoSettings(),
+        "tuned": replace(MuJoCo.profiles["tuned"], timestep=0.002, solref=(0.004, 1.0)),
+    }
+'''
+
+
+def test_third_party_simulator_runs_both_suites(
+    pytester: pytest.Pytester, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site = pytester.mkdir("site")
+    (site / "elsewhere_simbench.py").write_text(ADAPTER)
+    info = site / "elsewhere_simbench-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(
+        "Metadata-Version: 2.1\nName: elsewhere-simbench\nVersion: 1.0\n"
+    )
+    (info / "entry_points.txt").write_text(
+        "[pytest_simbench.simulators]\nelsewhere = elsewhere_simbench:Elsewhere\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(site), os.environ["PYTHONPATH"]]))
+    suites = Path(request.config.rootpath, "suites")
+    output = pytester.path / "out"
+    result = pytester.runpytest_subprocess(
+        str(suites), "--sim=elsewhere", "--protocol=smoke", f"--sim-output={output}"
+    )
+    result.assert_outcomes(passed=2)
+    kept = [json.loads(line) for line in (output / "records.jsonl").read_text().splitlines()]
+    assert [(r["simulator"], r["task"], r["status"]) for r in kept] == [
+        ("elsewhere", "stacking", "ok"),
+        ("elsewhere", "throwing", "ok"),
+    ]
+    assert [r["settings"]["timestep"] for r in kept] == [0.002, 0.002]
+    assert "elsewhere: Elsewhere" in pytester.runpytest_subprocess("--sims").stdout.str()

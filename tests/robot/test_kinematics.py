@@ -1,0 +1,68 @@
+"""Inverse kinematics inverts, and reaches everything the study needs."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pytest_simbench.robot.errors import Unreachable
+from pytest_simbench.robot.kinematics import (
+    inverse_kinematics,
+    straight_line,
+    tool_over,
+    top_down_grasps,
+)
+from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.robot.panda import panda
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.tasks.stacking import GRID, TABLE_TOP, TOWERS
+
+MODEL = RobotModel(panda())
+PLACES = [(x, y, TABLE_TOP + 0.025) for x, y in GRID] + [
+    (x, y, TABLE_TOP + 0.05 * (level + 0.5)) for (x, y), level in product(TOWERS, range(5))
+]
+
+
+@pytest.mark.parametrize("height", [0.0, 0.10], ids=["at", "above"])
+def test_every_pose_of_the_study_is_reachable(ready: FloatArray, height: float) -> None:
+    for place in PLACES:
+        for tool in top_down_grasps(Pose.at(*place).translated(z=height)):
+            q = inverse_kinematics(MODEL, tool, ready, np.random.default_rng(0))
+            assert np.allclose(MODEL.tool_pose(q).matrix(), tool.matrix(), atol=1e-5)
+
+
+@given(st.lists(st.floats(0.05, 0.95), min_size=7, max_size=7))
+@settings(max_examples=50, deadline=None)
+def test_forward_kinematics_inverts_it(shares: list[float]) -> None:
+    q = MODEL.lower + np.array(shares) * (MODEL.upper - MODEL.lower)
+    target = MODEL.tool_pose(q)
+    found = inverse_kinematics(MODEL, target, np.clip(q + 0.05, MODEL.lower, MODEL.upper))
+    assert np.allclose(MODEL.tool_pose(found).matrix(), target.matrix(), atol=1e-5)
+    assert (found >= MODEL.lower).all()
+    assert (found <= MODEL.upper).all()
+
+
+def test_out_of_reach_says_where(ready: FloatArray) -> None:
+    with pytest.raises(Unreachable, match=r"unreachable: tool at \(2.000, 0.000, 0.300\)"):
+        inverse_kinematics(MODEL, tool_over(Pose.at(2, 0, 0.3), 0.0), ready)
+
+
+def test_grasps_follow_the_yaw_of_a_cube_on_any_face() -> None:
+    flipped = Pose.at(0.4, 0.1, 0.3, yaw=0.3) * Pose(quaternion=(0.5**0.5, 0.5**0.5, 0, 0))
+    for cube in (Pose.at(0.4, 0.1, 0.3, yaw=0.3), flipped):
+        for tool in top_down_grasps(cube):
+            closing = tool.rotation()[:, 1]
+            assert np.abs(cube.rotation().T @ closing).max() == pytest.approx(1.0)
+            assert np.allclose(tool.rotation()[:, 2], [0, 0, -1])
+
+
+def test_a_straight_line_is_straight(ready: FloatArray) -> None:
+    above = inverse_kinematics(MODEL, tool_over(Pose.at(0.4, 0.1, 0.5), 0.2), ready)
+    path = straight_line(MODEL, above, tool_over(Pose.at(0.4, 0.1, 0.35), 0.2))
+    tips = np.array([MODEL.tool_pose(q).position for q in path])
+    assert np.allclose(tips[:, :2], [0.4, 0.1], atol=1e-5)
+    assert (np.diff(tips[:, 2]) < 0).all()
