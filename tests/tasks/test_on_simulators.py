@@ -1,0 +1,79 @@
+"""The tasks on the real engines: small versions that must succeed, and picks that cannot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import pytest
+
+from pytest_simbench.scene import Pose, Scene
+from pytest_simbench.session.case import Case
+from pytest_simbench.session.repetition import Repetition
+from pytest_simbench.tasks import Jitter, Stacking, Throwing
+from tests.conftest import ADAPTERS
+
+
+@pytest.fixture(params=ADAPTERS)
+def any_case(request: pytest.FixtureRequest, case: Case) -> Case:
+    name = request.param
+    return replace(case, simulator=name, adapter=ADAPTERS[name], test=f"t[{name}-headless]")
+
+
+def test_two_cubes_are_stacked(any_case: Case) -> None:
+    record, error = Repetition(any_case, Stacking().smoke(), 1).run()
+    assert error is None
+    assert record.metrics["at_end_strict"] == 1.0
+    assert record.metrics["untouched_moved"] == 0.0
+    assert record.seconds["total"] >= sum(
+        record.seconds[name] for name in ("launch", "load", "plan", "step")
+    )
+
+
+def test_the_throw_hits(any_case: Case) -> None:
+    record, error = Repetition(any_case, Throwing().smoke(), 1).run()
+    assert error is None
+    assert record.metrics["hit"] == 1.0
+    assert record.metrics["lost_in_transit"] == 0.0
+    assert record.metrics["landing_error"] is not None
+    assert record.metrics["landing_error"] < 0.03
+
+
+def test_the_same_seed_gives_the_same_outcome(any_case: Case) -> None:
+    first, second = (Repetition(any_case, Throwing().smoke(), 2).run()[0] for _ in range(2))
+    assert first.metrics == second.metrics
+    assert first.details["projectile_end"] == second.details["projectile_end"]
+
+
+@dataclass(frozen=True)
+class FarAway(Stacking):
+    """Half of the cubes lie where the arm cannot reach them."""
+
+    def scene(self, seed: int, jitter: Jitter) -> Scene:
+        scene = super().scene(seed, jitter)
+        for k in range(1, 21, 2):
+            scene = scene.with_pose(f"cube_{k:02d}", Pose.at(-2.0, 0.2 * k, 0.025))
+        return scene
+
+
+def test_unreachable_cubes_are_counted_and_the_task_goes_on(case: Case) -> None:
+    record, error = Repetition(case, FarAway(towers=1, levels=3, settle=0.5), 3).run()
+    assert error is None
+    failed = record.details["failed_picks"]
+    assert record.metrics["failed_picks"] == len(failed) >= 1
+    assert all(pick["reason"].startswith("unreachable: tool at (-2.000") for pick in failed)
+    assert record.metrics["at_end_strict"] == 1.0
+
+
+@pytest.mark.parametrize("name", ADAPTERS)
+def test_with_a_window_the_outcome_is_the_same(case: Case, name: str) -> None:
+    display = pytest.importorskip("pyvirtualdisplay.display")
+    headless = replace(case, simulator=name, adapter=ADAPTERS[name])
+    with display.Display(visible=False, size=(1280, 960), manage_global_env=False) as virtual:
+        environment = {"DISPLAY": f":{virtual.display}"}
+        gui = replace(headless, mode="gui", environment=environment)
+        throw = Throwing(settle=1.0)
+        with_window, error = Repetition(gui, throw, 1).run()
+    assert error is None
+    without, _ = Repetition(headless, throw, 1).run()
+    assert with_window.metrics == without.metrics
+    assert with_window.details["projectile_end"] == without.details["projectile_end"]
