@@ -93,6 +93,7 @@ class MuJoCo(Simulator):
             Deviation("", "contacts are soft by design: cubes sink in and creep a little"),
         ),
         install_size_mb=60,
+        environment={"MUJOCO_GL": "egl"},
     )
     profiles: ClassVar[Mapping[str, Settings]] = {
         "default": MuJoCoSettings(),
@@ -160,6 +161,8 @@ class MuJoCo(Simulator):
         option.impratio = s.impratio
         option.noslip_iterations = s.noslip_iterations
         option.gravity = scene.gravity
+        # On a state that is not finite MuJoCo would start over from its initial state, silently.
+        option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1080
 
     def _set_surface(self, geom: Any, friction: float, group: int, touches: int) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 from fnmatch import fnmatchcase
 
@@ -53,6 +54,7 @@ class SimulatorInfo:
         deviations: what it cannot express of a scene.
         costly_start: starting is so costly (kernels to compile) that one worker serves several
             repetitions, with a checked reset in between.
+        environment: variables to be set before a headless engine is imported, unless the user did.
         install_size_mb: download and unpacked size on disk, rounded [MB].
     """
 
@@ -68,6 +70,7 @@ class SimulatorInfo:
     deviations: tuple[Deviation, ...] = ()
     costly_start: bool = False
     install_size_mb: int | None = None
+    environment: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def modes(self) -> tuple[str, ...]:

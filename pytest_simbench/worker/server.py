@@ -80,6 +80,9 @@ class Server:
         """Import the adapter (`module:Class`) and give it its settings."""
         module, _, name = adapter.partition(":")
         cls: type[Simulator] = getattr(importlib.import_module(module), name)
+        if not gui:
+            for variable, value in cls.info.environment.items():
+                os.environ.setdefault(variable, value)
         for engine_module in cls.info.modules:
             importlib.import_module(engine_module)
         settings = changed(cls.profiles[profile], changes, cls.info.name)

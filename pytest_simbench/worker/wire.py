@@ -10,7 +10,7 @@ import numpy as np
 def pack(value: Any) -> Any:
     """Plain data from nested data with arrays, numpy scalars and tuples in it."""
     if isinstance(value, np.ndarray):
-        array = np.ascontiguousarray(value)
+        array = np.asarray(value, order="C")
         return {"__array__": [array.dtype.str, list(array.shape), array.tobytes()]}
     if isinstance(value, np.generic):
         return value.item()

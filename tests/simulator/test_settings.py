@@ -1,0 +1,51 @@
+"""Settings: profiles, conversions, and errors that list what is valid."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pytest_simbench.sims.mujoco import MuJoCo, MuJoCoSettings
+
+from pytest_simbench.simulator import SettingsError
+from pytest_simbench.simulator.settings import changed, profile
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "value"),
+    [
+        ("timestep", "0.004", 0.004),
+        ("noslip_iterations", "5", 5),
+        ("cone", "elliptic", "elliptic"),
+        ("condim", "4", 4),
+        ("solref", "0.01/1", (0.01, 1.0)),
+        ("solref", (0.01, 1), (0.01, 1.0)),
+    ],
+)
+def test_texts_become_values(name: str, text: Any, value: Any) -> None:
+    assert getattr(changed(MuJoCoSettings(), {name: text}, "mujoco"), name) == value
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"speed": 1}, "mujoco has no setting 'speed'; choose from .*timestep=0.002"),
+        ({"cone": "round"}, "mujoco.cone=round: choose from pyramidal, elliptic"),
+        ({"solref": "1"}, "mujoco.solref=1: give 2 numbers, separated by '/'"),
+        ({"timestep": "fast"}, "mujoco.timestep='fast' is not a valid float"),
+        ({"timestep": -1}, "mujoco.timestep must be positive, not -1.0"),
+    ],
+)
+def test_bad_changes(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(SettingsError, match=message):
+        changed(MuJoCoSettings(), changes, "mujoco")
+
+
+def test_unknown_profile() -> None:
+    with pytest.raises(SettingsError, match="mujoco has no settings profile 'best'; .* tuned"):
+        profile(MuJoCo.profiles, "best", "mujoco")
+
+
+def test_settings_travel_and_come_back() -> None:
+    tuned = MuJoCo.profiles["tuned"]
+    assert changed(MuJoCoSettings(), tuned.to_wire(), "mujoco") == tuned
