@@ -2,8 +2,8 @@
 
     python benchmarks/stepping.py mujoco pybullet
 
-Each pair of runs is made in two fresh processes, in turn. `clock` compares the worker's own clock of
-stepping with the bare loop; `all` compares the whole request: messages, log check, bookkeeping.
+Each pair of runs is made in two fresh processes, in turn. `clock` compares the worker's own clock
+of stepping with the bare loop; `all` compares the whole request: messages, log check, bookkeeping.
 """
 
 from __future__ import annotations
