@@ -13,6 +13,7 @@ from pytest_simbench.plugin import run, selection
 
 if TYPE_CHECKING:
     from pytest_simbench.client.world import World
+    from pytest_simbench.measure.resources import ResourceSampler
     from pytest_simbench.measure.results import ResultSet
     from pytest_simbench.scene import Scene
     from pytest_simbench.session.case import Case
@@ -68,37 +69,50 @@ def output_path(request: pytest.FixtureRequest) -> Path:
     return folder
 
 
+def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: Any) -> Case:
+    """What the options say of a simulator's repetitions."""
+    from pytest_simbench.session.case import Case
+    from pytest_simbench.session.protocol import PROTOCOLS
+    from pytest_simbench.simulator.registry import registered
+
+    name, mode = sim_case
+    chosen, this = selection(config), run(config)
+    settings = more.pop("settings", {})
+    return Case(
+        test=test,
+        simulator=name,
+        mode=mode,
+        profile=chosen.profile,
+        adapter=registered()[name].value,
+        folder=this.folder,
+        changes={**settings, **chosen.changes.get(name, {})},
+        python=chosen.pythons.get(name),
+        spec=chosen.specs.get(name),
+        environment=this.displays.environment() if mode == "gui" else {},
+        protocol=PROTOCOLS[options.value(config, "protocol")],
+        stall_timeout=options.value(config, "sim_stall_timeout"),
+        memory_limit=options.value(config, "sim_memory_limit"),
+        seed=options.value(config, "sim_seed"),
+        jitter=options.value(config, "jitter"),
+        trace=options.value(config, "sim_trace"),
+        **more,
+    )
+
+
 @pytest.fixture
 def simbench_case(
     request: pytest.FixtureRequest, sim_case: tuple[str, str], sim_settings: dict[str, Any]
 ) -> Case:
     """Everything that the repetitions of this test have in common."""
     from pytest_simbench.selection import number_mark
-    from pytest_simbench.session.case import Case
-    from pytest_simbench.session.protocol import PROTOCOLS
-    from pytest_simbench.simulator.registry import registered
 
-    config, (name, mode) = request.config, sim_case
-    chosen, this = selection(config), run(config)
-    given = options.value(config, "sim_timeout")
-    return Case(
-        test=request.node.nodeid,
-        simulator=name,
-        mode=mode,
-        profile=chosen.profile,
-        adapter=registered()[name].value,
-        folder=this.folder,
-        changes={**sim_settings, **chosen.changes.get(name, {})},
-        python=chosen.pythons.get(name),
-        spec=chosen.specs.get(name),
-        environment=this.displays.environment() if mode == "gui" else {},
-        protocol=PROTOCOLS[options.value(config, "protocol")],
+    given = options.value(request.config, "sim_timeout")
+    return _case(
+        request.config,
+        sim_case,
+        request.node.nodeid,
+        settings=sim_settings,
         timeout=given if given is not None else number_mark(request.node, "sim_timeout"),
-        stall_timeout=options.value(config, "sim_stall_timeout"),
-        memory_limit=options.value(config, "sim_memory_limit"),
-        seed=options.value(config, "sim_seed"),
-        jitter=options.value(config, "jitter"),
-        trace=options.value(config, "sim_trace"),
     )
 
 
@@ -167,18 +181,46 @@ def threshold(request: pytest.FixtureRequest) -> Callable[[str, float], float]:
     return lambda metric, default: float(given.get(metric, default))
 
 
-@pytest.fixture
-def simulator(simbench_case: Case) -> Iterator[SimulatorHandle]:
-    """Handle of the simulator, safe under Hypothesis: `with simulator.episode(scene) as world`."""
+@pytest.fixture(scope="session")
+def simulator(
+    request: pytest.FixtureRequest, sim_case: tuple[str, str]
+) -> Iterator[SimulatorHandle]:
+    """Handle of the simulator: `with simulator.episode(scene) as world`.
+
+    One for the whole session, so that every example of Hypothesis may use it; the `sim_settings`
+    of a test do not reach it.
+    """
     from pytest_simbench.session.handle import SimulatorHandle
 
-    handle = SimulatorHandle(simbench_case)
+    handle = SimulatorHandle(_case(request.config, sim_case, "simulator"))
     yield handle
     handle.close()
 
 
 @pytest.fixture
-def sim(simulator: SimulatorHandle) -> Iterator[Callable[[Scene], World]]:
+def sim(simbench_case: Case) -> Iterator[Callable[[Scene], World]]:
     """Loads a scene into a fresh world of the simulator: `world = sim(scene)`."""
-    with simulator.episodes() as start:
+    from pytest_simbench.session.handle import SimulatorHandle
+
+    handle = SimulatorHandle(simbench_case)
+    with handle.episodes() as start:
         yield start
+    handle.close()
+
+
+@pytest.fixture
+def resources() -> Iterator[Callable[[World], ResourceSampler]]:
+    """Samples CPU and memory of a world's worker: `use = resources(world)`, later `use.stop()`."""
+    from pytest_simbench.measure.resources import ResourceSampler
+
+    started: list[ResourceSampler] = []
+
+    def sample(world: World) -> ResourceSampler:
+        if world.process.pid is None:
+            raise ValueError("the worker has no process on this machine to sample")
+        started.append(ResourceSampler(world.process.pid))
+        return started[-1]
+
+    yield sample
+    for sampler in started:
+        sampler.stop()
