@@ -52,6 +52,8 @@ def main(channel: Any) -> None:
     if config["log"]:
         redirect_output(config["log"])
     sys.path[:] = [entry for entry in sys.path if entry not in ("", os.getcwd())]
+    if config["folder"]:
+        os.chdir(config["folder"])  # engines leave logs and caches where they run
     sys.meta_path.insert(0, PackageFinder(config["packages"]))
 
     from pytest_simbench.worker.server import serve

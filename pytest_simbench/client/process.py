@@ -103,7 +103,7 @@ class WorkerProcess:
             try:
                 gateway = self._group.makegateway(self._spec())
                 channel = gateway.remote_exec(bootstrap)
-                channel.send({"log": str(self.launch.log or ""), "packages": self._packages()})
+                channel.send(self._configuration())
                 made.append((gateway, channel))
             except BaseException as error:
                 failed.append(error)
@@ -115,6 +115,9 @@ class WorkerProcess:
         if made:
             return made[0]  # type: ignore[no-any-return]
         self._kill_tree()
+        if self._process is not None:
+            with contextlib.suppress(psutil.Error):
+                self._process.wait(1.0)
         interpreter = self.launch.spec or self.launch.python or "this interpreter"
         if failed:
             reason = f"{type(failed[0]).__name__}: {failed[0]}"
@@ -137,6 +140,14 @@ class WorkerProcess:
         command.append(self.launch.python or sys.executable)
         return f"popen//execmodel=main_thread_only//python={shlex.join(command)}"
 
+    def _configuration(self) -> dict[str, Any]:
+        log = self.launch.log
+        return {
+            "log": str(log or ""),
+            "folder": str(log.parent.absolute()) if log and log.parent != Path("/dev") else "",
+            "packages": self._packages(),
+        }
+
     def _packages(self) -> dict[str, str]:
         """Where the packages that the worker needs lie: this one, the adapters, a third party's."""
         if self.launch.spec and not self.launch.spec.startswith("popen"):
@@ -147,9 +158,11 @@ class WorkerProcess:
         return {name: s.origin for name, s in specs.items() if s is not None and s.origin}
 
     def _find_process(self) -> psutil.Process | None:
+        # Until `env` has become the interpreter, the token stands in its arguments.
+        argument = f"{TOKEN}={self._token}"
         for child in psutil.Process().children(recursive=True):
             with contextlib.suppress(psutil.Error):
-                if child.environ().get(TOKEN) == self._token:
+                if child.environ().get(TOKEN) == self._token or argument in child.cmdline():
                     return child
         return None
 
