@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from importlib.util import find_spec
+from math import inf
 from typing import Any
 
 import pytest
@@ -180,6 +181,11 @@ def _marks(node: Any, name: str, mode: str, selection: Selection) -> list[pytest
         if name in _names(mark, node):
             marks.append(pytest.mark.xfail(reason=mark.kwargs.get("reason", "")))
     for mark in node.iter_markers("needs"):
+        _check_keywords(mark, node)
+        if not mark.args:
+            raise pytest.UsageError(
+                f"{node.nodeid}: needs() without a capability: choose from {', '.join(Capability)}"
+            )
         for capability in mark.args:
             if capability not in list(Capability):
                 raise pytest.UsageError(
@@ -193,13 +199,30 @@ def _marks(node: Any, name: str, mode: str, selection: Selection) -> list[pytest
 def _names(mark: pytest.Mark, node: Any) -> list[str]:
     from pytest_simbench.simulator.registry import UnknownSimulatorError, check_names
 
+    _check_keywords(mark, node)
     if not mark.args:
         raise pytest.UsageError(f"{node.nodeid}: {mark.name} needs the name of a simulator")
     try:
-        check_names(mark.args)
+        check_names(map(str, mark.args))
     except UnknownSimulatorError as error:
         raise pytest.UsageError(f"{node.nodeid}: {mark.name}: {error}") from None
     return list(mark.args)
+
+
+KEYWORDS = {"skip_sim": ("reason",), "xfail_sim": ("reason",)}
+"""Keyword arguments of the marks that take any."""
+
+
+def _check_keywords(mark: pytest.Mark, node: Any) -> None:
+    valid = KEYWORDS.get(mark.name, ())
+    for key, value in mark.kwargs.items():
+        if key not in valid:
+            allowed = f"it takes {', '.join(valid)}" if valid else "it takes none"
+            raise pytest.UsageError(
+                f"{node.nodeid}: {mark.name} has no keyword argument {key!r}; {allowed}"
+            )
+        if not isinstance(value, str):
+            raise pytest.UsageError(f"{node.nodeid}: {mark.name}: {key} must be a text")
 
 
 def number_mark(node: Any, name: str) -> Any:
@@ -211,7 +234,16 @@ def number_mark(node: Any, name: str) -> Any:
     mark = node.get_closest_marker(name)
     if mark is None:
         return None
+    _check_keywords(mark, node)
+    if len(mark.args) > 1:
+        raise pytest.UsageError(f"{node.nodeid}: {name}{mark.args!r}: give one number")
     number = mark.args[0] if mark.args else None
-    if not isinstance(number, int | float) or isinstance(number, bool) or number <= 0:
-        raise pytest.UsageError(f"{node.nodeid}: {name}({number!r}): give a positive number")
+    whole = name == "reps"
+    if (
+        isinstance(number, bool)
+        or not isinstance(number, int if whole else int | float)
+        or not 0 < number < inf
+    ):
+        noun = "positive whole number" if whole else "positive number"
+        raise pytest.UsageError(f"{node.nodeid}: {name}({number!r}): give a {noun}")
     return number

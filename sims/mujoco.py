@@ -292,10 +292,10 @@ class MuJoCo(Simulator):
             self._viewer.sync()
 
     def close(self) -> None:
-        if self._renderer is not None:
-            self._renderer.close()
-        if self._viewer is not None:
-            self._viewer.close()
+        for name in ("_renderer", "_viewer"):
+            opened = getattr(self, name, None)  # not even None, when loading failed before
+            if opened is not None:
+                opened.close()
 
 
 _INTEGRATORS = {

@@ -24,6 +24,7 @@ What was learnt (3.2.7, tuned settings but for the one named):
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -128,6 +129,7 @@ class PyBullet(Simulator):
     def load(self, scene: Scene) -> None:
         self.scene = scene
         self._steps = 0
+        self._commanded: tuple[FloatArray, ...] | None = None
         s = self.settings
         options = "--width=1024 --height=768" if self.gui else ""
         self.client = c = pybullet.connect(
@@ -181,7 +183,7 @@ class PyBullet(Simulator):
         pybullet.changeDynamics(
             body,
             link,
-            lateralFriction=friction,
+            lateralFriction=math.sqrt(friction),  # of a pair, Bullet takes the product
             spinningFriction=s.spinning_friction,
             rollingFriction=0.0,
             restitution=0.0,
@@ -256,14 +258,14 @@ class PyBullet(Simulator):
         reported: dict[str, Any] = {
             "gravity": [engine[f"gravityAcceleration{axis}"] for axis in "XYZ"],
             "timestep": engine["fixedTimeStep"],
-            "ground/friction": ground[1],
+            "ground/friction": ground[1] ** 2,
             "ground/height": place[2],
         }
         for name, body in self._bodies.items():
             dynamics = pybullet.getDynamicsInfo(body, -1, physicsClientId=c)
             shape = pybullet.getCollisionShapeData(body, -1, physicsClientId=c)[0]
             reported[f"body/{name}/size"] = shape[3]
-            reported[f"body/{name}/friction"] = dynamics[1]
+            reported[f"body/{name}/friction"] = dynamics[1] ** 2
             position, (x, y, z, w) = pybullet.getBasePositionAndOrientation(body, physicsClientId=c)
             reported[f"body/{name}/pose"] = [*position, w, x, y, z]
             if dynamics[0] > 0:
@@ -288,9 +290,10 @@ class PyBullet(Simulator):
             )
             reported[f"link/{link.name}/mass"] = dynamics[0]
             reported[f"link/{link.name}/inertia"] = np.sort(dynamics[2])
-            reported[f"link/{link.name}/friction"] = dynamics[1]
+            reported[f"link/{link.name}/friction"] = dynamics[1] ** 2
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        self._commanded = (position, velocity, effort)
         pybullet.setJointMotorControlArray(
             self._robot,
             self._joints,
@@ -325,12 +328,14 @@ class PyBullet(Simulator):
         states = pybullet.getJointStates(self._robot, self._joints, physicsClientId=self.client)
         return np.array([[state[0] for state in states], [state[1] for state in states]])
 
-    def save(self) -> tuple[int, int]:
-        return pybullet.saveState(physicsClientId=self.client), self._steps
+    def save(self) -> tuple[int, int, tuple[FloatArray, ...] | None]:
+        return pybullet.saveState(physicsClientId=self.client), self._steps, self._commanded
 
-    def restore(self, state: tuple[int, int]) -> None:
+    def restore(self, state: tuple[int, int, tuple[FloatArray, ...] | None]) -> None:
         pybullet.restoreState(stateId=state[0], physicsClientId=self.client)
-        self._steps = state[1]
+        self._steps, commanded = state[1], state[2]
+        if commanded is not None:  # motor targets are not part of Bullet's state
+            self.command(*commanded)
 
     def contact_count(self) -> int:
         return len(pybullet.getContactPoints(physicsClientId=self.client) or ())
@@ -350,5 +355,6 @@ class PyBullet(Simulator):
         return pixels[:, :, :3].copy()
 
     def close(self) -> None:
-        if pybullet.isConnected(self.client):
-            pybullet.disconnect(self.client)
+        client = getattr(self, "client", None)  # none, when loading failed before
+        if client is not None and pybullet.isConnected(client):
+            pybullet.disconnect(client)

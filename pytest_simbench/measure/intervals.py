@@ -118,7 +118,8 @@ def expanded_level(confidence: float, n: int) -> float:
     """Confidence level at which a bootstrap of `n` values is as wide as Student's t interval.
 
     alpha' / 2 = Phi(-sqrt(n / (n - 1)) t(1 - alpha / 2, n - 1)): Hesterberg 2015, What teachers
-    should know about the bootstrap, The American Statistician 69 (4), section 3.3.
+    should know about the bootstrap, The American Statistician 69 (4), the expanded percentile
+    interval.
     """
     from scipy.stats import norm, t
 
@@ -196,7 +197,7 @@ def interval(
             return Interval(
                 found.mean, found.low, found.high, found.n, "wilson", bool(equal), confidence
             )
-    return bootstrap(sample, np.mean, confidence)
+    return bootstrap(sample, np.mean, confidence, RESAMPLES)
 
 
 def interquartile_mean(values: ArrayLike, axis: int = -1) -> Any:

@@ -75,6 +75,8 @@ class Repeater:
             on_count=lambda done, total: progress.count(done, total, "cubes"),
         )
         self._active.add(repetition)
+        if self._stopping.is_set():  # this thread took it up just before it could be cancelled
+            repetition.kill()
         progress.repetition(number, repetition.seed)
         record, error = repetition.run()
         self._active.discard(repetition)

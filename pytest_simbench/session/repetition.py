@@ -55,6 +55,7 @@ class Repetition:
         self.stopwatch = Stopwatch()
         self._on_phase = on_phase
         self._on_count = on_count
+        self._killed = False
         self._process: WorkerProcess | None = None
         self._sampler: ResourceSampler | None = None
         self._world: World | None = None
@@ -64,6 +65,7 @@ class Repetition:
 
     def kill(self) -> None:
         """End the worker at once; `run` then returns the record of a failure."""
+        self._killed = True  # before the look at the process: it may just be starting
         if self._process is not None:
             self._process.kill()
 
@@ -86,6 +88,8 @@ class Repetition:
         self._enter("launch")
         with self.stopwatch.measuring("launch"):
             process = self._process = self._launch()
+            if self._killed:
+                process.kill()
             process.deadline = deadline
             self._sample(process)
             if case.protocol.before:

@@ -100,7 +100,10 @@ class Simulator(ABC):
         """Show the present state in the window; called about 30 times a second in GUI mode."""
 
     def close(self) -> None:  # noqa: B027 - there may be nothing to release
-        """Release the engine's resources; the process ends right after."""
+        """Release the engine's resources, also when `load` failed or was never called.
+
+        The process ends right after, or constructs the next simulator.
+        """
 
     def versions(self) -> dict[str, str]:
         """Versions of the packages that the results depend on."""

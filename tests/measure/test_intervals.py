@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.stats import binom
+from scipy.stats import binom, norm, t
 
 from pytest_simbench.measure.intervals import (
     Interval,
@@ -99,11 +99,13 @@ def test_the_interval_of_a_mean_covers_the_truth(
     assert held / 400 >= least - 2 * (least * (1 - least) / 400) ** 0.5
 
 
-def test_the_level_is_expanded_as_published() -> None:
-    """Hesterberg 2015, table 4: alpha / 2 = 0.025 becomes 0.0010 at n = 5 and 0.0159 at n = 20."""
-    assert (1 - expanded_level(0.95, 5)) / 2 == pytest.approx(0.0010, abs=5e-5)
-    assert (1 - expanded_level(0.95, 20)) / 2 == pytest.approx(0.0159, abs=5e-5)
-    assert expanded_level(0.95, 10_000) == pytest.approx(0.95, abs=1e-4)
+@given(st.lists(st.floats(-100, 100), min_size=3, max_size=30), st.floats(0.5, 0.99))
+def test_the_expanded_level_is_as_wide_as_students_t(values: list[float], level: float) -> None:
+    """The spread of bootstrap means is std / sqrt(n) with ddof 0; Student's interval has ddof 1."""
+    n = len(values)
+    student = t.ppf((1 + level) / 2, n - 1) * np.std(values, ddof=1) / n**0.5
+    normal = norm.ppf((1 + expanded_level(level, n)) / 2) * np.std(values) / n**0.5
+    assert normal == pytest.approx(student, rel=1e-3)
 
 
 def test_the_interval_of_the_interquartile_mean_covers_the_truth() -> None:

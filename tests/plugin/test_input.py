@@ -46,9 +46,17 @@ def test_bad_option(pytester: pytest.Pytester, arguments: list[str], message: st
     [
         ("only_sim('mujocco')", "unknown simulator 'mujocco'; choose from *mujoco, pybullet*"),
         ("skip_sim()", "skip_sim needs the name of a simulator"),
+        ("skip_sim(['mujoco'])", "unknown simulator \"['mujoco']\"; choose from"),
+        ("skip_sim('mujoco', reson='x')", "skip_sim has no keyword argument 'reson'; *reason"),
+        ("only_sim('mujoco', strict=1)", "only_sim has no keyword argument 'strict'; *none"),
+        ("xfail_sim('mujoco', reason=3)", "xfail_sim: reason must be a text"),
         ("needs('wings')", "needs('wings'): choose from *window*offscreen*"),
-        ("reps(0)", "reps(0): give a positive number"),
+        ("needs()", "needs() without a capability: choose from *window*offscreen*"),
+        ("reps(0)", "reps(0): give a positive whole number"),
+        ("reps(1.5)", "reps(1.5): give a positive whole number"),
+        ("reps(2, 3)", "reps(2, 3): give one number"),
         ("sim_timeout('long')", "sim_timeout('long'): give a positive number"),
+        ("sim_timeout(float('nan'))", "sim_timeout(nan): give a positive number"),
     ],
 )
 def test_bad_mark(pytester: pytest.Pytester, mark: str, message: str) -> None:

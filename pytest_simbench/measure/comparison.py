@@ -1,0 +1,208 @@
+"""Do two simulators, modes or runs differ, or do they agree? Tests on their repetitions.
+
+Where the two sides share their seeds (same cube order, same jitter) their values are paired, which
+removes what the seeds have in common. The default test is a permutation test of the difference of
+means: it asks what the tables show, needs no distribution, and bears ties. Wilcoxon's and
+Brunner and Munzel's tests are there for ordinal questions ("is the one usually larger?").
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pytest_simbench.measure.intervals import CONFIDENCE, SEED
+
+ALPHA = 1 - CONFIDENCE
+"""Probability of a false alarm of every test, unless said otherwise."""
+
+PERMUTATIONS = 9999
+"""Random permutations where not all are tried; p is then exact to about 0.002 at 0.05."""
+
+Alternative = Literal["two-sided", "less", "greater"]
+FloatArray = NDArray[np.float64]
+Method = Literal["permutation", "wilcoxon", "brunner-munzel"]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The difference second minus first of two means, and how likely it is by chance.
+
+    Attributes:
+        first, second: the means.
+        p_value: probability of such a difference (in the direction asked for) without a true one.
+        test: the name of the test.
+        paired: whether values of the same seed were paired.
+        n: repetitions on each side, or pairs.
+    """
+
+    first: float
+    second: float
+    p_value: float
+    test: str
+    paired: bool
+    n: tuple[int, int]
+
+    @property
+    def difference(self) -> float:
+        return self.second - self.first
+
+    def significant(self, alpha: float = ALPHA) -> bool:
+        return self.p_value <= alpha
+
+
+def pair(first: Mapping[int, float], second: Mapping[int, float]) -> tuple[FloatArray, FloatArray]:
+    """The values of two sets by seed, for the seeds that both have, in the order of the seeds."""
+    seeds = sorted(first.keys() & second.keys())
+    return (
+        np.array([first[seed] for seed in seeds], dtype=float),
+        np.array([second[seed] for seed in seeds], dtype=float),
+    )
+
+
+def compare(
+    first: ArrayLike,
+    second: ArrayLike,
+    *,
+    paired: bool = False,
+    alternative: Alternative = "two-sided",
+    method: Method | None = None,
+) -> Comparison:
+    """Test whether `second` differs from `first` (is `less`, is `greater`).
+
+    Args:
+        first, second: values (n,) and (m,); pairs in order where paired.
+        paired: whether they share their seeds.
+        alternative: the direction of the difference second - first.
+        method: `permutation` (default); `wilcoxon` for pairs, `brunner-munzel` for others.
+
+    Raises:
+        ValueError: an empty side, pairs of different numbers, or a method that does not fit.
+    """
+    from scipy import stats
+
+    a, b = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
+    if not a.size or not b.size:
+        raise ValueError("nothing to compare: a side has no repetitions")
+    if paired and a.size != b.size:
+        raise ValueError(f"pairs need as many values on each side, not {a.size} and {b.size}")
+    if method == "wilcoxon" and not paired:
+        raise ValueError("Wilcoxon's test is for pairs; use brunner-munzel or permutation")
+    if method == "brunner-munzel" and paired:
+        raise ValueError("Brunner and Munzel's test is not for pairs; use wilcoxon or permutation")
+
+    p = math.nan
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of few or equal values: answered by the nan below
+        if method == "wilcoxon":
+            p = float(stats.wilcoxon(b - a, alternative=alternative).pvalue)
+        elif method == "brunner-munzel":
+            p = float(stats.brunnermunzel(b, a, alternative=alternative).pvalue)
+    if math.isnan(p):  # a rank test has no answer where nothing varies
+        p = _permutation(a, b, paired, alternative)
+    return Comparison(
+        float(a.mean()),
+        float(b.mean()),
+        p,
+        method or "permutation",
+        paired,
+        (a.size, b.size),
+    )
+
+
+def _permutation(a: FloatArray, b: FloatArray, paired: bool, alternative: Alternative) -> float:
+    from scipy import stats
+
+    found = stats.permutation_test(
+        (b, a),
+        _mean_difference,
+        permutation_type="samples" if paired else "independent",
+        vectorized=True,
+        n_resamples=PERMUTATIONS,
+        alternative=alternative,
+        rng=np.random.default_rng(SEED),
+    )
+    return float(found.pvalue)
+
+
+def _mean_difference(second: Any, first: Any, axis: int = -1) -> Any:
+    return np.mean(second, axis=axis) - np.mean(first, axis=axis)
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """Holm's adjusted p values, in the same order: none of many comparisons alarms falsely.
+
+    Compare each with alpha; the chance of one or more false alarms among all is then at most alpha
+    (Holm 1979, A simple sequentially rejective multiple test procedure). scipy has only the
+    correction of the false-discovery rate.
+    """
+    adjusted = [0.0] * len(p_values)
+    largest = 0.0
+    for rank, index in enumerate(sorted(range(len(p_values)), key=lambda k: p_values[k])):
+        largest = max(largest, min(1.0, (len(p_values) - rank) * p_values[index]))
+        adjusted[index] = largest
+    return adjusted
+
+
+@dataclass(frozen=True)
+class Equivalence:
+    """Whether two means differ by less than a margin, by two one-sided tests.
+
+    Attributes:
+        difference: of the means, second - first.
+        margin: the largest difference that does not matter; same unit.
+        p_value: the larger of the two tests'.
+    """
+
+    difference: float
+    margin: float
+    p_value: float
+
+    def equivalent(self, alpha: float = ALPHA) -> bool:
+        return self.p_value <= alpha
+
+
+def equivalence(
+    first: ArrayLike, second: ArrayLike, margin: float, *, paired: bool = False
+) -> Equivalence:
+    """Two one-sided t tests (TOST): "headless and GUI do not differ by more than `margin`".
+
+    Not significantly different is not the same as equivalent: few repetitions show neither.
+
+    Args:
+        first, second: values (n,) and (m,), at least two each; pairs in order where paired.
+        margin: above 0.
+        paired: whether they share their seeds.
+
+    Raises:
+        ValueError: fewer than two values on a side, unequal pairs, or a margin that is not above 0.
+    """
+    from scipy import stats
+
+    a, b = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
+    if margin <= 0:
+        raise ValueError(f"the margin of an equivalence must be above 0, not {margin:g}")
+    if a.size < 2 or b.size < 2 or (paired and a.size != b.size):
+        raise ValueError(f"equivalence needs two or more values a side, not {a.size} and {b.size}")
+    difference = float(b.mean() - a.mean())
+    spread = np.ptp(b - a) if paired else max(np.ptp(a), np.ptp(b))
+    if spread <= 1e-12 * max(1.0, float(np.abs(a).max())):
+        return Equivalence(difference, margin, 0.0 if abs(difference) < margin else 1.0)
+    worst = 0.0
+    sides: tuple[tuple[FloatArray, Alternative], ...] = (
+        (b + margin, "greater"),
+        (b - margin, "less"),
+    )
+    for shifted, alternative in sides:
+        if paired:
+            p = stats.ttest_rel(shifted, a, alternative=alternative).pvalue
+        else:
+            p = stats.ttest_ind(shifted, a, equal_var=False, alternative=alternative).pvalue
+        worst = max(worst, float(p))
+    return Equivalence(difference, margin, worst)

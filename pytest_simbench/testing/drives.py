@@ -1,0 +1,173 @@
+"""Checks of the joint drives on the Panda: law in `scene.Joint`, Pinocchio as the reference."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Scene, Trajectory
+from pytest_simbench.simulator import Deviation
+from pytest_simbench.testing import scenes
+from pytest_simbench.testing.checks import check
+from pytest_simbench.testing.subject import Subject, logged, require, require_close
+
+ARM_TICK = 0.004
+"""Control tick of the set points [s], as in the tasks."""
+
+
+def _model(robot: Robot) -> Any:
+    from pytest_simbench.robot.model import RobotModel
+
+    return RobotModel(robot)
+
+
+def _gravity_effort(robot: Robot, q: FloatArray) -> FloatArray:
+    zero = np.zeros((1, len(q)))
+    gravity = np.array(STANDARD_GRAVITY)
+    return np.asarray(_model(robot).inverse_dynamics(gravity, q[None], zero, zero)[0])
+
+
+@check()
+def static_hold(subject: Subject) -> None:
+    """Without feed-forward a spring sags: k (q* - q) equals the gravity torque of the model, per
+    arm joint within 3 % of the largest one. A drive that is no spring (declared deviation of
+    the stiffness) must instead hold within 5 mrad."""
+    robot = scenes.arm()
+    start = robot.column("initial_position")
+    with subject.world(scenes.arm_alone(robot)) as world:
+        world.wait(2.0)
+        q = world.joints[0]
+    if any(d.excuses(f"joint/{robot.joints[0].name}/stiffness") for d in _deviations(subject)):
+        require_close("sag under gravity", float(np.abs(start - q)[:7].max()), 0, 5e-3, "rad")
+        return
+    held = (robot.column("stiffness") * (start - q))[:7]
+    law = _gravity_effort(robot, q)[:7]
+    tolerance = 0.03 * float(np.abs(law).max())
+    for joint, value, expected in zip(robot.joints, held, law, strict=False):
+        require_close(f"holding torque of {joint.name}", value, expected, tolerance, "N m")
+
+
+def _deviations(subject: Subject) -> tuple[Deviation, ...]:
+    return subject.cls.info.deviations
+
+
+@check()
+def tracks_trajectory(subject: Subject) -> None:
+    """With feed-forward the arm follows a smooth trajectory (quintic, 0.4 rad in 1.5 s): at most
+    two steps late plus 2 mrad, at any joint and time."""
+    robot = scenes.arm()
+    start = robot.column("initial_position")
+    goal = start + np.array([0.4, -0.3, 0.3, 0.4, -0.3, 0.3, 0.4, -0.01, -0.01])
+    time = np.arange(0.0, 1.5 + ARM_TICK / 2, ARM_TICK)
+    s = (time / 1.5)[:, None]
+    q = start + (goal - start) * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    v = (goal - start) * (30 * s**2 - 60 * s**3 + 30 * s**4) / 1.5
+    a = (goal - start) * (60 * s - 180 * s**2 + 120 * s**3) / 1.5**2
+    effort = _model(robot).inverse_dynamics(np.array(STANDARD_GRAVITY), q, v, a)
+    rest = _gravity_effort(robot, start)
+    hold = Trajectory(ARM_TICK, *(np.array([r, r]) for r in (start, 0 * start, rest)))
+    with subject.world(scenes.arm_alone(robot)) as world:
+        world.follow(hold)
+        world.wait(1.0)  # so that the load's own transient is over
+        motion = logged(world.follow(Trajectory(ARM_TICK, q, v, effort), log_period=0))
+    late = motion.time - motion.time[0] + subject.timestep
+    ideal = np.stack([np.interp(late, time, column) for column in q.T], axis=1)
+    error = np.abs(motion.joints[:, 0, :7] - ideal[:, :7]).max(axis=0)
+    allowed = 2 * subject.timestep * np.abs(v[:, :7]).max(axis=0) + 2e-3
+    for joint, value, limit in zip(robot.joints, error, allowed, strict=False):
+        require_close(f"tracking error of {joint.name}", value, 0.0, float(limit), "rad")
+
+
+@check()
+def effort_limit_bounds_acceleration(subject: Subject) -> None:
+    """A far command saturates the drive of joint 1, whose momentum p = (M(q) q')_1 then grows by
+    the effort limit and nothing else: its axis is vertical and M does not depend on it. After
+    0.1 s p <= 1.05 limit t, and >= 0.8 limit t so that the limit is reached. A declared lack
+    of rotor inertia is left out of M."""
+    import pinocchio as pin
+
+    robot = scenes.arm()
+    start = robot.column("initial_position")
+    goal = start.copy()
+    goal[0] += 2.0
+    model = _model(robot)
+    far = Trajectory(subject.timestep, *(np.array([r, r]) for r in (goal, 0 * goal, 0 * goal)))
+    with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "arm weightless")) as world:
+        world.follow(far)
+        world.wait(0.1 - subject.timestep)
+        t, (q, v) = world.time, world.joints
+    if any(d.excuses(f"joint/{robot.joints[0].name}/armature") for d in _deviations(subject)):
+        model.pin.armature = np.zeros(len(q))
+    data = model.pin.createData()
+    upper = np.triu(pin.crba(model.pin, data, q))
+    mass = upper + np.triu(upper, 1).T
+    momentum, limit = float((mass @ v)[0]), robot.joints[0].effort_limit
+    require(
+        momentum <= 1.05 * limit * t,
+        f"joint 1 gained {momentum:.3g} N m s in {t:.3g} s, its limit allows {limit * t:.3g}",
+    )
+    require(
+        momentum >= 0.8 * limit * t,
+        f"joint 1 gained only {momentum:.3g} N m s of {limit * t:.3g}: the drive is too weak",
+    )
+
+
+@check()
+def weak_joint_sags(subject: Subject) -> None:
+    """A joint whose effort limit is a tenth of its gravity torque cannot hold: it moves by more
+    than 0.05 rad within 0.5 s, while with its own limit it holds within 0.02 rad."""
+    robot = scenes.arm()
+    q = robot.column("initial_position")
+    load = np.abs(_gravity_effort(robot, q)[:7])
+    index = int(load.argmax())
+    name = robot.joints[index].name
+    moved = []
+    for limit in (robot.joints[index].effort_limit, 0.1 * float(load[index])):
+        weak = scenes.with_joint(robot, name, effort_limit=limit)
+        with subject.world(scenes.arm_alone(weak)) as world:
+            world.wait(0.5)
+            moved.append(abs(float(world.joints[0, index] - q[index])))
+    require_close(f"sag of {name} with its own limit", moved[0], 0.0, 0.02, "rad")
+    require(moved[1] > 0.05, f"{name} held its load with a tenth of the effort it takes")
+
+
+@check()
+def fingers_stay_coupled(subject: Subject) -> None:
+    """The fingers stand equally far from the middle (1 mm) though told different positions."""
+    robot = scenes.arm()
+    goal = robot.column("initial_position")
+    goal[robot.finger_indices] = [0.03, 0.01]
+    split = Trajectory(subject.timestep, *(np.array([r, r]) for r in (goal, 0 * goal, 0 * goal)))
+    with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "arm weightless")) as world:
+        world.follow(split)
+        world.wait(1.0)
+        first, second = world.joints[0, robot.finger_indices]
+    require_close("difference of the fingers", float(first - second), 0.0, 1e-3, "m")
+
+
+@check()
+def grip_holds(subject: Subject) -> None:
+    """A cube gripped with the scene's squeeze (25 N a finger on 1 N of weight, mu 1) stays in the
+    hand for 2 s within 2 mm, from when the fingers have closed."""
+    scene = scenes.grip()
+    with subject.world(scene) as world:
+        world.follow(close_command(scene, subject.timestep))
+        world.wait(0.5)
+        before = world.bodies[0, :3].copy()
+        world.wait(2.0)
+        away = float(np.linalg.norm(world.bodies[0, :3] - before))
+    held_at = np.asarray(scene.body("held").pose.position)
+    dropped = float(np.linalg.norm(before - held_at))
+    require_close("motion of the cube while gripped", dropped, 0.0, 0.02, "m")
+    require_close("creep of the held cube", away, 0.0, 2e-3, "m")
+
+
+def close_command(scene: Scene, timestep: float) -> Trajectory:
+    """One command: arm at its start with gravity compensated, fingers closed."""
+    robot = scene.robot or scenes.arm()
+    goal = robot.column("initial_position")
+    effort = _gravity_effort(robot, goal)
+    goal[robot.finger_indices] = robot.gripper.closed
+    effort[robot.finger_indices] = 0.0
+    return Trajectory(timestep, *(np.array([r, r]) for r in (goal, 0 * goal, effort)))

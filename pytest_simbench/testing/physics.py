@@ -1,0 +1,145 @@
+"""Checks of the engine's mechanics with boxes alone: laws every rigid-body engine must obey."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pytest_simbench.client.world import Motion
+from pytest_simbench.scene import FloatArray, rotation_matrix
+from pytest_simbench.simulator import Capability
+from pytest_simbench.testing import scenes
+from pytest_simbench.testing.checks import check
+from pytest_simbench.testing.scenes import EDGE, GRAVITY
+from pytest_simbench.testing.subject import Subject, require, require_close
+
+
+@check()
+def free_fall(subject: Subject) -> None:
+    """After 1 s of free fall v = g t and s = g t^2 / 2; first-order integrators are off by at
+    most g dt in v and g t dt in s. Damping of 0.04 / s costs 0.19 m/s and is found."""
+    motion = subject.motion(scenes.falling(), 1.0, 0.1)
+    t, row = float(motion.time[-1]), motion.bodies[-1, 0]
+    g, dt = GRAVITY, subject.timestep
+    require_close("speed of free fall", -row[9], g * t, g * dt, "m/s")
+    require_close("height fallen", 6.0 - row[2], g * t * t / 2, g * t * dt + 1e-5, "m")
+    aside = float(np.hypot(row[0] - 0.1, row[1] - 0.2))
+    require_close("sideways motion in free fall", aside, 0.0, 1e-5, "m")
+
+
+@check()
+def rest_on_plane(subject: Subject) -> None:
+    """A cube put on the ground stays for 3 s: within 1 mm in x, y and z, within 0.5 degrees."""
+    motion = subject.motion(scenes.tower(), 5.0, 0.1)
+    rows = motion.bodies[motion.time < 3.05, 0]
+    away = np.abs(rows[:, :3] - [0.4, 0.0, EDGE / 2]).max(axis=0)
+    for axis, value in zip("xyz", away, strict=True):
+        require_close(f"drift in {axis} of a resting cube", float(value), 0.0, 1e-3, "m")
+    upright = min(float(rotation_matrix(row[3:7])[2, 2]) for row in rows)
+    tilt = math.degrees(math.acos(min(1.0, upright)))
+    require_close("tilt of a resting cube", tilt, 0.0, 0.5, "degrees")
+
+
+@check()
+def tower_stands(subject: Subject) -> None:
+    """Three cubes upon each other stay for 5 s, each within 2 mm of its place."""
+    row = subject.motion(scenes.tower(), 5.0, 0.1).bodies[-1]
+    for level in range(3):
+        place = np.array([0.4, 0.0, EDGE * (level + 0.5)])
+        away = float(np.linalg.norm(row[level, :3] - place))
+        require_close(f"displacement of level {level}", away, 0.0, 2e-3, "m")
+
+
+def _slide(subject: Subject, direction: float) -> None:
+    slope, mu = 0.75, 0.5
+    motion = subject.motion(scenes.incline(slope, mu, direction), 0.8, 0.05)
+    along = motion.bodies[:, 0, 7:9] @ [math.cos(direction), math.sin(direction)]
+    used = motion.time > 0.25  # the contact has settled
+    measured = float(np.polyfit(motion.time[used], along[used], 1)[0])
+    angle = math.atan(slope)
+    law = GRAVITY * (math.sin(angle) - mu * math.cos(angle))
+    normal = GRAVITY * math.cos(angle)
+    require_close("acceleration down the incline", measured, law, 0.05 * mu * normal, "m/s^2")
+
+
+@check()
+def slides_above_mu(subject: Subject) -> None:
+    """Down a slope steeper than mu a slab accelerates by g (sin - mu cos); mu within 5 %."""
+    _slide(subject, 0.0)
+
+
+@check()
+def slides_alike_diagonally(subject: Subject) -> None:
+    """The same along a diagonal of the axes, where a friction pyramid differs from the cone."""
+    _slide(subject, math.pi / 4)
+
+
+@check()
+def sticks_below_mu(subject: Subject) -> None:
+    """On a slope of 0.8 mu a slab stays: less than 1 mm in 2 s, the settling left out."""
+    motion = subject.motion(scenes.incline(0.4, 0.5), 2.2, 0.1)
+    away = float(np.linalg.norm(motion.bodies[-1, 0, :2] - motion.bodies[1, 0, :2]))
+    require_close("creep on a slope below mu", away, 0.0, 1e-3, "m")
+
+
+def _flight(motion: Motion) -> FloatArray:
+    rows = motion.bodies[motion.bodies[:, 0, 2] < 4.8, 0]  # below the ledge, in the air
+    require(len(rows) >= 5, "the box did not leave the ledge")
+    spin = float(np.linalg.norm(rows[0, 10:]))
+    require(spin > 1.0, f"the box spins at {spin:.2g} rad/s only: the ledge gave it no turn")
+    return np.asarray(rows)
+
+
+def _spin(subject: Subject, size: tuple[float, float, float], tolerance: float) -> None:
+    scene = scenes.tumbling(size)
+    rows = _flight(subject.motion(scene, 0.8, 0.02))
+    inertia = np.diag(scene.body("box").inertia())
+    energy, momentum = [], []
+    for row in rows:
+        rotation, omega = rotation_matrix(row[3:7]), row[10:]
+        momentum.append(rotation @ inertia @ rotation.T @ omega)
+        energy.append(float(omega @ momentum[-1]) / 2)
+    change = energy[-1] / energy[0] - 1
+    require_close("relative change of the spin's energy", change, 0.0, tolerance, "")
+    turned = np.linalg.norm(momentum[-1] - momentum[0]) / np.linalg.norm(momentum[0])
+    require_close("relative change of angular momentum", float(turned), 0.0, tolerance, "")
+
+
+@check()
+def cube_spins_on(subject: Subject) -> None:
+    """A cube spinning in free flight (about 0.6 s) keeps its rotational energy and angular
+    momentum within 1 %: for equal moments of inertia omega is constant, whatever the integrator."""
+    _spin(subject, (EDGE, EDGE, EDGE), 0.01)
+
+
+@check()
+def brick_tumbles_on(subject: Subject) -> None:
+    """A brick with three different moments of inertia does so too, within 10 %: engines
+    integrate the gyroscopic torque to first order, or leave it out."""
+    _spin(subject, (0.1, 0.06, 0.03), 0.10)
+
+
+@check()
+def collision_keeps_momentum(subject: Subject) -> None:
+    """Two cubes that collide on frictionless ground keep a horizontal momentum of zero, within
+    2 % of what they exchange: the ground can only push upward."""
+    rows = subject.motion(scenes.collision(), 0.4, 0.02).bodies
+    masses = np.array([scenes.MASS, 2 * scenes.MASS])
+    momentum = masses[None, :, None] * rows[:, :, 7:9]
+    exchanged = float(np.abs(momentum[:, 0]).max())
+    require(exchanged > 0.005, f"the cubes exchanged only {exchanged:.2g} N s: they missed")
+    total = float(np.abs(momentum.sum(axis=1)).max())
+    require_close("total horizontal momentum", total, 0.0, 0.02 * exchanged, "N s")
+
+
+@check(Capability.CONTACT_COUNT)
+def contacts_counted(subject: Subject) -> None:
+    """No contact in free flight, at least one of a cube that rests."""
+    flying = scenes.tumbling((EDGE, EDGE, EDGE))
+    with subject.world(flying) as world:
+        world.wait(2 * subject.timestep)
+        require(world.contact_count() == 0, f"{world.contact_count()} contacts in free flight")
+    with subject.world(scenes.tower()) as world:
+        world.wait(0.5)
+        require(world.contact_count() > 0, "no contact in a tower of cubes that rests")

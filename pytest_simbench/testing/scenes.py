@@ -1,0 +1,95 @@
+"""The small worlds in which the checks look at one thing each."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import STANDARD_GRAVITY, Box, Pose, Robot, Scene, Vector3
+
+GRAVITY = -STANDARD_GRAVITY[2]
+EDGE, MASS = 0.05, 0.1
+"""The cube of the tasks [m], [kg]."""
+
+
+def cube(name: str, pose: Pose, mass: float = MASS, friction: float = 1.0) -> Box:
+    return Box(name, (EDGE, EDGE, EDGE), pose, mass, friction)
+
+
+def falling() -> Scene:
+    """One cube, yawed by 0.3 rad, 6 m above the ground, and a fixed box aside."""
+    return Scene(
+        "falling",
+        (
+            Box("post", (0.1, 0.1, 0.4), Pose.at(1, 1, 0.2)),
+            cube("falling", Pose.at(0.1, 0.2, 6.0, yaw=0.3)),
+            Box("shelf", (0.1, 0.1, 0.1), Pose.at(-1, 1, 0.05)),
+            cube("resting", Pose.at(-0.5, -0.3, EDGE / 2)),
+        ),
+    )
+
+
+def tower() -> Scene:
+    """Three cubes upon each other."""
+    return Scene(
+        "tower", tuple(cube(f"level{i}", Pose.at(0.4, 0, EDGE * (i + 0.5))) for i in range(3))
+    )
+
+
+def incline(slope: float, mu: float, direction: float = 0.0) -> Scene:
+    """A slab on the plane, gravity tilted by atan(slope) towards `direction` [rad]."""
+    angle = math.atan(slope)
+    pull = GRAVITY * math.sin(angle)
+    gravity = (pull * math.cos(direction), pull * math.sin(direction), -GRAVITY * math.cos(angle))
+    slab = Box("slab", (0.1, 0.1, 0.02), Pose.at(0, 0, 0.01), MASS, mu)
+    return Scene(f"incline {slope} {mu} {direction}", (slab,), gravity=gravity, ground_friction=mu)
+
+
+def tumbling(size: Vector3) -> Scene:
+    """A box that falls upon the edge of a fixed one high above the ground, and spins on freely."""
+    turn = Pose(quaternion=(math.cos(0.2), math.sin(0.2) * 0.6, math.sin(0.2) * 0.8, 0.0))
+    start = Pose((0.0, 0.0, 5.25), (turn * Pose.at(0, 0, 0, yaw=0.4)).quaternion)
+    ledge = Box("ledge", (0.2, 0.4, 0.1), Pose.at(-0.115, 0.0, 5.05))
+    return Scene(f"tumbling {size}", (ledge, Box("box", size, start, MASS)))
+
+
+def collision() -> Scene:
+    """A rolled cube falls upon the edge of one that stands on ice: nothing pushes sideways."""
+    roll = (math.cos(0.3), 0.0, math.sin(0.3), 0.0)
+    moving = cube("moving", Pose((-0.035, 0.0, 0.3), roll), friction=0.0)
+    standing = cube("standing", Pose.at(0.0, 0.0, EDGE / 2), mass=2 * MASS, friction=0.0)
+    return Scene("collision", (moving, standing), ground_friction=0.0)
+
+
+def arm() -> Robot:
+    """The Panda."""
+    from pytest_simbench.robot.panda import panda
+
+    return panda()
+
+
+def with_joint(robot: Robot, name: str, **values: Any) -> Robot:
+    """The same robot with values of one joint replaced."""
+    joints = tuple(replace(j, **values) if j.name == name else j for j in robot.joints)
+    return replace(robot, joints=joints)
+
+
+def arm_alone(
+    robot: Robot | None = None, gravity: Vector3 = STANDARD_GRAVITY, name: str = "arm"
+) -> Scene:
+    return Scene(name, robot=robot or arm(), gravity=gravity)
+
+
+def grip() -> Scene:
+    """The Panda with a cube between its nearly closed fingers."""
+    from pytest_simbench.robot.model import RobotModel
+
+    robot = arm()
+    for finger in robot.gripper.joints:
+        robot = with_joint(robot, finger, initial_position=EDGE / 2 + 2e-4)
+    start = robot.column("initial_position")
+    held = cube("held", RobotModel(robot).tool_pose(np.asarray(start)))
+    return Scene("grip", (held,), robot=robot)

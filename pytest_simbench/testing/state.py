@@ -1,0 +1,154 @@
+"""Checks of what an adapter claims: save and restore, determinism, pictures, window."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+
+from pytest_simbench.client.world import Motion, World
+from pytest_simbench.scene import Pose, Scene, Trajectory
+from pytest_simbench.simulator import Capability
+from pytest_simbench.testing import scenes
+from pytest_simbench.testing.checks import check
+from pytest_simbench.testing.drives import close_command
+from pytest_simbench.testing.subject import Subject, logged, require
+
+
+def _busy_scene() -> Scene:
+    cubes = [scenes.cube(f"c{i}", Pose.at(0.5, 0.02 * i, 0.1 + 0.08 * i)) for i in range(3)]
+    return Scene("busy", tuple(cubes), robot=scenes.arm())
+
+
+def _swing(scene: Scene, timestep: float, share: float) -> Trajectory:
+    robot = scene.robot or scenes.arm()
+    start = robot.column("initial_position")
+    goal = start + share
+    goal[robot.finger_indices] = start[robot.finger_indices]
+    zero = np.zeros_like(goal)
+    return Trajectory(timestep, *(np.array([row, row]) for row in (goal, zero, zero)))
+
+
+def require_same(what: str, a: Motion, b: Motion) -> None:
+    """Every sampled bit of both motions is equal; else tell when and by how much they part."""
+    for kind in ("time", "bodies", "joints"):
+        x, y = getattr(a, kind), getattr(b, kind)
+        if x.tobytes() != y.tobytes():
+            first = next(i for i in range(len(x)) if x[i].tobytes() != y[i].tobytes())
+            gap = float(np.abs(x - y).max())
+            require(
+                False,
+                f"{what}: {kind} differ from t = {a.time[first]:.3f} s on, by up to {gap:.3g}",
+            )
+
+
+def _run(world: World, scene: Scene, timestep: float) -> Motion:
+    world.follow(_swing(scene, timestep, 0.2))
+    return logged(world.wait(1.0, log_period=0.02))
+
+
+@check(Capability.SAVE_RESTORE)
+def restore_repeats(subject: Subject) -> None:
+    """From a restored state the same future follows every time, bit for bit: cubes falling and
+    colliding, the arm moving under the command that was in force when the state was saved."""
+    scene = _busy_scene()
+    with subject.world(scene) as world:
+        world.follow(_swing(scene, subject.timestep, 0.3))
+        world.wait(0.1)
+        world.save()
+        saved = (world.time, world.bodies.tobytes(), world.joints.tobytes())
+        futures = []
+        for share in (-0.3, 0.1, None):
+            world.restore()
+            now = (world.time, world.bodies.tobytes(), world.joints.tobytes())
+            require(now == saved, "the restored state is not the saved one")
+            futures.append(logged(world.wait(0.5, log_period=0.02)))
+            if share is not None:  # lead it astray, to see that the command is restored too
+                world.follow(_swing(scene, subject.timestep, share))
+                world.wait(0.1)
+    require_same("second and first future", futures[1], futures[0])
+    require_same("third and first future", futures[2], futures[0])
+
+
+@check(Capability.SAVE_RESTORE)
+def restore_continues(subject: Subject) -> None:
+    """A run that was restored equals, bit for bit, the one that was not interrupted."""
+    scene = _busy_scene()
+    with subject.world(scene) as world:
+        world.follow(_swing(scene, subject.timestep, 0.3))
+        world.wait(0.1)
+        world.save()
+        straight = logged(world.wait(0.5, log_period=0.02))
+        world.restore()
+        again = logged(world.wait(0.5, log_period=0.02))
+    require_same("restored and uninterrupted run", again, straight)
+
+
+@check(Capability.SAVE_RESTORE)
+def restore_in_the_grip(subject: Subject) -> None:
+    """The same with a cube between the fingers, from two restores."""
+    scene = scenes.grip()
+    with subject.world(scene) as world:
+        world.follow(close_command(scene, subject.timestep))
+        world.wait(0.3)
+        world.save()
+        futures = []
+        for _ in range(2):
+            world.restore()
+            futures.append(logged(world.wait(0.5, log_period=0.02)))
+    require_same("second and first future in the grip", futures[1], futures[0])
+
+
+@check(Capability.DETERMINISTIC)
+def fresh_processes_agree(subject: Subject) -> None:
+    """Two fresh processes compute the same, bit for bit."""
+    scene, runs = _busy_scene(), []
+    for _ in range(2):
+        with subject.world(scene, fresh=True) as world:
+            runs.append(_run(world, scene, subject.timestep))
+    require_same("two fresh processes", runs[1], runs[0])
+
+
+@check(Capability.DETERMINISTIC)
+def reused_process_agrees(subject: Subject) -> None:
+    """A second world in one process, after another scene was in between, computes the same."""
+    scene, runs = _busy_scene(), []
+    for _ in range(2):
+        with subject.world(scene) as world:
+            runs.append(_run(world, scene, subject.timestep))
+        with subject.world(scenes.tower()) as world:
+            world.wait(0.1)
+    require_same("two worlds in one process", runs[1], runs[0])
+
+
+@check(Capability.WINDOW)
+def window_changes_nothing(subject: Subject) -> None:
+    """With a window the same is computed, bit for bit where determinism is claimed, else within
+    1 mm. Skipped where there is no display."""
+    if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        pytest.skip("no display; start one, e.g. with xvfb-run")
+    scene, runs = _busy_scene(), []
+    for gui in (False, True):
+        with subject.world(scene, fresh=True, gui=gui) as world:
+            runs.append(_run(world, scene, subject.timestep))
+    if subject.can(Capability.DETERMINISTIC):
+        require_same("with and without a window", runs[1], runs[0])
+    else:
+        gap = float(np.abs(runs[0].bodies[:, :, :3] - runs[1].bodies[:, :, :3]).max())
+        require(gap < 1e-3, f"with a window the cubes end {1000 * gap:.2g} mm away")
+
+
+@check(Capability.OFFSCREEN)
+def picture_shows_something(subject: Subject) -> None:
+    """An offscreen picture has the size asked for, (height, width, 3) bytes, more than one
+    colour, and another one is drawn when the scene is another."""
+    pictures = []
+    for scene in (_busy_scene(), scenes.tower()):
+        with subject.world(scene) as world:
+            pictures.append(world.render(160, 120))
+    for picture in pictures:
+        require(picture.shape == (120, 160, 3), f"the picture has shape {picture.shape}")
+        require(picture.dtype == np.uint8, f"the picture's values are {picture.dtype}")
+        require(len(np.unique(picture.reshape(-1, 3), axis=0)) > 1, "the picture is of one colour")
+    require((pictures[0] != pictures[1]).any(), "two different scenes give the same picture")

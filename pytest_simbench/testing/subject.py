@@ -1,0 +1,167 @@
+"""The adapter under test: its settings, and worlds of it in a real worker process."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pytest_simbench.client.errors import Where, WorkerError
+from pytest_simbench.client.process import Launch, WorkerProcess
+from pytest_simbench.client.world import Motion, World
+from pytest_simbench.scene import Scene
+from pytest_simbench.simulator import Capability, Settings, Simulator
+from pytest_simbench.simulator.settings import profile
+
+
+class ConformanceFailure(AssertionError):
+    """A simulator breaks one of the kit's laws."""
+
+
+def require(holds: object, message: str) -> None:
+    """Raise `ConformanceFailure` with the message unless the law holds."""
+    if not holds:
+        raise ConformanceFailure(message)
+
+
+def require_close(what: str, value: float, expected: float, tolerance: float, unit: str) -> None:
+    """Raise `ConformanceFailure` unless |value - expected| <= tolerance; all three are told."""
+    unit = f" {unit}" if unit else ""
+    require(
+        abs(value - expected) <= tolerance,
+        f"{what} is {value:.6g}{unit}, expected {expected:.6g} within {tolerance:.3g}{unit}",
+    )
+
+
+COMPILE_TIMEOUT = 900.0
+"""An engine that compiles at first use needs minutes (ENGINES: up to 180 s) [s]."""
+
+_shared: dict[tuple[str | None, str], WorkerProcess] = {}
+
+
+@dataclass(frozen=True)
+class Subject:
+    """One adapter with one settings profile.
+
+    Checks share one worker process per interpreter, in which every world is constructed anew, as
+    the plugin does for engines that start slowly; a check that fails in the engine costs only
+    that process.
+
+    Attributes:
+        cls: the adapter's class.
+        profile: name of its settings profile.
+        python: interpreter of its worker, None for this one.
+    """
+
+    cls: type[Simulator]
+    profile: str = "tuned"
+    python: str | None = None
+    motions: dict[tuple[Any, ...], Motion] = field(default_factory=dict, compare=False)
+
+    @property
+    def adapter(self) -> str:
+        return f"{self.cls.__module__}:{self.cls.__qualname__}"
+
+    @property
+    def name(self) -> str:
+        return self.cls.info.name
+
+    @property
+    def settings(self) -> Settings:
+        return profile(self.cls.profiles, self.profile, self.name)
+
+    @property
+    def timestep(self) -> float:
+        """[s]."""
+        return self.settings.timestep
+
+    def can(self, capability: Capability) -> bool:
+        return capability in self.cls.info.capabilities
+
+    def launch(self, *, gui: bool = False) -> WorkerProcess:
+        """A worker process of its own; the caller closes it."""
+        handle, log = tempfile.mkstemp(prefix=f"{self.name}-", suffix=".log")
+        os.close(handle)
+        atexit.register(Path(log).unlink, missing_ok=True)
+        timeout = COMPILE_TIMEOUT if self.cls.info.costly_start else 120.0
+        launch = Launch(self.adapter, python=self.python, log=Path(log), stall_timeout=timeout)
+        return WorkerProcess(launch, Where(self.name, "gui" if gui else "headless"))
+
+    def shared(self) -> WorkerProcess:
+        """The process that checks share; started when first needed."""
+        key = (self.python, self.cls.__module__.partition(".")[0])
+        if key not in _shared or not _shared[key].alive:
+            _shared[key] = self.launch()
+        return _shared[key]
+
+    def construct(
+        self, process: WorkerProcess, changes: Mapping[str, Any] | None = None, gui: bool = False
+    ) -> dict[str, Any]:
+        """Have the process make the simulator; the answer holds its settings and versions."""
+        answer: dict[str, Any] = process.request(
+            "construct",
+            timeout=COMPILE_TIMEOUT,
+            adapter=self.adapter,
+            profile=self.profile,
+            changes=dict(changes or {}),
+            gui=gui,
+            real_time=False,
+        )
+        return answer
+
+    @contextmanager
+    def world(
+        self,
+        scene: Scene,
+        *,
+        fresh: bool = False,
+        gui: bool = False,
+        changes: Mapping[str, Any] | None = None,
+    ) -> Iterator[World]:
+        """A world of `scene`, parity checked; in a process of its own if `fresh` or `gui`."""
+        alone = fresh or gui
+        process = self.launch(gui=gui) if alone else self.shared()
+        try:
+            self.construct(process, changes, gui)
+            yield World(process, scene, load_timeout=COMPILE_TIMEOUT)
+        except WorkerError:
+            process.kill()
+            raise
+        finally:
+            if alone:
+                process.close()
+
+    def motion(self, scene: Scene, seconds: float, log_period: float) -> Motion:
+        """What happens by itself in `scene`; the same question is answered from memory."""
+        key = (scene.name, seconds, log_period)
+        if key not in self.motions:
+            with self.world(scene) as world:
+                self.motions[key] = logged(world.wait(seconds, log_period=log_period))
+        return self.motions[key]
+
+
+def logged(motion: Motion | None) -> Motion:
+    """The motion, which must be there.
+
+    Raises:
+        ConformanceFailure: the worker returned none.
+    """
+    if motion is None:
+        raise ConformanceFailure("a motion was asked for with a log, but none came back")
+    return motion
+
+
+def close_workers() -> None:
+    """End the processes that checks shared."""
+    while _shared:
+        _, process = _shared.popitem()
+        if process.alive:
+            process.close()
+
+
+atexit.register(close_workers)

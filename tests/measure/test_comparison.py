@@ -1,0 +1,187 @@
+"""Comparisons: false alarms and power in simulated experiments, corrections, equivalence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pytest_simbench.measure import comparison
+from pytest_simbench.measure.comparison import Method, compare, equivalence, holm, pair
+
+EXPERIMENTS = 400
+SAMPLING = 2 * (0.05 * 0.95 / EXPERIMENTS) ** 0.5
+"""Two standard errors of a false-alarm rate measured by that many experiments: 0.022."""
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(comparison, "PERMUTATIONS", 499)
+
+
+def normal(rng: np.random.Generator, n: int) -> Any:
+    return rng.normal(0, 1, n)
+
+
+def skewed(rng: np.random.Generator, n: int) -> Any:
+    return rng.exponential(1, n)
+
+
+def tied(rng: np.random.Generator, n: int) -> Any:
+    return rng.binomial(15, 0.95, n) / 15
+
+
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize("draw", [normal, skewed, tied])
+@pytest.mark.parametrize(
+    ("method", "paired"),
+    [("permutation", True), ("permutation", False), ("wilcoxon", True), ("brunner-munzel", False)],
+)
+@pytest.mark.parametrize("alternative", ["two-sided", "less"])
+def test_no_true_difference_alarms_in_one_of_twenty(
+    draw: Callable[..., Any], method: Method, paired: bool, alternative: Any
+) -> None:
+    """At most 5 %, and two standard errors; Brunner and Munzel's t is 1 % too eager at n = 15."""
+    rng = np.random.default_rng(10)
+    alarms = sum(
+        compare(
+            draw(rng, 15), draw(rng, 15), paired=paired, alternative=alternative, method=method
+        ).significant()
+        for _ in range(EXPERIMENTS)
+    )
+    eager = 0.01 if method == "brunner-munzel" else 0.0
+    assert alarms / EXPERIMENTS <= 0.05 + eager + SAMPLING
+    assert alarms > 0  # a test that never alarms would pass the line above
+
+
+@pytest.mark.usefixtures("quick")
+def test_paired_seeds_find_what_unpaired_ones_do_not() -> None:
+    rng = np.random.default_rng(11)
+    found = {True: 0, False: 0}
+    for _ in range(40):
+        seeds = rng.normal(0, 1, 20)  # what a seed does to both sides
+        first, second = seeds + rng.normal(0, 0.2, 20), seeds + 0.2 + rng.normal(0, 0.2, 20)
+        for paired in found:
+            found[paired] += compare(first, second, paired=paired).significant()
+    assert found[True] >= 32
+    assert found[False] <= 8
+
+
+@pytest.mark.parametrize("paired", [True, False])
+def test_equal_sides_never_differ(paired: bool) -> None:
+    values = [0.9, 0.9, 1.0]
+    assert compare(values, values, paired=paired).p_value == 1.0
+    assert compare([1.0] * 20, [1.0] * 20, paired=paired).p_value == 1.0
+
+
+@pytest.mark.parametrize("method", ["wilcoxon", "permutation", "brunner-munzel"])
+def test_sides_without_spread_can_still_differ(method: Method) -> None:
+    paired = method == "wilcoxon"
+    found = compare([0.5] * 10, [0.9] * 10, method=method, paired=paired)
+    assert found.significant()
+    assert found.difference == pytest.approx(0.4)
+
+
+def test_the_direction_is_that_of_second_minus_first() -> None:
+    low, high = [1.0, 1.1, 1.2, 1.3, 1.4], [2.0, 2.1, 2.2, 2.3, 2.4]
+    assert compare(low, high, alternative="greater").p_value == pytest.approx(1 / 252)
+    assert compare(low, high, alternative="less").p_value == 1.0
+    assert compare(high, low, alternative="less").significant()
+
+
+@given(
+    st.lists(st.floats(0, 1), min_size=2, max_size=6),
+    st.lists(st.floats(0, 1), min_size=2, max_size=6),
+)
+def test_exchanging_the_sides_mirrors_the_comparison(
+    first: list[float], second: list[float]
+) -> None:
+    found, mirrored = compare(first, second), compare(second, first)
+    assert found.difference == -mirrored.difference
+    assert found.p_value == pytest.approx(mirrored.p_value)
+    assert 0 < found.p_value <= 1
+
+
+def test_only_common_seeds_are_paired() -> None:
+    first, second = pair({3: 0.3, 1: 0.1, 2: 0.2}, {1: 1.1, 3: 1.3, 9: 1.9})
+    assert list(first) == [0.1, 0.3]
+    assert list(second) == [1.1, 1.3]
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "options", "message"),
+    [
+        ([], [1.0], {}, "a side has no repetitions"),
+        ([1.0], [1.0, 2.0], {"paired": True}, "as many values on each side, not 1 and 2"),
+        ([1.0], [1.0], {"method": "wilcoxon"}, "is for pairs"),
+        ([1.0], [1.0], {"method": "brunner-munzel", "paired": True}, "is not for pairs"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused(
+    first: list[float], second: list[float], options: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        compare(first, second, **options)
+
+
+def test_holm_agrees_with_a_worked_example() -> None:
+    """By hand: 0.01 x 4 = 0.04, 0.03 x 3 = 0.09 (twice: it never falls), 0.04 x 2 -> 0.09."""
+    assert holm([0.01, 0.04, 0.03, 0.5]) == pytest.approx([0.04, 0.09, 0.09, 0.5])
+    assert holm([]) == []
+
+
+@given(st.lists(st.floats(0, 1), max_size=10))
+def test_holm_keeps_the_order_and_never_lowers(p_values: list[float]) -> None:
+    adjusted = holm(p_values)
+    assert all(p <= a <= 1 for p, a in zip(p_values, adjusted, strict=True))
+    ranks = sorted(range(len(p_values)), key=lambda k: p_values[k])
+    assert [adjusted[k] for k in ranks] == sorted(adjusted)
+
+
+def test_holm_holds_the_false_alarms_of_the_whole_family() -> None:
+    p_values = np.random.default_rng(12).random((4000, 8))
+    alarmed = np.mean([min(holm(list(family))) <= 0.05 for family in p_values])
+    assert alarmed == pytest.approx(0.05, abs=0.01)
+
+
+@pytest.mark.parametrize("paired", [True, False])
+def test_equivalence_alarms_in_one_of_twenty_at_its_margin(paired: bool) -> None:
+    """A true difference of just the margin must not be called equivalent."""
+    rng = np.random.default_rng(13)
+    claimed = sum(
+        equivalence(rng.normal(0, 1, 20), rng.normal(1.5, 1, 20), 1.5, paired=paired).equivalent()
+        for _ in range(EXPERIMENTS)
+    )
+    assert 0.05 - SAMPLING <= claimed / EXPERIMENTS <= 0.05 + SAMPLING
+
+
+def test_equivalence_is_not_the_lack_of_a_difference() -> None:
+    rng = np.random.default_rng(14)
+    few, many = rng.normal(0, 1, (2, 5)), rng.normal(0, 1, (2, 200))
+    assert not compare(*few).significant()
+    assert not equivalence(*few, 0.5).equivalent()
+    assert equivalence(*many, 0.5).equivalent()
+
+
+def test_equivalence_of_sides_without_spread() -> None:
+    assert equivalence([0.9] * 3, [0.9] * 3, 0.01).equivalent()
+    assert not equivalence([0.9] * 3, [0.8] * 3, 0.05).equivalent()
+
+
+@pytest.mark.parametrize(
+    ("second", "margin", "paired", "message"),
+    [
+        ([1.0, 2.0], 0.0, False, "margin of an equivalence must be above 0"),
+        ([1.0], 0.1, False, "two or more values a side, not 2 and 1"),
+        ([1.0, 2.0, 3.0], 0.1, True, "two or more values a side, not 2 and 3"),
+    ],
+)
+def test_equivalence_refuses_what_it_cannot_judge(
+    second: list[float], margin: float, paired: bool, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        equivalence([1.0, 2.0], second, margin, paired=paired)

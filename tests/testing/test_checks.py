@@ -1,0 +1,63 @@
+"""The checks of the kit go red: one planted fault for each, in a real engine."""
+
+from __future__ import annotations
+
+import pytest
+
+from pytest_simbench.client.errors import WorkerError
+from pytest_simbench.simulator import Simulator
+from pytest_simbench.testing import CHECKS, ConformanceFailure, ConformanceTest, Subject
+
+from . import wrong
+
+FAULTS: list[tuple[type[Simulator], str]] = [
+    (wrong.ImportsEngine, "imports_without_engine"),
+    (wrong.NoTitle, "info_complete"),
+    (wrong.NoTuned, "profiles_complete"),
+    (wrong.LongStep, "time_advances"),
+    (wrong.OwnClock, "time_advances"),
+    (wrong.ScalarLast, "state_as_loaded"),
+    (wrong.Reversed, "state_as_loaded"),
+    (wrong.BodyFrame, "velocity_frames"),
+    (wrong.LongQuaternion, "quaternions_are_unit"),
+    (wrong.OneShot, "commands_persist"),
+    (wrong.Echo, "read_back_is_the_engines"),
+    (wrong.AnyRobot, "bad_description_rejected"),
+    (wrong.DoubleGravity, "free_fall"),
+    (wrong.Air, "free_fall"),
+    (wrong.DeepGround, "rest_on_plane"),
+    (wrong.Shaking, "tower_stands"),
+    (wrong.HalfFriction, "slides_above_mu"),
+    (wrong.HalfFriction, "slides_alike_diagonally"),
+    (wrong.SlipperyHand, "sticks_below_mu"),
+    (wrong.AngularDamping, "cube_spins_on"),
+    (wrong.WrongMass, "collision_keeps_momentum"),
+    (wrong.NoContacts, "contacts_counted"),
+    (wrong.SoftDrives, "static_hold"),
+    (wrong.NoFeedForward, "tracks_trajectory"),
+    (wrong.NoEffortLimit, "effort_limit_bounds_acceleration"),
+    (wrong.NoEffortLimit, "weak_joint_sags"),
+    (wrong.FreeFingers, "fingers_stay_coupled"),
+    (wrong.SlipperyHand, "grip_holds"),
+    (wrong.ForgetsCommand, "restore_repeats"),
+    (wrong.RoundsState, "restore_continues"),
+    (wrong.Noisy, "restore_in_the_grip"),
+    (wrong.Noisy, "fresh_processes_agree"),
+    (wrong.Noisy, "reused_process_agrees"),
+    (wrong.Blank, "picture_shows_something"),
+]
+
+
+@pytest.mark.parametrize(
+    ("adapter", "name"), FAULTS, ids=[f"{cls.__name__}-{name}" for cls, name in FAULTS]
+)
+def test_fault_is_found(adapter: type[Simulator], name: str) -> None:
+    test = ConformanceTest(Subject(adapter), CHECKS[name])
+    with pytest.raises(ConformanceFailure):
+        test()
+
+
+def test_parity_check_runs_while_loading() -> None:
+    class_without_lie = Subject(wrong.Misbuilt)
+    with pytest.raises(WorkerError, match="gravity: scene"):
+        CHECKS["parity_of_full_scene"].law(class_without_lie)

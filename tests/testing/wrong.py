@@ -1,0 +1,221 @@
+"""MuJoCo with one planted fault each: adapters that lie, forget or confuse.
+
+Where the engine itself is changed, `read_back` goes on telling the scene's value, so that the
+check under test has to find it, not the parity check at loading.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import mujoco  # on purpose: this module does not import without its engine
+import numpy as np
+from pytest_simbench.sims.mujoco import MuJoCo
+
+from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.simulator import SimulatorInfo
+
+
+class Lying(MuJoCo):
+    """Reads back what was built before `tamper` changed it."""
+
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        self.told = {k: np.copy(v) for k, v in super().read_back().items()}
+        self.tamper()
+
+    def tamper(self) -> None: ...
+
+    def read_back(self) -> dict[str, Any]:
+        return self.told
+
+
+class ImportsEngine(MuJoCo):
+    version = mujoco.__version__
+
+
+class NoTitle(MuJoCo):
+    info: ClassVar[SimulatorInfo] = replace(MuJoCo.info, title=" ")
+
+
+class NoTuned(MuJoCo):
+    profiles = {**MuJoCo.profiles}  # noqa: RUF012 - as an adapter's author might
+    del profiles["default"]
+
+
+class DoubleGravity(Lying):
+    def tamper(self) -> None:
+        self.model.opt.gravity *= 2
+
+
+class Air(Lying):
+    def step(self) -> None:
+        super().step()
+        self.data.qvel[:3] *= 1 - 0.04 * self.settings.timestep
+
+
+class AngularDamping(Lying):
+    def step(self) -> None:
+        super().step()
+        self.data.qvel[3:6] *= 1 - 0.04 * self.settings.timestep
+
+
+class LongStep(Lying):
+    def tamper(self) -> None:
+        self.model.opt.timestep *= 1.001
+
+
+class OwnClock(MuJoCo):
+    """Takes the profile's step whatever its settings say."""
+
+    @property
+    def time(self) -> float:
+        steps = round(super().time / self.settings.timestep)
+        return steps * self.profiles["tuned"].timestep
+
+
+class ScalarLast(MuJoCo):
+    def body_state(self) -> FloatArray:
+        state = super().body_state()
+        state[:, 3:7] = np.roll(state[:, 3:7], -1, axis=1)
+        return state
+
+
+class Reversed(MuJoCo):
+    def body_state(self) -> FloatArray:
+        return super().body_state()[::-1].copy()
+
+
+class BodyFrame(MuJoCo):
+    """Angular velocity in the body's frame, as the engine itself keeps it."""
+
+    def body_state(self) -> FloatArray:
+        state = super().body_state()
+        state[:, 10:] = self.data.qvel[self._body_v + 3]
+        return state
+
+
+class LongQuaternion(MuJoCo):
+    def body_state(self) -> FloatArray:
+        state = super().body_state()
+        state[:, 3:7] *= 1.001
+        return state
+
+
+class OneShot(MuJoCo):
+    """Forgets its command after half a second."""
+
+    def step(self) -> None:
+        super().step()
+        if self.time > 0.5 and self.scene.robot is not None:
+            self.data.ctrl[:] = self.scene.robot.column("initial_position")
+
+
+class Echo(Lying):
+    """Reads back the scene as it was loaded."""
+
+
+class WrongMass(Lying):
+    def tamper(self) -> None:
+        self.model.body_mass[-1] *= 1.5
+        self.model.body_inertia[-1] *= 1.5
+        self.model.dof_M0[-6:] *= 1.5  # which the engine takes for bodies that nothing hangs on
+
+
+class AnyRobot(MuJoCo):
+    """Accepts a description that does not exist."""
+
+    def load(self, scene: Scene) -> None:
+        robot = scene.robot
+        if robot is not None and robot.urdf.startswith("/nowhere"):
+            scene = replace(scene, robot=None)
+        super().load(scene)
+
+
+class HalfFriction(Lying):
+    def tamper(self) -> None:
+        self.model.geom_friction[:, 0] *= 0.9
+
+
+class DeepGround(Lying):
+    def tamper(self) -> None:
+        ground = self.model.geom("ground").id
+        self.model.geom_pos[ground, 2] -= 0.003
+        self.model.geom_sameframe[ground] = 0  # else the engine takes the body's frame
+
+
+class Shaking(Lying):
+    """Pushes every body sideways with a tenth of its weight."""
+
+    def tamper(self) -> None:
+        self.model.opt.gravity[0] += 12.0
+
+
+class SoftDrives(Lying):
+    def tamper(self) -> None:
+        self.model.actuator_gainprm[:, 0] /= 2
+        self.model.actuator_biasprm[:, 1] /= 2
+
+
+class NoFeedForward(MuJoCo):
+    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        super().command(position, 0 * velocity, 0 * effort)
+
+
+class NoEffortLimit(Lying):
+    def tamper(self) -> None:
+        self.model.actuator_forcelimited[:] = 0
+        self.model.jnt_actfrclimited[:] = 0  # the URDF's effort limit, which is the same
+
+
+class FreeFingers(Lying):
+    def tamper(self) -> None:
+        self.data.eq_active[:] = 0
+
+
+class SlipperyHand(Lying):
+    def tamper(self) -> None:
+        self.model.geom_friction[:, 0] = 0.01
+
+
+class NoContacts(MuJoCo):
+    def contact_count(self) -> int:
+        return 0
+
+
+class ForgetsCommand(MuJoCo):
+    def restore(self, state: FloatArray) -> None:
+        command = self.data.ctrl.copy()
+        super().restore(state)
+        self.data.ctrl[:] = command
+
+
+class RoundsState(MuJoCo):
+    def save(self) -> FloatArray:
+        return super().save().astype(np.float32).astype(float)
+
+
+class Noisy(MuJoCo):
+    """Each process has its own random state."""
+
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        self.noise = np.random.default_rng()
+
+    def step(self) -> None:
+        self.data.qvel[:] += 1e-12 * self.noise.standard_normal(len(self.data.qvel))
+        super().step()
+
+
+class Blank(MuJoCo):
+    def render(self, width: int, height: int) -> Any:
+        return np.zeros((height, width, 3), np.uint8)
+
+
+class Misbuilt(MuJoCo):
+    """Builds half the gravity, and says so."""
+
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        self.model.opt.gravity *= 0.5
