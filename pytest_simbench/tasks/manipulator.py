@@ -65,6 +65,7 @@ class Manipulator:
         self.home = self.arm.copy()
         self.fingers = self.gripper.opened
         self.held: str | None = None
+        self._released: tuple[str, ...] = ()
         self._origin: Pose | None = None
         self._grip = Pose()
         self._released_at = world.time
@@ -134,10 +135,13 @@ class Manipulator:
         return self.world.time - self._released_at
 
     def try_retreat(self) -> str | None:
-        """Straight up from where a cube was let go; a sentence when that is not possible."""
-        tool = self.model.tool_pose(self.arm)
+        """Straight up from where a cube was let go; a sentence when that is not possible.
+
+        The fingers may touch that cube: it may have turned a little between them.
+        """
+        above = self.model.tool_pose(self.arm).translated(z=APPROACH)
         return self._attempt(
-            "retreat", lambda: self._linear(tool.translated(z=APPROACH), speed=FREE_SPEED)
+            "retreat", lambda: self._linear(above, ignored=self._released, speed=FREE_SPEED)
         )
 
     def try_go_home(self) -> str | None:
@@ -207,6 +211,7 @@ class Manipulator:
 
     def _open(self) -> None:
         self._released_at = self.world.time
+        self._released = (self.held,) if self.held else self._released
         self.held = None
         self.planning.detach()
         self._move_fingers(self.gripper.opened, RELEASE_TIME)
