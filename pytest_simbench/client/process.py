@@ -38,6 +38,10 @@ from pytest_simbench.worker.wire import pack, unpack
 TOKEN = "PYTEST_SIMBENCH_WORKER"
 """Environment variable by which a worker's process is found before it has told its pid."""
 
+IGNORING_INTERRUPTS = ("sh", "-c", 'trap "" INT; exec "$@"', "sh")
+"""Prefix of a worker's command. Ctrl-C reaches the whole process group, also a worker that is just
+starting; its death would be recorded as a failure of its own before the client can intervene."""
+
 LOG_TAIL_LINES = 30
 
 
@@ -136,7 +140,8 @@ class WorkerProcess:
             return self.launch.spec
         # Not execnet's own `env:`, which is set only once the interpreter answers.
         variables = {**self.launch.environment, TOKEN: self._token}
-        command = ["env", *(f"{key}={value}" for key, value in variables.items())]
+        command = [*IGNORING_INTERRUPTS, "env"]
+        command += [f"{key}={value}" for key, value in variables.items()]
         command.append(self.launch.python or sys.executable)
         return f"popen//execmodel=main_thread_only//python={shlex.join(command)}"
 

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 
 import psutil
 
-MB = 2**20
-"""Bytes of one MB here and in the records, as `ru_maxrss / 1024` and VmHWM / 1024 give it."""
+MB = 1e6
+"""Bytes of one MB here and in the records, as the worker counts its own peak."""
 
 LISTING_INTERVAL = 1.0
 """Wall seconds between two looks for new children: listing reads every process of the machine."""

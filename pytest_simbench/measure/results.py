@@ -71,6 +71,11 @@ class ResultSet:
             found.setdefault(cause, []).append(record)
         return dict(sorted(found.items(), key=lambda item: -len(item[1])))
 
+    @property
+    def known(self) -> tuple[str, ...]:
+        """Names of the metrics and costs that can be asked for."""
+        return (*self.metrics, *self._costs)
+
     def metric(self, name: str) -> Metric:
         """The metric (or cost) of that name.
 
@@ -80,7 +85,7 @@ class ResultSet:
         found = self.metrics.get(name) or self._costs.get(name)
         if found is None:
             where = f" in {self.label}" if self.records else ""
-            raise UnknownMetric(name, [*self.metrics, *self._costs], where)
+            raise UnknownMetric(name, self.known, where)
         return found
 
     def value(self, record: Record, name: str) -> float | None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from pytest_simbench.client.process import Launch
 from pytest_simbench.session.protocol import PROTOCOLS, Protocol
 
 
@@ -50,3 +53,27 @@ class Case:
     jitter: float = 1.0
     trace: str = "off"
     contended: bool = False
+
+    @property
+    def short_name(self) -> str:
+        """The test's name without its file, fit for a file name."""
+        name = self.test.rpartition("::")[2]
+        return re.sub(r"[^A-Za-z0-9_.=-]+", "_", name).strip("_")
+
+    def launch(self, name: str) -> Launch:
+        """How to start a worker of this case; its log is `logs/NAME.log` in the run folder."""
+        log = self.folder / "logs" / f"{name}.log"
+        try:
+            log.parent.mkdir(parents=True, exist_ok=True)
+            log.unlink(missing_ok=True)
+        except OSError:  # a full disk must not stop the worker
+            log = Path(os.devnull)
+        return Launch(
+            adapter=self.adapter,
+            python=self.python,
+            spec=self.spec,
+            environment=self.environment,
+            log=log,
+            start_timeout=max(self.stall_timeout, 1.0),
+            stall_timeout=self.stall_timeout,
+        )

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 from pytest_simbench.client.errors import Where, WorkerError
-from pytest_simbench.client.process import Launch, WorkerProcess
+from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.scene import Scene
 from pytest_simbench.session.case import Case
@@ -23,6 +24,7 @@ class SimulatorHandle:
     def __init__(self, case: Case) -> None:
         self.case = case
         self._process: WorkerProcess | None = None
+        self._started = 0
 
     @contextmanager
     def episode(self, scene: Scene, *, parity: bool = True) -> Iterator[World]:
@@ -45,17 +47,10 @@ class SimulatorHandle:
     def _start(self, scene: Scene, parity: bool) -> World:
         case = self.case
         if self._process is None or not self._process.alive:
-            self._process = WorkerProcess(
-                Launch(
-                    adapter=case.adapter,
-                    python=case.python,
-                    spec=case.spec,
-                    environment=case.environment,
-                    start_timeout=case.stall_timeout,
-                    stall_timeout=case.stall_timeout,
-                ),
-                Where(case.simulator, case.mode),
-            )
+            self._started += 1
+            # The process id keeps the workers of pytest-xdist apart, which share a run folder.
+            name = f"{case.short_name}-{case.simulator}-{os.getpid()}-{self._started}"
+            self._process = WorkerProcess(case.launch(name), Where(case.simulator, case.mode))
         self._process.request(
             "construct",
             timeout=case.stall_timeout,

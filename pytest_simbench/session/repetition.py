@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import platform
-import re
 import time
 from collections.abc import Callable
 from dataclasses import asdict
@@ -16,7 +15,7 @@ import numpy as np
 
 from pytest_simbench import __version__
 from pytest_simbench.client.errors import Where, WorkerError
-from pytest_simbench.client.process import Launch, WorkerProcess
+from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.stopwatch import Stopwatch
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.measure.record import Failure, Record
@@ -87,7 +86,9 @@ class Repetition:
         deadline = time.monotonic() + (case.timeout or self.task.study_timeout)
         self._enter("launch")
         with self.stopwatch.measuring("launch"):
-            process = self._process = self._launch()
+            process = self._process = WorkerProcess(
+                case.launch(f"{case.short_name}-{self.number}"), self.where
+            )
             if self._killed:
                 process.kill()
             process.deadline = deadline
@@ -116,28 +117,6 @@ class Repetition:
         outcome = self.task.perform(world, self.seed, self._on_count)
         self._stats = world.stats()
         return outcome
-
-    def _launch(self) -> WorkerProcess:
-        case = self.case
-        name = re.sub(r"[^A-Za-z0-9_.=-]+", "_", case.test.rpartition("::")[2]).strip("_")
-        log = case.folder / "logs" / f"{name}-{self.number}.log"
-        try:
-            log.parent.mkdir(parents=True, exist_ok=True)
-            log.unlink(missing_ok=True)
-        except OSError:  # a full disk must not stop the repetition
-            log = Path(os.devnull)
-        return WorkerProcess(
-            Launch(
-                adapter=case.adapter,
-                python=case.python,
-                spec=case.spec,
-                environment=case.environment,
-                log=log,
-                start_timeout=max(case.stall_timeout, 1.0),
-                stall_timeout=case.stall_timeout,
-            ),
-            self.where,
-        )
 
     def _sample(self, process: WorkerProcess) -> None:
         limit = self.case.memory_limit

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import stat
 import sys
 from dataclasses import replace
@@ -15,6 +16,7 @@ from pytest_simbench.measure.record import Record
 from pytest_simbench.session.case import Case
 from pytest_simbench.session.repeat import Repeater
 from pytest_simbench.session.repetition import Repetition
+from tests.conftest import ADAPTERS
 from tests.tiny import Falling
 
 
@@ -112,6 +114,23 @@ def test_interpreter_that_is_none(case: Case, tmp_path: Path, script: str) -> No
     assert record.error is not None
     assert record.error.type == "WorkerStartError"
     assert str(wrapper) in record.error.message
+
+
+@pytest.mark.parametrize("simulator", ["mujoco", "pybullet"])
+def test_no_display(case: Case, simulator: str) -> None:
+    display = {"DISPLAY": ":4711"}  # nobody serves it
+    record = run(
+        replace(
+            case,
+            simulator=simulator,
+            adapter=ADAPTERS[simulator],
+            mode="gui",
+            environment=display,
+        )
+    )
+    assert record.error is not None
+    assert (record.error.type, record.error.phase) == ("WorkerExited", "load")
+    assert re.search("display|X server", record.error.log_tail)
 
 
 def test_missing_engine_module(case: Case) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import ttest_ind
 
@@ -23,6 +23,7 @@ def test_35_successes_show_90_percent() -> None:
     assert further_repetitions(wilson(20, 20), 0.9) == 15
 
 
+@settings(max_examples=40)
 @given(st.floats(0.0, 1.0), st.floats(0.05, 0.95))
 def test_the_repetitions_for_a_proportion_are_enough(rate: float, threshold: float) -> None:
     n = repetitions_for_proportion(rate, threshold)
@@ -32,6 +33,7 @@ def test_the_repetitions_for_a_proportion_are_enough(rate: float, threshold: flo
         assert threshold not in wilson(rate * n, n) or threshold == wilson(rate * n, n).low
 
 
+@settings(max_examples=40)
 @given(st.floats(0.02, 0.98), st.floats(0.01, 0.3))
 def test_more_repetitions_are_needed_nearer_the_threshold(rate: float, gap: float) -> None:
     far = repetitions_for_proportion(rate, max(0.0, rate - 2 * gap)) or 10_001

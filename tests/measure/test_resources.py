@@ -54,7 +54,7 @@ def go(process: subprocess.Popen[str]) -> None:
 IDLE = "print('ready', flush=True); input()"
 ALLOCATE = """
     print('ready', flush=True); input()
-    block = bytearray(b'x') * (200 * 2**20)
+    block = bytearray(b'x') * (200_000_000)
     input()
 """
 
@@ -95,7 +95,7 @@ def test_memory_of_a_child_counts_as_the_workers(start: Start) -> None:
         """
         import subprocess, sys
         child = subprocess.Popen(
-            [sys.executable, "-c", "b = bytearray(b'x') * (100 * 2**20); print('ready'); input()"],
+            [sys.executable, "-c", "b = bytearray(b'x') * (100_000_000); print('ready'); input()"],
             stdin=subprocess.PIPE)
         child.wait()
         """
@@ -109,7 +109,7 @@ def test_a_child_that_comes_later_and_goes_is_followed(start: Start) -> None:
         """
         import subprocess, sys
         print('ready', flush=True); input()
-        code = "b = bytearray(b'x') * (100 * 2**20); input()"
+        code = "b = bytearray(b'x') * (100_000_000); input()"
         child = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE)
         input()
         child.kill(); child.wait()

@@ -152,10 +152,15 @@ def test_full_disk_loses_nothing(
     assert len(saved.read_text().splitlines()) == 2
 
 
-def test_interrupt_prints_the_table_and_keeps_the_records(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(TEST.replace("Falling()", "Falling(duration=200.0)"))
+@pytest.mark.parametrize(
+    "arguments", [[], ["--sim-jobs=3"], ["-n2"]], ids=["plain", "jobs", "xdist"]
+)
+def test_interrupt_prints_the_table_and_keeps_the_records(
+    pytester: pytest.Pytester, arguments: list[str]
+) -> None:
+    pytester.makepyfile(TEST.replace("Falling()", "Falling(duration=80.0)"))
     process = subprocess.Popen(
-        [sys.executable, "-m", "pytest", "--sim=mujoco", "--sim-output=out", "--reps=50"],
+        [sys.executable, "-m", "pytest", "--sim=mujoco", "--sim-output=out", *arguments],
         cwd=pytester.path,
         stdout=subprocess.PIPE,
         text=True,
@@ -166,17 +171,36 @@ def test_interrupt_prints_the_table_and_keeps_the_records(pytester: pytest.Pytes
         if path.is_file() and len(path.read_text().splitlines()) >= 1:
             break
         time.sleep(0.1)
-    time.sleep(1.0)
+    time.sleep(0.2)  # the next worker is being launched or has just begun
     children = psutil.Process(process.pid).children(recursive=True)
+    before = len(path.read_text().splitlines())
     os.killpg(process.pid, signal.SIGINT)
     output, _ = process.communicate(timeout=60)
     assert process.returncode == pytest.ExitCode.INTERRUPTED
-    assert "simulator comparison" in output
+    assert output.count("simulator comparison") == 1
     statuses = [r["status"] for r in records(pytester.path / "out")]
-    assert statuses[0] == "ok"
-    assert statuses[-1] == "interrupted"
+    assert set(statuses[:before]) == {"ok"}
+    assert set(statuses[before:]) == {"interrupted"}
     _, alive = psutil.wait_procs(children, timeout=5)
     assert not alive
+
+
+def test_k_and_x_choose_and_stop(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        TEST
+        + """
+    def test_impossible(repeat):
+        repeat(Falling()).assert_at_most("landed", -1.0)
+"""
+    )
+    arguments = ["--sim=all", "--reps=1", "--sim-output=out"]
+    result = pytester.runpytest_subprocess(*arguments, "-k", "falling and mujoco")
+    result.assert_outcomes(passed=1, deselected=3)
+    result = pytester.runpytest_subprocess(*arguments, "-k", "impossible", "-x")
+    result.assert_outcomes(failed=1, deselected=2)
+    result.stdout.fnmatch_lines(["*simulator comparison*"])
+    result = pytester.runpytest_subprocess(*arguments, "--lf", "-x")
+    result.assert_outcomes(failed=1)
 
 
 def test_plugin_load_is_light(pytester: pytest.Pytester) -> None:

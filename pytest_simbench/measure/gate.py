@@ -1,0 +1,232 @@
+"""Did it get worse? A run's records against a baseline's, with limits.
+
+A limit is exceeded when the change is both larger than it and significant: a one-sided permutation
+test of the means, paired by seed where the runs share their seeds, corrected (Holm) for all
+comparisons of the run, so that a run without a true change fails in at most one of twenty cases.
+
+What it needs: a change of d with a spread of s between repetitions is found in 4 of 5 cases by
+about 12 (s / d)^2 repetitions (`power.repetitions_to_detect`), if its limit is well below d. A loss
+of 10 points in *placed* against `placed:5%,ram:10%,rtf:20%` is found by 20 repetitions in 99 of 100
+runs when every cube is lost a little more often (s = 8 points), but only in 14 to 21 when one
+repetition in five loses half its tower cubes (s = 20): that takes about 45, and one in ten that
+loses all of them about 90 (real records, resampled; the first case is tested in
+tests/measure/test_gate.py).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from pytest_simbench.measure.comparison import (
+    ALPHA,
+    PERMUTATIONS,
+    Alternative,
+    Comparison,
+    compare,
+    holm,
+    pair,
+)
+from pytest_simbench.measure.differences import differences
+from pytest_simbench.measure.limits import FAILURES, Limit
+from pytest_simbench.measure.metrics import Metric
+from pytest_simbench.measure.record import Record
+from pytest_simbench.measure.results import ResultSet
+
+COMMON_SEEDS = 0.9
+"""Pair by seed when at least this share of the smaller side's seeds is on both sides."""
+
+SPEED_POWER = {"rtf": 1, "cpu_cost": -1, "start": -1, "end": -1, "total": -1}
+"""Costs that depend on the machine's speed: the power of the control workload's seconds that takes
+it out. A machine half as fast has half the rtf, and the control takes twice as long. The seconds
+are `control_wall` and `control_cpu` of a record's `stepping`; without them nothing is done."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """One metric of one test, before and after.
+
+    Attributes:
+        test: the test's id.
+        metric: what was compared.
+        limit: how much worse it may get.
+        comparison: the means and the one-sided p value of getting worse.
+        p_value: corrected for all comparisons of the run.
+        loss: how much worse, in the limit's terms; below 0: better.
+        normalised: whether the machine's speed was taken out by the control workload.
+    """
+
+    test: str
+    metric: Metric
+    limit: Limit
+    comparison: Comparison
+    p_value: float
+    loss: float
+    normalised: bool = False
+
+    @property
+    def exceeded(self) -> bool:
+        """Whether it got worse by more than the limit, and not by chance."""
+        return self.loss > self.limit.amount and self.p_value <= ALPHA
+
+    @property
+    def repetitions(self) -> str:
+        """How many were compared, in words."""
+        first, second = self.comparison.n
+        return f"{first} pairs" if self.comparison.paired else f"{first} and {second} repetitions"
+
+    def sentence(self) -> str:
+        """What changed, by how much, and how sure."""
+        before, after = self.comparison.first, self.comparison.second
+        verb = "fell" if after < before else "rose" if after > before else "stayed"
+        speed = ", machine speed taken out" if self.normalised else ""
+        return (
+            f"{self.test}: {self.metric.name} {verb} from {self.metric.format(before)} to "
+            f"{self.metric.format(after)} (worse by {self.limit.describe(self.metric, self.loss)}, "
+            f"limit {self.limit.describe(self.metric, self.limit.amount)}; "
+            f"p = {self.p_value:.2g}, {self.repetitions}{speed})"
+        )
+
+
+@dataclass(frozen=True)
+class GateReport:
+    """What a comparison with a baseline found.
+
+    Attributes:
+        differences: settings, versions and machines that are not the same: read them first.
+        changes: every comparison made.
+        broken: tests that gave no result any more, one sentence each.
+        notes: what could not be compared, and why.
+    """
+
+    differences: tuple[str, ...] = ()
+    changes: tuple[Change, ...] = ()
+    broken: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """One sentence for each limit exceeded and each broken test; empty: the gate is passed."""
+        return (*self.broken, *(c.sentence() for c in self.changes if c.exceeded))
+
+
+def run_gate(
+    baseline: Iterable[Record],
+    current: Iterable[Record],
+    limits: Sequence[Limit],
+    metrics: Mapping[str, Sequence[Metric]],
+) -> GateReport:
+    """Compare two runs.
+
+    Args:
+        baseline: records of the run to compare with.
+        current: records of this run.
+        limits: from `parse_limits`.
+        metrics: the metrics of each task, by its name.
+    """
+    before, after = _by_test(baseline, current, metrics)
+    common = [test for test in after if test in before]
+    notes = [f"{test} is not in the baseline and is not compared" for test in after.keys() - before]
+    notes += [f"{test} is in the baseline but did not run" for test in before.keys() - after]
+    broken = [_broken(test, before[test], after[test]) for test in common]
+    found = [
+        change
+        for test in common
+        for limit in limits
+        if (change := _change(test, before[test], after[test], limit)) is not None
+    ]
+    corrected = holm([change.comparison.p_value for change in found])
+    changes = [replace(c, p_value=p) for c, p in zip(found, corrected, strict=True)]
+    notes += [
+        f"{limit.metric} was not measured in both runs, so its limit is not tested"
+        for limit in limits
+        if not any(change.limit == limit for change in changes)
+    ]
+    notes += [
+        f"{change.test}: {change.repetitions} are too few for a change of {change.metric.name} "
+        f"to be significant among {len(changes)} comparisons"
+        for change in changes
+        if _smallest_p(change.comparison) * len(changes) > ALPHA
+    ]
+    named = differences({test: (before[test].records, after[test].records) for test in common})
+    return GateReport(
+        tuple(named), tuple(changes), tuple(filter(None, broken)), tuple(sorted(notes))
+    )
+
+
+def _by_test(
+    baseline: Iterable[Record], current: Iterable[Record], metrics: Mapping[str, Sequence[Metric]]
+) -> tuple[dict[str, ResultSet], dict[str, ResultSet]]:
+    """Both runs' result sets by test, without its file: that depends on where pytest ran."""
+    runs = [list(baseline), list(current)]
+    short = all(len({r.test for r in run}) == len({_name(r.test) for r in run}) for run in runs)
+    sides: list[dict[str, ResultSet]] = []
+    for run in runs:
+        groups: dict[str, list[Record]] = {}
+        for record in run:
+            groups.setdefault(_name(record.test) if short else record.test, []).append(record)
+        sides.append({t: ResultSet(g, metrics.get(g[0].task, ())) for t, g in groups.items()})
+    return sides[0], sides[1]
+
+
+def _name(test: str) -> str:
+    return test.rpartition("::")[2]
+
+
+def _broken(test: str, old: ResultSet, new: ResultSet) -> str:
+    """A sentence when nothing succeeds any more, so that there is no metric to compare."""
+    if not old.ok or new.ok or not new.failures:
+        return ""
+    return (
+        f"{test}: none of {len(new.failures)} repetitions succeeded (most often "
+        f"{next(iter(new.causes()))}); {len(old.ok)} of {len(old)} did in the baseline"
+    )
+
+
+def _change(test: str, old: ResultSet, new: ResultSet, limit: Limit) -> Change | None:
+    """The change of one metric, not yet corrected; None where a side does not have it."""
+    normalised = False
+    if limit.metric == FAILURES.name:
+        metric, first, second = FAILURES, _failed(old), _failed(new)
+    elif limit.metric in old.known and limit.metric in new.known:
+        metric = new.metric(limit.metric)
+        first, second = old.by_seed(metric.name), new.by_seed(metric.name)
+        power = SPEED_POWER.get(metric.name, 0) if metric.name not in new.metrics else 0
+        clock = "control_cpu" if metric.name == "cpu_cost" else "control_wall"
+        speeds = _control(old, clock), _control(new, clock)
+        if power and first.keys() <= speeds[0].keys() and second.keys() <= speeds[1].keys():
+            normalised = bool(first and second)
+            usual = math.fsum(speeds[0].values()) / max(1, len(speeds[0]))
+            first = {s: v * (speeds[0][s] / usual) ** power for s, v in first.items()}
+            second = {s: v * (speeds[1][s] / usual) ** power for s, v in second.items()}
+    else:
+        return None
+    if not first or not second:
+        return None
+    shared = len(first.keys() & second.keys())
+    paired = shared >= max(2, math.ceil(COMMON_SEEDS * min(len(first), len(second))))
+    sides = pair(first, second) if paired else ([*first.values()], [*second.values()])
+    worse: Alternative = "less" if metric.better == "higher" else "greater"
+    comparison = compare(*sides, paired=paired, alternative=worse)
+    loss = limit.loss(metric, comparison.first, comparison.second)
+    return Change(test, metric, limit, comparison, comparison.p_value, loss, normalised)
+
+
+def _failed(result: ResultSet) -> dict[int, float]:
+    """1 for each repetition that failed, 0 for each that did not, by seed."""
+    return {r.seed: float(not r.ok) for r in (*result.ok, *result.failures)}
+
+
+def _control(result: ResultSet, clock: str) -> dict[int, float]:
+    """Seconds of the control workload run beside each repetition, by seed, where recorded."""
+    return {
+        r.seed: seconds for r in result.ok if (seconds := r.stepping.get(clock)) and seconds > 0
+    }
+
+
+def _smallest_p(comparison: Comparison) -> float:
+    """The smallest p value that so many repetitions can give in a permutation test."""
+    first, second = comparison.n
+    arrangements = 2**first if comparison.paired else math.comb(first + second, first)
+    return 1 / min(arrangements, PERMUTATIONS + 1)

@@ -1,0 +1,87 @@
+"""What `--sim-compare-fail="placed:5%,ram:10%,rtf:20%"` says: how much worse is too much."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from pytest_simbench.measure.metrics import COSTS, Metric, UnknownMetric
+
+FAILURES = Metric(
+    "failures", "failed repetitions", better="lower", kind="yes_no", doc="1 for each that failed"
+)
+"""The share of failed repetitions, as a metric of every task."""
+
+
+class LimitError(ValueError):
+    """A limit that cannot be understood; the message says why and shows a right one."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """How much a metric may get worse.
+
+    Attributes:
+        metric: the metric's name.
+        amount: above or equal 0; a share (0.05) where `percent`, else in the metric's unit.
+        percent: of the baseline's mean for values; percentage points for shares and yes-or-no
+            metrics, which are shown in percent anyway.
+    """
+
+    metric: str
+    amount: float
+    percent: bool
+
+    def loss(self, metric: Metric, before: float, after: float) -> float:
+        """How much worse `after` is than `before`, in the limit's own terms; below 0: better."""
+        loss = before - after if metric.better == "higher" else after - before
+        if not self.percent or metric.bounded:
+            return loss
+        if before:
+            return loss / abs(before)
+        return math.copysign(math.inf, loss) if loss else 0.0
+
+    def describe(self, metric: Metric, amount: float) -> str:
+        """An amount in the limit's terms: `5 points`, `20 %`, `0.01 m`."""
+        if metric.bounded:
+            return f"{100 * amount:.3g} points"
+        if self.percent:
+            return f"{100 * amount:.3g} %"
+        return metric.format(amount)
+
+
+def parse_limits(text: str, metrics: Iterable[Metric]) -> tuple[Limit, ...]:
+    """The limits in `name:amount[,name:amount...]`.
+
+    An amount with % is relative (points for shares); one without is in the metric's own unit.
+
+    Args:
+        text: as the user gave it.
+        metrics: of all tasks; the costs and `failures` are known besides.
+
+    Raises:
+        LimitError: an item that is not of that form, is there twice, or names a metric of which
+            neither direction is better.
+        UnknownMetric: no such metric; the message lists the valid names.
+    """
+    known = {metric.name: metric for metric in (*COSTS, FAILURES, *metrics)}
+    usable = [name for name, metric in known.items() if metric.better]
+    found: dict[str, Limit] = {}
+    for item in (part.strip() for part in text.split(",")):
+        match = re.fullmatch(r"(\w+)\s*:\s*(\d+(?:\.\d*)?|\.\d+)\s*(%?)", item)
+        if match is None:
+            raise LimitError(f"{item!r} is not a limit like placed:5% or landing_error:0.01")
+        name, number, percent = match.groups()
+        if name not in known:
+            raise UnknownMetric(name, usable)
+        if name not in usable:
+            raise LimitError(
+                f"{name} can be neither better nor worse, so it has no limit; "
+                f"valid names: {', '.join(sorted(usable))}"
+            )
+        if name in found:
+            raise LimitError(f"{name} has two limits; give it one")
+        found[name] = Limit(name, float(number) / (100 if percent else 1), bool(percent))
+    return tuple(found.values())

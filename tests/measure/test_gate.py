@@ -1,0 +1,196 @@
+"""The gate: planted changes are caught, neutral ones are not; every red has its test."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pytest_simbench.measure import comparison, gate
+from pytest_simbench.measure.gate import GateReport, run_gate
+from pytest_simbench.measure.limits import parse_limits
+from pytest_simbench.measure.record import Record
+from pytest_simbench.measure.records import read_records
+
+from .build import METRICS, failed, record
+
+REAL = read_records(Path(__file__).with_name("stacking_records.jsonl")).records
+"""20 stacking repetitions of MuJoCo and 21 of PyBullet, as recorded, without their details."""
+
+
+def run(baseline: Iterable[Record], current: Iterable[Record], text: str) -> GateReport:
+    limits = parse_limits(text, METRICS)
+    return run_gate(baseline, current, limits, {"stacking": METRICS})
+
+
+def made(placed: Iterable[float], first_seed: int = 0, **changes: Any) -> list[Record]:
+    return [
+        record(k, seed=first_seed + k, metrics={"placed": float(v)}, **changes)
+        for k, v in enumerate(placed)
+    ]
+
+
+def resampled(rng: np.random.Generator, simulator: str, loss: float = 0.0) -> list[Record]:
+    """20 records drawn from the real ones, where each placed cube is lost with that chance more."""
+    pool = [item for item in REAL if item.simulator == simulator]
+    found = []
+    for k, item in enumerate(rng.choice(len(pool), 20)):
+        real = pool[item]
+        cubes = rng.binomial(round(15 * (real.metrics["placed"] or 0)), 1 - loss)
+        found.append(replace(real, repetition=k, seed=k, metrics={"placed": cubes / 15}))
+    return found
+
+
+@pytest.mark.parametrize("simulator", ["mujoco", "pybullet"])
+def test_a_planted_loss_is_caught_and_no_change_is_not(
+    simulator: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(comparison, "PERMUTATIONS", 999)
+    monkeypatch.setattr(gate, "PERMUTATIONS", 999)
+    rng = np.random.default_rng(20)
+    limits = "placed:5%,ram:10%,rtf:20%"
+    caught = false = 0
+    for _ in range(100):
+        baseline = resampled(rng, simulator)
+        lost = run(baseline, resampled(rng, simulator, loss=0.10), limits)
+        caught += any("placed fell" in failure for failure in lost.failures)
+        false += bool(run(baseline, resampled(rng, simulator), limits).failures)
+    assert caught >= 80
+    assert false <= 5
+
+
+def test_false_alarms_stay_below_one_in_twenty_even_without_a_margin(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Three limits of 0 %, two tests: six chances of a false alarm, in 100 neutral pairs."""
+    monkeypatch.setattr(comparison, "PERMUTATIONS", 499)
+    monkeypatch.setattr(gate, "PERMUTATIONS", 499)
+    rng = np.random.default_rng(21)
+    false = 0
+    for _ in range(100):
+        runs = [resampled(rng, "mujoco") + resampled(rng, "pybullet") for _ in range(2)]
+        false += bool(run(*runs, "placed:0%,ram:0%,rtf:0%").failures)
+    assert 1 <= false <= 5 + 2 * 2.2  # two standard errors of 5 in 100
+
+
+def test_the_sentence_says_what_by_how_much_and_how_sure() -> None:
+    report = run(made([1.0] * 20), made([0.8] * 20), "placed:5%")
+    assert report.failures == (
+        "test_stacking[engine-headless]: placed fell from 100 % to 80 % "
+        "(worse by 20 points, limit 5 points; p = 0.0001, 20 pairs)",
+    )
+
+
+def test_a_significant_change_within_the_limit_passes() -> None:
+    assert run(made([1.0] * 20), made([0.96] * 20), "placed:5%").failures == ()
+
+
+def test_a_large_change_that_may_be_chance_passes() -> None:
+    lucky = [1.0] * 19 + [0.0]
+    report = run(made([1.0] * 20), made(lucky), "placed:2%")
+    assert report.changes[0].loss == pytest.approx(0.05)
+    assert report.failures == ()
+
+
+def test_getting_better_passes() -> None:
+    report = run(made([0.8] * 20), made([1.0] * 20), "placed:5%")
+    assert report.failures == ()
+    assert "placed rose from 80 % to 100 % (worse by -20 points" in report.changes[0].sentence()
+
+
+def test_more_memory_fails() -> None:
+    more = {"rss_mb": {"mean": 180.0, "peak": 200.0}}
+    report = run(made([1.0] * 10), made([1.0] * 10, resources=more), "ram:10%,ram_peak:50%")
+    assert len(report.failures) == 1
+    assert "ram rose from 150 MB to 180 MB (worse by 20 %, limit 10 %" in report.failures[0]
+
+
+def test_more_failures_fail() -> None:
+    current = [*made([1.0] * 10), *(failed(k) for k in range(10, 20))]
+    report = run(made([1.0] * 20), current, "failures:10%")
+    assert "failures rose from 0 % to 50 % (worse by 50 points" in report.failures[0]
+
+
+def test_a_test_that_gives_nothing_any_more_fails_whatever_the_limits() -> None:
+    report = run(made([1.0] * 3), [failed(0), failed(1)], "ram:10%")
+    assert report.failures == (
+        "test_stacking[engine-headless]: none of 2 repetitions succeeded (most often WorkerHung in "
+        "settle); 3 of 3 did in the baseline",
+    )
+
+
+def test_seeds_pair_where_they_can() -> None:
+    rng = np.random.default_rng(22)
+    before = np.round(rng.uniform(0.3, 0.9, 20), 3)
+    after = before - 0.06
+    paired = run(made(before), made(after), "placed:5%")
+    others = run(made(before), made(after, first_seed=500), "placed:5%")
+    assert paired.changes[0].comparison.paired
+    assert len(paired.failures) == 1
+    assert not others.changes[0].comparison.paired
+    assert others.failures == ()
+
+
+def timed(wall: float, control: float | None, rng: np.random.Generator) -> list[Record]:
+    """20 repetitions whose stepping took about `wall` seconds, and the control beside each."""
+    found = []
+    for k, noise in enumerate(rng.normal(1, 0.03, (20, 2))):
+        stepping = {"wall": wall * noise[0], "cpu": wall, "simulated": 140.0}
+        if control is not None:
+            stepping |= {"control_wall": control * noise[1], "control_cpu": control}
+        found.append(record(k, metrics={"placed": 1.0}, stepping=stepping))
+    return found
+
+
+def test_a_slow_machine_passes_and_a_real_slowdown_does_not() -> None:
+    rng = np.random.default_rng(23)
+    baseline = timed(8.0, 0.1, rng)
+    slow_machine = run(baseline, timed(16.0, 0.2, rng), "rtf:20%")
+    assert slow_machine.failures == ()
+    assert slow_machine.changes[0].normalised
+    slow_engine = run(baseline, timed(16.0 / 0.7, 0.2, rng), "rtf:20%")
+    assert "rtf fell from 17.5 to 12." in slow_engine.failures[0]
+    assert "machine speed taken out" in slow_engine.failures[0]
+
+
+def test_without_a_control_nothing_is_taken_out() -> None:
+    rng = np.random.default_rng(24)
+    report = run(timed(8.0, 0.1, rng), timed(16.0, None, rng), "rtf:20%")
+    assert not report.changes[0].normalised
+    assert len(report.failures) == 1
+
+
+def test_differences_are_named_first() -> None:
+    report = run(made([1.0] * 5), made([1.0] * 5, versions={"engine": "2.0"}), "placed:5%")
+    assert report.differences == (
+        'versions.engine was "1.0", is "2.0" (test_stacking[engine-headless])',
+    )
+
+
+def test_the_path_of_the_test_file_does_not_matter() -> None:
+    here = made([1.0] * 20, test="suites/test_stacking.py::test_stacking[engine-headless]")
+    there = made([0.5] * 20, test="test_stacking.py::test_stacking[engine-headless]")
+    assert len(run(here, there, "placed:5%").failures) == 1
+
+
+def test_two_tests_of_one_name_are_kept_apart_by_their_path() -> None:
+    both = made([1.0] * 6, test="a.py::t[e]") + made([0.5] * 6, test="b.py::t[e]")
+    report = run(both, both, "placed:5%")
+    assert {change.test for change in report.changes} == {"a.py::t[e]", "b.py::t[e]"}
+
+
+def test_what_cannot_be_compared_is_said() -> None:
+    baseline = made([1.0] * 3, test="kept") + made([1.0] * 3, test="gone")
+    current = made([1.0] * 3, test="kept") + made([1.0] * 3, test="new")
+    report = run(baseline, current, "placed:5%,landing_error:1")
+    assert report.failures == ()
+    assert report.notes == (
+        "gone is in the baseline but did not run",
+        "kept: 3 pairs are too few for a change of placed to be significant among 1 comparisons",
+        "landing_error was not measured in both runs, so its limit is not tested",
+        "new is not in the baseline and is not compared",
+    )
