@@ -21,6 +21,9 @@ WINDOW_PERIOD = 1 / 30
 CHECK_PERIOD = 0.1
 """Simulated time between two looks at the state for values that are not finite [s]."""
 
+LOOK_PERIOD = 0.01
+"""Simulated time between two looks at the wall clock, for window and pacing [s]."""
+
 
 @dataclass
 class Clocks:
@@ -100,7 +103,8 @@ class Stepper:
         simulator, timestep = self.simulator, self.simulator.settings.timestep
         log_every = 0 if log_period is None else max(1, round(log_period / timestep))
         check_every = max(1, round(CHECK_PERIOD / timestep))
-        look_every = max(1, round(0.01 / timestep))
+        watched = simulator.gui or self.real_time
+        look_every = max(1, round((LOOK_PERIOD if watched else CHECK_PERIOD) / timestep))
         log = Log()
         step, command, now = simulator.step, simulator.command, time.perf_counter
         began, cpu_began = now(), time.process_time()
