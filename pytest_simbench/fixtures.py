@@ -73,9 +73,10 @@ def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: A
     """What the options say of a simulator's repetitions."""
     from pytest_simbench.session.case import Case
     from pytest_simbench.session.protocol import PROTOCOLS
-    from pytest_simbench.simulator.registry import registered
+    from pytest_simbench.simulator.registry import adapter, registered
 
     name, mode = sim_case
+    info = adapter(name).info
     chosen, this = selection(config), run(config)
     settings = more.pop("settings", {})
     return Case(
@@ -86,9 +87,15 @@ def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: A
         adapter=registered()[name].value,
         folder=this.folder,
         changes={**settings, **chosen.changes.get(name, {})},
-        python=chosen.pythons.get(name),
+        python=chosen.python(name),
         spec=chosen.specs.get(name),
-        environment=this.displays.environment() if mode == "gui" else {},
+        environment={
+            **chosen.environment(name).variables(),
+            **(this.displays.environment() if mode == "gui" else {}),
+        },
+        costly_start=info.costly_start,
+        compile_timeout=info.compile_timeout,
+        fresh=options.value(config, "sim_fresh"),
         protocol=PROTOCOLS[options.value(config, "protocol")],
         stall_timeout=options.value(config, "sim_stall_timeout"),
         memory_limit=options.value(config, "sim_memory_limit"),

@@ -54,6 +54,8 @@ OPTIONS = (
     Option("--sim-python", [], "interpreter of a simulator's worker: genesis=PATH", "list",
            "SIM=PATH"),
     Option("--sim-spec", [], "execnet specification of a simulator's worker", "list", "SIM=SPEC"),
+    Option("--sim-fresh", False, "a new worker for each repetition even where starting is costly",
+           "flag"),
     Option("--sim-jobs", 1, "repetitions in parallel workers (records are marked contended)",
            "int", "N"),
     Option("--sim-memory-limit", None, "memory a worker may use before it is killed", "float",
@@ -64,7 +66,7 @@ OPTIONS = (
     Option("--sim-threshold", [], "change a threshold of the suites: placed=0.9", "list",
            "METRIC=VALUE"),
 )  # fmt: skip
-"""Every option; `--sims` is added apart, since it lists and exits."""
+"""Every option; `--sims` and `--sim-install` are added apart: they do their work and exit."""
 
 
 def add_options(parser: pytest.Parser) -> None:
@@ -82,6 +84,12 @@ def add_options(parser: pytest.Parser) -> None:
         parser.addini(option.name, option.help, default=None)
     group.addoption(
         "--sims", action="store_true", help="list the known simulators and exit", dest="sims_list"
+    )
+    group.addoption(
+        "--sim-install",
+        action="append",
+        metavar="NAME",
+        help="make the environment of a simulator that needs one of its own, and exit",
     )
 
 

@@ -59,12 +59,30 @@ def run(config: pytest.Config) -> Run:
 
 
 def pytest_cmdline_main(config: pytest.Config) -> int | None:
+    if config.getoption("sim_install"):
+        return _install(config.getoption("sim_install"))
     if not config.getoption("sims_list"):
         return None
     from pytest_simbench.report.simulators import list_simulators
 
     for line in list_simulators(selection(config)):
         print(line)
+    return 0
+
+
+def _install(names: list[str]) -> int:
+    from pytest_simbench.client.environments import Environment
+    from pytest_simbench.simulator.errors import SimulatorError
+    from pytest_simbench.simulator.registry import adapter
+
+    try:
+        for name in [part for text in names for part in text.split(",")]:
+            environment = Environment.of(adapter(name).info)
+            if environment.problem:
+                environment.create()
+            print(f"{name}: {environment.info.title} {environment.version()} is ready")
+    except SimulatorError as error:
+        raise pytest.UsageError(str(error)) from None
     return 0
 
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from math import inf
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from pytest_simbench import options
+
+if TYPE_CHECKING:
+    from pytest_simbench.client.environments import Environment
 
 MODES = ("headless", "gui")
 
@@ -43,9 +46,28 @@ class Selection:
             return None
         info = adapter(name).info
         absent = [module for module in info.modules if not _importable(module)]
+        if info.requirements:
+            problem = self.environment(name).problem
+            return problem if absent else None
         if absent:
             return f"{name} is not installed (no module {absent[0]}); install it: {info.install}"
         return None
+
+    def environment(self, name: str) -> Environment:
+        """The place of a simulator's own environment."""
+        from pytest_simbench.client.environments import Environment
+        from pytest_simbench.simulator.registry import adapter
+
+        return Environment.of(adapter(name).info)
+
+    def python(self, name: str) -> str | None:
+        """Interpreter of a simulator's workers; None for this one."""
+        from pytest_simbench.simulator.registry import adapter
+
+        if name in self.pythons or not adapter(name).info.requirements:
+            return self.pythons.get(name)
+        environment = self.environment(name)
+        return None if environment.problem else str(environment.python)
 
 
 def _importable(module: str) -> bool:

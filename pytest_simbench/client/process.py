@@ -57,6 +57,7 @@ class Launch:
         log: file that takes all of the worker's output, None to leave it alone.
         start_timeout: for interpreter start and handshake [s].
         stall_timeout: longest silence before the worker counts as hung [s].
+        compile_timeout: for `Simulator.compile` [s]; 0 where there is nothing to compile.
     """
 
     adapter: str
@@ -66,6 +67,7 @@ class Launch:
     log: Path | None = None
     start_timeout: float = 60.0
     stall_timeout: float = 60.0
+    compile_timeout: float = 0.0
 
 
 class WorkerProcess:

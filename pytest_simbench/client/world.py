@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -75,6 +76,8 @@ class World:
         self._trace_period = trace_period
         self._on_phase = on_phase
         self._names = [body.name for body in scene.free_bodies]
+        if process.launch.compile_timeout:
+            self._compile()
         with self.phase("load"), self.stopwatch.measuring("load"):
             answer = process.request(
                 "load", timeout=load_timeout, scene=scene.to_wire(), parity=parity
@@ -86,6 +89,17 @@ class World:
         self.time = float(answer["time"])
         self.joints: FloatArray = answer["joints"]
         self.bodies: FloatArray = answer["bodies"]
+
+    def _compile(self) -> None:
+        """Have the engine compile; the repetition's time-out stands still meanwhile."""
+        process, deadline, began = self.process, self.process.deadline, time.monotonic()
+        process.deadline = None
+        with self.phase("compiling"), self.stopwatch.measuring("compile"):
+            process.request(
+                "compile", timeout=process.launch.compile_timeout, scene=self.scene.to_wire()
+            )
+        if deadline is not None:
+            process.deadline = deadline + time.monotonic() - began
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:

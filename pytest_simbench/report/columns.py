@@ -65,6 +65,8 @@ def time_spent(summary: TaskSummary) -> list[Column]:
         return []
     columns = [labels(rows)]
     for phase in PHASES:
+        if phase == "compile" and not any(row.seconds.get(phase) for row in rows):
+            continue
         texts = []
         for row in rows:
             seconds = row.seconds.get(phase)

@@ -8,6 +8,30 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pytest_simbench.selection import Selection
+    from pytest_simbench.simulator.info import SimulatorInfo
+
+
+def _here(selection: Selection, name: str) -> str:
+    """Where a simulator is and which version."""
+    from pytest_simbench.simulator.registry import adapter
+
+    info = adapter(name).info
+    if name in selection.pythons or name in selection.specs:
+        return f"in {selection.pythons.get(name) or selection.specs[name]}"
+    own = selection.python(name) is not None
+    try:
+        found = selection.environment(name).version() if own else version(info.distribution)
+    except PackageNotFoundError:
+        found = None
+    place = f"in its own environment, {selection.environment(name).folder}" if own else "installed"
+    untested = "" if found == info.tested_version else ", UNTESTED"
+    return f"version {found or 'unknown'}{untested}, {place}"
+
+
+def _size(info: SimulatorInfo) -> str:
+    size = "" if info.install_size_mb is None else f"{info.install_size_mb} MB on disk; "
+    start = "compiles at first use" if info.costly_start else "nothing to compile"
+    return size + start
 
 
 def list_simulators(selection: Selection) -> Iterator[str]:
@@ -19,11 +43,8 @@ def list_simulators(selection: Selection) -> Iterator[str]:
         info = cls.info
         missing = selection.missing(name)
         yield f"{name}: {info.title} ({info.licence}), engine {info.engine}"
-        try:
-            here = f"version {version(info.distribution)} installed"
-        except PackageNotFoundError:
-            here = "in an interpreter of its own"
-        yield f"    {'NOT HERE: ' + missing if missing else here}, tested {info.tested_version}"
+        yield f"    {'NOT HERE: ' + missing if missing else _here(selection, name)}"
+        yield f"    tested with version {info.tested_version}; {_size(info)}"
         yield f"    modes: {', '.join(info.modes)}; profiles: {', '.join(cls.profiles)}"
         yield f"    can: {', '.join(sorted(info.capabilities))}"
         for deviation in info.deviations:

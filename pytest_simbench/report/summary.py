@@ -20,7 +20,7 @@ from pytest_simbench.measure.record import Record
 Ends = Callable[[Sequence[float], Metric], tuple[float, float]]
 """Gives the lower and upper end of the interval of a metric's mean; infinite where not known."""
 
-PHASES = ("launch", "load", "plan", "step", "other")
+PHASES = ("launch", "compile", "load", "plan", "step", "other")
 """Where the wall time of a repetition goes, in order."""
 
 

@@ -31,6 +31,9 @@ class Case:
         seed: base seed; repetition k has seed + k - 1.
         jitter: scale of the start jitter; 1 is 1 mm and 1 degree.
         trace: `off`, `on` or `retain-on-failure`: write the motion of every repetition.
+        costly_start: the engine compiles when it starts; one worker serves several repetitions.
+        compile_timeout: of the compiling [s].
+        fresh: start a new worker for each repetition all the same.
         contended: repetitions run side by side, so their times are not comparable.
         folder: the run folder.
     """
@@ -52,7 +55,15 @@ class Case:
     seed: int = 2022
     jitter: float = 1.0
     trace: str = "off"
+    costly_start: bool = False
+    compile_timeout: float = 0.0
+    fresh: bool = False
     contended: bool = False
+
+    @property
+    def reuses_worker(self) -> bool:
+        """Whether one worker serves several repetitions."""
+        return self.costly_start and not self.fresh
 
     @property
     def short_name(self) -> str:
@@ -76,4 +87,5 @@ class Case:
             log=log,
             start_timeout=max(self.stall_timeout, 1.0),
             stall_timeout=self.stall_timeout,
+            compile_timeout=self.compile_timeout if self.costly_start else 0.0,
         )

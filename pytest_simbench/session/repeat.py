@@ -13,6 +13,7 @@ from pytest_simbench.measure.record import Record
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.session.case import Case
 from pytest_simbench.session.repetition import Repetition
+from pytest_simbench.session.workers import IdleWorkers
 from pytest_simbench.tasks.base import Task
 
 
@@ -44,6 +45,7 @@ class Repeater:
         self.jobs = jobs
         self.progress = progress
         self.keep = keep
+        self._idle = IdleWorkers()
         self._active: set[Repetition] = set()
         self._stopping = threading.Event()
 
@@ -62,6 +64,7 @@ class Repeater:
             else:
                 records = [self._one(task, number) for number in numbers]
         finally:
+            self._idle.close()
             self.progress.end_test()
         return ResultSet(records, (task.smoke() if self.case.protocol.smallest else task).metrics)
 
@@ -71,6 +74,7 @@ class Repeater:
             self.case,
             task,
             number,
+            idle=self._idle,
             on_phase=progress.phase,
             on_count=lambda done, total: progress.count(done, total, "cubes"),
         )

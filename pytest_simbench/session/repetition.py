@@ -21,6 +21,7 @@ from pytest_simbench.client.world import Motion, World
 from pytest_simbench.measure.record import Failure, Record
 from pytest_simbench.measure.resources import ResourceSampler
 from pytest_simbench.session.case import Case
+from pytest_simbench.session.workers import IdleWorkers
 from pytest_simbench.tasks.base import Jitter, Outcome, Task
 
 TRACE_PERIOD = 0.02
@@ -28,12 +29,15 @@ TRACE_PERIOD = 0.02
 
 
 class Repetition:
-    """One repetition of a task in a fresh worker. `run` once; `kill` from any thread.
+    """One repetition of a task. `run` once; `kill` from any thread.
+
+    Its worker is fresh, unless the case reuses workers and one is idle.
 
     Args:
         case: simulator, settings and limits.
         task: what to do.
         number: of the repetition, from 1.
+        idle: where workers come from and go to, if the case reuses them.
         on_phase, on_count: progress, see `tasks.base`.
     """
 
@@ -43,6 +47,7 @@ class Repetition:
         task: Task,
         number: int,
         *,
+        idle: IdleWorkers | None = None,
         on_phase: Callable[[str], None] = lambda name: None,
         on_count: Callable[[int, int], None] = lambda done, total: None,
     ) -> None:
@@ -52,6 +57,8 @@ class Repetition:
         self.seed = case.seed + number - 1
         self.where = Where(case.simulator, case.mode, number, self.seed)
         self.stopwatch = Stopwatch()
+        self._idle = idle if idle is not None and case.reuses_worker else None
+        self._reused = False
         self._on_phase = on_phase
         self._on_count = on_count
         self._killed = False
@@ -86,9 +93,7 @@ class Repetition:
         deadline = time.monotonic() + (case.timeout or self.task.study_timeout)
         self._enter("launch")
         with self.stopwatch.measuring("launch"):
-            process = self._process = WorkerProcess(
-                case.launch(f"{case.short_name}-{self.number}"), self.where
-            )
+            process = self._process = self._worker()
             if self._killed:
                 process.kill()
             process.deadline = deadline
@@ -118,6 +123,15 @@ class Repetition:
         self._stats = world.stats()
         return outcome
 
+    def _worker(self) -> WorkerProcess:
+        process = self._idle.take() if self._idle is not None else None
+        if process is None:
+            launch = self.case.launch(f"{self.case.short_name}-{self.number}")
+            return WorkerProcess(launch, self.where)
+        process.where = self.where
+        self._reused = True
+        return process
+
     def _sample(self, process: WorkerProcess) -> None:
         limit = self.case.memory_limit
         if process.pid is not None and (self.case.spec or "popen").startswith("popen"):
@@ -141,7 +155,9 @@ class Repetition:
         if self._sampler is not None:
             use = self._sampler.stop(self._stats.get("peak_rss_mb")).to_wire()
         if self._process is not None:
-            if error is None:
+            if error is None and self._idle is not None:
+                self._idle.give(self._process)
+            elif error is None:
                 self._closing = self._process.close()
             else:
                 self._process.kill()
@@ -152,7 +168,9 @@ class Repetition:
     ) -> Record:
         case, total = self.case, self.stopwatch.elapsed()
         stepping = self._stats.get("stepping", {})
-        seconds = {k: self.stopwatch.seconds.get(k, 0.0) for k in ("launch", "load", "plan")}
+        seconds = {
+            k: self.stopwatch.seconds.get(k, 0.0) for k in ("launch", "compile", "load", "plan")
+        }
         seconds["step"] = stepping.get("wall", 0.0)
         seconds["other"] = max(0.0, total - sum(seconds.values()))
         seconds["total"] = total
@@ -186,6 +204,7 @@ class Repetition:
             host=host(),
             deviations=tuple(self._world.excused if self._world else ()),
             contended=case.contended,
+            reused_worker=self._reused,
         )
 
     def _log_name(self) -> str:

@@ -43,6 +43,13 @@ class Simulator(ABC):
         self.settings = settings
         self.gui = gui
 
+    def compile(self, scene: Scene) -> None:  # noqa: B027 - most engines have nothing to compile
+        """Have ready what `load` of this scene needs compiled; called just before it.
+
+        Its time is a phase of its own in the record, never counted in the task. Only called where
+        `info.costly_start`; what it compiles may be kept in the process for the next instance.
+        """
+
     @abstractmethod
     def load(self, scene: Scene) -> None:
         """Build the world of `scene`; its joints at rest at their initial positions."""

@@ -54,6 +54,11 @@ class SimulatorInfo:
         deviations: what it cannot express of a scene.
         costly_start: starting is so costly (kernels to compile) that one worker serves several
             repetitions, with a checked reset in between.
+        compile_timeout: the longest that `Simulator.compile` may take with cold caches [s].
+        requirements: pinned requirements of an interpreter of its own, for an engine whose
+            packages clash with pytest's or with another engine's; empty when it installs here.
+        caches: environment variables to be set to folders (named by the values) that are kept
+            between runs, for compiled kernels.
         environment: variables to be set before a headless engine is imported, unless the user did.
         install_size_mb: download and unpacked size on disk, rounded [MB].
     """
@@ -69,6 +74,9 @@ class SimulatorInfo:
     capabilities: frozenset[Capability]
     deviations: tuple[Deviation, ...] = ()
     costly_start: bool = False
+    compile_timeout: float = 900.0
+    requirements: tuple[str, ...] = ()
+    caches: Mapping[str, str] = field(default_factory=dict)
     install_size_mb: int | None = None
     environment: Mapping[str, str] = field(default_factory=dict)
 

@@ -13,12 +13,15 @@ import os
 import sys
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from pytest_simbench import __version__
 from pytest_simbench.scene import Scene, Trajectory
-from pytest_simbench.simulator import Simulator, SimulatorError
+from pytest_simbench.simulator import ParityError, Simulator, SimulatorError, SimulatorInfo
 from pytest_simbench.simulator.parity import check, expected_quantities
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.worker.stepping import Stepper
@@ -39,6 +42,12 @@ def peak_rss_mb() -> float | None:
     except OSError:
         pass
     return None
+
+
+def reset_peak_rss() -> None:
+    """Start the peak anew, for a worker that serves several repetitions (`man proc`)."""
+    with suppress(OSError), open("/proc/self/clear_refs", "w", encoding="ascii") as file:
+        file.write("5")
 
 
 class Server:
@@ -83,16 +92,19 @@ class Server:
         if not gui:
             for variable, value in cls.info.environment.items():
                 os.environ.setdefault(variable, value)
-        for engine_module in cls.info.modules:
-            importlib.import_module(engine_module)
+        _import_engine(cls.info)
         settings = changed(cls.profiles[profile], changes, cls.info.name)
         if self.simulator is not None:
             self.simulator.close()  # a reused worker starts each world anew
         self.stepper = None
         self.saved.clear()
+        reset_peak_rss()
         self.simulator = cls(settings, gui=gui)
         self.real_time = real_time
         return {"settings": settings.to_wire(), "versions": self.simulator.versions()}
+
+    def do_compile(self, scene: dict[str, Any]) -> None:
+        self._constructed().compile(Scene.from_wire(scene))
 
     def do_load(self, scene: dict[str, Any], parity: bool) -> dict[str, Any]:
         simulator = self._constructed()
@@ -100,6 +112,7 @@ class Server:
         simulator.load(world)
         self.stepper = Stepper(simulator, lambda at: self.send({"alive": at}))
         self.stepper.real_time = self.real_time
+        _check_at_start(simulator)
         excused: list[str] = []
         if parity:
             expected = expected_quantities(world, simulator.settings)
@@ -162,6 +175,28 @@ class Server:
         if self.stepper is None:
             raise SimulatorError("no scene was loaded yet")
         return self.stepper
+
+
+def _import_engine(info: SimulatorInfo) -> None:
+    for module in info.modules:
+        try:
+            importlib.import_module(module)
+        except ImportError as error:
+            raise SimulatorError(
+                f"{info.title} does not import ({error}); it is missing or half installed in "
+                f"{sys.executable}: {info.install}"
+            ) from error
+
+
+def _check_at_start(simulator: Simulator) -> None:
+    """A world must start at time 0 and at rest, also in a worker that served others before."""
+    speeds = [simulator.joint_state()[1], simulator.body_state()[:, 7:]]
+    fastest = max((float(np.abs(values).max()) for values in speeds if values.size), default=0.0)
+    if abs(simulator.time) > 1e-9 or not fastest < 1e-6:
+        raise ParityError(
+            f"{simulator.info.name} starts a world at t = {simulator.time:g} s with speeds up to "
+            f"{fastest:.3g} (m/s, rad/s); it must start at 0 and at rest"
+        )
 
 
 def serve(receive: Callable[[], Any], send: Callable[[Any], None]) -> None:
