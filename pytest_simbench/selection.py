@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from importlib.util import find_spec
 from math import inf
 from typing import TYPE_CHECKING, Any
 
@@ -40,18 +39,12 @@ class Selection:
 
     def missing(self, name: str) -> str | None:
         """Why a simulator cannot run here, with what mends it; None when it can."""
+        from pytest_simbench.client.environments import missing
         from pytest_simbench.simulator.registry import adapter
 
         if name in self.pythons or name in self.specs:
             return None
-        info = adapter(name).info
-        absent = [module for module in info.modules if not _importable(module)]
-        if info.requirements:
-            problem = self.environment(name).problem
-            return problem if absent else None
-        if absent:
-            return f"{name} is not installed (no module {absent[0]}); install it: {info.install}"
-        return None
+        return missing(adapter(name).info)
 
     def environment(self, name: str) -> Environment:
         """The place of a simulator's own environment."""
@@ -62,19 +55,10 @@ class Selection:
 
     def python(self, name: str) -> str | None:
         """Interpreter of a simulator's workers; None for this one."""
+        from pytest_simbench.client.environments import interpreter
         from pytest_simbench.simulator.registry import adapter
 
-        if name in self.pythons or not adapter(name).info.requirements:
-            return self.pythons.get(name)
-        environment = self.environment(name)
-        return None if environment.problem else str(environment.python)
-
-
-def _importable(module: str) -> bool:
-    try:
-        return find_spec(module) is not None
-    except (ImportError, ValueError):
-        return False
+        return self.pythons.get(name) or interpreter(adapter(name).info)
 
 
 def select(config: pytest.Config) -> Selection:

@@ -16,6 +16,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import distributions
+from importlib.util import find_spec
 from pathlib import Path
 
 from pytest_simbench.simulator.errors import SimulatorError
@@ -122,3 +123,27 @@ def cache_variables(caches: Mapping[str, str], folder: Path) -> dict[str, str]:
         for variable, name in caches.items()
         if variable not in os.environ
     }
+
+
+def missing(info: SimulatorInfo) -> str | None:
+    """Why an engine can be imported neither here nor in its own environment, and what mends it."""
+    absent = [module for module in info.modules if not _importable(module)]
+    if not absent:
+        return None
+    if info.requirements:
+        return Environment.of(info).problem
+    return f"{info.name} is not installed (no module {absent[0]}); install it: {info.install}"
+
+
+def interpreter(info: SimulatorInfo) -> str | None:
+    """The interpreter of an engine's own environment where there is one; None for this one."""
+    if not info.requirements or Environment.of(info).problem:
+        return None
+    return str(Environment.of(info).python)
+
+
+def _importable(module: str) -> bool:
+    try:
+        return find_spec(module) is not None
+    except (ImportError, ValueError):
+        return False

@@ -12,7 +12,6 @@ it holds the engine to, how closely, and why.
 
 from __future__ import annotations
 
-import importlib.util
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -21,6 +20,7 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.client.environments import missing
 from pytest_simbench.simulator import Simulator
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.testing import contract, drives, physics, state
@@ -76,10 +76,9 @@ class ConformanceTest:
         info, needs = self.subject.cls.info, self.check.needs
         if needs is not None and not self.subject.can(needs):
             pytest.skip(f"{info.name} does not claim {needs}")
-        if self.subject.python is None:
-            missing = [m for m in info.modules if not _importable(m)]
-            if missing:
-                pytest.skip(f"{', '.join(missing)} is not installed: {info.install}")
+        absent = None if self.subject.python else missing(info)
+        if absent:
+            pytest.skip(absent)
         reason = reason_for(self.id, self.expected_failures)
         try:
             self.check.law(self.subject)
@@ -111,7 +110,8 @@ def conformance_checks(
         profiles: settings profiles to check.
         expected_failures: file or mapping of laws known to be broken: they become xfail. A line
             that matches no check, or whose check passes, gives a `ConformanceWarning`.
-        python: interpreter by simulator name, for engines outside this environment.
+        python: interpreter by simulator name, for engines that are neither here nor in an
+            environment of their own.
         only: names of the checks wanted, default all.
 
     Raises:
@@ -136,10 +136,3 @@ def conformance_checks(
             stacklevel=2,
         )
     return pytest.mark.parametrize("check", [pytest.param(test, id=test.id) for test in tests])
-
-
-def _importable(module: str) -> bool:
-    try:
-        return importlib.util.find_spec(module) is not None
-    except ImportError:
-        return False

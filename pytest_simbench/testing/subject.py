@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from pytest_simbench.client.environments import Environment, interpreter
 from pytest_simbench.client.errors import Where, WorkerError
 from pytest_simbench.client.process import Launch, WorkerProcess
 from pytest_simbench.client.world import Motion, World
@@ -38,8 +39,8 @@ def require_close(what: str, value: float, expected: float, tolerance: float, un
     )
 
 
-COMPILE_TIMEOUT = 900.0
-"""An engine that compiles at first use needs minutes (ENGINES: up to 180 s) [s]."""
+TIMEOUT = 120.0
+"""For anything but compiling [s]."""
 
 _shared: dict[tuple[str | None, str], WorkerProcess] = {}
 
@@ -55,7 +56,8 @@ class Subject:
     Attributes:
         cls: the adapter's class.
         profile: name of its settings profile.
-        python: interpreter of its worker, None for this one.
+        python: interpreter of its worker; None for that of its own environment where it has one
+            (`pytest --sim-install`), else this one.
     """
 
     cls: type[Simulator]
@@ -88,13 +90,20 @@ class Subject:
         handle, log = tempfile.mkstemp(prefix=f"{self.name}-", suffix=".log")
         os.close(handle)
         atexit.register(Path(log).unlink, missing_ok=True)
-        timeout = COMPILE_TIMEOUT if self.cls.info.costly_start else 120.0
-        launch = Launch(self.adapter, python=self.python, log=Path(log), stall_timeout=timeout)
+        info = self.cls.info
+        launch = Launch(
+            self.adapter,
+            python=self.python or interpreter(info),
+            environment=Environment.of(info).variables(),
+            log=Path(log),
+            stall_timeout=TIMEOUT,
+            compile_timeout=info.compile_timeout if info.costly_start else 0.0,
+        )
         return WorkerProcess(launch, Where(self.name, "gui" if gui else "headless"))
 
     def shared(self) -> WorkerProcess:
         """The process that checks share; started when first needed."""
-        key = (self.python, self.cls.__module__.partition(".")[0])
+        key = (self.python, self.name)
         if key not in _shared or not _shared[key].alive:
             _shared[key] = self.launch()
         return _shared[key]
@@ -105,7 +114,7 @@ class Subject:
         """Have the process make the simulator; the answer holds its settings and versions."""
         answer: dict[str, Any] = process.request(
             "construct",
-            timeout=COMPILE_TIMEOUT,
+            timeout=TIMEOUT,
             adapter=self.adapter,
             profile=self.profile,
             changes=dict(changes or {}),
@@ -128,7 +137,7 @@ class Subject:
         process = self.launch(gui=gui) if alone else self.shared()
         try:
             self.construct(process, changes, gui)
-            yield World(process, scene, load_timeout=COMPILE_TIMEOUT)
+            yield World(process, scene, load_timeout=TIMEOUT)
         except WorkerError:
             process.kill()
             raise

@@ -103,5 +103,5 @@ def test_conformance(check):
 """
     )
     result = pytester.runpytest_subprocess("-rs")
-    result.stdout.fnmatch_lines(["*no_such_engine is not installed: buy it*"])
+    result.stdout.fnmatch_lines(["*gone is not installed (no module no_such_engine); install it: buy it*"])
     result.assert_outcomes(skipped=1)
