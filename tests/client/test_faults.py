@@ -20,17 +20,42 @@ from tests.conftest import ADAPTERS
 from tests.tiny import Falling
 
 
+class Silent:
+    """Progress that nobody watches."""
+
+    def __getattr__(self, name: str) -> object:
+        return lambda *arguments: None
+
+
 def run(case: Case, adapter: str | None = None, number: int = 1) -> Record:
     if adapter is not None:
-        case = replace(case, adapter=f"tests.client.faulty:{adapter}")
+        case = faulty(case, adapter)
+    before = workers()
     record, _ = Repetition(case, Falling(), number).run()
     assert Record.from_json(record.to_json()) == Record.from_json(record.to_json())
-    assert not [
+    assert not workers() - before, "a worker was left behind"
+    return record
+
+
+def faulty(case: Case, fault: str) -> Case:
+    """The case on the same engine with a fault."""
+    engine = case.adapter.rpartition(":")[2]
+    return replace(case, adapter=f"tests.client.faulty:{engine}_{fault}")
+
+
+def workers() -> set[psutil.Process]:
+    """Living workers of this process."""
+    return {
         child
         for child in psutil.Process().children()
         if child.status() != psutil.STATUS_ZOMBIE and "python" in child.name()
-    ], "a worker was left behind"
-    return record
+    }
+
+
+@pytest.fixture(params=["mujoco", "pybullet"])
+def engine(case: Case, request: pytest.FixtureRequest) -> Case:
+    """The case on each engine."""
+    return replace(case, simulator=request.param, adapter=ADAPTERS[request.param])
 
 
 @pytest.mark.parametrize(
@@ -44,8 +69,8 @@ def run(case: Case, adapter: str | None = None, number: int = 1) -> Record:
         ("NotANumber", "Diverged", "not finite at t = 0.3"),
     ],
 )
-def test_fault_while_stepping(case: Case, adapter: str, error: str, message: str) -> None:
-    case = replace(case, stall_timeout=3.0)
+def test_fault_while_stepping(engine: Case, adapter: str, error: str, message: str) -> None:
+    case = replace(engine, stall_timeout=3.0)
     record = run(case, adapter)
     assert record.status == "failed"
     assert record.error is not None
@@ -54,34 +79,34 @@ def test_fault_while_stepping(case: Case, adapter: str, error: str, message: str
     assert run(case, number=2).metrics == {"landed": 1.0}
 
 
-def test_the_log_tail_shows_where_it_crashed(case: Case) -> None:
-    record = run(case, "Crashed")
+def test_the_log_tail_shows_where_it_crashed(engine: Case) -> None:
+    record = run(engine, "Crashed")
     assert record.error is not None
     assert "Segmentation fault" in record.error.log_tail
     assert "in fault" in record.error.log_tail
 
 
-def test_a_worker_that_eats_memory_is_killed(case: Case) -> None:
-    record = run(replace(case, memory_limit=500.0), "Greedy")
+def test_a_worker_that_eats_memory_is_killed(engine: Case) -> None:
+    record = run(replace(engine, memory_limit=500.0), "Greedy")
     assert record.error is not None
     assert record.error.type == "OutOfMemory"
     assert "limit of 500 MB" in record.error.message
     assert record.resources["rss_mb"]["peak"] > 500
 
 
-def test_a_repetition_times_out(case: Case) -> None:
-    record = run(replace(case, timeout=2.0), "Hung")
+def test_a_repetition_times_out(engine: Case) -> None:
+    record = run(replace(engine, timeout=2.0), "Hung")
     assert record.error is not None
     assert record.error.type == "RepetitionTimeout"
 
 
-def test_garbage_on_stdout_harms_nothing(case: Case) -> None:
-    record = run(case, "Chatty")
+def test_garbage_on_stdout_harms_nothing(engine: Case) -> None:
+    record = run(engine, "Chatty")
     assert (record.status, record.metrics) == ("ok", {"landed": 1.0})
 
 
-def test_crash_while_closing_does_not_fail_a_finished_repetition(case: Case) -> None:
-    record = run(case, "CrashesClosing")
+def test_crash_while_closing_does_not_fail_a_finished_repetition(engine: Case) -> None:
+    record = run(engine, "CrashesClosing")
     assert record.status == "ok"
     assert "SIGSEGV" in record.details["closing"]
 
@@ -116,18 +141,9 @@ def test_interpreter_that_is_none(case: Case, tmp_path: Path, script: str) -> No
     assert str(wrapper) in record.error.message
 
 
-@pytest.mark.parametrize("simulator", ["mujoco", "pybullet"])
-def test_no_display(case: Case, simulator: str) -> None:
+def test_no_display(engine: Case) -> None:
     display = {"DISPLAY": ":4711"}  # nobody serves it
-    record = run(
-        replace(
-            case,
-            simulator=simulator,
-            adapter=ADAPTERS[simulator],
-            mode="gui",
-            environment=display,
-        )
-    )
+    record = run(replace(engine, mode="gui", environment=display))
     assert record.error is not None
     assert (record.error.type, record.error.phase) == ("WorkerExited", "load")
     assert re.search("display|X server", record.error.log_tail)
@@ -139,21 +155,17 @@ def test_missing_engine_module(case: Case) -> None:
     assert "no_such_module" in record.error.message
 
 
-def test_another_world_stops_the_run(case: Case) -> None:
+def test_another_world_stops_the_run(engine: Case) -> None:
     kept: list[Record] = []
-    case = replace(case, adapter="tests.client.faulty:WrongGravity")
+    case = faulty(engine, "WrongGravity")
 
-    class Silent:
-        def __getattr__(self, name: str) -> object:
-            return lambda *arguments: None
-
-    with pytest.raises(Exception, match="gravity: scene .*-9.80665.*mujoco .*-20"):
+    with pytest.raises(Exception, match=f"gravity: scene .*-9.80665.*{case.simulator} .*-20"):
         Repeater(case, 1, Silent(), kept.append).run(Falling(), range(1, 4))  # type: ignore[arg-type]
     assert [record.error.type for record in kept if record.error] == ["WorldParityError"]
 
 
-def test_full_disk_for_logs_does_not_stop_the_repetition(case: Case, tmp_path: Path) -> None:
+def test_full_disk_for_logs_does_not_stop_the_repetition(engine: Case, tmp_path: Path) -> None:
     (tmp_path / "full").symlink_to("/dev/full")
-    record = run(replace(case, folder=tmp_path / "full"))
+    record = run(replace(engine, folder=tmp_path / "full"))
     assert record.status == "ok"
     assert os.path.islink(tmp_path / "full")

@@ -7,5 +7,7 @@ import pytest
 
 @pytest.fixture(autouse=True)
 def importable(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The inner pytest can import the helpers of these tests."""
+    """The inner pytest can import the helpers of these tests, and is no worker of xdist."""
     monkeypatch.setenv("PYTHONPATH", str(request.config.rootpath))
+    for name in ("PYTEST_XDIST_WORKER", "PYTEST_XDIST_WORKER_COUNT", "PYTEST_XDIST_TESTRUNUID"):
+        monkeypatch.delenv(name, raising=False)

@@ -103,5 +103,7 @@ def test_conformance(check):
 """
     )
     result = pytester.runpytest_subprocess("-rs")
-    result.stdout.fnmatch_lines(["*gone is not installed (no module no_such_engine); install it: buy it*"])
+    result.stdout.fnmatch_lines(
+        ["*gone is not installed (no module no_such_engine); install it: buy it*"]
+    )
     result.assert_outcomes(skipped=1)
