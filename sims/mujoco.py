@@ -78,6 +78,7 @@ class MuJoCo(Simulator):
         install="pip install 'pytest-simbench[mujoco]'",
         licence="Apache-2.0",
         engine="MuJoCo",
+        language="C, C++",
         tested_version="4.0.0",
         capabilities=frozenset(
             {

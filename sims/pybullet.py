@@ -97,6 +97,7 @@ class PyBullet(Simulator):
         install="pip install 'pytest-simbench[pybullet]'",
         licence="Zlib",
         engine="Bullet",
+        language="C++",
         tested_version="3.2.7",
         capabilities=frozenset(
             {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
@@ -9,6 +10,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pytest_simbench.selection import Selection
     from pytest_simbench.simulator.info import SimulatorInfo
+
+
+def _width() -> int:
+    return shutil.get_terminal_size((160, 24)).columns
 
 
 def _here(selection: Selection, name: str) -> str:
@@ -35,9 +40,12 @@ def _size(info: SimulatorInfo) -> str:
 
 
 def list_simulators(selection: Selection) -> Iterator[str]:
-    """Lines, a paragraph for each registered simulator."""
+    """Lines: the table of capabilities, then a paragraph for each registered simulator."""
+    from pytest_simbench.report.capabilities import capability_table
     from pytest_simbench.simulator.registry import adapter, registered
 
+    yield capability_table([adapter(name).info for name in registered()], _width())
+    yield ""
     for name in registered():
         cls = adapter(name)
         info = cls.info

@@ -202,7 +202,7 @@ def _undeclared(records: Sequence[Record]) -> list[Metric]:
 def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str, ends: Ends) -> Row:
     first = records[0]
     done = [record for record in records if record.status == "ok"]
-    notes = []
+    notes = list(dict.fromkeys(r.details["untested"] for r in records if "untested" in r.details))
     if any(record.contended for record in done):
         notes.append("repetitions ran in parallel: its times and CPU are contended")
     if any(record.reused_worker for record in done):

@@ -175,6 +175,8 @@ class Repetition:
         seconds["other"] = max(0.0, total - sum(seconds.values()))
         seconds["total"] = total
         details = {**outcome.details, "log": self._log_name()}
+        if self._constructed.get("untested"):
+            details["untested"] = self._constructed["untested"]
         if self._closing:
             details["closing"] = self._closing
         return Record(

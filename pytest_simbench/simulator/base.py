@@ -121,5 +121,16 @@ class Simulator(ABC):
         except PackageNotFoundError:
             return {}
 
+    def untested(self) -> str:
+        """A sentence when the engine is of another version than the adapter was tested with."""
+        info = self.info
+        found = self.versions().get(info.distribution, "of an unknown version")
+        if found == info.tested_version:
+            return ""
+        return (
+            f"UNTESTED VERSION: {info.distribution} {found} is here, the adapter was tested with "
+            f"{info.tested_version}; for that one: {info.install}"
+        )
+
     def _missing(self, what: str) -> NotSupportedError:
         return NotSupportedError(f"{self.info.name} has no {what}")

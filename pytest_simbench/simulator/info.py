@@ -60,7 +60,8 @@ class SimulatorInfo:
         caches: environment variables to be set to folders (named by the values) that are kept
             between runs, for compiled kernels.
         environment: variables to be set before a headless engine is imported, unless the user did.
-        install_size_mb: download and unpacked size on disk, rounded [MB].
+        install_size_mb: what installing it adds on disk, rounded [MB].
+        language: in which the engine is written.
     """
 
     name: str
@@ -79,6 +80,7 @@ class SimulatorInfo:
     caches: Mapping[str, str] = field(default_factory=dict)
     install_size_mb: int | None = None
     environment: Mapping[str, str] = field(default_factory=dict)
+    language: str = "unknown"
 
     @property
     def modes(self) -> tuple[str, ...]:

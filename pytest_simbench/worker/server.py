@@ -101,7 +101,11 @@ class Server:
         reset_peak_rss()
         self.simulator = cls(settings, gui=gui)
         self.real_time = real_time
-        return {"settings": settings.to_wire(), "versions": self.simulator.versions()}
+        return {
+            "settings": settings.to_wire(),
+            "versions": self.simulator.versions(),
+            "untested": self.simulator.untested(),
+        }
 
     def do_compile(self, scene: dict[str, Any]) -> None:
         self._constructed().compile(Scene.from_wire(scene))
