@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -145,10 +146,24 @@ def repeat(
             simbench_case, options.value(config, "sim_jobs"), this.progress, this.keep
         )
         result = repeater.run(task, range(1, int(reps) + 1))
+        request.node.user_properties.extend(_properties(result))
         _benchmark(benchmark, result)
         return result
 
     return repeat_task
+
+
+def _properties(result: ResultSet) -> Iterator[tuple[str, float]]:
+    """For JUnit: the mean of each metric and cost and the ends of its 95 % interval."""
+    yield "repetitions", len(result.ok) + len(result.failures)
+    yield "failures", len(result.failures)
+    for name in result.known:
+        found = result.interval(name)
+        if found.n:
+            yield name, found.mean
+            if isfinite(found.half_width):
+                yield f"{name}.low", found.low
+                yield f"{name}.high", found.high
 
 
 def _benchmark(benchmark: Any, result: ResultSet) -> None:
@@ -160,6 +175,8 @@ def _benchmark(benchmark: Any, result: ResultSet) -> None:
     def advance() -> None:
         worker_clock.seconds += next(seconds, 0.0)
 
+    from pytest_simbench.measure import saved
+
     first = result.ok[0]
     benchmark.extra_info.update(
         {
@@ -169,6 +186,7 @@ def _benchmark(benchmark: Any, result: ResultSet) -> None:
             "protocol": first.protocol,
             "settings": dict(first.settings),
             "versions": dict(first.versions),
+            "host": dict(first.host),
             "failures": len(result.failures),
             "metrics": {name: result.values(name) for name in result.metrics},
             "seeds": [record.seed for record in result.ok],
@@ -176,6 +194,7 @@ def _benchmark(benchmark: Any, result: ResultSet) -> None:
                 name: [record.cost(name) for record in result.ok]
                 for name in ("rtf", "cpu", "ram", "ram_peak", "cpu_cost", "start", "end", "total")
             },
+            saved.KEY: saved.to_extra_info(result.records),
         }
     )
     benchmark.pedantic(advance, rounds=len(result.ok), iterations=1, warmup_rounds=0)
@@ -184,6 +203,12 @@ def _benchmark(benchmark: Any, result: ResultSet) -> None:
 @pytest.fixture
 def threshold(request: pytest.FixtureRequest) -> Callable[[str, float], float]:
     """`threshold("placed", 0.9)`: the suite's value, unless `--sim-threshold` changes it."""
+    if hasattr(request.config, "workerinput"):  # an xdist worker must not fail while collecting
+        from pytest_simbench.thresholds import problem
+
+        found = problem(request.config, request.session.items)
+        if found:
+            pytest.fail(found, pytrace=False)
     given = options.assignments(request.config, "sim_threshold")
     return lambda metric, default: float(given.get(metric, default))
 

@@ -65,6 +65,12 @@ OPTIONS = (
            "text", "WHEN", ("off", "on", "retain-on-failure")),
     Option("--sim-threshold", [], "change a threshold of the suites: placed=0.9", "list",
            "METRIC=VALUE"),
+    Option("--sim-baseline", None, "run to compare with: a run folder, its records.jsonl, or a "
+           "--benchmark-json file (default: the run that --benchmark-compare chooses)",
+           "text", "PATH"),
+    Option("--sim-compare-fail", None, "fail when a metric is significantly worse than in the "
+           "baseline, and by more than this: placed:5%,ram:10%,rtf:20%",
+           "text", "METRIC:LIMIT,..."),
 )  # fmt: skip
 """Every option; `--sims` and `--sim-install` are added apart: they do their work and exit."""
 

@@ -9,11 +9,14 @@ import pytest
 from pytest_simbench import options
 
 if TYPE_CHECKING:
+    from pytest_simbench.compare import Comparison
     from pytest_simbench.run import Run
     from pytest_simbench.selection import Selection
 
 RUN = pytest.StashKey["Run"]()
 SELECTION = pytest.StashKey["Selection"]()
+COMPARISON: pytest.StashKey[Comparison] = pytest.StashKey()
+SAVED = pytest.StashKey[list[dict[str, Any]]]()
 
 MARKS = (
     "only_sim(*names): run only on these simulators",
@@ -58,6 +61,26 @@ def run(config: pytest.Config) -> Run:
     return config.stash[RUN]
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_benchmark_compare_machine_info(config: pytest.Config, compared_benchmark: Any) -> None:
+    """Keep the saved run that `--benchmark-compare` chose; of several, the newest comes last."""
+    config.stash.setdefault(SAVED, []).append(compared_benchmark)
+
+
+@pytest.hookimpl(tryfirst=True)  # before xdist starts its workers
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Complain of a bad baseline or limit before anything runs."""
+    config = session.config
+    asked = options.value(config, "sim_compare_fail") or options.value(config, "sim_baseline")
+    if hasattr(config, "workerinput") or not (asked or SAVED in config.stash):
+        return
+    from pytest_simbench.compare import prepare
+
+    comparison = prepare(config, config.stash.get(SAVED, []))
+    if comparison is not None:
+        config.stash[COMPARISON] = comparison
+
+
 def pytest_cmdline_main(config: pytest.Config) -> int | None:
     if config.getoption("sim_install"):
         return _install(config.getoption("sim_install"))
@@ -98,7 +121,14 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     metafunc.parametrize("sim_case", chosen, indirect=True, scope="session")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+@pytest.hookimpl(tryfirst=True)  # before -k and -m leave out tests
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.getoption("sim_threshold") and not hasattr(config, "workerinput"):
+        from pytest_simbench.thresholds import problem
+
+        found = problem(config, items)
+        if found:
+            raise pytest.UsageError(found)
     for item in items:
         if "repeat" in getattr(item, "fixturenames", ()):
             from pytest_simbench.fixtures import worker_clock
@@ -117,26 +147,52 @@ def pytest_configure_node(node: Any) -> None:
 def pytest_runtest_makereport(item: pytest.Item, call: Any) -> Any:
     outcome = yield
     if call.when == "call" and RUN in item.config.stash:
-        lines = run(item.config).of_test(item.nodeid)
+        this = run(item.config)
+        lines = this.of_test(item.nodeid)
         if lines:
-            outcome.get_result().simbench_records = lines
+            outcome.get_result().simbench = {"records": lines, "tasks": this.declared()}
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    _received.extend(getattr(report, "simbench_records", ()))
+    found = getattr(report, "simbench", None)
+    if found:
+        _received.append(found)
 
 
-_received: list[str] = []
-"""Records that came with reports; taken over when the session ends."""
+_received: list[dict[str, Any]] = []
+"""Records and tasks that came with reports; taken over when the session ends."""
+
+
+@pytest.hookimpl(trylast=True)  # xdist has heard all its workers then
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Compare with the baseline; a metric that is worse than allowed fails the run."""
+    config = session.config
+    for found in _received:
+        run(config).receive(found["records"])
+        run(config).receive_declared(found["tasks"])
+    _received.clear()
+    if RUN not in config.stash or hasattr(config, "workerinput"):
+        return
+    this = run(config)
+    this.complete()
+    if COMPARISON in config.stash and this.records:
+        comparison = config.stash[COMPARISON]
+        comparison.make(this.records.values(), this.metrics)
+        if comparison.failed and session.exitstatus == pytest.ExitCode.OK:
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     config = terminalreporter.config
-    if _received:
-        run(config).receive(_received)
-        _received.clear()
+    if hasattr(config, "workerinput"):  # an xdist worker has a reporter too, which nobody reads
+        return
+    comparison = config.stash.get(COMPARISON, None)
     if RUN in config.stash:
-        config.stash[RUN].summarise(terminalreporter)
+        markdown = comparison.markdown() if comparison else ""
+        config.stash[RUN].summarise(terminalreporter, markdown)
+    if comparison:
+        terminalreporter.write_sep("=", "comparison with the baseline")
+        terminalreporter.write_line(comparison.text(terminalreporter._tw.fullwidth))
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:

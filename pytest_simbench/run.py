@@ -39,6 +39,7 @@ class Run:
         self._progress: Progress | None = None
         self._metrics: dict[str, list[Metric]] = {}
         self._references: dict[str, dict[str, float]] = {}
+        self._problems: list[str] = []
 
     def _choose_folder(self) -> Path:
         shared = getattr(self.config, "workerinput", {}).get("simbench_folder")
@@ -97,6 +98,26 @@ class Run:
         self._metrics.setdefault(task.name, list(task.metrics))
         self._references.setdefault(task.name, dict(task.references))
 
+    @property
+    def metrics(self) -> dict[str, list[Metric]]:
+        """The metrics of each task that was performed, by its name."""
+        return self._metrics
+
+    def declared(self) -> dict[str, Any]:
+        """What was declared, as plain data, to travel with a report."""
+        return {
+            name: {"metrics": [m.to_wire() for m in found], "references": self._references[name]}
+            for name, found in self._metrics.items()
+        }
+
+    def receive_declared(self, tasks: dict[str, Any]) -> None:
+        """Take over what an xdist worker declared."""
+        from pytest_simbench.measure.metrics import Metric
+
+        for name, found in tasks.items():
+            self._metrics.setdefault(name, [Metric(**item) for item in found["metrics"]])
+            self._references.setdefault(name, dict(found["references"]))
+
     def of_test(self, test: str) -> list[str]:
         """Records of one test as JSON lines, to travel with its report."""
         return [r.to_json() for r in self.records.values() if r.test == test]
@@ -124,23 +145,37 @@ class Run:
             self.records.setdefault(_key(record), record)
         return list(reading.problems)
 
-    def summarise(self, reporter: pytest.TerminalReporter) -> None:
-        """Print the tables and write the report files."""
-        problems = self._read_folder() if self.records or self._shared() else []
+    def complete(self) -> None:
+        """Gather what other processes recorded; called when all tests have ended."""
+        if self.records or self._shared():
+            self._problems = self._read_folder()
+        if self.records:
+            self._declare_known()
+
+    def summarise(self, reporter: pytest.TerminalReporter, comparison: str = "") -> None:
+        """Print the tables and write the report files.
+
+        Args:
+            reporter: prints.
+            comparison: with a baseline, as Markdown, for the summary page of a CI job.
+        """
         if not self.records:
             return
+        from pytest_simbench.report import markdown
         from pytest_simbench.report.files import write_report
+        from pytest_simbench.report.github import append_summary
         from pytest_simbench.report.summary import summarise
         from pytest_simbench.report.tables import render_run
 
-        self._declare_known()
         records = sorted(self.records.values(), key=lambda r: (r.test, r.repetition))
         summaries = summarise(records, self._metrics, self._references)
         reporter.write_sep("=", "simulator comparison")
         reporter.write_line(render_run(summaries, reporter._tw.fullwidth, self.folder))
+        problems = list(self._problems)
         with suppress(OSError):
             problems += write_report(self.folder, summaries, records)
-        for line in [*problems, *self._unsaved()]:
+        problems.append(append_summary("\n".join([comparison, markdown.render_run(summaries)])))
+        for line in filter(None, [*problems, *self._unsaved()]):
             reporter.write_line(line)
 
     def _shared(self) -> bool:

@@ -51,7 +51,8 @@ class Change:
         test: the test's id.
         metric: what was compared.
         limit: how much worse it may get.
-        comparison: the means and the one-sided p value of getting worse.
+        comparison: the means and the p value: of getting worse where there is a limit, else of
+            any change.
         p_value: corrected for all comparisons of the run.
         loss: how much worse, in the limit's terms; below 0: better.
         normalised: whether the machine's speed was taken out by the control workload.
@@ -68,7 +69,12 @@ class Change:
     @property
     def exceeded(self) -> bool:
         """Whether it got worse by more than the limit, and not by chance."""
-        return self.loss > self.limit.amount and self.p_value <= ALPHA
+        return self.loss > self.limit.amount and self.significant
+
+    @property
+    def significant(self) -> bool:
+        """Whether it changed, in the direction that was tested, and not by chance."""
+        return self.p_value <= ALPHA
 
     @property
     def repetitions(self) -> str:
@@ -96,12 +102,15 @@ class GateReport:
     Attributes:
         differences: settings, versions and machines that are not the same: read them first.
         changes: every comparison made.
+        others: metrics without a limit, tested in both directions and corrected among
+            themselves: nothing fails for them, and they take nothing from the limits' certainty.
         broken: tests that gave no result any more, one sentence each.
         notes: what could not be compared, and why.
     """
 
     differences: tuple[str, ...] = ()
     changes: tuple[Change, ...] = ()
+    others: tuple[Change, ...] = ()
     broken: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -130,14 +139,16 @@ def run_gate(
     notes = [f"{test} is not in the baseline and is not compared" for test in after.keys() - before]
     notes += [f"{test} is in the baseline but did not run" for test in before.keys() - after]
     broken = [_broken(test, before[test], after[test]) for test in common]
-    found = [
-        change
+    changes = _corrected(
+        _change(test, before[test], after[test], limit) for test in common for limit in limits
+    )
+    limited = {limit.metric for limit in limits}
+    others = _corrected(
+        _change(test, before[test], after[test], Limit(name, 0.0, True), both_ways=True)
         for test in common
-        for limit in limits
-        if (change := _change(test, before[test], after[test], limit)) is not None
-    ]
-    corrected = holm([change.comparison.p_value for change in found])
-    changes = [replace(c, p_value=p) for c, p in zip(found, corrected, strict=True)]
+        for name in (FAILURES.name, *after[test].known)
+        if name not in limited
+    )
     notes += [
         f"{limit.metric} was not measured in both runs, so its limit is not tested"
         for limit in limits
@@ -151,8 +162,15 @@ def run_gate(
     ]
     named = differences({test: (before[test].records, after[test].records) for test in common})
     return GateReport(
-        tuple(named), tuple(changes), tuple(filter(None, broken)), tuple(sorted(notes))
+        tuple(named), changes, others, tuple(filter(None, broken)), tuple(sorted(notes))
     )
+
+
+def _corrected(found: Iterable[Change | None]) -> tuple[Change, ...]:
+    """The changes that could be tested, with their p values corrected for their number."""
+    changes = [change for change in found if change is not None]
+    corrected = holm([change.comparison.p_value for change in changes])
+    return tuple(replace(c, p_value=p) for c, p in zip(changes, corrected, strict=True))
 
 
 def _by_test(
@@ -184,8 +202,11 @@ def _broken(test: str, old: ResultSet, new: ResultSet) -> str:
     )
 
 
-def _change(test: str, old: ResultSet, new: ResultSet, limit: Limit) -> Change | None:
-    """The change of one metric, not yet corrected; None where a side does not have it."""
+def _change(
+    test: str, old: ResultSet, new: ResultSet, limit: Limit, *, both_ways: bool = False
+) -> Change | None:
+    """The change of one metric, not yet corrected; None where a side does not have it, or where
+    neither direction is the worse one."""
     normalised = False
     if limit.metric == FAILURES.name:
         metric, first, second = FAILURES, _failed(old), _failed(new)
@@ -202,13 +223,14 @@ def _change(test: str, old: ResultSet, new: ResultSet, limit: Limit) -> Change |
             second = {s: v * (speeds[1][s] / usual) ** power for s, v in second.items()}
     else:
         return None
-    if not first or not second:
+    if metric.better is None or not first or not second:
         return None
     shared = len(first.keys() & second.keys())
     paired = shared >= max(2, math.ceil(COMMON_SEEDS * min(len(first), len(second))))
     sides = pair(first, second) if paired else ([*first.values()], [*second.values()])
     worse: Alternative = "less" if metric.better == "higher" else "greater"
-    comparison = compare(*sides, paired=paired, alternative=worse)
+    tested: Alternative = "two-sided" if both_ways else worse
+    comparison = compare(*sides, paired=paired, alternative=tested)
     loss = limit.loss(metric, comparison.first, comparison.second)
     return Change(test, metric, limit, comparison, comparison.p_value, loss, normalised)
 

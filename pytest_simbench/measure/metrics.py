@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from difflib import get_close_matches
-from typing import Literal
+from typing import Any, Literal
 
 Better = Literal["higher", "lower"]
 Kind = Literal["share", "yes_no", "value"]
@@ -60,6 +60,10 @@ class Metric:
     def bounded(self) -> bool:
         """Whether it lies in 0..1, so that a mean of it is a proportion."""
         return self.kind != "value"
+
+    def to_wire(self) -> dict[str, Any]:
+        """Plain data: the arguments that make it again."""
+        return {item.name: getattr(self, item.name) for item in fields(self)}
 
     def format(self, value: float, digits: int = 3) -> str:
         """The value as a reader sees it: proportions in percent, others with their unit."""

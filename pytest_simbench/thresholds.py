@@ -1,0 +1,52 @@
+"""Is every metric of `--sim-threshold` one that a threshold can be of?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from types import CodeType
+
+import pytest
+
+from pytest_simbench import options
+
+
+def problem(config: pytest.Config, items: Iterable[pytest.Item]) -> str:
+    """What is wrong with the names in `--sim-threshold`, once the tests are known; else nothing.
+
+    Valid are the metrics of our own tasks, the costs, `failures`, and every name that stands in the
+    code or the parameters of a collected test that asks for a `threshold`: tests of other packages
+    have metrics of their own. The ini file, which holds for tests that were not collected this
+    time too, is not checked.
+    """
+    if not config.getoption("sim_threshold"):
+        return ""
+    asking = [item for item in items if "threshold" in getattr(item, "fixturenames", ())]
+    given = options.assignments(config, "sim_threshold")
+    unknown = given.keys() - {text for item in asking for text in _texts(item)}
+    if not unknown:
+        return ""
+    from pytest_simbench.measure.limits import FAILURES
+    from pytest_simbench.measure.metrics import COSTS, UnknownMetric
+    from pytest_simbench.tasks import Stacking, Throwing
+
+    tasks = (Stacking(), Throwing())
+    known = {m.name for m in (*COSTS, FAILURES, *(m for task in tasks for m in task.metrics))}
+    for name in sorted(unknown - known):
+        return f"--sim-threshold {name}={given[name]}: {UnknownMetric(name, known)}"
+    return ""
+
+
+def _texts(item: pytest.Item) -> Iterator[str]:
+    """The texts in a test's code and parameters; a metric's name is one of them."""
+    parameters = getattr(getattr(item, "callspec", None), "params", {})
+    yield from (value for value in parameters.values() if isinstance(value, str))
+    code = getattr(getattr(item, "function", None), "__code__", None)
+    yield from _constants(code) if code else ()
+
+
+def _constants(code: CodeType) -> Iterator[str]:
+    for constant in code.co_consts:
+        if isinstance(constant, str):
+            yield constant
+        elif isinstance(constant, CodeType):
+            yield from _constants(constant)

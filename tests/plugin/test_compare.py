@@ -1,0 +1,162 @@
+"""The comparison with a baseline, as users run it: what fails, what passes, what it says."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from textwrap import dedent
+from xml.etree import ElementTree
+
+import pytest
+
+TEST = """
+    import os
+    from tests.tiny import Falling
+
+    def test_falling(repeat):
+        repeat(Falling(duration=float(os.environ.get("DURATION", "0.6"))))
+"""
+ARGUMENTS = ("--sim=mujoco", "--reps=5")
+WORSE = "FAILED test_falling[mujoco-headless]: landed fell from 100 % to 0 % (worse by"
+
+
+@pytest.fixture(scope="module")
+def saved(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Path]:
+    """A folder with a run whose cubes land, saved in every form that a baseline may have."""
+    folder = tmp_path_factory.mktemp("saved")
+    (folder / "test_it.py").write_text(dedent(TEST))
+    command = [
+        *(sys.executable, "-m", "pytest", *ARGUMENTS, "--sim-output=base"),
+        *("--benchmark-json=base.json", "--benchmark-autosave"),
+    ]
+    environment = {**os.environ, "PYTHONPATH": str(request.config.rootpath)}
+    subprocess.run(command, cwd=folder, env=environment, check=True, capture_output=True)
+    yield folder
+    shutil.rmtree(folder)
+
+
+@pytest.fixture
+def baseline(pytester: pytest.Pytester, saved: Path) -> Path:
+    """The folder of the inner pytest, with that run in it."""
+    shutil.copytree(saved, pytester.path, dirs_exist_ok=True)
+    return pytester.path
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        ["--sim-baseline=base"],
+        ["--sim-baseline=base.json"],
+        ["--benchmark-compare"],
+        ["--sim-baseline=base/records.jsonl", "-n2"],
+    ],
+    ids=["folder", "benchmark-json", "benchmark-compare", "xdist"],
+)
+def test_a_worse_run_fails_with_one_sentence(
+    pytester: pytest.Pytester, baseline: Path, monkeypatch: pytest.MonkeyPatch, form: list[str]
+) -> None:
+    summary = baseline / "summary.md"
+    summary.write_text("before\n")
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(summary))
+    monkeypatch.setenv("DURATION", "0.05")  # the cubes are still in the air
+    result = pytester.runpytest_subprocess(
+        *ARGUMENTS, "--sim-output=now", *form, "--sim-compare-fail=landed:5%"
+    )
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.assert_outcomes(passed=1)
+    output = result.stdout.str()
+    assert output.count(WORSE) == 1
+    assert "Traceback" not in output + result.stderr.str()
+    assert output.index("settings.task.duration was 0.6, is 0.05") < output.index("landed fell")
+    written = summary.read_text()
+    assert written.startswith("before\n## Compared with ")
+    assert "- FAILED test\\_falling[mujoco-headless]: landed fell from 100 % to 0 %" in written
+    assert "| test\\_falling[mujoco-headless] | landed | 100 % | 0 % |" in written
+    assert written.count("## falling: 5 repetitions") == 1
+
+
+def test_the_same_again_passes_and_says_so(pytester: pytest.Pytester, baseline: Path) -> None:
+    result = pytester.runpytest_subprocess(
+        *ARGUMENTS, "--sim-baseline=base", "--sim-compare-fail=landed:0%,ram:50%"
+    )
+    assert result.ret == pytest.ExitCode.OK
+    result.stdout.fnmatch_lines(["no metric got worse beyond its limit"])
+
+
+def test_limits_in_the_ini_file_wait_for_a_baseline_which_alone_fails_nothing(
+    pytester: pytest.Pytester, baseline: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DURATION", "0.05")
+    result = pytester.runpytest_subprocess(*ARGUMENTS, "--sim-baseline=base")
+    assert result.ret == pytest.ExitCode.OK
+    result.stdout.fnmatch_lines(["test_falling*landed*100 %*0 %*"])
+    assert "got worse" not in result.stdout.str()
+    pytester.makeini("[pytest]\nsim_compare_fail = landed:5%\n")
+    assert pytester.runpytest_subprocess(*ARGUMENTS).ret == pytest.ExitCode.OK
+    result = pytester.runpytest_subprocess(*ARGUMENTS, "--sim-baseline=base")
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--sim-compare-fail=landed"], "'landed' is not a limit like placed:5% or *"),
+        (["--sim-compare-fail=landed:-5%"], "'landed:-5%' is not a limit like *"),
+        (["--sim-compare-fail="], "'' is not a limit like placed:5% or *"),
+        (["--sim-compare-fail=ram:5%,ram:6%"], "ram has two limits; give it one"),
+        (
+            ["--sim-compare-fail=lended:5%"],
+            "no metric is named 'lended'; did you mean 'landed'? valid names: *landed, *ram,*",
+        ),
+        (["--sim-compare-fail=landing_x:5%"], "landing_x can be neither better nor worse*"),
+        (["--sim-baseline=nowhere"], "there is no baseline *nowhere; give a run folder, its *"),
+        (["--sim-baseline=text"], "the baseline cannot be read: *text:1: not JSON*"),
+        (["--sim-baseline=empty"], "the baseline *empty holds no repetition; give a run folder*"),
+        (["--sim-baseline=other.json"], "the baseline *other.json holds no repetition of a sim*"),
+        (["--sim-baseline=wrong.json"], "the baseline *'benchmarks' is not a list"),
+    ],
+    ids=lambda value: value[0] if isinstance(value, list) else "",
+)
+def test_bad_input_is_one_sentence(
+    pytester: pytest.Pytester, request: pytest.FixtureRequest, arguments: list[str], message: str
+) -> None:
+    records = Path(request.config.rootpath, "tests/measure/stacking_records.jsonl")
+    text = records.read_text().splitlines()[0].replace('"placed"', '"landed"')
+    pytester.path.joinpath("good").write_text(text + "\n")
+    pytester.path.joinpath("text").write_text("no record\n")
+    pytester.path.joinpath("empty").write_text("")
+    pytester.path.joinpath("other.json").write_text('{"benchmarks": [{"fullname": "t"}]}')
+    pytester.path.joinpath("wrong.json").write_text('{"benchmarks": 3}')
+    pytester.makepyfile(TEST)
+    first = [] if "baseline" in arguments[0] else ["--sim-baseline=good"]
+    result = pytester.runpytest_subprocess("--sim=mujoco", *first, *arguments)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines([f"*{message}"])
+    assert len(result.stderr.str().strip().splitlines()) == 1
+    assert "Traceback" not in result.stderr.str() + result.stdout.str()
+
+
+def test_limits_need_a_baseline(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(TEST)
+    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-compare-fail=landed:5%")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["ERROR: --sim-compare-fail needs a run to compare with: *"])
+
+
+def test_junit_has_a_property_for_each_metric(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(TEST)
+    result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=2", "--junitxml=junit.xml")
+    result.assert_outcomes(passed=1)
+    tree = ElementTree.parse(pytester.path / "junit.xml")
+    found = {item.get("name"): item.get("value") for item in tree.iter("property")}
+    assert found["repetitions"] == "2"
+    assert found["failures"] == "0"
+    assert found["landed"] == "1.0"
+    assert 0.3 < float(found["landed.low"] or "nan") < 0.4
+    assert {"rtf", "ram", "cpu", "start", "end"} <= found.keys()
