@@ -1,0 +1,310 @@
+"""SAPIEN (PhysX 5), through its Python bindings; the engine under ManiSkill.
+
+Drives are PhysX's own implicit springs in the joints of a reduced-coordinate articulation, force
+limited. A joint force set beside the drive would not count towards that limit, so the effort
+feed-forward rides on the position target: q* + tau_ff / k; the limit then clips the whole sum.
+Velocity targets are native. The fingers are held together by SAPIEN's mimic tendon, with the
+stiffness that its URDF loader gives a mimic joint. See docs/engines/sapien.md.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_simbench.scene import Box, FloatArray, Scene
+from pytest_simbench.simulator import (
+    Capability,
+    Deviation,
+    PreparedRobot,
+    Settings,
+    Simulator,
+    SimulatorInfo,
+    lazy_import,
+)
+
+sapien = lazy_import("sapien")
+physx = lazy_import("sapien.physx")
+
+ROBOT, WORLD = 1, 2
+"""Collision groups: the robot's links touch everything but each other."""
+
+
+@dataclass(frozen=True)
+class SAPIENSettings(Settings):
+    """SAPIEN's options; defaults are those that SAPIEN 3.0.3 and its PhysX 5.3 report.
+
+    Attributes:
+        timestep: [s]; a new SAPIEN scene has 0.01.
+        position_iterations, velocity_iterations: of the solver, for bodies and articulation.
+        tgs: temporal Gauss-Seidel solver instead of projected Gauss-Seidel.
+        pcm: persistent contact manifolds.
+        friction_every_iteration: friction is solved in every iteration, not only in the last ones.
+        enhanced_determinism: the result does not depend on bodies elsewhere in the scene.
+        bounce_threshold: approach speed below which contacts do not bounce [m/s].
+        contact_offset: distance at which contacts begin to be generated, of each shape [m].
+        sleep_threshold: kinetic energy per mass below which bodies fall asleep [m^2/s^2].
+        angular_damping: of free bodies [1/s].
+        joint_friction: coefficient of the joints' friction.
+        coupling_stiffness: of the tendon between the fingers [N/m].
+    """
+
+    timestep: float = 0.01
+    position_iterations: int = 10
+    velocity_iterations: int = 1
+    tgs: bool = True
+    pcm: bool = True
+    friction_every_iteration: bool = True
+    enhanced_determinism: bool = False
+    bounce_threshold: float = 2.0
+    contact_offset: float = 0.01
+    sleep_threshold: float = 0.005
+    angular_damping: float = 0.05
+    joint_friction: float = 0.05
+    coupling_stiffness: float = 1e5
+
+
+class SAPIEN(Simulator):
+    """Adapter of SAPIEN."""
+
+    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+        name="sapien",
+        title="SAPIEN",
+        distribution="sapien",
+        modules=("sapien",),
+        install="pip install 'pytest-simbench[sapien]'",
+        licence="MIT, PhysX: BSD-3-Clause",
+        engine="PhysX 5",
+        tested_version="3.0.3",
+        capabilities=frozenset(
+            {
+                Capability.SAVE_RESTORE,
+                Capability.CONTACT_COUNT,
+                Capability.CONTACT_FORCES,
+                Capability.DETERMINISTIC,
+            }
+        ),
+        deviations=(Deviation("gripper/coupled", "SAPIEN does not report its tendons"),),
+        install_size_mb=115,
+    )
+    profiles: ClassVar[Mapping[str, Settings]] = {
+        "default": SAPIENSettings(),
+        "tuned": SAPIENSettings(
+            timestep=0.004, sleep_threshold=0.0, angular_damping=0.0, joint_friction=0.0
+        ),
+    }
+    settings: SAPIENSettings
+
+    def load(self, scene: Scene) -> None:
+        self.scene = scene
+        self._steps = 0
+        self._configure(scene)
+        self._system = physx.PhysxCpuSystem()
+        self._system.timestep = self.settings.timestep
+        self._world = sapien.Scene([self._system])
+        self._ground = self._add_ground(scene.ground_friction)
+        self._bodies = {box.name: self._add_box(box) for box in scene.bodies}
+        self._free = [self._bodies[box.name] for box in scene.free_bodies]
+        self.prepared = None
+        self._robot: Any = None
+        self._joints: list[Any] = []
+        if scene.robot is not None:
+            self.prepared = PreparedRobot(scene.robot)
+            self._load_robot(self.prepared)
+
+    def _configure(self, scene: Scene) -> None:
+        """Set what PhysX reads when a scene, a shape and a body are made: global, so all of it."""
+        s = self.settings
+        physx.set_scene_config(
+            gravity=scene.gravity,
+            bounce_threshold=s.bounce_threshold,
+            enable_pcm=s.pcm,
+            enable_tgs=s.tgs,
+            enable_ccd=False,
+            enable_enhanced_determinism=s.enhanced_determinism,
+            enable_friction_every_iteration=s.friction_every_iteration,
+            cpu_workers=0,
+        )
+        physx.set_body_config(s.position_iterations, s.velocity_iterations, s.sleep_threshold)
+        physx.set_shape_config(s.contact_offset, 0.0)
+
+    def _add_ground(self, friction: float) -> Any:
+        builder = self._world.create_actor_builder()
+        # PhysX's plane faces along x; turned by -90 degrees about y it faces up.
+        upward = sapien.Pose([0, 0, 0], [math.sqrt(0.5), 0, -math.sqrt(0.5), 0])
+        builder.add_plane_collision(upward, physx.PhysxMaterial(friction, friction, 0.0))
+        builder.collision_groups = [WORLD, WORLD | ROBOT, 0, 0]
+        entity = builder.build_static("ground")
+        return entity.find_component_by_type(physx.PhysxRigidStaticComponent)
+
+    def _add_box(self, box: Box) -> Any:
+        builder = self._world.create_actor_builder()
+        material = physx.PhysxMaterial(box.friction, box.friction, 0.0)
+        half = [edge / 2 for edge in box.size]
+        builder.add_box_collision(half_size=half, material=material)
+        builder.collision_groups = [WORLD, WORLD | ROBOT, 0, 0]
+        builder.initial_pose = sapien.Pose(box.pose.position, box.pose.quaternion)
+        if box.fixed:
+            entity = builder.build_static(box.name)
+            return entity.find_component_by_type(physx.PhysxRigidStaticComponent)
+        builder.set_mass_and_inertia(box.mass, sapien.Pose(), box.inertia())
+        entity = builder.build(box.name)
+        body = entity.find_component_by_type(physx.PhysxRigidDynamicComponent)
+        body.angular_damping = self.settings.angular_damping
+        return body
+
+    def _load_robot(self, prepared: PreparedRobot) -> None:
+        robot = prepared.robot
+        loader = self._world.create_urdf_loader()
+        loader.set_material(robot.friction, robot.friction, 0.0)
+        with tempfile.TemporaryDirectory() as folder:
+            path = prepared.write_urdf(folder)
+            _drop_visuals(path)
+            builder = loader.load_file_as_articulation_builder(str(path))
+        for link in builder.link_builders:
+            link.collision_groups = [ROBOT, WORLD, 0, 0]
+        self._robot = builder.build(fix_root_link=True)
+        self._links = {link.name: link for link in self._robot.links}
+        for link in prepared.links.values():
+            built = len(self._links[link.name].collision_shapes)
+            if built != len(link.shapes):  # SAPIEN passes over a shape that it cannot build
+                raise RuntimeError(
+                    f"SAPIEN built {built} of the {len(link.shapes)} shapes of {link.name}"
+                )
+        active = {joint.name: joint for joint in self._robot.active_joints}
+        order = [joint.name for joint in self._robot.active_joints]
+        self._order = np.array([order.index(name) for name in robot.joint_names])
+        self._joints = [active[name] for name in robot.joint_names]
+        for joint, drive in zip(self._joints, robot.joints, strict=True):
+            joint.set_drive_properties(drive.stiffness, drive.damping, drive.effort_limit, "force")
+            joint.set_armature([drive.armature])
+            joint.set_friction(self.settings.joint_friction)
+        self._couple_fingers(*robot.gripper.joints)
+        initial = np.empty(len(order))
+        initial[self._order] = robot.column("initial_position")
+        self._robot.set_qpos(initial)
+        self._robot.set_qvel(np.zeros(len(order)))
+        self._compliance = 1.0 / robot.column("stiffness")
+        self._targets = [joint.set_drive_target for joint in self._joints]
+        self._speeds = [joint.set_drive_velocity_target for joint in self._joints]
+        zero = np.zeros(len(order))
+        self.command(robot.column("initial_position"), zero, zero)
+
+    def _couple_fingers(self, first: str, second: str) -> None:
+        """Hold the fingers at equal positions, as SAPIEN's loader does for a mimic joint."""
+        fingers = [self._robot.find_joint_by_name(name).child_link for name in (first, second)]
+        self._robot.create_fixed_tendon(
+            [fingers[0].parent, *fingers],
+            [0, -1, 1],
+            [0, -1, 1],
+            stiffness=self.settings.coupling_stiffness,
+        )
+
+    def read_back(self) -> dict[str, Any]:
+        plane = self._ground.entity.pose * self._ground.collision_shapes[0].local_pose
+        reported: dict[str, Any] = {
+            "gravity": self._system.config.gravity,
+            "timestep": self._system.timestep,
+            "ground/height": plane.p[2],
+            "ground/friction": _friction(self._ground),
+        }
+        for name, body in self._bodies.items():
+            reported[f"body/{name}/size"] = 2 * body.collision_shapes[0].half_size
+            reported[f"body/{name}/friction"] = _friction(body)
+            reported[f"body/{name}/pose"] = _pose(body)
+            if body in self._free:
+                reported[f"body/{name}/mass"] = body.mass
+                reported[f"body/{name}/inertia"] = body.inertia
+        if self.prepared is not None:
+            self._read_back_robot(self.prepared, reported)
+        return reported
+
+    def _read_back_robot(self, prepared: PreparedRobot, reported: dict[str, Any]) -> None:
+        positions = self._robot.qpos[self._order]
+        for name, joint, position in zip(
+            prepared.robot.joint_names, self._joints, positions, strict=True
+        ):
+            reported[f"joint/{name}/limits"] = joint.limits[0]
+            reported[f"joint/{name}/effort_limit"] = joint.force_limit
+            reported[f"joint/{name}/stiffness"] = joint.stiffness
+            reported[f"joint/{name}/damping"] = joint.damping
+            reported[f"joint/{name}/armature"] = joint.armature[0]
+            reported[f"joint/{name}/initial_position"] = position
+        for prepared_link in prepared.moving_links:
+            name, link = prepared_link.name, self._links[prepared_link.name]
+            reported[f"link/{name}/mass"] = link.mass
+            reported[f"link/{name}/inertia"] = np.sort(link.inertia)
+            reported[f"link/{name}/friction"] = _friction(link)
+
+    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        for set_target, target in zip(
+            self._targets, (position + effort * self._compliance).tolist(), strict=True
+        ):
+            set_target(target)
+        for set_speed, speed in zip(self._speeds, velocity.tolist(), strict=True):
+            set_speed(speed)
+
+    def step(self) -> None:
+        self._system.step()
+        self._steps += 1
+
+    @property
+    def time(self) -> float:
+        return self._steps * self.settings.timestep
+
+    def body_state(self) -> FloatArray:
+        state = np.empty((len(self._free), 13))
+        for row, body in zip(state, self._free, strict=True):
+            row[:7] = _pose(body)
+            row[7:10], row[10:] = body.linear_velocity, body.angular_velocity
+        return state
+
+    def joint_state(self) -> FloatArray:
+        if self._robot is None:
+            return np.empty((2, 0))
+        return np.stack([self._robot.qpos, self._robot.qvel])[:, self._order].astype(float)
+
+    def save(self) -> tuple[bytes, int]:
+        return self._system.pack(), self._steps
+
+    def restore(self, state: tuple[bytes, int]) -> None:
+        self._system.unpack(state[0])
+        self._steps = state[1]
+
+    def contact_count(self) -> int:
+        return sum(len(contact.points) for contact in self._system.get_contacts())
+
+    def close(self) -> None:
+        # Everything that holds on to the scene must go, else PhysX keeps it.
+        for name in list(vars(self)):
+            if name.startswith("_"):
+                delattr(self, name)
+
+
+def _drop_visuals(path: Path) -> None:
+    """Take the visual shapes out of a URDF file: even to note one down needs a Vulkan device."""
+    tree = ElementTree.parse(path)
+    for link in tree.iter("link"):
+        for visual in link.findall("visual"):
+            link.remove(visual)
+    tree.write(path)
+
+
+def _pose(component: Any) -> FloatArray:
+    pose = component.entity.pose
+    return np.concatenate([pose.p, pose.q])
+
+
+def _friction(component: Any) -> Any:
+    """The friction of all shapes of a body, static and dynamic; one number when they agree."""
+    materials = [shape.physical_material for shape in component.collision_shapes]
+    values = np.unique([[m.static_friction, m.dynamic_friction] for m in materials])
+    return values[0] if len(values) == 1 else values
