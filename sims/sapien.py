@@ -18,7 +18,6 @@ from typing import Any, ClassVar
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pytest_simbench.scene import Box, FloatArray, Scene
 from pytest_simbench.simulator import (
@@ -53,6 +52,7 @@ class SAPIENSettings(Settings):
         contact_offset: distance at which contacts begin to be generated, of each shape [m].
         sleep_threshold: kinetic energy per mass below which bodies fall asleep [m^2/s^2].
         angular_damping: of free bodies [1/s].
+        link_damping: of the robot's links, linear and angular [1/s].
         joint_friction: coefficient of the joints' friction.
         coupling_stiffness: of the tendon between the fingers [N/m].
     """
@@ -68,6 +68,7 @@ class SAPIENSettings(Settings):
     contact_offset: float = 0.01
     sleep_threshold: float = 0.005
     angular_damping: float = 0.05
+    link_damping: float = 0.05
     joint_friction: float = 0.05
     coupling_stiffness: float = 1e5
 
@@ -81,8 +82,9 @@ class SAPIEN(Simulator):
         distribution="sapien",
         modules=("sapien",),
         install="pip install 'pytest-simbench[sapien]'",
-        licence="MIT, PhysX: BSD-3-Clause",
+        licence="Apache-2.0, PhysX: BSD-3-Clause",
         engine="PhysX 5",
+        language="C++",
         tested_version="3.0.3",
         capabilities=frozenset(
             {
@@ -93,19 +95,28 @@ class SAPIEN(Simulator):
             }
         ),
         deviations=(Deviation("gripper/coupled", "SAPIEN does not report its tendons"),),
-        install_size_mb=115,
+        install_size_mb=340,
     )
     profiles: ClassVar[Mapping[str, Settings]] = {
         "default": SAPIENSettings(),
         "tuned": SAPIENSettings(
-            timestep=0.004, sleep_threshold=0.0, angular_damping=0.0, joint_friction=0.0
+            timestep=0.001,
+            position_iterations=4,
+            sleep_threshold=0.0,
+            angular_damping=0.0,
+            link_damping=0.0,
+            joint_friction=0.0,
         ),
     }
     settings: SAPIENSettings
 
     def load(self, scene: Scene) -> None:
         self.scene = scene
+        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         self._steps = 0
+        self._build(scene)
+
+    def _build(self, scene: Scene) -> None:
         self._configure(scene)
         self._system = physx.PhysxCpuSystem()
         self._system.timestep = self.settings.timestep
@@ -113,11 +124,9 @@ class SAPIEN(Simulator):
         self._ground = self._add_ground(scene.ground_friction)
         self._bodies = {box.name: self._add_box(box) for box in scene.bodies}
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
-        self.prepared = None
         self._robot: Any = None
         self._joints: list[Any] = []
-        if scene.robot is not None:
-            self.prepared = PreparedRobot(scene.robot)
+        if self.prepared is not None:
             self._load_robot(self.prepared)
 
     def _configure(self, scene: Scene) -> None:
@@ -173,6 +182,8 @@ class SAPIEN(Simulator):
             link.collision_groups = [ROBOT, WORLD, 0, 0]
         self._robot = builder.build(fix_root_link=True)
         self._links = {link.name: link for link in self._robot.links}
+        for link in self._robot.links:
+            link.linear_damping = link.angular_damping = self.settings.link_damping
         for link in prepared.links.values():
             built = len(self._links[link.name].collision_shapes)
             if built != len(link.shapes):  # SAPIEN passes over a shape that it cannot build
@@ -276,6 +287,9 @@ class SAPIEN(Simulator):
         return self._system.pack(), self._steps
 
     def restore(self, state: tuple[bytes, int]) -> None:
+        # The state that SAPIEN packs holds no contacts. A world that lives on keeps its own, their
+        # friction and their order, and the future would depend on what was before the restore.
+        self._build(self.scene)
         self._system.unpack(state[0])
         self._steps = state[1]
 

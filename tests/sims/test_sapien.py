@@ -1,0 +1,368 @@
+"""What only SAPIEN's adapter has to show: its settings reach PhysX, `default` is what PhysX and
+SAPIEN do by themselves, feed-forward counts towards the effort limit, the tendon between the
+fingers takes nothing of the squeeze, and what a restored world keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pytest_simbench.sims.sapien import SAPIEN, SAPIENSettings
+
+from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene
+from pytest_simbench.simulator import ParityError, PreparedRobot
+from pytest_simbench.simulator.parity import check, expected_quantities
+from pytest_simbench.tasks import Jitter, Stacking
+from pytest_simbench.testing import scenes
+
+sapien = pytest.importorskip("sapien")
+
+TUNED = SAPIEN.profiles["tuned"]
+
+
+@contextmanager
+def world(scene: Scene, chosen: Any = TUNED) -> Iterator[SAPIEN]:
+    simulator = SAPIEN(chosen)
+    try:
+        simulator.load(scene)
+        yield simulator
+    finally:
+        simulator.close()
+
+
+def arm_and_cube() -> Scene:
+    return replace(scenes.arm_alone(), bodies=(scenes.cube("cube", Pose.at(0.6, 0.3, 0.025)),))
+
+
+@settings(max_examples=10, deadline=None)
+@given(
+    chosen=st.builds(
+        SAPIENSettings,
+        timestep=st.sampled_from([0.001, 0.004, 0.01]),
+        position_iterations=st.integers(1, 50),
+        velocity_iterations=st.integers(0, 4),
+        tgs=st.booleans(),
+        pcm=st.booleans(),
+        friction_every_iteration=st.booleans(),
+        enhanced_determinism=st.booleans(),
+        bounce_threshold=st.sampled_from([0.2, 2.0]),
+        contact_offset=st.sampled_from([0.002, 0.01]),
+        sleep_threshold=st.sampled_from([0.0, 0.005]),
+        angular_damping=st.sampled_from([0.0, 0.05]),
+        link_damping=st.sampled_from([0.0, 0.05]),
+        joint_friction=st.sampled_from([0.0, 0.05]),
+    )
+)
+def test_every_setting_reaches_the_engine(chosen: SAPIENSettings) -> None:
+    """Whatever was set in the process before: SAPIEN's configuration is global."""
+    with world(arm_and_cube(), chosen) as simulator:
+        assert reported(simulator) == pytest.approx(
+            {
+                name: getattr(chosen, name)
+                for name in vars(chosen)
+                if name != "coupling_stiffness"  # SAPIEN does not report its tendons
+            }
+        )
+
+
+def reported(simulator: SAPIEN) -> dict[str, Any]:
+    """The settings as the engine's own objects report them."""
+    config, cube, robot = simulator._system.config, simulator._bodies["cube"], simulator._robot
+    values = {
+        "timestep": {simulator._system.timestep},
+        "position_iterations": {b.solver_position_iterations for b in (cube, robot)},
+        "velocity_iterations": {b.solver_velocity_iterations for b in (cube, robot)},
+        "tgs": {config.enable_tgs},
+        "pcm": {config.enable_pcm},
+        "friction_every_iteration": {config.enable_friction_every_iteration},
+        "enhanced_determinism": {config.enable_enhanced_determinism},
+        "bounce_threshold": {config.bounce_threshold},
+        "contact_offset": {
+            shape.contact_offset for b in (cube, *robot.links) for shape in b.collision_shapes
+        },
+        "sleep_threshold": {b.sleep_threshold for b in (cube, robot)},
+        "angular_damping": {cube.angular_damping},
+        "link_damping": {d for b in robot.links for d in (b.linear_damping, b.angular_damping)},
+        "joint_friction": {joint.friction for joint in robot.active_joints},
+    }
+    return {name: single(found) for name, found in values.items()}
+
+
+def single(found: set[Any]) -> Any:
+    assert len(found) == 1, found
+    return found.pop()
+
+
+def test_default_is_what_the_engine_does_by_itself(tmp_path: Path) -> None:
+    """A world built by SAPIEN's own tools, nothing set, reports the profile `default`."""
+    from sapien import physx
+
+    physx.set_scene_config(physx.PhysxSceneConfig())
+    physx.set_body_config(physx.PhysxBodyConfig())
+    physx.set_shape_config(physx.PhysxShapeConfig())
+    simulator = SAPIEN(SAPIEN.profiles["default"])
+    simulator._system = physx.PhysxCpuSystem()
+    bare = sapien.Scene([simulator._system])
+    builder = bare.create_actor_builder()
+    builder.add_box_collision(half_size=[0.025] * 3)
+    builder.initial_pose = sapien.Pose([0.6, 0.3, 0.025])
+    cube = builder.build("cube").find_component_by_type(physx.PhysxRigidDynamicComponent)
+    simulator._bodies = {"cube": cube}
+    path = PreparedRobot(scenes.arm()).write_urdf(tmp_path)
+    without_visuals(path)
+    simulator._robot = (
+        bare.create_urdf_loader().load_file_as_articulation_builder(str(path)).build(True)
+    )
+    expected = {k: v for k, v in vars(simulator.settings).items() if k != "coupling_stiffness"}
+    assert reported(simulator) == pytest.approx(expected)
+
+
+def without_visuals(path: Path) -> None:
+    tree = ElementTree.parse(path)
+    for link in tree.iter("link"):
+        for visual in link.findall("visual"):
+            link.remove(visual)
+    tree.write(path)
+
+
+def turned_by_joint_1(robot: Robot, effort: float, seconds: float) -> tuple[float, float]:
+    """Angular momentum about joint 1 [N m s] after an effort feed-forward, and the time [s]."""
+    import pinocchio as pin
+
+    from pytest_simbench.robot.model import RobotModel
+
+    start = robot.column("initial_position")
+    push = np.zeros_like(start)
+    push[0] = effort
+    with world(scenes.arm_alone(robot, (0.0, 0.0, 0.0))) as simulator:
+        simulator.command(start, 0 * start, push)
+        while simulator.time < seconds - 1e-9:
+            simulator.step()
+        time, (q, v) = simulator.time, simulator.joint_state()
+    model = RobotModel(robot)
+    data = model.pin.createData()
+    upper = np.triu(pin.crba(model.pin, data, q))
+    return float(((upper + np.triu(upper, 1).T) @ v)[0]), time
+
+
+def soft_joint_1() -> Robot:
+    """The arm, joint 1 without damping and nearly without stiffness: its effort is the feed-forward
+    alone. A limit of 20 N m."""
+    return scenes.with_joint(
+        scenes.arm(), "panda_joint1", stiffness=1.0, damping=0.0, effort_limit=20.0
+    )
+
+
+@pytest.mark.parametrize(("effort", "applied"), [(10.0, 10.0), (-10.0, -10.0), (60.0, 20.0)])
+def test_feed_forward_is_an_effort_and_counts_towards_the_limit(
+    effort: float, applied: float
+) -> None:
+    momentum, time = turned_by_joint_1(soft_joint_1(), effort, 0.1)
+    assert momentum == pytest.approx(applied * time, rel=0.05)
+
+
+def forces_on(simulator: SAPIEN, body: Any) -> dict[str, FloatArray]:
+    """Force on `body` from each entity that presses on it [N], of the last step."""
+    forces: dict[str, FloatArray] = {}
+    for contact in simulator._system.get_contacts():
+        first, second = contact.bodies
+        if body not in (first, second):
+            continue
+        other, sign = (second, 1.0) if first is body else (first, -1.0)
+        total = sign * np.sum([point.impulse for point in contact.points], axis=0)
+        if total.any():  # pairs within the contact offset are listed too
+            forces[other.entity.name] = total / simulator.settings.timestep
+    return forces
+
+
+def test_the_tendon_takes_nothing_of_the_squeeze() -> None:
+    """Each finger presses with its effort limit, 25 N, on the held cube."""
+    scene = scenes.grip()
+    robot = scene.robot
+    assert robot is not None
+    goal = robot.column("initial_position")
+    goal[robot.finger_indices] = robot.gripper.closed
+    with world(replace(scene, gravity=(0.0, 0.0, 0.0))) as simulator:
+        simulator.command(goal, 0 * goal, 0 * goal)
+        for _ in range(round(0.5 / simulator.settings.timestep)):
+            simulator.step()
+        forces = forces_on(simulator, simulator._bodies["held"])
+    assert set(forces) == {"panda_leftfinger", "panda_rightfinger"}
+    for force in forces.values():
+        assert np.linalg.norm(force) == pytest.approx(robot.gripper.squeeze, rel=0.01)
+
+
+def future(simulator: SAPIEN, steps: int) -> FloatArray:
+    rows = []
+    for _ in range(steps):
+        simulator.step()
+        rows.append(simulator.body_state())
+    return np.array(rows)
+
+
+def test_a_restored_flight_goes_on_bit_for_bit() -> None:
+    with world(scenes.tumbling((0.1, 0.06, 0.03))) as simulator:
+        for _ in range(100):
+            simulator.step()
+        assert simulator.contact_count() == 0
+        state = simulator.save()
+        straight = future(simulator, 50)
+        simulator.restore(state)
+        assert np.array_equal(future(simulator, 50), straight)
+
+
+def test_a_restored_tower_is_built_of_new_contacts() -> None:
+    """PhysX saves no contacts: those of a restored tower begin anew. It must not show: every
+    cube stays within 1 mm of where it would have been; that the bits differ is the declared
+    failure of `restore_continues`."""
+    with world(scenes.tower()) as simulator:
+        for _ in range(250):
+            simulator.step()
+        state = simulator.save()
+        straight = future(simulator, 500)
+        simulator.restore(state)
+        again = future(simulator, 500)
+    assert not np.array_equal(again, straight)
+    assert np.abs(again - straight)[:, :, :3].max() < 1e-3
+
+
+@settings(max_examples=10, deadline=None)
+@given(astray=st.integers(0, 300), share=st.floats(-0.3, 0.3), finger=st.floats(0.0, 0.035))
+def test_what_was_before_a_restore_leaves_no_trace(
+    astray: int, share: float, finger: float
+) -> None:
+    """With a cube in the grip: PhysX keeps the contacts of a world that lives on."""
+    scene = scenes.grip()
+    robot = scene.robot
+    assert robot is not None
+    closed = robot.column("initial_position")
+    closed[robot.finger_indices] = robot.gripper.closed
+    elsewhere = closed + share
+    elsewhere[robot.finger_indices] = finger
+    with world(scene) as simulator:
+        simulator.command(closed, 0 * closed, 0 * closed)
+        future(simulator, 200)
+        state = simulator.save()
+        futures = []
+        for steps in (0, astray):
+            simulator.command(elsewhere, 0 * closed, 0 * closed)
+            future(simulator, steps)
+            simulator.restore(state)
+            futures.append((future(simulator, 100), simulator.joint_state()))
+    assert np.array_equal(futures[0][0], futures[1][0])
+    assert np.array_equal(futures[0][1], futures[1][1])
+
+
+def test_a_mesh_that_sapien_cannot_read_is_an_error(tmp_path: Path) -> None:
+    robot = scenes.arm()
+    tree = ElementTree.parse(robot.urdf)
+    broken = tmp_path / "broken.stl"
+    broken.write_bytes(b"")
+    mesh = next(mesh for mesh in tree.iter("mesh") if mesh.get("filename", "").endswith(".stl"))
+    mesh.set("filename", str(broken))
+    description = tmp_path / "robot.urdf"
+    tree.write(description)
+    scene = scenes.arm_alone(replace(robot, urdf=str(description)))
+    with pytest.raises(RuntimeError), world(scene):
+        pass
+
+
+SCENE = Stacking().scene(1, Jitter())
+
+
+def compare(simulator: SAPIEN) -> None:
+    expected = expected_quantities(SCENE, simulator.settings)
+    check(expected, simulator.read_back(), simulator.info.deviations, simulator.info.name)
+
+
+def body(name: str, **change: Any) -> Callable[[SAPIEN], None]:
+    def plant(simulator: SAPIEN) -> None:
+        for attribute, value in change.items():
+            setattr(simulator._bodies[name], attribute, value)
+
+    return plant
+
+
+def slippery(shapes: Any) -> None:
+    """One shape, of friction 0.5."""
+    from sapien import physx
+
+    shapes[-1].physical_material = physx.PhysxMaterial(0.5, 0.5, 0.0)
+
+
+def drive(**change: float) -> Callable[[SAPIEN], None]:
+    def plant(simulator: SAPIEN) -> None:
+        joint = simulator._joints[3]
+        values = {"stiffness": joint.stiffness, "damping": joint.damping}
+        joint.set_drive_properties(**{**values, "force_limit": joint.force_limit, **change})
+
+    return plant
+
+
+def lower(component: Any) -> None:
+    pose = component.entity.pose
+    component.entity.pose = sapien.Pose(pose.p - [0, 0, 0.012], pose.q)
+
+
+def other_start(simulator: SAPIEN) -> None:
+    simulator._robot.set_qpos(simulator._robot.qpos + 0.01)
+
+
+def link(**change: Any) -> Callable[[SAPIEN], None]:
+    def plant(simulator: SAPIEN) -> None:
+        for attribute, value in change.items():
+            setattr(simulator._links["panda_link4"], attribute, value)
+
+    return plant
+
+
+FAULTS: dict[str, Callable[[SAPIEN], None]] = {
+    "timestep": lambda s: setattr(s._system, "timestep", 0.005),
+    "ground/height": lambda s: lower(s._ground),
+    "ground/friction": lambda s: slippery(s._ground.collision_shapes),
+    "body/cube_05/mass": body("cube_05", mass=1.0),
+    "body/cube_05/inertia": body("cube_05", inertia=[1e-4] * 3),
+    "body/cube_05/friction": lambda s: slippery(s._bodies["cube_05"].collision_shapes),
+    "body/table/pose": lambda s: lower(s._bodies["table"]),
+    "joint/panda_joint4/limits": lambda s: s._joints[3].set_limits([[-1.0, 1.0]]),
+    "joint/panda_joint4/effort_limit": drive(force_limit=100.0),
+    "joint/panda_joint4/stiffness": drive(stiffness=4000.0),
+    "joint/panda_joint4/damping": drive(damping=400.0),
+    "joint/panda_joint4/armature": lambda s: s._joints[3].set_armature([0.0]),
+    "joint/panda_joint4/initial_position": other_start,
+    "link/panda_link4/mass": link(mass=5.0),
+    "link/panda_link4/inertia": link(inertia=[0.1, 0.2, 0.2]),
+    "link/panda_leftfinger/friction": lambda s: slippery(
+        s._links["panda_leftfinger"].collision_shapes
+    ),
+}
+
+
+@pytest.mark.parametrize("quantity", FAULTS)
+def test_fault_is_caught(quantity: str) -> None:
+    with world(SCENE) as simulator:
+        compare(simulator)
+        FAULTS[quantity](simulator)
+        with pytest.raises(ParityError, match=f"{quantity}: scene .*, sapien "):
+            compare(simulator)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "built"),
+    [
+        ("gravity", replace(SCENE, gravity=(0.0, 0.0, -9.7))),
+        ("body/table/size", replace(SCENE, bodies=(Box("table", (0.9, 0.9, 0.2), Pose()),))),
+    ],
+)
+def test_another_scene_is_caught(quantity: str, built: Scene) -> None:
+    """What SAPIEN cannot change once it is built."""
+    with world(built) as simulator, pytest.raises(ParityError, match=f"{quantity}: scene .*"):
+        compare(simulator)
