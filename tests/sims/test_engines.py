@@ -1,4 +1,4 @@
-"""What both engines claim: determinism, restore in flight and in the grip, pictures, contacts."""
+"""What the engines claim: determinism, restore in flight and in the grip, pictures, contacts."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from pytest_simbench.client.errors import Where
 from pytest_simbench.client.process import Launch, WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks import Jitter, Throwing
 from pytest_simbench.tasks.manipulator import Manipulator
-from tests.conftest import ADAPTERS
+from tests.conftest import ADAPTERS, able_to
 
 SCENE = Throwing().scene(1, Jitter())
 
@@ -68,10 +69,16 @@ def test_restore_in_the_grip_repeats_itself(start: Callable[[Scene], World]) -> 
     assert np.array_equal(ends[0][1], ends[1][1])
 
 
-def test_picture_and_contacts(start: Callable[[Scene], World]) -> None:
+@pytest.mark.parametrize("start", able_to(Capability.OFFSCREEN), indirect=True)
+def test_picture(start: Callable[[Scene], World]) -> None:
     world = start(SCENE)
     world.wait(0.1)
     picture = world.render(160, 120)
     assert picture.shape == (120, 160, 3)
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 20
+
+
+def test_contacts(start: Callable[[Scene], World]) -> None:
+    world = start(SCENE)
+    world.wait(0.1)
     assert world.contact_count() >= 7 * 3

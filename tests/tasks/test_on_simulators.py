@@ -9,8 +9,9 @@ import pytest
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.session.case import Case
 from pytest_simbench.session.repetition import Repetition
+from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
-from tests.conftest import ADAPTERS
+from tests.conftest import ADAPTERS, able_to
 
 
 @pytest.fixture(params=ADAPTERS)
@@ -64,7 +65,7 @@ def test_unreachable_cubes_are_counted_and_the_task_goes_on(case: Case) -> None:
     assert record.metrics["at_end_strict"] == 1.0
 
 
-@pytest.mark.parametrize("name", ADAPTERS)
+@pytest.mark.parametrize("name", able_to(Capability.WINDOW))
 def test_with_a_window_the_outcome_is_the_same(case: Case, name: str) -> None:
     display = pytest.importorskip("pyvirtualdisplay.display")
     headless = replace(case, simulator=name, adapter=ADAPTERS[name])
