@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -122,6 +123,7 @@ class Drake(Simulator):
             timestep=0.004,
             contact_model="point",
             approximation="sap",
+            relaxation_time=0.01,
             corner_radius=0.004,
             pad_radius=0.003,
             shrink=1e-4,
@@ -140,7 +142,9 @@ class Drake(Simulator):
         self._spheres: list[Any] = []
         self._shapes: dict[str, list[Any]] = {}
         world = self.plant.world_body()
-        self._add_shape(world, "ground", geometry.HalfSpace(), Pose(), scene.ground_friction)
+        self._add_shape(
+            world, "ground", "plane", geometry.HalfSpace(), Pose(), scene.ground_friction
+        )
         slab = geometry.Box(10.0, 10.0, 0.02)
         self._add_picture(world, "ground", slab, Pose((0.0, 0.0, -0.01)), GREY)
         self._bodies = {box.name: self._add_box(box) for box in scene.bodies}
@@ -191,14 +195,18 @@ class Drake(Simulator):
         surface.relaxation_time = s.relaxation_time
         return config
 
-    def _add_shape(self, body: Any, name: str, shape: Any, pose: Pose, friction: float) -> Any:
+    def _add_shape(
+        self, body: Any, owner: str, part: str, shape: Any, pose: Pose, friction: float
+    ) -> Any:
         """A collision shape. Of two surfaces' friction Drake takes the harmonic mean."""
         surface = geometry.ProximityProperties()
         geometry.AddContactMaterial(
             properties=surface, friction=plants.CoulombFriction(friction, friction)
         )
-        made = self.plant.RegisterCollisionGeometry(body, _transform(pose), shape, name, surface)
-        self._shapes.setdefault(name.partition("/")[0], []).append(made)
+        made = self.plant.RegisterCollisionGeometry(
+            body, _transform(pose), shape, f"{owner}/{part}", surface
+        )
+        self._shapes.setdefault(owner, []).append(made)
         return made
 
     def _add_picture(self, body: Any, name: str, shape: Any, pose: Pose, colour: Any) -> None:
@@ -210,7 +218,7 @@ class Drake(Simulator):
         for k, (x, y, z) in enumerate(centres):
             pose = Pose((float(x), float(y), float(z)))
             sphere = geometry.Sphere(radius)
-            made = self._add_shape(body, f"{name}/sphere{k}", sphere, pose, friction)
+            made = self._add_shape(body, name, f"sphere{k}", sphere, pose, friction)
             self._spheres.append(made)
 
     def _add_box(self, box: Box) -> Any:
@@ -226,7 +234,7 @@ class Drake(Simulator):
                 centres = corner_centres(box.size, radius)
                 self._add_spheres(body, box.name, centres, radius, box.friction)
         core = geometry.Box(*(np.asarray(box.size) - 2 * gone))
-        self._add_shape(body, f"{box.name}/box", core, pose, box.friction)
+        self._add_shape(body, box.name, "box", core, pose, box.friction)
         self._add_picture(body, box.name, geometry.Box(*box.size), pose, box.colour)
         return body
 
@@ -239,7 +247,7 @@ class Drake(Simulator):
             self._links[link.name] = body
             for k, shape in enumerate(link.shapes):
                 made = _robot_shape(shape, f"{link.name}_{k}")
-                self._add_shape(body, f"{link.name}/{k}", made, shape.pose, robot.friction)
+                self._add_shape(body, link.name, str(k), made, shape.pose, robot.friction)
                 self._add_picture(body, f"{link.name}/{k}", made, shape.pose, LIGHT)
         plant.WeldFrames(plant.world_frame(), self._links[prepared.root].body_frame())
         self._joints = {}
@@ -422,10 +430,11 @@ class Drake(Simulator):
 
     def _open_window(self, builder: Any) -> Any:
         """A Meshcat server, fed when `refresh_window` says so."""
-        meshcat = geometry.Meshcat(geometry.MeshcatParams(show_stats_plot=False))
-        print(f"Drake's window: open {meshcat.web_url()} in a browser", flush=True)
+        server = geometry.MeshcatParams(host="localhost", show_stats_plot=False)
+        meshcat = geometry.Meshcat(server)
+        never = geometry.MeshcatVisualizerParams(publish_period=1e6)  # but when told to
         self._visualizer = geometry.MeshcatVisualizer.AddToBuilder(
-            builder, self.scene_graph, meshcat, geometry.MeshcatVisualizerParams()
+            builder, self.scene_graph, meshcat, never
         )
         meshcat.SetCameraPose(EYE, LOOK_AT)
         return meshcat
@@ -438,6 +447,7 @@ class Drake(Simulator):
         for name in list(vars(self)):
             if name not in ("settings", "gui"):
                 delattr(self, name)
+        gc.collect()  # pydrake's parts keep each other alive; Meshcat would keep its port
 
 
 EYE, LOOK_AT = (2.0, -1.4, 1.3), (0.5, 0.0, 0.35)

@@ -1,4 +1,4 @@
-"""What both engines claim: determinism, restore in flight and in the grip, pictures, contacts."""
+"""What the engines claim: determinism, restore in flight and in the grip, pictures, contacts."""
 
 from __future__ import annotations
 
