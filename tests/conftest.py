@@ -6,17 +6,20 @@ from pathlib import Path
 
 import pytest
 
+from pytest_simbench.client.environments import missing
 from pytest_simbench.session.case import Case
+from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter
 
 pytest_plugins = ["pytester"]
 
 ADAPTERS = {
-    "mujoco": "pytest_simbench.sims.mujoco:MuJoCo",
-    "pybullet": "pytest_simbench.sims.pybullet:PyBullet",
-    "sapien": "pytest_simbench.sims.sapien:SAPIEN",
+    name: entry.value
+    for name, entry in registered().items()
+    if not adapter(name).info.requirements and not missing(adapter(name).info)
 }
+"""Adapters of the engines in this environment, as workers name them."""
 
 
 def able_to(capability: Capability) -> list[str]:

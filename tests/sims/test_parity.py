@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from pytest_simbench.sims.mujoco import MuJoCo
 from pytest_simbench.sims.pybullet import PyBullet
-from pytest_simbench.sims.sapien import SAPIEN
 
 from pytest_simbench.simulator import ParityError, Simulator
 from pytest_simbench.simulator.parity import check, expected_quantities
+from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
+from tests.conftest import ADAPTERS
 
 SCENE = Stacking().scene(1, Jitter())
 
@@ -24,9 +25,10 @@ def compared(simulator: Simulator) -> list[str]:
     return check(expected, simulator.read_back(), info.deviations, info.name)
 
 
-@pytest.fixture(params=[MuJoCo, PyBullet, SAPIEN], ids=lambda cls: cls.info.name)
+@pytest.fixture(params=ADAPTERS)
 def loaded(request: pytest.FixtureRequest) -> Iterator[Simulator]:
-    simulator: Simulator = request.param(request.param.profiles["tuned"])
+    cls = adapter(request.param)
+    simulator = cls(cls.profiles["tuned"])
     simulator.load(SCENE)
     yield simulator
     simulator.close()
@@ -34,8 +36,9 @@ def loaded(request: pytest.FixtureRequest) -> Iterator[Simulator]:
 
 @pytest.mark.parametrize("profile", ["default", "tuned"])
 @pytest.mark.parametrize("task", [Stacking(), Throwing()], ids=lambda task: task.name)
-@pytest.mark.parametrize("cls", [MuJoCo, PyBullet, SAPIEN], ids=lambda cls: cls.info.name)
-def test_an_honest_world_passes(cls: type[Simulator], task: Any, profile: str) -> None:
+@pytest.mark.parametrize("name", ADAPTERS)
+def test_an_honest_world_passes(name: str, task: Any, profile: str) -> None:
+    cls = adapter(name)
     simulator = cls(cls.profiles[profile])
     scene = task.scene(7, Jitter())
     simulator.load(scene)
