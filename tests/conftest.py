@@ -2,18 +2,44 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from pytest_simbench.client.environments import Environment, interpreter, missing
 from pytest_simbench.session.case import Case
+from pytest_simbench.simulator.registry import adapter
 
 pytest_plugins = ["pytester"]
 
 ADAPTERS = {
     "mujoco": "pytest_simbench.sims.mujoco:MuJoCo",
     "pybullet": "pytest_simbench.sims.pybullet:PyBullet",
+    "newton": "pytest_simbench.sims.newton:Newton",
 }
+
+
+def case_of(case: Case, name: str) -> Case:
+    """The same case for another engine, in the engine's own interpreter where it has one.
+
+    Skips the test where the engine is missing.
+    """
+    info = adapter(name).info
+    absent = missing(info)
+    if absent:
+        pytest.skip(absent)
+    return replace(
+        case,
+        simulator=name,
+        adapter=ADAPTERS[name],
+        test=f"t[{name}-headless]",
+        python=interpreter(info),
+        environment=Environment.of(info).variables(),
+        costly_start=info.costly_start,
+        compile_timeout=info.compile_timeout,
+        stall_timeout=120.0 if info.costly_start else case.stall_timeout,
+    )
 
 
 @pytest.fixture
