@@ -73,7 +73,8 @@ class Newton(Simulator):
         modules=("newton", "mujoco_warp", "pyglet", "trimesh"),
         install="pytest --sim-install newton",
         licence="Apache-2.0",
-        engine="MuJoCo (C), through Newton's SolverMuJoCo",
+        engine="MuJoCo",
+        language="Python (Warp), C",
         tested_version="1.8.0",
         capabilities=frozenset(
             {
@@ -81,6 +82,7 @@ class Newton(Simulator):
                 Capability.OFFSCREEN,
                 Capability.SAVE_RESTORE,
                 Capability.CONTACT_COUNT,
+                Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,
             }
         ),
