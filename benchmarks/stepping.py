@@ -12,14 +12,18 @@ since these machines are shared.
 from __future__ import annotations
 
 import json
+import os
 import statistics
 import subprocess
 import sys
-import time
+from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import psutil
 
+from pytest_simbench.client import bootstrap
+from pytest_simbench.client.environments import Environment, interpreter
 from pytest_simbench.client.errors import Where
 from pytest_simbench.client.process import Launch, WorkerProcess
 from pytest_simbench.client.world import World
@@ -50,23 +54,42 @@ def motion() -> Trajectory:
 
 
 def bare(name: str) -> float:
-    """CPU seconds of a loop with nothing in it but command and step."""
-    cls = adapter(name)
-    simulator = cls(cls.profiles["tuned"])
-    simulator.load(SCENE)
-    points = motion().resampled(simulator.settings.timestep)
-    rows = list(zip(points.position, points.velocity, points.effort, strict=True))
-    began = time.process_time()
-    for row in rows:
-        simulator.command(*row)
-        simulator.step()
-    return time.process_time() - began
+    """CPU seconds of a loop with nothing in it but command and step, in a process of its own."""
+    info, trajectory = adapter(name).info, motion()
+    order = {
+        "bootstrap": bootstrap.__file__,
+        "packages": {
+            package: find_spec(package).origin  # type: ignore[union-attr]
+            for package in ("pytest_simbench", "pytest_simbench.sims")
+        },
+        "adapter": registered()[name].value,
+        "scene": SCENE.to_wire(),
+        "tick": trajectory.tick,
+        "position": trajectory.position.tolist(),
+        "velocity": trajectory.velocity.tolist(),
+        "effort": trajectory.effort.tolist(),
+    }
+    output = subprocess.run(
+        [interpreter(info) or sys.executable, str(Path(__file__).with_name("bare_loop.py"))],
+        input=json.dumps(order),
+        stdout=subprocess.PIPE,
+        env={**os.environ, **Environment.of(info).variables()},
+        text=True,
+        check=True,
+    ).stdout
+    return float(output.splitlines()[-1])
 
 
 def worker(name: str) -> tuple[float, float]:
     """CPU seconds of the same motion in a worker: its own clock, and the whole request."""
-    path = registered()[name].value
-    process = WorkerProcess(Launch(path), Where(name, "headless"))
+    path, info = registered()[name].value, adapter(name).info
+    launch = Launch(
+        path,
+        python=interpreter(info),
+        environment=Environment.of(info).variables(),
+        compile_timeout=info.compile_timeout if info.costly_start else 0.0,
+    )
+    process = WorkerProcess(launch, Where(name, "headless"))
     process.request(
         "construct", adapter=path, profile="tuned", changes={}, gui=False, real_time=False
     )
@@ -83,14 +106,10 @@ def worker(name: str) -> tuple[float, float]:
 
 
 def main(names: list[str]) -> None:
-    if names[:1] == ["--bare"]:
-        print(json.dumps(bare(names[1])))
-        return
-    for name in names or [n for n in registered() if not adapter(n).info.requirements]:
+    for name in names or [n for n in registered() if not missing(adapter(n).info)]:
         clock, whole = [], []
         for _ in range(PAIRS):
-            output = subprocess.check_output([sys.executable, __file__, "--bare", name], text=True)
-            alone = json.loads(output.splitlines()[-1])
+            alone = bare(name)
             mine, request = worker(name)
             clock.append(mine / alone)
             whole.append(request / alone)

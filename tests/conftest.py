@@ -2,29 +2,54 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from pytest_simbench.client.environments import missing
+from pytest_simbench.client.environments import Environment, interpreter, missing
 from pytest_simbench.session.case import Case
-from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.simulator import Capability
-from pytest_simbench.simulator.registry import adapter
+from pytest_simbench.simulator.registry import adapter, registered
 
 pytest_plugins = ["pytester"]
 
-ADAPTERS = {
-    name: entry.value
-    for name, entry in registered().items()
+ADAPTERS = {name: entry.value for name, entry in registered().items()}
+"""Every registered adapter, as workers name it."""
+
+HERE = [
+    name
+    for name in ADAPTERS
     if not adapter(name).info.requirements and not missing(adapter(name).info)
-}
-"""Adapters of the engines in this environment, as workers name them."""
+]
+"""The engines that can be imported in this process."""
 
 
 def able_to(capability: Capability) -> list[str]:
     """Those of `ADAPTERS` that claim the capability."""
     return [name for name in ADAPTERS if capability in adapter(name).info.capabilities]
+
+
+def case_of(case: Case, name: str) -> Case:
+    """The same case for another engine, in the engine's own interpreter where it has one.
+
+    Skips the test where the engine is missing.
+    """
+    info = adapter(name).info
+    absent = missing(info)
+    if absent:
+        pytest.skip(absent)
+    return replace(
+        case,
+        simulator=name,
+        adapter=ADAPTERS[name],
+        test=f"t[{name}-headless]",
+        python=interpreter(info),
+        environment=Environment.of(info).variables(),
+        costly_start=info.costly_start,
+        compile_timeout=info.compile_timeout,
+        stall_timeout=120.0 if info.costly_start else case.stall_timeout,
+    )
 
 
 @pytest.fixture

@@ -8,28 +8,34 @@ import numpy as np
 import pytest
 
 from pytest_simbench.client.errors import Where
-from pytest_simbench.client.process import Launch, WorkerProcess
+from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.session.case import Case
 from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks import Jitter, Throwing
 from pytest_simbench.tasks.manipulator import Manipulator
-from tests.conftest import ADAPTERS, able_to
+from tests.conftest import ADAPTERS, able_to, case_of
 
 SCENE = Throwing().scene(1, Jitter())
 
 
 @pytest.fixture(params=ADAPTERS)
-def start(request: pytest.FixtureRequest) -> Iterator[Callable[[Scene], World]]:
+def start(request: pytest.FixtureRequest, case: Case) -> Iterator[Callable[[Scene], World]]:
     """Starts worlds of an engine, each in a process of its own."""
     workers = []
+    engine = case_of(case, request.param)
 
     def begin(scene: Scene) -> World:
-        adapter = ADAPTERS[request.param]
-        worker = WorkerProcess(Launch(adapter), Where(request.param, "headless"))
+        worker = WorkerProcess(engine.launch("engine"), Where(engine.simulator, "headless"))
         workers.append(worker)
         worker.request(
-            "construct", adapter=adapter, profile="tuned", changes={}, gui=False, real_time=False
+            "construct",
+            adapter=engine.adapter,
+            profile="tuned",
+            changes={},
+            gui=False,
+            real_time=False,
         )
         return World(worker, scene)
 

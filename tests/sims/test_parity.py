@@ -14,7 +14,7 @@ from pytest_simbench.simulator import ParityError, Simulator
 from pytest_simbench.simulator.parity import check, expected_quantities
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
-from tests.conftest import ADAPTERS
+from tests.conftest import HERE
 
 SCENE = Stacking().scene(1, Jitter())
 
@@ -25,7 +25,7 @@ def compared(simulator: Simulator) -> list[str]:
     return check(expected, simulator.read_back(), info.deviations, info.name)
 
 
-@pytest.fixture(params=ADAPTERS)
+@pytest.fixture(params=HERE)
 def loaded(request: pytest.FixtureRequest) -> Iterator[Simulator]:
     cls = adapter(request.param)
     simulator = cls(cls.profiles["tuned"])
@@ -36,7 +36,7 @@ def loaded(request: pytest.FixtureRequest) -> Iterator[Simulator]:
 
 @pytest.mark.parametrize("profile", ["default", "tuned"])
 @pytest.mark.parametrize("task", [Stacking(), Throwing()], ids=lambda task: task.name)
-@pytest.mark.parametrize("name", ADAPTERS)
+@pytest.mark.parametrize("name", HERE)
 def test_an_honest_world_passes(name: str, task: Any, profile: str) -> None:
     cls = adapter(name)
     simulator = cls(cls.profiles[profile])

@@ -11,13 +11,12 @@ from pytest_simbench.session.case import Case
 from pytest_simbench.session.repetition import Repetition
 from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
-from tests.conftest import ADAPTERS, able_to
+from tests.conftest import ADAPTERS, able_to, case_of
 
 
 @pytest.fixture(params=ADAPTERS)
 def any_case(request: pytest.FixtureRequest, case: Case) -> Case:
-    name = request.param
-    return replace(case, simulator=name, adapter=ADAPTERS[name], test=f"t[{name}-headless]")
+    return case_of(case, request.param)
 
 
 def test_two_cubes_are_stacked(any_case: Case) -> None:
@@ -68,9 +67,9 @@ def test_unreachable_cubes_are_counted_and_the_task_goes_on(case: Case) -> None:
 @pytest.mark.parametrize("name", able_to(Capability.WINDOW))
 def test_with_a_window_the_outcome_is_the_same(case: Case, name: str) -> None:
     display = pytest.importorskip("pyvirtualdisplay.display")
-    headless = replace(case, simulator=name, adapter=ADAPTERS[name])
+    headless = case_of(case, name)
     with display.Display(visible=False, size=(1280, 960), manage_global_env=False) as virtual:
-        environment = {"DISPLAY": f":{virtual.display}"}
+        environment = {**headless.environment, "DISPLAY": f":{virtual.display}"}
         gui = replace(headless, mode="gui", environment=environment)
         throw = Throwing(settle=1.0)
         with_window, error = Repetition(gui, throw, 1).run()

@@ -1,0 +1,446 @@
+"""Newton (NVIDIA, Google DeepMind, Disney Research), on the CPU.
+
+Newton is a builder of worlds and a set of solvers over them. The one here is SolverMuJoCo with
+MuJoCo's C implementation: Newton's model is converted once, and each step copies Newton's state
+(single precision) into MuJoCo, steps that, and copies back.
+
+Drives are Newton's joint targets, position and velocity: SolverMuJoCo makes each of the two an
+actuator, and clips their sum at the joint's effort limit. Newton's feed-forward `joint_f` would
+be added behind that clip; the effort rides on the position target instead, q* + tau / k.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_simbench.scene import Box, FloatArray, Joint, Pose, Scene
+from pytest_simbench.simulator import (
+    Capability,
+    Deviation,
+    PreparedRobot,
+    Settings,
+    Simulator,
+    SimulatorInfo,
+    lazy_import,
+)
+
+newton = lazy_import("newton")
+wp = lazy_import("warp")
+mujoco = lazy_import("mujoco")
+
+
+@dataclass(frozen=True)
+class NewtonSettings(Settings):
+    """Options of SolverMuJoCo; defaults are the engine's own.
+
+    Attributes:
+        timestep: [s]; Newton's examples of SolverMuJoCo mostly take 1/60 s in 10 substeps.
+        integrator: of MuJoCo; Newton's default is `implicitfast`.
+        cone: friction cone.
+        impratio: ratio of friction to normal constraint impedance.
+        condim: dimension of the contact space: 3 sliding, 4 with torsional friction.
+        ke: contact stiffness [N/m]; SolverMuJoCo makes of it and `kd` MuJoCo's time constant of
+            contacts, 2 / kd [s], and damping ratio, kd / (2 sqrt(ke)).
+        kd: contact damping [N s/m].
+        solimp: contact impedance: minimum, maximum, width [m].
+        gap: distance within which contacts are looked for [m]; Newton's default is 0.1.
+    """
+
+    timestep: float = 1 / 600
+    integrator: Literal["euler", "implicit", "implicitfast", "rk4"] = "implicitfast"
+    cone: Literal["pyramidal", "elliptic"] = "pyramidal"
+    impratio: float = 1.0
+    condim: Literal[3, 4, 6] = 3
+    ke: float = 2500.0
+    kd: float = 100.0
+    solimp: tuple[float, float, float] = (0.9, 0.95, 0.001)
+    gap: float = 0.1
+
+
+class Newton(Simulator):
+    """Adapter of Newton."""
+
+    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+        name="newton",
+        title="Newton",
+        distribution="newton",
+        modules=("newton", "mujoco_warp", "pyglet", "trimesh"),
+        install="pytest --sim-install newton",
+        licence="Apache-2.0",
+        engine="MuJoCo",
+        language="Python (Warp), C",
+        tested_version="1.8.0",
+        capabilities=frozenset(
+            {
+                Capability.WINDOW,
+                Capability.OFFSCREEN,
+                Capability.SAVE_RESTORE,
+                Capability.CONTACT_COUNT,
+                Capability.CONTACT_FORCES,
+                Capability.DETERMINISTIC,
+            }
+        ),
+        deviations=(
+            Deviation("", "contacts are soft by design: cubes sink in and creep a little"),
+            Deviation("", "the state is kept in single precision between steps"),
+        ),
+        costly_start=True,
+        compile_timeout=900.0,
+        requirements=(
+            "newton==1.8.0",
+            "warp-lang==1.19.0",
+            "mujoco==3.17.0",
+            "mujoco-warp==3.17.0",
+            "numpy==2.4.6",
+            "scipy==1.17.1",
+            "trimesh==5.2.0",
+            "pyglet==2.1.19",
+            "pillow==13.0.0",
+        ),
+        caches={"WARP_CACHE_PATH": "warp"},
+        install_size_mb=720,
+        environment={"MUJOCO_GL": "egl"},
+    )
+    profiles: ClassVar[Mapping[str, Settings]] = {
+        "default": NewtonSettings(),
+        "tuned": NewtonSettings(
+            timestep=0.001,
+            cone="elliptic",
+            condim=4,
+            ke=250000.0,
+            kd=1000.0,
+            solimp=(0.99, 0.9999, 0.001),
+            gap=0.0,
+        ),
+    }
+    settings: NewtonSettings
+
+    _compiled: ClassVar[set[bool]] = set()
+
+    def compile(self, scene: Scene) -> None:
+        """Load the world once and step it: Warp then has every kernel, on disk and in memory.
+
+        Scenes with a robot need more kernels than scenes without; a process does each kind once.
+        """
+        kind = scene.robot is not None
+        if kind not in Newton._compiled:
+            self.load(scene)
+            self.step()
+            self.close()
+            Newton._compiled.add(kind)
+
+    def load(self, scene: Scene) -> None:
+        wp.config.log_level = wp.LOG_WARNING
+        self.scene = scene
+        self._viewer = None
+        builder = self._builder(scene)
+        self.prepared = None
+        if scene.robot is not None:
+            self.prepared = PreparedRobot(scene.robot)
+            self._add_robot(builder, self.prepared)
+        builder.add_ground_plane(cfg=self._surface(scene.ground_friction), label="ground")
+        for box in scene.bodies:
+            self._add_box(builder, box)
+        self.model = builder.finalize(device="cpu")
+        self._set_contacts()
+        self._number(scene)
+        s = self.settings
+        self.solver = newton.solvers.SolverMuJoCo(
+            self.model,
+            use_mujoco_cpu=True,
+            integrator=s.integrator,
+            cone=s.cone,
+            impratio=s.impratio,
+        )
+        options = self.solver.mj_model.opt
+        options.timestep = s.timestep
+        # On a state that is not finite MuJoCo would start over from its initial state, silently.
+        options.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        for equality in range(self.solver.mj_model.neq):  # as stiff as the step allows
+            self.solver.mj_model.eq_solref[equality] = (2 * s.timestep, 1.0)
+        self._states = [self.model.state(), self.model.state()]
+        self._control = self.model.control()
+        self._targets = self._control.joint_target_q.numpy()  # views: the device is the CPU
+        self._speeds = self._control.joint_target_qd.numpy()
+        self._steps = 0
+        for state in self._states:
+            newton.eval_fk(self.model, self.model.joint_q, self.model.joint_qd, state)
+        self._show_mujoco_the_start()
+        if self.gui:
+            self._open_window()
+
+    def _show_mujoco_the_start(self) -> None:
+        """Newton hands its state to MuJoCo only in `step`; it may be looked at before."""
+        model, data = self.solver.mj_model, self.solver.mj_data
+        data.qpos[model.jnt_qposadr[self._mujoco_joints()]] = self.model.joint_q.numpy()[self._q]
+        mujoco.mj_forward(model, data)
+
+    def _mujoco_joints(self) -> list[int]:
+        """MuJoCo's numbers of the driven joints."""
+        numbers = self.solver.mjc_jnt_to_newton_jnt.numpy()[0].tolist()
+        return [numbers.index(joint) for joint in self._joints]
+
+    def _builder(self, scene: Scene) -> Any:
+        builder = newton.ModelBuilder(gravity=scene.gravity)
+        newton.solvers.SolverMuJoCo.register_custom_attributes(builder)
+        return builder
+
+    def _surface(self, friction: float) -> Any:
+        """A shape's settings, with its mass left to the body that it belongs to."""
+        s = self.settings
+        return newton.ModelBuilder.ShapeConfig(
+            mu=friction, ke=s.ke, kd=s.kd, gap=s.gap, density=0.0
+        )
+
+    def _add_robot(self, builder: Any, prepared: PreparedRobot) -> None:
+        robot = prepared.robot
+        builder.default_shape_cfg = self._surface(robot.friction)
+        builder.add_urdf(
+            prepared.to_urdf(),
+            parse_visuals_as_colliders=True,
+            enable_self_collisions=False,
+            force_position_velocity_actuation=True,
+        )
+        builder.default_shape_cfg = newton.ModelBuilder.ShapeConfig()
+        names = _labels(builder.joint_label)
+        for joint in robot.joints:
+            _set_drive(builder, names.index(joint.name), joint)
+        first, second = (names.index(name) for name in robot.gripper.joints)
+        builder.set_joint_mimic(second, first)
+
+    def _add_box(self, builder: Any, box: Box) -> None:
+        pose, cfg = _transform(box.pose), self._surface(box.friction)
+        body = -1
+        if not box.fixed:
+            cfg.density = box.mass / float(np.prod(box.size))
+            body, pose = builder.add_body(xform=pose, label=box.name), None
+        hx, hy, hz = (edge / 2 for edge in box.size)
+        builder.add_shape_box(
+            body, xform=pose, hx=hx, hy=hy, hz=hz, cfg=cfg, color=box.colour[:3], label=box.name
+        )
+
+    def _set_contacts(self) -> None:
+        """What MuJoCo needs of a contact beyond Newton's own parameters, the same everywhere."""
+        attributes, s = self.model.mujoco, self.settings
+        attributes.condim.fill_(s.condim)
+        attributes.geom_solimp.numpy()[:] = (*s.solimp, 0.5, 2.0)
+
+    def _number(self, scene: Scene) -> None:
+        """Where Newton's arrays hold the driven joints and the free bodies."""
+        model = self.model
+        labels = _labels(model.joint_label)
+        names = scene.robot.joint_names if scene.robot else ()
+        self._joints = joints = np.array([labels.index(name) for name in names], dtype=int)
+        self._q = model.joint_q_start.numpy()[joints]
+        self._v = model.joint_qd_start.numpy()[joints]
+        self._target = model.joint_target_q_start.numpy()[joints]
+        self._free = [model.body_label.index(body.name) for body in scene.free_bodies]
+        if scene.robot is not None:
+            self._stiffness = scene.robot.column("stiffness")
+
+    def read_back(self) -> dict[str, Any]:
+        """From MuJoCo's model, which is what is stepped."""
+        model, data = self.solver.mj_model, self.solver.mj_data
+        ground = model.geom(self._geom("ground"))
+        reported: dict[str, Any] = {
+            "gravity": model.opt.gravity,
+            "timestep": model.opt.timestep,
+            "ground/height": ground.pos[2],
+            "ground/friction": ground.friction[0],
+        }
+        for box in self.scene.bodies:
+            geom = model.geom(self._geom(box.name))
+            place = data.geom(geom.id)
+            rotation = np.empty(4)
+            mujoco.mju_mat2Quat(rotation, place.xmat)
+            reported[f"body/{box.name}/size"] = 2 * geom.size
+            reported[f"body/{box.name}/friction"] = geom.friction[0]
+            reported[f"body/{box.name}/pose"] = np.concatenate([place.xpos, rotation])
+            body = model.body(int(geom.bodyid[0]))
+            if body.dofnum[0]:
+                reported[f"body/{box.name}/mass"] = body.mass[0]
+                reported[f"body/{box.name}/inertia"] = _inertia(body)
+        if self.prepared is not None:
+            self._read_back_robot(self.prepared, reported)
+        return reported
+
+    def _geom(self, label: str) -> int:
+        """MuJoCo's number of Newton's shape with this label."""
+        return self._shapes().index(self.model.shape_label.index(label))
+
+    def _shapes(self) -> list[int]:
+        """Newton's number of each of MuJoCo's geoms."""
+        numbers: list[int] = self.solver.mjc_geom_to_newton_shape.numpy()[0].tolist()
+        return numbers
+
+    def _read_back_robot(self, prepared: PreparedRobot, reported: dict[str, Any]) -> None:
+        model, data = self.solver.mj_model, self.solver.mj_data
+        bodies = self.solver.mjc_body_to_newton.numpy()[0].tolist()
+        ids = dict(zip(prepared.robot.joint_names, self._mujoco_joints(), strict=True))
+        fingers = {ids[joint] for joint in prepared.robot.gripper.joints}
+        reported["gripper/coupled"] = any(
+            {a, b} == fingers and kind == mujoco.mjtEq.mjEQ_JOINT and active
+            for a, b, kind, active in zip(
+                model.eq_obj1id, model.eq_obj2id, model.eq_type, data.eq_active, strict=True
+            )
+        )
+        for name, at in ids.items():
+            dof = model.jnt_dofadr[at]
+            drives = np.flatnonzero(model.actuator_trnid[:, 0] == at)
+            biases = model.actuator_biasprm[drives].sum(axis=0)
+            reported[f"joint/{name}/limits"] = model.jnt_range[at]
+            reported[f"joint/{name}/effort_limit"] = model.jnt_actfrcrange[at, 1]
+            reported[f"joint/{name}/stiffness"] = -biases[1]
+            passive = float(np.ravel(model.dof_damping[dof])[0])
+            reported[f"joint/{name}/damping"] = passive - biases[2]
+            reported[f"joint/{name}/armature"] = model.dof_armature[dof]
+            reported[f"joint/{name}/initial_position"] = data.qpos[model.jnt_qposadr[at]]
+        for link in prepared.moving_links:
+            body = model.body(bodies.index(_labels(self.model.body_label).index(link.name)))
+            reported[f"link/{link.name}/mass"] = body.mass[0]
+            reported[f"link/{link.name}/inertia"] = np.sort(body.inertia)
+            values = np.unique(model.geom_friction[model.geom_bodyid == body.id, 0])
+            reported[f"link/{link.name}/friction"] = values[0] if len(values) == 1 else values
+
+    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        self._targets[self._target] = position + effort / self._stiffness
+        self._speeds[self._v] = velocity
+
+    def step(self) -> None:
+        before, after = self._states
+        timestep = float(self.solver.mj_model.opt.timestep)
+        self.solver.step(before, after, self._control, None, timestep)
+        self._states = [after, before]
+        self._steps += 1
+
+    @property
+    def time(self) -> float:
+        return self._steps * self.settings.timestep
+
+    def body_state(self) -> FloatArray:
+        state = self._states[0]
+        rows = np.empty((len(self._free), 13))
+        if self._free:
+            poses, velocities = state.body_q.numpy(), state.body_qd.numpy()
+            rows[:, :3] = poses[self._free, :3]
+            rows[:, 3] = poses[self._free, 6]  # Newton's quaternions end with w
+            rows[:, 4:7] = poses[self._free, 3:6]
+            rows[:, 7:] = velocities[self._free]
+        return rows
+
+    def joint_state(self) -> FloatArray:
+        state = self._states[0]
+        if not len(self._q):
+            return np.empty((2, 0))
+        return np.stack([state.joint_q.numpy()[self._q], state.joint_qd.numpy()[self._v]]).astype(
+            float
+        )
+
+    def save(self) -> dict[str, Any]:
+        """Newton's state and targets, and what MuJoCo remembers beyond them (warm starts)."""
+        model, data = self.solver.mj_model, self.solver.mj_data
+        kind = mujoco.mjtState.mjSTATE_INTEGRATION
+        memory = np.empty(mujoco.mj_stateSize(model, kind))
+        mujoco.mj_getState(model, data, memory, kind)
+        arrays = [getattr(self._states[0], name).numpy().copy() for name in _STATE]
+        targets = [self._targets.copy(), self._speeds.copy()]
+        return {"arrays": arrays, "targets": targets, "memory": memory, "steps": self._steps}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        for name, values in zip(_STATE, state["arrays"], strict=True):
+            getattr(self._states[0], name).numpy()[:] = values
+        self._targets[:], self._speeds[:] = state["targets"]
+        kind = mujoco.mjtState.mjSTATE_INTEGRATION
+        mujoco.mj_setState(self.solver.mj_model, self.solver.mj_data, state["memory"], kind)
+        mujoco.mj_forward(self.solver.mj_model, self.solver.mj_data)
+        self._steps = state["steps"]
+
+    def contact_count(self) -> int:
+        """Contacts that take part in the solution; MuJoCo also lists those within the gap."""
+        data = self.solver.mj_data
+        return int((data.contact.efc_address >= 0).sum())
+
+    def render(self, width: int, height: int) -> NDArray[np.uint8]:
+        """A picture by MuJoCo, whose renderer needs no display."""
+        model = self.solver.mj_model
+        model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+        model.vis.headlight.ambient[:] = 0.4
+        model.geom_rgba[:, :3] = self.model.shape_color.numpy()[self._shapes()]
+        camera = mujoco.MjvCamera()
+        camera.lookat[:] = _LOOK_AT
+        camera.distance, camera.azimuth, camera.elevation = 2.2, 140.0, -25.0
+        with mujoco.Renderer(model, height, width) as renderer:
+            renderer.update_scene(self.solver.mj_data, camera)
+            return np.array(renderer.render())
+
+    def _open_window(self) -> None:
+        import newton.viewer
+
+        self._viewer = newton.viewer.ViewerGL(width=960, height=720)
+        self._viewer.set_model(self.model)
+        self._viewer.set_camera(pos=wp.vec3(2.0, -1.3, 1.3), pitch=-25.0, yaw=140.0)
+        self._next_picture = 0.0
+        self.refresh_window()
+
+    def refresh_window(self) -> None:
+        """Draw, unless the last picture is so fresh that drawing would take most of the time."""
+        began = time.perf_counter()
+        if self._viewer is None or began < self._next_picture:
+            return
+        self._viewer.begin_frame(self.time)
+        self._viewer.log_state(self._states[0])
+        self._viewer.end_frame()
+        ended = time.perf_counter()
+        self._next_picture = ended + (ended - began)
+
+    def close(self) -> None:
+        if self.__dict__.get("_viewer") is not None:
+            self._viewer.close()
+        for name in ("_viewer", "solver", "model", "_states", "_control", "_targets", "_speeds"):
+            self.__dict__.pop(name, None)
+
+    def versions(self) -> dict[str, str]:
+        from importlib.metadata import version
+
+        return {name: version(name) for name in ("newton", "warp-lang", "mujoco", "mujoco-warp")}
+
+
+_LOOK_AT = (0.5, 0.0, 0.35)
+"""What the offscreen camera looks at [m]."""
+
+_STATE = ("joint_q", "joint_qd", "body_q", "body_qd")
+"""Arrays of Newton's state."""
+
+
+def _transform(pose: Pose) -> Any:
+    w, x, y, z = pose.quaternion
+    return wp.transform(pose.position, wp.quat(x, y, z, w))
+
+
+def _labels(paths: list[str]) -> list[str]:
+    """Names without the robot's, which Newton puts before those of its links and joints."""
+    return [path.rpartition("/")[2] for path in paths]
+
+
+def _set_drive(builder: Any, number: int, joint: Joint) -> None:
+    dof, q = builder.joint_qd_start[number], builder.joint_q_start[number]
+    builder.joint_target_ke[dof] = joint.stiffness
+    builder.joint_target_kd[dof] = joint.damping
+    builder.joint_effort_limit[dof] = joint.effort_limit
+    builder.joint_armature[dof] = joint.armature
+    builder.joint_q[q] = joint.initial_position
+    builder.joint_target_q[q] = joint.initial_position
+
+
+def _inertia(body: Any) -> FloatArray:
+    """Diagonal of a body's inertia in its own axes; MuJoCo may have permuted them."""
+    rotation = np.empty(9)
+    mujoco.mju_quat2Mat(rotation, body.iquat)
+    turn = rotation.reshape(3, 3)
+    return np.diag(turn @ np.diag(body.inertia) @ turn.T)

@@ -1,0 +1,117 @@
+"""Newton with one planted fault: a world that differs from the scene in one quantity.
+
+Loaded by workers as `tests.sims.newton_faults:FaultyNewton`, since Newton lives in an interpreter
+of its own; the setting `fault` names the quantity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from pytest_simbench.sims.newton import Newton, NewtonSettings
+
+from pytest_simbench.scene import Scene
+from pytest_simbench.simulator import Settings
+
+
+@dataclass(frozen=True)
+class FaultySettings(NewtonSettings):
+    """Adds `fault`, a key of `FAULTS` or "" for none."""
+
+    fault: str = ""
+
+
+class FaultyNewton(Newton):
+    profiles: ClassVar[Mapping[str, Settings]] = {
+        name: FaultySettings(**asdict(settings)) for name, settings in Newton.profiles.items()
+    }
+    settings: FaultySettings
+
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        if self.settings.fault:
+            FAULTS[self.settings.fault](self)
+
+
+def geom(s: Any, name: str) -> Any:
+    return s.solver.mj_model.geom(s._geom(name))
+
+
+def body(s: Any, name: str) -> Any:
+    numbers = s.solver.mjc_body_to_newton.numpy()[0].tolist()
+    labels = [label.rpartition("/")[2] for label in s.model.body_label]
+    return s.solver.mj_model.body(numbers.index(labels.index(name)))
+
+
+def joint(s: Any, name: str = "panda_joint4") -> int:
+    """MuJoCo's number of a joint."""
+    numbers = s.solver.mjc_jnt_to_newton_jnt.numpy()[0].tolist()
+    labels = [label.rpartition("/")[2] for label in s.model.joint_label]
+    return int(numbers.index(labels.index(name)))
+
+
+def gain(column: int) -> Callable[[Any], None]:
+    def plant(s: Any) -> None:
+        model = s.solver.mj_model
+        model.actuator_biasprm[model.actuator_trnid[:, 0] == joint(s), column] *= 1.1
+
+    return plant
+
+
+def in_model(array: str, value: float) -> Callable[[Any], None]:
+    """Sets the row of joint 4 in an array of MuJoCo's joints or degrees of freedom."""
+
+    def plant(s: Any) -> None:
+        model, at = s.solver.mj_model, joint(s)
+        row = model.jnt_dofadr[at] if array.startswith("dof") else at
+        getattr(model, array)[row] = value
+
+    return plant
+
+
+def in_data(s: Any) -> None:
+    model, data = s.solver.mj_model, s.solver.mj_data
+    data.qpos[model.jnt_qposadr[joint(s)]] += 0.1
+
+
+def sunk_table(s: Any) -> None:
+    import mujoco
+
+    geom(s, "table").pos[2] -= 0.012
+    mujoco.mj_kinematics(s.solver.mj_model, s.solver.mj_data)
+
+
+def one_finger_shape(s: Any) -> None:
+    model = s.solver.mj_model
+    shapes = np.flatnonzero(model.geom_bodyid == body(s, "panda_leftfinger").id)
+    model.geom_friction[shapes[-1], 0] = 0.3
+
+
+def uncouple(s: Any) -> None:
+    s.solver.mj_data.eq_active[:] = 0
+
+
+FAULTS: dict[str, Callable[[Any], None]] = {
+    "body/cube_05/mass": lambda s: body(s, "cube_05").mass.__setitem__(0, 1.0),
+    "body/cube_05/inertia": lambda s: body(s, "cube_05").inertia.__imul__(1.2),
+    "body/cube_05/friction": lambda s: geom(s, "cube_05").friction.__setitem__(0, 0.5),
+    "body/cube_05/size": lambda s: geom(s, "cube_05").size.__setitem__(1, 0.02),
+    "body/table/pose": sunk_table,
+    "gravity": lambda s: s.solver.mj_model.opt.gravity.__setitem__(2, -9.7),
+    "timestep": lambda s: setattr(s.solver.mj_model.opt, "timestep", 0.005),
+    "ground/height": lambda s: geom(s, "ground").pos.__setitem__(2, 0.01),
+    "ground/friction": lambda s: geom(s, "ground").friction.__setitem__(0, 0.5),
+    "joint/panda_joint4/stiffness": gain(1),
+    "joint/panda_joint4/damping": gain(2),
+    "joint/panda_joint4/effort_limit": in_model("jnt_actfrcrange", 200.0),
+    "joint/panda_joint4/armature": in_model("dof_armature", 0.0),
+    "joint/panda_joint4/limits": in_model("jnt_range", 1.0),
+    "joint/panda_joint4/initial_position": in_data,
+    "link/panda_link4/mass": lambda s: body(s, "panda_link4").mass.__setitem__(0, 5.0),
+    "link/panda_link4/inertia": lambda s: body(s, "panda_link4").inertia.__imul__(1.2),
+    "link/panda_leftfinger/friction": one_finger_shape,
+    "gripper/coupled": uncouple,
+}

@@ -1,0 +1,63 @@
+"""Newton's parity check, in Newton's own interpreter: honest worlds pass, planted faults do not."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from pytest_simbench.sims.newton import Newton
+
+from pytest_simbench.client.environments import Environment, interpreter, missing
+from pytest_simbench.client.errors import Where, WorldParityError
+from pytest_simbench.client.process import Launch, WorkerProcess
+from pytest_simbench.client.world import World
+from pytest_simbench.scene import Scene
+from pytest_simbench.tasks import Jitter, Stacking, Throwing
+from tests.sims.newton_faults import FAULTS
+
+ADAPTER = "tests.sims.newton_faults:FaultyNewton"
+
+
+@pytest.fixture(scope="module")
+def worker() -> Iterator[WorkerProcess]:
+    absent = missing(Newton.info)
+    if absent:
+        pytest.skip(absent)
+    process = WorkerProcess(
+        Launch(
+            ADAPTER,
+            python=interpreter(Newton.info),
+            environment=Environment.of(Newton.info).variables(),
+            stall_timeout=120.0,
+            compile_timeout=Newton.info.compile_timeout,
+        ),
+        Where("newton", "headless"),
+    )
+    yield process
+    process.close()
+
+
+def load(worker: WorkerProcess, scene: Scene, profile: str = "tuned", fault: str = "") -> World:
+    worker.request(
+        "construct",
+        adapter=ADAPTER,
+        profile=profile,
+        changes={"fault": fault},
+        gui=False,
+        real_time=False,
+    )
+    return World(worker, scene)
+
+
+@pytest.mark.parametrize("profile", ["default", "tuned"])
+@pytest.mark.parametrize("task", [Stacking(), Throwing()], ids=lambda task: task.name)
+def test_an_honest_world_passes(worker: WorkerProcess, task: Any, profile: str) -> None:
+    assert load(worker, task.scene(7, Jitter()), profile).time == 0.0
+
+
+@pytest.mark.parametrize("quantity", FAULTS)
+def test_fault_is_caught(worker: WorkerProcess, quantity: str) -> None:
+    with pytest.raises(WorldParityError, match=f"{re.escape(quantity)}: scene .*, newton "):
+        load(worker, Stacking().scene(1, Jitter()), fault=quantity)
