@@ -22,8 +22,9 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
+from pytest_simbench.sims import ovphysx_stage as usd
 
-from pytest_simbench.scene import Box, FloatArray, Pose, Scene
+from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
@@ -33,7 +34,6 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
-from pytest_simbench.sims import ovphysx_stage as usd
 
 ovphysx = lazy_import("ovphysx")
 ovphysx_types = lazy_import("ovphysx.types")
@@ -97,7 +97,7 @@ class OvPhysX(Simulator):
         licence="NVIDIA Omniverse licence (proprietary); not part of this package",
         engine="PhysX 5",
         tested_version="0.7.0",
-        capabilities=frozenset({Capability.CONTACT_COUNT, Capability.DETERMINISTIC}),
+        capabilities=frozenset({Capability.DETERMINISTIC}),
         deviations=(
             Deviation("timestep", "an argument of each step, which PhysX does not report"),
             Deviation("gravity", "PhysX reports no gravity through this package"),
@@ -126,32 +126,7 @@ class OvPhysX(Simulator):
         self.prepared = PreparedRobot(scene.robot) if scene.robot is not None else None
         self._commanded: tuple[FloatArray, FloatArray] | None = None
         self._bindings: dict[str, tuple[Any, Any]] = {}
-        s = self.settings
-        text = usd.stage_text(
-            scene,
-            self.prepared,
-            {
-                "solverType": s.solver,
-                "enableGPUDynamics": False,
-                "broadphaseType": "SAP",
-                "disableSleeping": not s.sleeping,
-                "frictionOffsetThreshold": s.friction_offset_threshold,
-                "frictionCorrelationDistance": s.friction_correlation_distance,
-                "solveArticulationContactLast": s.contact_last,
-            },
-            {
-                "solverPositionIterationCount": s.body_iterations,
-                "solverVelocityIterationCount": s.velocity_iterations,
-                "linearDamping": s.linear_damping,
-                "angularDamping": s.angular_damping,
-                "maxDepenetrationVelocity": s.max_depenetration_velocity,
-            },
-            {
-                "solverPositionIterationCount": s.arm_iterations,
-                "solverVelocityIterationCount": s.velocity_iterations,
-            },
-            {"contactOffset": s.contact_offset, "restOffset": s.rest_offset},
-        )
+        text = usd.Stage(scene, self.prepared, _attributes(self.settings)).text()
         self._attach(text)
         free = [i for i, box in enumerate(scene.bodies) if not box.fixed]
         self._free = [usd.body_path(i) for i in free]
@@ -167,7 +142,7 @@ class OvPhysX(Simulator):
     def _attach(self, text: str) -> None:
         """Start PhysX with a stage."""
         types = ovphysx_types
-        # Deprecated bindings are used on purpose, see the module's docstring.
+        # Deprecated bindings are used on purpose (see above), and only the processor.
         warnings.filterwarnings("ignore", category=DeprecationWarning, module="pytest_simbench")
         ovphysx.PhysX.set_cpu_mode(True)
         ovphysx.set_global_config(types.GlobalConfigKey.NUM_THREADS, self.settings.threads)
@@ -323,7 +298,9 @@ class OvPhysX(Simulator):
         mode = ovphysx_types.SceneQueryMode.ALL
         hits = self.physx.raycast(start.tolist(), direction.tolist(), 2 * REACH, mode)
         paths = self.physx.get_scene_query_paths_from_ids([hit["collision"] for hit in hits])
-        return [np.array(hit["position"]) for hit, at in zip(hits, paths, strict=True) if at == path]
+        return [
+            np.array(hit["position"]) for hit, at in zip(hits, paths, strict=True) if at == path
+        ]
 
     def _size(self, path: str, pose: Pose) -> FloatArray:
         """Extents of a collider along the axes of its body, measured with rays from outside."""
@@ -337,9 +314,6 @@ class OvPhysX(Simulator):
     def _height(self) -> float:
         hits = self._hits(usd.GROUND, np.array([0.0, 0.0, REACH]), np.array([0.0, 0.0, -1.0]))
         return float(hits[0][2]) if hits else math.nan
-
-    def contact_count(self) -> int:
-        return 0
 
     def close(self) -> None:
         for binding, _ in getattr(self, "_bindings", {}).values():
@@ -361,6 +335,30 @@ def _friction(
     count = int(values["shapeCount"][path]) if shapes is None else shapes
     found = np.unique([np.atleast_1d(values[name][path])[:count] for name in _FRICTIONS])
     return float(found[0]) if len(found) == 1 else found
+
+
+def _attributes(s: OvPhysXSettings) -> dict[str, dict[str, Any]]:
+    """The settings in the words of PhysX's schemas."""
+    iterations = {"solverVelocityIterationCount": s.velocity_iterations}
+    return {
+        "physxScene": {
+            "solverType": s.solver,
+            "enableGPUDynamics": False,
+            "disableSleeping": not s.sleeping,
+            "frictionOffsetThreshold": s.friction_offset_threshold,
+            "frictionCorrelationDistance": s.friction_correlation_distance,
+            "solveArticulationContactLast": s.contact_last,
+        },
+        "physxRigidBody": {
+            "solverPositionIterationCount": s.body_iterations,
+            **iterations,
+            "linearDamping": s.linear_damping,
+            "angularDamping": s.angular_damping,
+            "maxDepenetrationVelocity": s.max_depenetration_velocity,
+        },
+        "physxArticulation": {"solverPositionIterationCount": s.arm_iterations, **iterations},
+        "physxCollision": {"contactOffset": s.contact_offset, "restOffset": s.rest_offset},
+    }
 
 
 def _register_schemas() -> None:

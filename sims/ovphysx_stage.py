@@ -20,6 +20,9 @@ from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
 
 GROUND, ROOT = "/World/ground", "/World/root_joint"
 
+_COLLIDER = ("PhysicsCollisionAPI", "PhysxCollisionAPI", "MaterialBindingAPI")
+_BODY = ("PhysicsRigidBodyAPI", "PhysxRigidBodyAPI", "PhysicsMassAPI")
+
 
 def body_path(index: int) -> str:
     """Prim of the scene's body of that index."""
@@ -36,157 +39,136 @@ def joint_path(index: int) -> str:
     return f"/World/joint_{index}"
 
 
-def stage_text(
-    scene: Scene,
-    prepared: PreparedRobot | None,
-    options: Mapping[str, Any],
-    bodies: Mapping[str, Any],
-    articulation: Mapping[str, Any],
-    collision: Mapping[str, Any],
-) -> str:
-    """The whole stage as `.usda` text.
+class Stage:
+    """Writer of one scene.
 
     Args:
         scene: the world to write.
         prepared: its robot.
-        options: attributes of PhysxSceneAPI, by name without prefix.
-        bodies: those of PhysxRigidBodyAPI, for free bodies and links alike.
-        articulation: those of PhysxArticulationAPI.
-        collision: those of PhysxCollisionAPI.
+        attributes: of PhysX's schemas, by their prefix (`physxScene`, `physxRigidBody`,
+            `physxArticulation`, `physxCollision`) and name; None keeps the schema's default.
     """
-    prims = [_scene(scene, options), *_materials(scene), _ground(scene, collision)]
-    prims += [_box(i, box, bodies, collision) for i, box in enumerate(scene.bodies)]
-    if prepared is not None:
-        prims += _robot(prepared, bodies, articulation, collision)
-    world = _prim("Xform", "World", (), [], prims)
-    header = '(defaultPrim = "World"\n metersPerUnit = 1\n kilogramsPerUnit = 1\n upAxis = "Z")'
-    return f"#usda 1.0\n{header}\n\n{world}\n"
 
+    def __init__(
+        self,
+        scene: Scene,
+        prepared: PreparedRobot | None,
+        attributes: Mapping[str, Mapping[str, Any]],
+    ) -> None:
+        self.scene = scene
+        self.prepared = prepared
+        self._lines = {prefix: _attributes(prefix, values) for prefix, values in attributes.items()}
 
-def _scene(scene: Scene, options: Mapping[str, Any]) -> str:
-    magnitude = float(np.linalg.norm(scene.gravity))
-    direction = np.asarray(scene.gravity) / magnitude if magnitude else (0, 0, -1)
-    lines = [
-        f"vector3f physics:gravityDirection = {_tuple(direction)}",
-        f"float physics:gravityMagnitude = {magnitude!r}",
-        *_attributes("physxScene", options),
-    ]
-    return _prim("PhysicsScene", "physics", ("PhysxSceneAPI",), lines)
+    def text(self) -> str:
+        """The stage as `.usda` text."""
+        prims = [self._physics(), *self._materials(), self._ground()]
+        prims += [self._box(i, box) for i, box in enumerate(self.scene.bodies)]
+        if self.prepared is not None:
+            prims += self._robot(self.prepared)
+        units = "metersPerUnit = 1\n kilogramsPerUnit = 1"
+        header = f'(defaultPrim = "World"\n {units}\n upAxis = "Z")'
+        return f"#usda 1.0\n{header}\n\n{_prim('Xform', 'World', (), [], prims)}\n"
 
+    def _physics(self) -> str:
+        magnitude = float(np.linalg.norm(self.scene.gravity))
+        direction = np.asarray(self.scene.gravity) / magnitude if magnitude else (0, 0, -1)
+        lines = [
+            f"vector3f physics:gravityDirection = {_tuple(direction)}",
+            f"float physics:gravityMagnitude = {magnitude!r}",
+            *self._lines["physxScene"],
+        ]
+        return _prim("PhysicsScene", "physics", ("PhysxSceneAPI",), lines)
 
-def _materials(scene: Scene) -> list[str]:
-    """One material a coefficient, static and dynamic friction alike, no restitution."""
-    return [
-        _prim(
-            "Material",
-            _material(friction),
-            ("PhysicsMaterialAPI",),
-            [
-                f"float physics:staticFriction = {friction!r}",
-                f"float physics:dynamicFriction = {friction!r}",
-                "float physics:restitution = 0",
-            ],
-        )
-        for friction in sorted(
-            {scene.ground_friction}
-            | {box.friction for box in scene.bodies}
-            | ({scene.robot.friction} if scene.robot else set())
-        )
-    ]
+    def _materials(self) -> list[str]:
+        """One material a coefficient, static and dynamic friction alike, no restitution.
+
+        PhysX combines two by their average, which is the scene's value for equal surfaces.
+        """
+        frictions = {self.scene.ground_friction, *(box.friction for box in self.scene.bodies)}
+        if self.scene.robot is not None:
+            frictions.add(self.scene.robot.friction)
+        return [
+            _prim(
+                "Material",
+                _material(friction),
+                ("PhysicsMaterialAPI",),
+                [
+                    f"float physics:staticFriction = {float(friction)!r}",
+                    f"float physics:dynamicFriction = {float(friction)!r}",
+                    "float physics:restitution = 0",
+                ],
+            )
+            for friction in sorted(frictions)
+        ]
+
+    def _surface(self, friction: float) -> list[str]:
+        bound = f"rel material:binding:physics = </World/{_material(friction)}>"
+        return [bound, *self._lines["physxCollision"]]
+
+    def _ground(self) -> str:
+        lines = ['uniform token axis = "Z"', *self._surface(self.scene.ground_friction)]
+        return _prim("Plane", "ground", _COLLIDER, lines)
+
+    def _box(self, index: int, box: Box) -> str:
+        """A rigid body; kinematic where it is fixed, since PhysX reports nothing of static ones."""
+        shape = _prim("Cube", "shape", _COLLIDER, [*_cube(box.size), *self._surface(box.friction)])
+        lines = [*_placed(box.pose), *self._lines["physxRigidBody"]]
+        if box.fixed:
+            lines.append("bool physics:kinematicEnabled = true")
+        else:
+            lines += _mass(box.mass, np.zeros(3), np.diag(box.inertia()))
+        return _prim("Xform", f"body_{index}", _BODY, lines, [shape])
+
+    def _robot(self, prepared: PreparedRobot) -> list[str]:
+        robot, names = prepared.robot, list(prepared.links)
+        poses = {prepared.root: Pose()}
+        for joint in prepared.joints:
+            poses[joint.child] = poses[joint.parent] * joint.origin
+        prims = [
+            self._link(i, prepared.links[name], poses[name], robot.friction)
+            for i, name in enumerate(names)
+        ]
+        root = [
+            f"rel physics:body1 = <{link_path(names.index(prepared.root))}>",
+            "bool physxArticulation:enabledSelfCollisions = false",
+            *self._lines["physxArticulation"],
+        ]
+        schemas = ("PhysicsArticulationRootAPI", "PhysxArticulationAPI")
+        prims.append(_prim("PhysicsFixedJoint", ROOT.rpartition("/")[2], schemas, root))
+        first, second = robot.finger_indices
+        for joint in prepared.joints:
+            index = robot.joint_names.index(joint.name)
+            limits = prepared.limits[joint.name]
+            coupled_to = first if index == second else None
+            prims.append(_joint(index, joint, robot.joints[index], limits, names, coupled_to))
+        return prims
+
+    def _link(self, index: int, link: Link, pose: Pose, friction: float) -> str:
+        lines = [*_placed(pose), *self._lines["physxRigidBody"]]
+        if link.mass > 0:
+            lines += _mass(link.mass, link.centre, link.inertia)
+        shapes = [self._shape(i, shape, friction) for i, shape in enumerate(link.shapes)]
+        return _prim("Xform", f"link_{index}", _BODY, lines, shapes)
+
+    def _shape(self, index: int, shape: Shape, friction: float) -> str:
+        """A box, or the convex hull of a mesh, which PhysX makes (at most 64 corners)."""
+        name, surface = f"shape_{index}", self._surface(friction)
+        if shape.size is not None:
+            return _prim("Cube", name, _COLLIDER, [*_cube(shape.size, shape.pose), *surface])
+        triangles = read_stl(Path(str(shape.mesh)))
+        corners, faces = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+        lines = [
+            *_placed(shape.pose),
+            'uniform token physics:approximation = "convexHull"',
+            f"point3f[] points = [{', '.join(_tuple(point) for point in corners)}]",
+            f"int[] faceVertexCounts = [{', '.join(['3'] * len(triangles))}]",
+            f"int[] faceVertexIndices = [{', '.join(str(i) for i in faces.ravel())}]",
+        ]
+        return _prim("Mesh", name, (*_COLLIDER, "PhysicsMeshCollisionAPI"), [*lines, *surface])
 
 
 def _material(friction: float) -> str:
     return "friction_" + repr(float(friction)).translate(str.maketrans(".+-", "_pm"))
-
-
-def _surface(friction: float, collision: Mapping[str, Any]) -> tuple[tuple[str, ...], list[str]]:
-    """Schemas and attributes of a collider with that friction."""
-    schemas = ("PhysicsCollisionAPI", "PhysxCollisionAPI", "MaterialBindingAPI")
-    bound = f"rel material:binding:physics = </World/{_material(friction)}>"
-    return schemas, [bound, *_attributes("physxCollision", collision)]
-
-
-def _ground(scene: Scene, collision: Mapping[str, Any]) -> str:
-    schemas, lines = _surface(scene.ground_friction, collision)
-    return _prim("Plane", "ground", schemas, ['uniform token axis = "Z"', *lines])
-
-
-def _box(
-    index: int, box: Box, bodies: Mapping[str, Any], collision: Mapping[str, Any]
-) -> str:
-    """A rigid body; kinematic where it is fixed, since PhysX reports nothing of static ones."""
-    schemas, lines = _surface(box.friction, collision)
-    shape = _prim("Cube", "shape", schemas, [*_cube(box.size), *lines])
-    lines = [*_placed(box.pose), *_attributes("physxRigidBody", bodies)]
-    if box.fixed:
-        lines.append("bool physics:kinematicEnabled = true")
-    else:
-        lines += _mass(box.mass, np.zeros(3), np.diag(box.inertia()))
-    schemas = ("PhysicsRigidBodyAPI", "PhysxRigidBodyAPI", "PhysicsMassAPI")
-    return _prim("Xform", f"body_{index}", schemas, lines, [shape])
-
-
-def _robot(
-    prepared: PreparedRobot,
-    bodies: Mapping[str, Any],
-    articulation: Mapping[str, Any],
-    collision: Mapping[str, Any],
-) -> list[str]:
-    robot, names = prepared.robot, list(prepared.links)
-    poses = {prepared.root: Pose()}
-    for joint in prepared.joints:
-        poses[joint.child] = poses[joint.parent] * joint.origin
-    prims = [
-        _link(i, prepared.links[name], poses[name], robot.friction, bodies, collision)
-        for i, name in enumerate(names)
-    ]
-    root = [
-        f"rel physics:body1 = <{link_path(names.index(prepared.root))}>",
-        "bool physxArticulation:enabledSelfCollisions = false",
-        *_attributes("physxArticulation", articulation),
-    ]
-    schemas = ("PhysicsArticulationRootAPI", "PhysxArticulationAPI")
-    prims.append(_prim("PhysicsFixedJoint", ROOT.rpartition("/")[2], schemas, root))
-    first, second = robot.finger_indices
-    for joint in prepared.joints:
-        index = robot.joint_names.index(joint.name)
-        limits = prepared.limits[joint.name]
-        coupled_to = first if index == second else None
-        prims.append(_joint(index, joint, robot.joints[index], limits, names, coupled_to))
-    return prims
-
-
-def _link(
-    index: int,
-    link: Link,
-    pose: Pose,
-    friction: float,
-    bodies: Mapping[str, Any],
-    collision: Mapping[str, Any],
-) -> str:
-    lines = [*_placed(pose), *_attributes("physxRigidBody", bodies)]
-    if link.mass > 0:
-        lines += _mass(link.mass, link.centre, link.inertia)
-    shapes = [_shape(i, shape, friction, collision) for i, shape in enumerate(link.shapes)]
-    schemas = ("PhysicsRigidBodyAPI", "PhysxRigidBodyAPI", "PhysicsMassAPI")
-    return _prim("Xform", f"link_{index}", schemas, lines, shapes)
-
-
-def _shape(index: int, shape: Shape, friction: float, collision: Mapping[str, Any]) -> str:
-    schemas, lines = _surface(friction, collision)
-    name = f"shape_{index}"
-    if shape.size is not None:
-        return _prim("Cube", name, schemas, [*_cube(shape.size, shape.pose), *lines])
-    points = read_stl(Path(str(shape.mesh)))
-    corners, faces = np.unique(points.reshape(-1, 3), axis=0, return_inverse=True)
-    lines += [
-        *_placed(shape.pose),
-        'uniform token physics:approximation = "convexHull"',
-        f"point3f[] points = [{', '.join(_tuple(point) for point in corners)}]",
-        f"int[] faceVertexCounts = [{', '.join(['3'] * len(points))}]",
-        f"int[] faceVertexIndices = [{', '.join(str(i) for i in faces.ravel())}]",
-    ]
-    return _prim("Mesh", name, (*schemas, "PhysicsMeshCollisionAPI"), lines)
 
 
 def _joint(
@@ -310,7 +292,7 @@ _TYPES = {bool: "bool", int: "int", float: "float", str: "uniform token"}
 
 
 def _attributes(prefix: str, values: Mapping[str, Any]) -> list[str]:
-    """Attributes of a PhysX schema; those that are None keep the schema's default."""
+    """Lines of a PhysX schema's attributes, but for those that are None."""
     lines = []
     for name, value in values.items():
         if value is not None:
