@@ -8,11 +8,12 @@ their index (`/World/body_3`, `/World/link_0`), so that any name of the scene is
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pytest_simbench.sims import usd_text as usd
 
 from pytest_simbench.scene import Box, FloatArray, Joint, Pose, Scene
 from pytest_simbench.simulator import PreparedRobot
@@ -57,7 +58,9 @@ class Stage:
     ) -> None:
         self.scene = scene
         self.prepared = prepared
-        self._lines = {prefix: _attributes(prefix, values) for prefix, values in attributes.items()}
+        self._lines = {
+            prefix: usd.attributes(prefix, values) for prefix, values in attributes.items()
+        }
 
     def text(self) -> str:
         """The stage as `.usda` text."""
@@ -67,17 +70,17 @@ class Stage:
             prims += self._robot(self.prepared)
         units = "metersPerUnit = 1\n kilogramsPerUnit = 1"
         header = f'(defaultPrim = "World"\n {units}\n upAxis = "Z")'
-        return f"#usda 1.0\n{header}\n\n{_prim('Xform', 'World', (), [], prims)}\n"
+        return f"#usda 1.0\n{header}\n\n{usd.prim('Xform', 'World', (), [], prims)}\n"
 
     def _physics(self) -> str:
         magnitude = float(np.linalg.norm(self.scene.gravity))
         direction = np.asarray(self.scene.gravity) / magnitude if magnitude else (0, 0, -1)
         lines = [
-            f"vector3f physics:gravityDirection = {_tuple(direction)}",
+            f"vector3f physics:gravityDirection = {usd.numbers(direction)}",
             f"float physics:gravityMagnitude = {magnitude!r}",
             *self._lines["physxScene"],
         ]
-        return _prim("PhysicsScene", "physics", ("PhysxSceneAPI",), lines)
+        return usd.prim("PhysicsScene", "physics", ("PhysxSceneAPI",), lines)
 
     def _materials(self) -> list[str]:
         """One material a coefficient, static and dynamic friction alike, no restitution.
@@ -88,7 +91,7 @@ class Stage:
         if self.scene.robot is not None:
             frictions.add(self.scene.robot.friction)
         return [
-            _prim(
+            usd.prim(
                 "Material",
                 _material(friction),
                 ("PhysicsMaterialAPI",),
@@ -107,17 +110,19 @@ class Stage:
 
     def _ground(self) -> str:
         lines = ['uniform token axis = "Z"', *self._surface(self.scene.ground_friction)]
-        return _prim("Plane", "ground", _COLLIDER, lines)
+        return usd.prim("Plane", "ground", _COLLIDER, lines)
 
     def _box(self, index: int, box: Box) -> str:
         """A rigid body; kinematic where it is fixed, since PhysX reports nothing of static ones."""
-        shape = _prim("Cube", "shape", _COLLIDER, [*_cube(box.size), *self._surface(box.friction)])
-        lines = [*_placed(box.pose), *self._lines["physxRigidBody"]]
+        shape = usd.prim(
+            "Cube", "shape", _COLLIDER, [*usd.cube(box.size), *self._surface(box.friction)]
+        )
+        lines = [*usd.placed(box.pose), *self._lines["physxRigidBody"]]
         if box.fixed:
             lines.append("bool physics:kinematicEnabled = true")
         else:
-            lines += _mass(box.mass, np.zeros(3), np.diag(box.inertia()))
-        return _prim("Xform", f"body_{index}", _BODY, lines, [shape])
+            lines += usd.mass_lines(box.mass, np.zeros(3), np.diag(box.inertia()))
+        return usd.prim("Xform", f"body_{index}", _BODY, lines, [shape])
 
     def _robot(self, prepared: PreparedRobot) -> list[str]:
         robot, names = prepared.robot, list(prepared.links)
@@ -134,7 +139,7 @@ class Stage:
             *self._lines["physxArticulation"],
         ]
         schemas = ("PhysicsArticulationRootAPI", "PhysxArticulationAPI")
-        prims.append(_prim("PhysicsFixedJoint", ROOT.rpartition("/")[2], schemas, root))
+        prims.append(usd.prim("PhysicsFixedJoint", ROOT.rpartition("/")[2], schemas, root))
         first, second = robot.finger_indices
         for joint in prepared.joints:
             index = robot.joint_names.index(joint.name)
@@ -144,27 +149,27 @@ class Stage:
         return prims
 
     def _link(self, index: int, link: Link, pose: Pose, friction: float) -> str:
-        lines = [*_placed(pose), *self._lines["physxRigidBody"]]
+        lines = [*usd.placed(pose), *self._lines["physxRigidBody"]]
         if link.mass > 0:
-            lines += _mass(link.mass, link.centre, link.inertia)
+            lines += usd.mass_lines(link.mass, link.centre, link.inertia)
         shapes = [self._shape(i, shape, friction) for i, shape in enumerate(link.shapes)]
-        return _prim("Xform", f"link_{index}", _BODY, lines, shapes)
+        return usd.prim("Xform", f"link_{index}", _BODY, lines, shapes)
 
     def _shape(self, index: int, shape: Shape, friction: float) -> str:
         """A box, or the convex hull of a mesh, which PhysX makes (at most 64 corners)."""
         name, surface = f"shape_{index}", self._surface(friction)
         if shape.size is not None:
-            return _prim("Cube", name, _COLLIDER, [*_cube(shape.size, shape.pose), *surface])
-        triangles = read_stl(Path(str(shape.mesh)))
+            return usd.prim("Cube", name, _COLLIDER, [*usd.cube(shape.size, shape.pose), *surface])
+        triangles = usd.read_stl(Path(str(shape.mesh)))
         corners, faces = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
         lines = [
-            *_placed(shape.pose),
+            *usd.placed(shape.pose),
             'uniform token physics:approximation = "convexHull"',
-            f"point3f[] points = [{', '.join(_tuple(point) for point in corners)}]",
+            f"point3f[] points = [{', '.join(usd.numbers(point) for point in corners)}]",
             f"int[] faceVertexCounts = [{', '.join(['3'] * len(triangles))}]",
             f"int[] faceVertexIndices = [{', '.join(str(i) for i in faces.ravel())}]",
         ]
-        return _prim("Mesh", name, (*_COLLIDER, "PhysicsMeshCollisionAPI"), [*lines, *surface])
+        return usd.prim("Mesh", name, (*_COLLIDER, "PhysicsMeshCollisionAPI"), [*lines, *surface])
 
 
 def _material(friction: float) -> str:
@@ -183,15 +188,15 @@ def _joint(
     revolute = joint.kind == "revolute"
     axis, unit = ("angular", math.pi / 180) if revolute else ("linear", 1.0)
     start = drive.initial_position / unit
-    turned = Pose(quaternion=_from_x(np.asarray(joint.axis)))
+    turned = Pose(quaternion=usd.turn_from_x(np.asarray(joint.axis)))
     before = joint.origin * turned
     lower, upper = (float(limit) / unit for limit in limits)
     lines = [
         f"rel physics:body0 = <{link_path(links.index(joint.parent))}>",
         f"rel physics:body1 = <{link_path(links.index(joint.child))}>",
-        f"point3f physics:localPos0 = {_tuple(before.position)}",
-        f"quatf physics:localRot0 = {_tuple(before.quaternion)}",
-        f"quatf physics:localRot1 = {_tuple(turned.quaternion)}",
+        f"point3f physics:localPos0 = {usd.numbers(before.position)}",
+        f"quatf physics:localRot0 = {usd.numbers(before.quaternion)}",
+        f"quatf physics:localRot1 = {usd.numbers(turned.quaternion)}",
         'uniform token physics:axis = "X"',
         f"float physics:lowerLimit = {lower!r}",
         f"float physics:upperLimit = {upper!r}",
@@ -213,105 +218,4 @@ def _joint(
             f"rel physxMimicJoint:rotX:referenceJoint = <{joint_path(coupled_to)}>",
         ]
     kind = "PhysicsRevoluteJoint" if revolute else "PhysicsPrismaticJoint"
-    return _prim(kind, f"joint_{index}", schemas, lines)
-
-
-def read_stl(path: Path) -> FloatArray:
-    """Triangles of a binary STL file, (n, 3, 3) [m].
-
-    Raises:
-        ValueError: the file is no binary STL.
-    """
-    data = path.read_bytes()
-    count = int.from_bytes(data[80:84], "little")
-    if len(data) != 84 + 50 * count:
-        raise ValueError(f"{path} is no binary STL file")
-    kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")])
-    return np.asarray(np.frombuffer(data, kind, offset=84)["corners"], dtype=float)
-
-
-def _from_x(axis: FloatArray) -> tuple[float, float, float, float]:
-    """Quaternion of the shortest turn from the x axis to `axis`."""
-    x, y, z = axis / np.linalg.norm(axis)
-    if x < -1 + 1e-12:
-        return (0.0, 0.0, 0.0, 1.0)
-    quaternion = np.array([1 + x, 0.0, -z, y])
-    w, x, y, z = (float(value) for value in quaternion / np.linalg.norm(quaternion))
-    return (w, x, y, z)
-
-
-def _mass(mass: float, centre: FloatArray, inertia: FloatArray) -> list[str]:
-    moments, axes = np.linalg.eigh(inertia)
-    if np.allclose(inertia, np.diag(np.diag(inertia)), rtol=0, atol=1e-15):
-        moments, axes = np.diag(inertia), np.eye(3)
-    if np.linalg.det(axes) < 0:
-        axes[:, 0] *= -1
-    return [
-        f"float physics:mass = {float(mass)!r}",
-        f"point3f physics:centerOfMass = {_tuple(centre)}",
-        f"float3 physics:diagonalInertia = {_tuple(moments)}",
-        f"quatf physics:principalAxes = {_tuple(_quaternion(axes))}",
-    ]
-
-
-def _quaternion(rotation: FloatArray) -> FloatArray:
-    """Quaternion w, x, y, z of a rotation matrix: the eigenvector of Bar-Itzhack's matrix."""
-    r = rotation
-    k = np.array(
-        [
-            [r[0, 0] + r[1, 1] + r[2, 2], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
-            [r[2, 1] - r[1, 2], r[0, 0] - r[1, 1] - r[2, 2], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]],
-            [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2], r[1, 2] + r[2, 1]],
-            [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1]],
-        ]
-    )
-    return np.asarray(np.linalg.eigh(k)[1][:, -1])
-
-
-def _placed(pose: Pose) -> list[str]:
-    return [
-        f"double3 xformOp:translate = {_tuple(pose.position)}",
-        f"quatd xformOp:orient = {_tuple(pose.quaternion)}",
-        'uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:orient"]',
-    ]
-
-
-def _cube(size: Sequence[float], pose: Pose | None = None) -> list[str]:
-    """A cube of edge 1, scaled."""
-    placed = _placed(pose or Pose())[:2]
-    order = '["xformOp:translate", "xformOp:orient", "xformOp:scale"]'
-    return [
-        "double size = 1",
-        *placed,
-        f"float3 xformOp:scale = {_tuple(size)}",
-        f"uniform token[] xformOpOrder = {order}",
-    ]
-
-
-_TYPES = {bool: "bool", int: "int", float: "float", str: "uniform token"}
-
-
-def _attributes(prefix: str, values: Mapping[str, Any]) -> list[str]:
-    """Lines of a PhysX schema's attributes, but for those that are None."""
-    lines = []
-    for name, value in values.items():
-        if value is not None:
-            text = {bool: str(value).lower(), str: f'"{value}"'}.get(type(value), repr(value))
-            lines.append(f"{_TYPES[type(value)]} {prefix}:{name} = {text}")
-    return lines
-
-
-def _tuple(values: Iterable[float]) -> str:
-    return "(" + ", ".join(repr(float(value)) for value in values) + ")"
-
-
-def _prim(
-    kind: str,
-    name: str,
-    schemas: Sequence[str],
-    lines: Sequence[str],
-    children: Sequence[str] = (),
-) -> str:
-    listed = ", ".join(f'"{schema}"' for schema in schemas)
-    head = f'def {kind} "{name}"' + (f" (prepend apiSchemas = [{listed}])" if schemas else "")
-    return "\n".join([head, "{", *lines, *children, "}"])
+    return usd.prim(kind, f"joint_{index}", schemas, lines)
