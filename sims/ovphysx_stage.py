@@ -173,7 +173,7 @@ class Stage:
 
 
 def _material(friction: float) -> str:
-    return "friction_" + repr(float(friction)).translate(str.maketrans(".+-", "_pm"))
+    return "friction_" + repr(float(friction)).translate(str.maketrans(".-+", "pmp"))
 
 
 def _joint(
