@@ -23,7 +23,7 @@ import numpy as np
 import psutil
 
 from pytest_simbench.client import bootstrap
-from pytest_simbench.client.environments import Environment, interpreter
+from pytest_simbench.client.environments import Environment, interpreter, missing
 from pytest_simbench.client.errors import Where
 from pytest_simbench.client.process import Launch, WorkerProcess
 from pytest_simbench.client.world import World

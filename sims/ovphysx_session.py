@@ -1,0 +1,127 @@
+"""PhysX with one USD stage: its start and end, and what its sessions and rays can tell.
+
+Sessions take 0.4 ms in Python, so they are not for stepping. Unlike tensor bindings they never run
+a step of their own, so they are what may be used before the first one. They count in degrees.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.simulator import lazy_import
+
+ovphysx = lazy_import("ovphysx")
+ovphysx_types = lazy_import("ovphysx.types")
+ovstage = lazy_import("ovstage")
+schema_support = lazy_import("ovphysx.samples.python_samples.schema_support")
+warp = lazy_import("warp")
+
+REACH = 5.0
+"""How far outside a body the rays begin that measure it [m]."""
+
+_registered = False
+
+
+class Session:
+    """PhysX, on the processor, simulating one stage.
+
+    Args:
+        text: the stage, `.usda`.
+        threads: workers of PhysX; 0 computes in the calling thread.
+
+    Attributes:
+        physx: the engine.
+    """
+
+    def __init__(self, text: str, threads: int) -> None:
+        warp.config.quiet = True
+        ovphysx.PhysX.set_cpu_mode(True)
+        ovphysx.set_global_config(ovphysx_types.GlobalConfigKey.NUM_THREADS, threads)
+        self.physx = ovphysx.PhysX()
+        self._stage = None
+        try:
+            _register_schemas()
+            self._stage = stage = ovstage.Stage("simbench")
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / "scene.usda"
+                path.write_text(text, encoding="utf-8")
+                domains = ovstage.PopulationDomain.PHYSICS
+                ovstage.population.open_usd(stage, str(path), ordinal=1, domains=domains)
+            stage.advance_write_floor(ordinal=1).wait()
+            self.physx.wait_task(self.physx.attach_ovstage(stage, read_ordinal=1))
+        except Exception:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """End PhysX; bindings must have been destroyed."""
+        if self._stage is not None:
+            if self.physx.is_stage_attached(self._stage):
+                self.physx.wait_task(self.physx.detach_ovstage())
+            self._stage.destroy()
+        self.physx.destroy()
+
+    def read(self, kind: str, *attributes: str) -> dict[str, dict[str, FloatArray]]:
+        """Attributes of all objects of a kind (`SimObjectType`), by attribute and prim path."""
+        found: dict[str, dict[str, FloatArray]] = {name: {} for name in attributes}
+        target = getattr(ovphysx_types.SimObjectType, kind)
+        scope = ovphysx_types.ObjectScope.ALL
+        with self.physx.read_sync(target, list(attributes), scope=scope) as result:
+            for group in result.groups:
+                paths = result.dictionary.get_path_strings(group.prim_list)
+                columns = [np.array(tensor.numpy(), dtype=float) for tensor in group.tensors]
+                rows = columns if group.is_array else columns[0]
+                name = result.dictionary.token_to_string(group.attribute)
+                found[name].update(zip(paths, rows, strict=True))
+        return found
+
+    def write_joints(self, attribute: str, values: Mapping[str, float]) -> None:
+        """Set an attribute of all joints, by prim path."""
+        dictionary = ovstage.PathDictionary(self._stage)
+        kind = ovphysx_types.SimObjectType.ARTICULATION_JOINT
+        with self.physx.write_sync(kind, attribute) as session:
+            for group in session.groups:
+                paths = dictionary.get_path_strings(group.prim_list)
+                for path, tensor in zip(paths, group.tensors, strict=True):
+                    tensor.numpy()[:] = values[path]
+                session.commit_sync(group)
+
+    def size(self, collider: str, pose: Pose) -> FloatArray:
+        """Extents of a collider along the axes of its body at `pose`, by rays from outside [m].
+
+        PhysX's sessions report no geometry. Where a ray misses it is nan.
+        """
+        centre, size = np.asarray(pose.position), np.full(3, np.nan)
+        for k, axis in enumerate(pose.rotation().T):
+            ends = [self._hits(collider, centre + s * REACH * axis, -s * axis) for s in (1, -1)]
+            if all(ends):
+                size[k] = (ends[0][0] - ends[1][0]) @ axis
+        return size
+
+    def height(self, collider: str) -> float:
+        """Height of a plane above the origin, by a ray from above [m]."""
+        hits = self._hits(collider, np.array([0.0, 0.0, REACH]), np.array([0.0, 0.0, -1.0]))
+        return float(hits[0][2]) if hits else math.nan
+
+    def _hits(self, collider: str, start: FloatArray, direction: FloatArray) -> list[FloatArray]:
+        """Where a ray of twice `REACH` enters the collider."""
+        mode = ovphysx_types.SceneQueryMode.ALL
+        hits = self.physx.raycast(start.tolist(), direction.tolist(), 2 * REACH, mode)
+        paths = self.physx.get_scene_query_paths_from_ids([hit["collision"] for hit in hits])
+        found = zip(hits, paths, strict=True)
+        return [np.array(hit["position"]) for hit, path in found if path == collider]
+
+
+def _register_schemas() -> None:
+    """Tell the USD library of PhysX's schemas, once in a process."""
+    global _registered
+    if not _registered:
+        paths = [str(path) for path in schema_support.physx_schema_paths()]
+        ovstage.population.register_usd_schemas(paths)
+        _registered = True
