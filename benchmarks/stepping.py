@@ -1,6 +1,6 @@
 """Stepping in the worker against a bare loop over the same engine, scene, steps and commands.
 
-    python benchmarks/stepping.py mujoco pybullet
+    python benchmarks/stepping.py mujoco pybullet dart
 
 Each pair of runs is made in two fresh processes, in turn. `clock` is the worker's own clock of
 stepping, `all` the whole request: message, log check, bookkeeping. All in CPU seconds,
@@ -84,7 +84,7 @@ def main(names: list[str]) -> None:
     if names[:1] == ["--bare"]:
         print(json.dumps(bare(names[1])))
         return
-    for name in names or ["mujoco", "pybullet"]:
+    for name in names or ["mujoco", "pybullet", "dart"]:
         clock, whole = [], []
         for _ in range(PAIRS):
             output = subprocess.check_output([sys.executable, __file__, "--bare", name], text=True)

@@ -13,6 +13,7 @@ pytest_plugins = ["pytester"]
 ADAPTERS = {
     "mujoco": "pytest_simbench.sims.mujoco:MuJoCo",
     "pybullet": "pytest_simbench.sims.pybullet:PyBullet",
+    "dart": "pytest_simbench.sims.dart:DART",
 }
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pytest_simbench.sims.dart import DART
 from pytest_simbench.sims.mujoco import MuJoCo
 from pytest_simbench.sims.pybullet import PyBullet
 
@@ -23,7 +24,7 @@ def compared(simulator: Simulator) -> list[str]:
     return check(expected, simulator.read_back(), info.deviations, info.name)
 
 
-@pytest.fixture(params=[MuJoCo, PyBullet], ids=lambda cls: cls.info.name)
+@pytest.fixture(params=[MuJoCo, PyBullet, DART], ids=lambda cls: cls.info.name)
 def loaded(request: pytest.FixtureRequest) -> Iterator[Simulator]:
     simulator: Simulator = request.param(request.param.profiles["tuned"])
     simulator.load(SCENE)
@@ -33,7 +34,7 @@ def loaded(request: pytest.FixtureRequest) -> Iterator[Simulator]:
 
 @pytest.mark.parametrize("profile", ["default", "tuned"])
 @pytest.mark.parametrize("task", [Stacking(), Throwing()], ids=lambda task: task.name)
-@pytest.mark.parametrize("cls", [MuJoCo, PyBullet], ids=lambda cls: cls.info.name)
+@pytest.mark.parametrize("cls", [MuJoCo, PyBullet, DART], ids=lambda cls: cls.info.name)
 def test_an_honest_world_passes(cls: type[Simulator], task: Any, profile: str) -> None:
     simulator = cls(cls.profiles[profile])
     scene = task.scene(7, Jitter())
