@@ -84,6 +84,7 @@ def test_picture(start: Callable[[Scene], World]) -> None:
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 20
 
 
+@pytest.mark.parametrize("start", able_to(Capability.CONTACT_COUNT), indirect=True)
 def test_contacts(start: Callable[[Scene], World]) -> None:
     world = start(SCENE)
     world.wait(0.1)

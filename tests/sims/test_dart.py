@@ -1,0 +1,167 @@
+"""What only DART's adapter has to show: its motors keep the effort limits and squeeze alike on both
+sides though one finger only follows, and parity faults are caught."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest_simbench.sims.dart import DART
+
+from pytest_simbench.scene import Scene
+from pytest_simbench.simulator import ParityError
+from pytest_simbench.simulator.parity import check, expected_quantities
+from pytest_simbench.simulator.settings import changed
+from pytest_simbench.tasks import Jitter, Stacking
+from pytest_simbench.testing import scenes
+
+pytest.importorskip("dartpy")
+
+SCENE = Stacking().scene(1, Jitter())
+
+
+def world(scene: Scene, profile: str = "tuned", **changes: Any) -> DART:
+    simulator = DART(changed(DART.profiles[profile], changes, "dart"))
+    simulator.load(scene)
+    return simulator
+
+
+@pytest.fixture
+def loaded() -> Iterator[DART]:
+    simulator = world(SCENE)
+    yield simulator
+    simulator.close()
+
+
+def test_motors_keep_the_effort_limits() -> None:
+    """Torn to and fro, too shortly to reach a joint limit, no drive exceeds its own limit and every
+    arm drive reaches it."""
+    robot = scenes.arm()
+    simulator = world(scenes.arm_alone(robot))
+    limits = robot.column("effort_limit")
+    limits[robot.finger_indices[1]] *= 2  # the follower's: it carries both drives' force
+    largest, rest = np.zeros_like(limits), np.zeros_like(limits)
+    for k in range(120):
+        target = robot.column("initial_position")
+        target[:7] += 1.0 if k // 20 % 2 else -1.0
+        simulator.command(target, rest, rest)
+        simulator.step()
+        efforts = simulator._robot.getConstraintForces()[simulator._index]
+        largest = np.maximum(largest, np.abs(efforts))
+    assert (largest <= limits * (1 + 1e-9)).all()
+    np.testing.assert_allclose(largest[:7], limits[:7], rtol=1e-6)
+
+
+def squeeze(simulator: DART) -> tuple[float, float]:
+    """Force of each finger on the held cube along the fingers' axis y [N]."""
+    result = simulator.world.getLastCollisionResult()
+    forces = {"panda_leftfinger": 0.0, "panda_rightfinger": 0.0}
+    for k in range(result.getNumContacts()):
+        contact = result.getContact(k)
+        pair = (contact.collisionObject1, contact.collisionObject2)
+        for name in (item.getShapeFrame().getName() for item in pair):
+            for finger in forces:
+                if name.startswith(finger):
+                    forces[finger] += abs(float(contact.force[1]))
+    return forces["panda_leftfinger"], forces["panda_rightfinger"]
+
+
+def test_both_fingers_press_with_the_squeeze() -> None:
+    scene = scenes.grip()
+    assert scene.robot is not None
+    simulator = world(scene)
+    goal = scene.robot.column("initial_position")
+    goal[scene.robot.finger_indices] = scene.robot.gripper.closed
+    simulator.command(goal, 0 * goal, 0 * goal)
+    for _ in range(round(0.6 / simulator.settings.timestep)):
+        simulator.step()
+    assert squeeze(simulator) == pytest.approx((25.0, 25.0), rel=0.02)
+
+
+@pytest.mark.parametrize("solver", ["dantzig", "pgs", "nsgs"])
+def test_the_chosen_solver_is_the_engines(solver: str) -> None:
+    """Also that `pgs`, which dartpy cannot construct, is really put first."""
+    engine = world(scenes.tower(), solver=solver).world.getConstraintSolver()
+    assert solver in type(engine.getBoxedLcpSolver()).__name__.lower()
+
+
+def test_sleeping_is_switched(loaded: DART) -> None:
+    assert not loaded.world.getDeactivationOptions().mEnabled
+    assert world(scenes.tower(), "default").world.getDeactivationOptions().mEnabled
+
+
+def surface(shape: Any, friction: float) -> None:
+    shape.getDynamicsAspect().setFrictionCoeff(friction)
+
+
+def heavier(body: Any, factor: float) -> None:
+    inertia = body.getInertia()
+    inertia.setMass(factor * inertia.getMass())
+    body.setInertia(inertia)
+
+
+def turned(body: Any, factor: float) -> None:
+    inertia = body.getInertia()
+    inertia.setMoment(factor * inertia.getMoment())
+    body.setInertia(inertia)
+
+
+def shape_of(s: DART, name: str) -> Any:
+    return s._bodies[name].getShapeNode(0)
+
+
+def joint(s: DART, name: str = "panda_joint4") -> Any:
+    return s._robot.getJoint(name)
+
+
+def link(s: DART, name: str = "panda_link4") -> Any:
+    return s._robot.getBodyNode(name)
+
+
+def uncoupled(s: DART) -> None:
+    import dartpy
+
+    joint(s, "panda_finger_joint2").setActuatorType(dartpy.dynamics.ActuatorType.FORCE)
+
+
+def one_finger_shape(s: DART) -> None:
+    shapes = [x for x in link(s, "panda_leftfinger").getShapeNodes() if x.hasDynamicsAspect()]
+    surface(shapes[-1], 0.3)
+
+
+def moved(s: DART) -> None:
+    q = s._bodies["cube_05"].getSkeleton().getPositions()
+    q[5] += 0.01
+    s._bodies["cube_05"].getSkeleton().setPositions(q)
+
+
+FAULTS: dict[str, Callable[[DART], None]] = {
+    "gravity": lambda s: s.world.setGravity([0.0, 0.0, -9.7]),
+    "timestep": lambda s: s.world.setTimeStep(0.005),
+    "ground/friction": lambda s: surface(s._ground.getShapeNode(0), 0.5),
+    "ground/height": lambda s: s._ground.getShapeNode(0).setRelativeTranslation([0.0, 0.0, 0.01]),
+    "body/cube_05/mass": lambda s: heavier(s._bodies["cube_05"], 10.0),
+    "body/cube_05/inertia": lambda s: turned(s._bodies["cube_05"], 1.2),
+    "body/cube_05/friction": lambda s: surface(shape_of(s, "cube_05"), 0.5),
+    "body/cube_05/pose": moved,
+    "body/table/size": lambda s: shape_of(s, "table").getShape().setSize([0.5, 0.5, 0.2]),
+    "joint/panda_joint4/limits": lambda s: joint(s).setPositionUpperLimit(0, 0.5),
+    "joint/panda_joint4/effort_limit": lambda s: joint(s).setForceUpperLimit(0, 174.0),
+    "joint/panda_joint4/initial_position": lambda s: joint(s).setPosition(0, -2.0),
+    "link/panda_link4/mass": lambda s: heavier(link(s), 1.5),
+    "link/panda_link4/inertia": lambda s: turned(link(s), 1.2),
+    "link/panda_leftfinger/friction": one_finger_shape,
+    "gripper/coupled": uncoupled,
+}
+
+
+@pytest.mark.parametrize("quantity", FAULTS)
+def test_fault_is_caught(loaded: DART, quantity: str) -> None:
+    expected = expected_quantities(SCENE, loaded.settings)
+    info = loaded.info
+    check(expected, loaded.read_back(), info.deviations, info.name)
+    FAULTS[quantity](loaded)
+    with pytest.raises(ParityError, match=rf"{quantity}: scene [^;]*, dart "):
+        check(expected, loaded.read_back(), info.deviations, info.name)
