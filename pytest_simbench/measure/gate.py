@@ -33,14 +33,10 @@ from pytest_simbench.measure.limits import FAILURES, Limit
 from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.measure.record import Record
 from pytest_simbench.measure.results import ResultSet
+from pytest_simbench.measure.speed import without_speed
 
 COMMON_SEEDS = 0.9
 """Pair by seed when at least this share of the smaller side's seeds is on both sides."""
-
-SPEED_POWER = {"rtf": 1, "cpu_cost": -1, "start": -1, "end": -1, "total": -1}
-"""Costs that depend on the machine's speed: the power of the control workload's seconds that takes
-it out. A machine half as fast has half the rtf, and the control takes twice as long. The seconds
-are `control_wall` and `control_cpu` of a record's `stepping`; without them nothing is done."""
 
 
 @dataclass(frozen=True)
@@ -213,14 +209,10 @@ def _change(
     elif limit.metric in old.known and limit.metric in new.known:
         metric = new.metric(limit.metric)
         first, second = old.by_seed(metric.name), new.by_seed(metric.name)
-        power = SPEED_POWER.get(metric.name, 0) if metric.name not in new.metrics else 0
-        clock = "control_cpu" if metric.name == "cpu_cost" else "control_wall"
-        speeds = _control(old, clock), _control(new, clock)
-        if power and first.keys() <= speeds[0].keys() and second.keys() <= speeds[1].keys():
-            normalised = bool(first and second)
-            usual = math.fsum(speeds[0].values()) / max(1, len(speeds[0]))
-            first = {s: v * (speeds[0][s] / usual) ** power for s, v in first.items()}
-            second = {s: v * (speeds[1][s] / usual) ** power for s, v in second.items()}
+        evened = without_speed(metric.name, old, new)
+        if evened is not None:
+            normalised = True
+            first, second = evened
     else:
         return None
     if metric.better is None or not first or not second:
@@ -238,13 +230,6 @@ def _change(
 def _failed(result: ResultSet) -> dict[int, float]:
     """1 for each repetition that failed, 0 for each that did not, by seed."""
     return {r.seed: float(not r.ok) for r in (*result.ok, *result.failures)}
-
-
-def _control(result: ResultSet, clock: str) -> dict[int, float]:
-    """Seconds of the control workload run beside each repetition, by seed, where recorded."""
-    return {
-        r.seed: seconds for r in result.ok if (seconds := r.stepping.get(clock)) and seconds > 0
-    }
 
 
 def _smallest_p(comparison: Comparison) -> float:

@@ -162,8 +162,10 @@ class Server:
         return self._constructed().render(width, height)
 
     def do_stats(self) -> dict[str, Any]:
-        """Clocks of the stepping loop and the exact memory peak."""
-        clocks = {} if self.stepper is None else asdict(self.stepper.clocks)
+        """Clocks of the stepping loop and of the control workload, and the exact memory peak."""
+        clocks: dict[str, Any] = {}
+        if self.stepper is not None:
+            clocks = {**asdict(self.stepper.clocks), **self.stepper.control.to_wire()}
         return {"stepping": clocks, "peak_rss_mb": peak_rss_mb()}
 
     def do_close(self) -> None:

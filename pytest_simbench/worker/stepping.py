@@ -11,6 +11,7 @@ import numpy as np
 
 from pytest_simbench.scene import FloatArray, Trajectory
 from pytest_simbench.simulator import DivergedError, Simulator
+from pytest_simbench.worker.control import Clock, Control
 
 HEARTBEAT_PERIOD = 0.5
 """Wall time between two signs of life while stepping [s]."""
@@ -32,13 +33,15 @@ class Clocks:
     Attributes:
         steps: number of time steps.
         simulated: [s].
-        wall: seconds in the stepping loop, without log, window and pacing [s].
+        wall: seconds in the stepping loop, without log, window, pacing and control [s].
+        waited: how much of that the thread waited for a processor that others had [s].
         cpu: CPU seconds of the whole process in that time [s].
     """
 
     steps: int = 0
     simulated: float = 0.0
     wall: float = 0.0
+    waited: float = 0.0
     cpu: float = 0.0
 
 
@@ -69,6 +72,7 @@ class Stepper:
 
     Attributes:
         clocks: totals since loading.
+        control: the workload that shows the machine's speed meanwhile.
         real_time: wait for the wall clock after each step, as the study's simulators did.
     """
 
@@ -76,6 +80,8 @@ class Stepper:
         self.simulator = simulator
         self.heartbeat = heartbeat
         self.clocks = Clocks()
+        self._clock = Clock()
+        self.control = Control(self._clock)
         self.real_time = False
 
     def follow(self, trajectory: Trajectory, log_period: float | None) -> dict[str, Any]:
@@ -106,18 +112,22 @@ class Stepper:
         watched = simulator.gui or self.real_time
         look_every = max(1, round((LOOK_PERIOD if watched else CHECK_PERIOD) / timestep))
         log = Log()
-        step, command, now = simulator.step, simulator.command, time.perf_counter
-        began, cpu_began = now(), time.process_time()
-        beat = window = began
-        idle_wall = idle_cpu = 0.0
+        step, command, clock = simulator.step, simulator.command, self._clock
+        totals, keep_up = self.clocks, self.control.keep_up
+        cpu_began = time.process_time()
+        began, waited = clock()
+        beat = window = resumed = began
         for k in range(1, steps + 1):
             if rows is not None:
                 command(*rows[k - 1])
             step()
             logs = log_every and k % log_every == 0
-            if not logs and k % look_every and k % check_every:
+            if not logs and k % look_every and k % check_every and k < steps:
                 continue
-            stopped, cpu_stopped = now(), time.process_time()
+            stopped, waited_now = clock()
+            totals.wall += stopped - resumed
+            totals.waited += waited_now - waited
+            totals.cpu += time.process_time() - cpu_began
             if logs:
                 log.sample(simulator)
             if k % check_every == 0:
@@ -129,15 +139,15 @@ class Stepper:
                 window = stopped
                 simulator.refresh_window()
             if self.real_time:
-                ahead = k * timestep - (now() - began)
+                ahead = k * timestep - (time.perf_counter() - began)
                 if ahead > 0:
                     time.sleep(ahead)
-            idle_wall += now() - stopped
-            idle_cpu += time.process_time() - cpu_stopped
-        self.clocks.wall += now() - began - idle_wall
-        self.clocks.cpu += time.process_time() - cpu_began - idle_cpu
-        self.clocks.steps += steps
-        self.clocks.simulated += steps * timestep
+            # The CPU time of an engine with threads, the wall time of a busy machine: the less.
+            keep_up(min(totals.wall, totals.cpu))
+            cpu_began = time.process_time()
+            resumed, waited = clock()
+        totals.steps += steps
+        totals.simulated += steps * timestep
         self._check_finite()
         return log.arrays() if log_every else {}
 

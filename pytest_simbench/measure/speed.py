@@ -1,0 +1,65 @@
+"""The machine's speed taken out of times, so that a slow or busy machine fails no build.
+
+Beside each repetition the worker ran a control workload, always the same (`worker.control`). A time
+is divided by the control's, a real-time factor multiplied, both relative to the baseline's usual
+one: a machine half as fast has half the real-time factor, and the control takes twice as long.
+"""
+
+from __future__ import annotations
+
+import math
+
+from pytest_simbench.measure.record import Record
+from pytest_simbench.measure.results import ResultSet
+
+Values = dict[int, float]
+"""A value for each seed."""
+
+POWER = {"rtf": 1, "cpu_cost": -1, "start": -1, "end": -1, "total": -1}
+"""Costs that depend on the machine's speed: the power of the control's time that evens them out."""
+
+
+def without_speed(name: str, before: ResultSet, after: ResultSet) -> tuple[Values, Values] | None:
+    """A cost's values in two runs as on a machine of the same speed.
+
+    `rtf` is freed of the time in which the stepping thread waited for a processor, too, and divided
+    by the control's time without such waiting: both are known exactly. The costs that hold more
+    than stepping (`start`, `end`, `total`) are compared with the control as it was interrupted,
+    which evens out over many repetitions only.
+
+    Returns:
+        None where the cost does not depend on speed, or a repetition has no control.
+    """
+    power = POWER.get(name)
+    if power is None or name in after.metrics:
+        return None
+    sides = [{r.seed: r for r in side.ok} for side in (before, after)]
+    speeds = [{seed: control(r, name) for seed, r in side.items()} for side in sides]
+    known = [{seed: s for seed, s in side.items() if s} for side in speeds]
+    if not all(speeds) or any(len(k) < len(s) for k, s in zip(known, speeds, strict=True)):
+        return None
+    usual = math.fsum(known[0].values()) / len(known[0])
+    found: list[Values] = []
+    for side, speed in zip(sides, known, strict=True):
+        values = {seed: _value(record, name) for seed, record in side.items()}
+        found.append(
+            {s: v * (speed[s] / usual) ** power for s, v in values.items() if v is not None}
+        )
+    return found[0], found[1]
+
+
+def control(record: Record, name: str) -> float:
+    """Seconds of the control workload that a cost is to be compared with; 0 where not recorded."""
+    stepping = record.stepping
+    if name == "cpu_cost":
+        return stepping.get("control_cpu") or 0.0
+    wall = stepping.get("control_wall") or 0.0
+    return max(0.0, wall - (stepping.get("control_waited") or 0.0)) if name == "rtf" else wall
+
+
+def _value(record: Record, name: str) -> float | None:
+    value, wall = record.cost(name), record.stepping.get("wall")
+    if name != "rtf" or value is None or not wall:
+        return value
+    alone = wall - (record.stepping.get("waited") or 0.0)
+    return value * wall / alone if alone > 0 else value

@@ -1,0 +1,75 @@
+"""The clocks of a busy machine, and the workload that runs beside the stepping."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from pytest_simbench.worker.control import MOST_AT_ONCE, SHARE, Clock, Control
+
+
+@contextmanager
+def busy_machine() -> Iterator[None]:
+    """Two processes a core that never rest."""
+    command = [sys.executable, "-c", "while True: pass"]
+    hogs = [subprocess.Popen(command) for _ in range(2 * (os.cpu_count() or 1))]
+    try:
+        yield
+    finally:
+        for hog in hogs:
+            hog.kill()
+            hog.wait()
+
+
+def test_what_was_waited_is_the_wall_time_without_the_cpu_time() -> None:
+    clock = Clock()
+    with busy_machine():
+        cpu = time.thread_time()
+        began, before = clock()
+        while time.thread_time() - cpu < 0.4:
+            pass
+        ended, after = clock()
+        cpu = time.thread_time() - cpu
+    wall, waited = ended - began, after - before
+    assert waited > 0.1
+    assert wall - waited == pytest.approx(cpu, rel=0.1)
+
+
+def test_where_the_kernel_does_not_tell_nothing_was_waited(tmp_path: Path) -> None:
+    clock = Clock(str(tmp_path / "none"))
+    before, waited = clock()
+    assert waited == 0.0
+    assert clock()[0] > before
+
+
+def test_the_control_takes_its_share_and_no_more() -> None:
+    control = Control(Clock())
+    assert control.to_wire() == {}
+    control.keep_up(0.0)
+    assert control.runs == 1  # also the shortest repetition has one
+    control.keep_up(0.0)
+    assert control.runs == 1
+    control.keep_up(0.05)
+    least = 1e-5  # of a machine ten times as fast as those of today
+    assert 1 < control.runs <= SHARE * 0.05 / least + 1
+    runs = control.runs
+    control.keep_up(1e6)  # steps that take forever do not keep the engine waiting
+    assert control.runs == runs + MOST_AT_ONCE
+
+
+def test_the_record_gets_means_of_single_runs() -> None:
+    control = Control(Clock())
+    for stepping in (0.01, 0.02, 0.03, 1.0):
+        control.keep_up(stepping)
+    found = control.to_wire()
+    assert found["control_runs"] == control.runs
+    assert found["control_runs"] * found["control_wall"] == pytest.approx(control.wall)
+    assert 0 <= found["control_waited"] < found["control_wall"]
+    assert 1e-6 < found["control_cpu"] < 0.01
