@@ -76,6 +76,7 @@ class DART(Simulator):
         install="pip install 'pytest-simbench[dart]'",
         licence="BSD-2-Clause",
         engine="DART",
+        language="C++",
         tested_version="6.20.0",
         capabilities=frozenset(
             {

@@ -91,6 +91,7 @@ class Drake(Simulator):
         install="pip install 'pytest-simbench[drake]'",
         licence="BSD-3-Clause",
         engine="Drake SAP",
+        language="C++",
         tested_version="1.51.1",
         capabilities=frozenset(
             {
