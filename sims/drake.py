@@ -7,10 +7,10 @@ no actuators with gains.
 
 What was learnt (1.51, tuned settings but for the one named, seed 100):
 - point contact gives one point for a pair of shapes, at the deepest place. A plain box rests on
-  one point that jumps from corner to corner: the cubes of the grid never come to rest
-  (0.12 m/s or rad/s with the engine's defaults), and a held one turns in the hand. `tuned` gives each free box eight
-  spheres in its corners, and each finger four behind its gripping face, that reach the true faces,
-  while the box itself is 0.1 mm smaller a face: four points a face
+  one point that jumps from corner to corner: with the engine's defaults the cubes of the grid
+  never come to rest (up to 0.12 m/s or rad/s), and a held one turns in the hand. `tuned` gives
+  each free box eight spheres in its corners, and each finger four behind its gripping face, that
+  reach the true faces, while the box itself is 0.1 mm smaller a face: four points a face
 - spheres may not touch spheres: stacked cubes then stand sphere on sphere and creep (0.3 mm
   between release and the end of the task, 5 micrometres without)
 - SAP's `relaxation_time` decides how far a grip sinks in: contacts get at most the
