@@ -44,13 +44,13 @@ def sim_case(request: pytest.FixtureRequest) -> tuple[str, str]:
     return name, mode
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def sim_name(sim_case: tuple[str, str]) -> str:
     """Name of the simulator under test."""
     return sim_case[0]
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def sim_mode(sim_case: tuple[str, str]) -> str:
     """`headless` or `gui`."""
     return sim_case[1]

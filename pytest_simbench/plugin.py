@@ -38,6 +38,9 @@ def pytest_configure(config: pytest.Config) -> None:
     from pytest_simbench import fixtures
 
     config.pluginmanager.register(fixtures, "simbench-fixtures")
+    from pytest_simbench.repeatability import fixtures as repeatability
+
+    config.pluginmanager.register(repeatability, "simbench-repeatability")
     if any(config.getoption(option.name) is not None for option in options.OPTIONS):
         selection(config)  # complain of bad input before anything is collected
 

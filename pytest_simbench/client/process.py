@@ -77,12 +77,15 @@ class WorkerProcess:
         pid: of the worker's process; of its host when that is another one.
         where: kept up to date by the owner; every error carries it.
         deadline: `time.monotonic()` at which the repetition times out, None for never.
+        busy: a request was sent and its answer not received; after an exception from elsewhere
+            (Ctrl-C, a time-out of the test) the next answer would be the wrong one.
     """
 
     def __init__(self, launch: Launch, where: Where) -> None:
         self.launch = launch
         self.where = where
         self.deadline: float | None = None
+        self.busy = False
         self.pid: int | None = None
         self._process: psutil.Process | None = None
         self._killed: tuple[type[WorkerError], str] | None = None
@@ -185,6 +188,7 @@ class WorkerProcess:
             WorkerError: one of its kinds; the worker is dead then, unless it is `EngineFailed`.
         """
         started = time.monotonic()
+        self.busy = True
         try:
             self._channel.send({"op": operation, **pack(arguments)})
         except OSError:
@@ -198,6 +202,7 @@ class WorkerProcess:
                 )
             if "alive" in answer:
                 continue
+            self.busy = False
             if "error" in answer:
                 raise self._remote_error(answer["error"])
             return unpack(answer["ok"])

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from itertools import count
+from pathlib import Path
+from typing import Any
 
 from pytest_simbench.client.errors import Where, WorkerError
 from pytest_simbench.client.process import WorkerProcess
+from pytest_simbench.client.tape import TapedWorld
 from pytest_simbench.client.world import World
 from pytest_simbench.scene import Scene
 from pytest_simbench.session.case import Case
+
+_numbers = count(1)
+"""Of the workers that handles of this process started: their logs have names of their own."""
 
 
 class SimulatorHandle:
@@ -18,40 +27,65 @@ class SimulatorHandle:
     the simulator and the scene anew; a worker that died is replaced.
 
     Safe in a Hypothesis test: a crash inside an example is an ordinary exception of that
-    example, and the next one gets a fresh worker.
+    example, and the next one gets a fresh worker. What was done to the world of a failing
+    example is written to a file, and a note on the exception says how to replay it.
+
+    Attributes:
+        case: simulator, settings and limits.
+        constructed: settings and versions that the worker reported last.
     """
 
     def __init__(self, case: Case) -> None:
         self.case = case
+        self.constructed: dict[str, Any] = {}
         self._process: WorkerProcess | None = None
-        self._started = 0
+        self._open = False
 
     @contextmanager
-    def episode(self, scene: Scene, *, parity: bool = True) -> Iterator[World]:
-        """A freshly loaded world.
+    def episode(self, scene: Scene, *, parity: bool = True, **options: Any) -> Iterator[TapedWorld]:
+        """A freshly loaded world, for as long as the `with` block lasts.
+
+        Args:
+            scene: to be loaded.
+            parity: whether to check that the engine built this scene.
+            options: of `TapedWorld`: a tape to be played, a period of samples.
 
         Raises:
             WorkerError: of whatever kind happens to the worker.
+            RuntimeError: another episode is still open; they share one worker.
         """
+        if self._open:
+            raise RuntimeError(
+                f"an episode of {self.case.simulator} is still open, and there is one worker: "
+                "leave its `with` block first"
+            )
+        self._open = True
+        tape: list[Any] = []
         try:
-            yield self._start(scene, parity)
-        except WorkerError:
-            self.close()
+            world = self._start(scene, parity, options)
+            tape = world.tape
+            yield world
+        except BaseException as error:
+            if isinstance(error, WorkerError) or (self._process and self._process.busy):
+                self.close()  # dead, or with an answer under way that nobody waits for
+            if isinstance(error, Exception) and not _of_hypothesis(error):
+                self._keep_example(error, scene, tape)
             raise
+        finally:
+            self._open = False
 
     @contextmanager
     def episodes(self) -> Iterator[Callable[[Scene], World]]:
         """A function that starts worlds, one at a time."""
-        yield lambda scene: self._start(scene, True)
+        yield lambda scene: self._start(scene, True, {})
 
-    def _start(self, scene: Scene, parity: bool) -> World:
+    def _start(self, scene: Scene, parity: bool, options: dict[str, Any]) -> TapedWorld:
         case = self.case
         if self._process is None or not self._process.alive:
-            self._started += 1
             # The process id keeps the workers of pytest-xdist apart, which share a run folder.
-            name = f"{case.short_name}-{case.simulator}-{os.getpid()}-{self._started}"
+            name = f"{case.short_name}-{case.simulator}-{os.getpid()}-{next(_numbers)}"
             self._process = WorkerProcess(case.launch(name), Where(case.simulator, case.mode))
-        self._process.request(
+        self.constructed = self._process.request(
             "construct",
             timeout=case.stall_timeout,
             adapter=case.adapter,
@@ -60,11 +94,48 @@ class SimulatorHandle:
             gui=case.mode == "gui",
             real_time=False,
         )
-        return World(self._process, scene, parity=parity)
+        return TapedWorld(self._process, scene, parity=parity, **options)
+
+    def _keep_example(self, error: Exception, scene: Scene, tape: list[Any]) -> None:
+        """Write the failing episode to the run folder; under Hypothesis the last one, which is
+        the smallest, overwrites those before."""
+        case = self.case
+        test = os.environ.get("PYTEST_CURRENT_TEST", case.short_name).rpartition(" ")[0]
+        name = re.sub(r"[^A-Za-z0-9_.=-]+", "_", test.rpartition("::")[2] or "episode").strip("_")
+        path = case.folder / "examples" / f"{name}-{case.simulator}-{case.mode}.json"
+        example = {
+            "simulator": case.simulator,
+            "adapter": case.adapter,
+            "mode": case.mode,
+            "profile": case.profile,
+            "changes": dict(case.changes),
+            "python": case.python,
+            "spec": case.spec,
+            "scene": scene.to_wire(),
+            "tape": [operation.to_wire() for operation in tape],
+        }
+        with suppress(OSError):  # a full disk must not hide the failure itself
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(json.dumps(example) + "\n", encoding="utf-8")
+            error.add_note(f"replay this episode: {replay_command(path)}")
 
     def close(self) -> None:
         """End the worker, if there is one."""
         if self._process is not None:
+            if self._process.busy:
+                self._process.kill()
             with suppress(WorkerError):
                 self._process.close(timeout=5.0)
             self._process = None
+
+
+def replay_command(path: Path) -> str:
+    """What to type to see the episode in `path` again."""
+    with suppress(ValueError):
+        path = path.absolute().relative_to(Path.cwd())
+    return f"python -m pytest_simbench.repeatability {path}"
+
+
+def _of_hypothesis(error: Exception) -> bool:
+    """Whether Hypothesis only gives an example up, as `assume` does."""
+    return type(error).__module__.partition(".")[0] == "hypothesis"

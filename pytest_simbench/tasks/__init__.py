@@ -3,5 +3,6 @@
 from pytest_simbench.tasks.base import Jitter, Outcome, Task
 from pytest_simbench.tasks.stacking import Stacking
 from pytest_simbench.tasks.throwing import Throwing
+from pytest_simbench.tasks.towers import LeaningTowers
 
-__all__ = ["Jitter", "Outcome", "Stacking", "Task", "Throwing"]
+__all__ = ["Jitter", "LeaningTowers", "Outcome", "Stacking", "Task", "Throwing"]

@@ -1,0 +1,217 @@
+"""A tape of what was asked of a world, to ask the same again: commands, waits, and what they gave.
+
+The boundary between task and simulator carries whole trajectories and waits, so a few dozen
+operations are all there is to an episode. Played to another world, they are the same commands
+to the last bit, whatever a planner would make of the cubes' poses there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.client.process import WorkerProcess
+from pytest_simbench.client.world import Motion, World
+from pytest_simbench.scene import FloatArray, Scene
+
+ARRAYS = ("position", "velocity", "effort")
+Rows = dict[str, FloatArray]
+
+
+@dataclass(frozen=True)
+class Operation:
+    """One thing asked of a world.
+
+    Attributes:
+        kind: `follow` or `wait`.
+        arguments: as sent to the worker: tick and arrays of a trajectory, duration of a wait [s].
+        phase: of the task, as its `World.phase` named it.
+    """
+
+    kind: str
+    arguments: Mapping[str, Any]
+    phase: str = ""
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        if self.kind == "wait":
+            return float(self.arguments["duration"])
+        return float(self.arguments["tick"]) * (len(self.arguments["position"]) - 1)
+
+    def same_command(self, other: Operation) -> bool:
+        """Whether both ask for the same, bit for bit."""
+        if self.kind != other.kind or self.arguments.keys() != other.arguments.keys():
+            return False
+        return all(np.array_equal(value, other.arguments[k]) for k, value in self.arguments.items())
+
+    def to_wire(self) -> dict[str, Any]:
+        """Plain data for JSON; numbers are kept to the last bit."""
+        arguments = {
+            key: value.tolist() if isinstance(value, np.ndarray) else value
+            for key, value in self.arguments.items()
+        }
+        return {"kind": self.kind, "arguments": arguments, "phase": self.phase}
+
+    @classmethod
+    def from_wire(cls, data: Mapping[str, Any]) -> Operation:
+        arguments = {
+            key: np.array(value, dtype=float) if key in ARRAYS else value
+            for key, value in data["arguments"].items()
+        }
+        return cls(data["kind"], arguments, data["phase"])
+
+
+Tape = Sequence[Operation]
+"""Operations in the order in which they were asked for."""
+
+
+class Latency:
+    """A controller that is late: every set point reaches the drives `delay` [s] after it was sent.
+
+    The time that an operation takes stays the same, so the end of each motion is carried out
+    during the next one, as on a robot whose controller lags behind its planner.
+    """
+
+    def __init__(self, delay: float) -> None:
+        self.delay = delay
+        self._tick = 0.0
+        self._last: Rows = {}
+        self._asked: Rows = {}
+        self._queue: Rows = {}
+
+    def late(self, operation: Operation) -> list[Operation]:
+        """What the drives get to see while `operation` is asked for."""
+        if operation.kind == "follow":
+            return [self._late_motion(operation)]
+        return self._late_wait(operation) if self._queue else [operation]
+
+    def _late_motion(self, operation: Operation) -> Operation:
+        rows = {name: operation.arguments[name] for name in ARRAYS}
+        if not self._queue:  # until the first motion arrives, the arm is held where it is
+            self._tick = float(operation.arguments["tick"])
+            self._last = _held(rows, 0)
+            self._queue = _repeated(self._last, round(self.delay / self._tick))
+        self._asked = _held(rows, -1)
+        # Row 0 of a trajectory is where the one before ended.
+        self._push({name: rows[name][1:] for name in ARRAYS})
+        return self._pop(len(rows["position"]) - 1, operation.phase)
+
+    def _late_wait(self, operation: Operation) -> list[Operation]:
+        count = min(len(self._queue["position"]), round(operation.duration / self._tick))
+        if count == 0:
+            return [operation]
+        self._push(_repeated(self._asked, count))
+        late = self._pop(count, operation.phase)
+        rest = operation.duration - late.duration
+        if rest < self._tick / 2:
+            return [late]
+        return [late, Operation("wait", {"duration": rest}, operation.phase)]
+
+    def _push(self, rows: Rows) -> None:
+        self._queue = {k: np.concatenate([self._queue[k], rows[k]]) for k in ARRAYS}
+
+    def _pop(self, count: int, phase: str) -> Operation:
+        now = {k: np.concatenate([self._last[k], self._queue[k][:count]]) for k in ARRAYS}
+        self._queue = {name: self._queue[name][count:] for name in ARRAYS}
+        self._last = {name: now[name][-1:] for name in ARRAYS}
+        return Operation("follow", {"tick": self._tick, **now}, phase)
+
+
+def _held(rows: Rows, number: int) -> Rows:
+    """One row of a trajectory as a set point to stay at."""
+    row = {name: rows[name][number][None] for name in ARRAYS}
+    return {**row, "velocity": np.zeros_like(row["velocity"])}
+
+
+def _repeated(row: Rows, count: int) -> Rows:
+    return {name: np.repeat(row[name], count, axis=0) for name in ARRAYS}
+
+
+class TapedWorld(World):
+    """A world that keeps a tape, and can play one instead of what it is asked for.
+
+    Args:
+        process, scene, options: as of `World`.
+        period: samples of every operation are kept in `motions` at this period [s]; None: none.
+        play: operations to be carried out in place of those asked for, one by one.
+        delay: of the controller [s], see `Latency`.
+        before: called before each operation, with the world and the operation about to be done.
+
+    Attributes:
+        tape: the operations asked for (or played) so far.
+        motions: where a period was given, the state after loading, then what each operation
+            gave, its end state last.
+        left_at: simulated time at which the task asked for another kind of operation than the
+            tape to be played had next [s]; from there on it gets what it asks for. None: never.
+    """
+
+    def __init__(
+        self,
+        process: WorkerProcess,
+        scene: Scene,
+        *,
+        period: float | None = None,
+        play: Tape | None = None,
+        delay: float = 0.0,
+        before: Callable[[TapedWorld, Operation], None] | None = None,
+        **options: Any,
+    ) -> None:
+        super().__init__(process, scene, **options)
+        self.period = period
+        self.tape: list[Operation] = []
+        self.motions: list[Motion] = [] if period is None else [self._kept([])]
+        self.left_at: float | None = None
+        self._play = play
+        self._latency = Latency(delay) if delay else None
+        self._before = before
+
+    def _move(self, operation: str, log_period: float | None, **arguments: Any) -> Motion | None:
+        asked = Operation(operation, arguments, self.process.where.phase)
+        wanted = self._next(asked)
+        if self._before is not None:
+            self._before(self, wanted)
+        self.tape.append(wanted)
+        parts = [
+            self.perform(part, log_period)
+            for part in (self._latency.late(wanted) if self._latency else [wanted])
+        ]
+        found = [part for part in parts if part is not None and len(part)]
+        if self.period is not None:
+            self.motions.append(self._kept(found))
+        return Motion.joined(found) if log_period is not None and found else None
+
+    def perform(self, operation: Operation, log_period: float | None = None) -> Motion | None:
+        """Carry out one operation without putting it on the tape."""
+        period = log_period if log_period is not None else self.period
+        return super()._move(operation.kind, period, **operation.arguments)
+
+    def play(self, tape: Tape) -> None:
+        """Carry out the operations of a tape, one after the other."""
+        for operation in tape:
+            self.process.where.phase = operation.phase
+            self._move(operation.kind, None, **operation.arguments)
+
+    def _next(self, asked: Operation) -> Operation:
+        if self._play is None or self.left_at is not None:
+            return asked
+        number = len(self.tape)
+        if number >= len(self._play) or self._play[number].kind != asked.kind:
+            self.left_at = self.time
+            return asked
+        return self._play[number]
+
+    def _kept(self, parts: list[Motion]) -> Motion:
+        """At most one sample for each period, and the end state."""
+        end = Motion(np.array([self.time]), self.joints[None], self.bodies[None])
+        kept = []
+        for motion in parts:
+            step = (motion.time[-1] - motion.time[0]) / max(1, len(motion) - 1)
+            every = max(1, round((self.period or 0.0) / step)) if step > 0 else 1
+            at = np.arange(len(motion))[::every]
+            at = at[motion.time[at] < self.time]
+            kept.append(Motion(motion.time[at], motion.joints[at], motion.bodies[at]))
+        return Motion.joined([*kept, end])

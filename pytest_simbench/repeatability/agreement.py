@@ -1,0 +1,223 @@
+"""Do simulators agree? For one seed: when and where their cubes first differ by 1 mm and 1 cm.
+
+Each simulator runs the task by itself, in a test of its own, and leaves its motion in the run
+folder; they are compared when all have run. The commands come from the same planner with the
+same seed. They stay the same until the planner looks at cubes that stand elsewhere, so the time
+from which the set points differ is told as well.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.client.tape import Operation
+from pytest_simbench.client.world import Motion
+from pytest_simbench.repeatability.episode import Episode
+from pytest_simbench.repeatability.motions import gaps
+from pytest_simbench.scene import FloatArray
+
+LIMITS = (0.001, 0.01)
+"""Distances of interest [m]."""
+
+SAME_COMMAND = 1e-3
+"""Set points closer than this count as the same [rad, m]: planned for the same poses to within
+what an inverse kinematics solver leaves."""
+
+FOLDER = "motions"
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One simulator's episode as kept in the run folder.
+
+    Attributes:
+        label: simulator, with mode and profile where a reader needs them.
+        task, seed: what was run; only equal ones are compared.
+        bodies: names of the free bodies.
+        motions: see `TapedWorld.motions`.
+        commands: arm and finger positions at the end of each motion, None for waits.
+        durations: of the operations [s].
+        counts: of the outcome.
+    """
+
+    label: str
+    task: str
+    seed: int
+    bodies: Sequence[str]
+    motions: Sequence[Motion]
+    commands: Sequence[FloatArray | None]
+    durations: Sequence[float]
+    counts: Mapping[str, float | None]
+
+    @classmethod
+    def of(cls, episode: Episode, label: str, task: str, seed: int) -> Sample:
+        return cls(
+            label,
+            task,
+            seed,
+            list(episode.bodies),
+            episode.motions,
+            [_command(operation) for operation in episode.tape],
+            [operation.duration for operation in episode.tape],
+            episode.counts,
+        )
+
+    def save(self, path: Path) -> None:
+        """Write it as .npz.
+
+        Raises:
+            OSError: the folder cannot be written to.
+        """
+        joined = Motion.joined(list(self.motions))
+        width = max((len(c) for c in self.commands if c is not None), default=0)
+        commands = [np.full(width, np.nan) if c is None else c for c in self.commands]
+        facts = {
+            "label": self.label,
+            "task": self.task,
+            "seed": self.seed,
+            "bodies": list(self.bodies),
+            "counts": dict(self.counts),
+        }
+        path.parent.mkdir(parents=True, exist_ok=True)
+        np.savez_compressed(
+            path,
+            facts=np.array(json.dumps(facts)),
+            time=joined.time,
+            joints=joined.joints,
+            bodies=joined.bodies,
+            lengths=np.array([len(motion) for motion in self.motions]),
+            commands=np.array(commands).reshape(len(commands), width),
+            durations=np.array(self.durations),
+        )
+
+    @classmethod
+    def load(cls, path: Path) -> Sample:
+        """Read it back."""
+        with np.load(path) as data:
+            facts = json.loads(str(data["facts"]))
+            cuts = np.cumsum(data["lengths"])[:-1]
+            parts = (np.split(data[name], cuts) for name in ("time", "joints", "bodies"))
+            motions = [Motion(*part) for part in zip(*parts, strict=True)]
+            commands = [None if np.isnan(row).all() else row for row in data["commands"]]
+            durations = [float(value) for value in data["durations"]]
+        return cls(**facts, motions=motions, commands=commands, durations=durations)
+
+
+def _command(operation: Operation) -> FloatArray | None:
+    if operation.kind == "wait":
+        return None
+    return np.asarray(operation.arguments["position"][-1], dtype=float)
+
+
+@dataclass(frozen=True)
+class Parting:
+    """Where two simulators first differ by a distance.
+
+    Attributes:
+        time: simulated, in the first one [s].
+        body: the cube.
+        position: of the cube in the first one [m].
+    """
+
+    time: float
+    body: str
+    position: tuple[float, float, float]
+
+    def __str__(self) -> str:
+        place = ", ".join(f"{value:.2f}" for value in self.position)
+        return f"{self.time:.2f} s, {self.body} at ({place})"
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Two simulators and one seed.
+
+    Attributes:
+        first, second: their labels.
+        partings: by distance [m]; None: they never differ so much.
+        commands_part: simulated time of the first operation whose set points or duration differ
+            [s]; None: all commands are the same.
+        until: how long both episodes lasted [s].
+        same_outcome: whether the task's counts are the same.
+    """
+
+    first: str
+    second: str
+    partings: Mapping[float, Parting | None]
+    commands_part: float | None
+    until: float
+    same_outcome: bool
+
+    def to_wire(self) -> dict[str, Any]:
+        """Plain data for the run's records."""
+        return {
+            "first": self.first,
+            "second": self.second,
+            "partings": {
+                f"{limit:g}": None if p is None else vars(p) for limit, p in self.partings.items()
+            },
+            "commands_part": self.commands_part,
+            "until": self.until,
+            "same_outcome": self.same_outcome,
+        }
+
+
+def agreement(first: Sample, second: Sample) -> Agreement:
+    """Compare two simulators' episodes of one task and seed.
+
+    Raises:
+        ValueError: they are of different tasks, seeds or scenes.
+    """
+    mine, other = [(s.task, s.seed, tuple(s.bodies)) for s in (first, second)]
+    if mine != other:
+        raise ValueError(f"{first.label} ran {mine[:2]}, {second.label} ran {other[:2]}")
+    between = gaps(first.motions, second.motions)
+    partings: dict[float, Parting | None] = {}
+    for limit in LIMITS:
+        found = between.first_beyond(limit)
+        if found is None:
+            partings[limit] = None
+            continue
+        sample, body = found
+        x, y, z = (float(value) for value in between.position[sample, body])
+        partings[limit] = Parting(float(between.time[sample]), first.bodies[body], (x, y, z))
+    return Agreement(
+        first.label,
+        second.label,
+        partings,
+        _commands_part(first, second),
+        float(between.time[-1]),
+        dict(first.counts) == dict(second.counts),
+    )
+
+
+def _commands_part(first: Sample, second: Sample) -> float | None:
+    for number in range(max(len(first.commands), len(second.commands))):
+        began = float(first.motions[min(number, len(first.motions) - 1)].time[-1])
+        if number >= min(len(first.commands), len(second.commands)):
+            return began
+        a, b = first.commands[number], second.commands[number]
+        if (a is None) != (b is None):
+            return began
+        if a is not None and b is not None and not np.allclose(a, b, rtol=0, atol=SAME_COMMAND):
+            return began
+        if abs(first.durations[number] - second.durations[number]) > SAME_COMMAND:
+            return began
+    return None
+
+
+def agreements(folder: Path) -> list[Agreement]:
+    """All pairs of what a run left in its folder, task by task and seed by seed."""
+    samples = [Sample.load(path) for path in sorted((folder / FOLDER).glob("*.npz"))]
+    return [
+        agreement(a, b)
+        for a, b in combinations(samples, 2)
+        if (a.task, a.seed, tuple(a.bodies)) == (b.task, b.seed, tuple(b.bodies))
+    ]

@@ -1,0 +1,115 @@
+"""One task, one seed, one simulator: run as often as it takes, changed or not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pytest_simbench.client.tape import Operation, Tape, TapedWorld
+from pytest_simbench.client.world import Motion
+from pytest_simbench.repeatability.perturbation import Perturbation, controller_delay, perturbed
+from pytest_simbench.scene import Scene
+from pytest_simbench.session.handle import SimulatorHandle
+from pytest_simbench.tasks.base import Jitter, Outcome, Task
+
+PERIOD = 0.02
+"""Sampling of joints and bodies [s]. Comparisons bit by bit see these samples, and the
+state at the end of every operation."""
+
+
+@dataclass(frozen=True)
+class Episode:
+    """What one run of a task gave.
+
+    Attributes:
+        outcome: the task's score.
+        counts: those of its metrics that count things: what "the outcome" means here.
+        tape: the operations that were carried out.
+        motions: their samples, see `TapedWorld.motions`.
+        bodies: names of the free bodies.
+        left_at: when the task asked for something else than the tape that was played [s].
+    """
+
+    outcome: Outcome
+    counts: Mapping[str, float | None]
+    tape: Tape
+    motions: Sequence[Motion]
+    bodies: Sequence[str]
+    left_at: float | None
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A task with a seed in a simulator.
+
+    Attributes:
+        handle: of the simulator; its worker is reused from run to run.
+        task: what is run, as it is (no smaller version of it).
+        seed: of the cubes' start, their order, and the planner.
+        jitter: of the cubes' start.
+    """
+
+    handle: SimulatorHandle
+    task: Task
+    seed: int
+    jitter: Jitter
+
+    def scene(self) -> Scene:
+        """The scene of this seed, not perturbed."""
+        return self.task.scene(self.seed, self.jitter)
+
+    def run(
+        self,
+        perturbations: Sequence[Perturbation] = (),
+        *,
+        play: Tape | None = None,
+        before: Callable[[TapedWorld, Operation], None] | None = None,
+        handle: SimulatorHandle | None = None,
+    ) -> Episode:
+        """Run it once.
+
+        Args:
+            perturbations: of scene and controller.
+            play: commands to be sent in place of those that the task plans.
+            before: called before each operation.
+            handle: another worker to run in.
+
+        Raises:
+            WorkerError: whatever happened to the worker.
+        """
+        scene = perturbed(self.scene(), perturbations)
+        options: dict[str, Any] = {
+            "period": PERIOD,
+            "play": play,
+            "before": before,
+            "delay": controller_delay(perturbations),
+            "load_timeout": max(120.0, self.handle.case.stall_timeout),
+        }
+        with (handle or self.handle).episode(scene, **options) as world:
+            outcome = self.task.perform(world, self.seed, lambda done, total: None)
+        return Episode(
+            outcome,
+            counts(self.task, outcome),
+            world.tape,
+            world.motions,
+            [body.name for body in scene.free_bodies],
+            world.left_at,
+        )
+
+
+def counts(task: Task, outcome: Outcome) -> dict[str, float | None]:
+    """The counting metrics of an outcome: shares, and yes or no. Lengths and speeds are never the
+    same twice once a bit differs; a count says whether it mattered."""
+    return {m.name: outcome.metrics.get(m.name) for m in task.metrics if m.bounded}
+
+
+def changed(before: Mapping[str, float | None], after: Mapping[str, float | None]) -> list[str]:
+    """Names of the counts that are not the same."""
+    return [name for name, value in before.items() if after.get(name) != value]
+
+
+def scaled_jitter(scale: float) -> Jitter:
+    """The tasks' start jitter times a factor, as `--jitter` means it."""
+    one = Jitter()
+    return Jitter(one.distance * scale, one.angle * scale)

@@ -1,0 +1,152 @@
+"""Where two episodes part: the first different bit, and how far apart their cubes get."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pytest_simbench.client.world import Motion
+from pytest_simbench.scene import FloatArray
+
+GROWTH_TIMES = (1.0, 5.0, 20.0)
+"""Growth of a difference is reported so long after it arose [s]."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How two runs of the same commands part.
+
+    Attributes:
+        first: simulated time of the first sample that is not the same, bit for bit [s].
+        body: the cube that differs there, "" when it is the robot alone.
+        growth: by seconds after that, the largest distance between a cube here and there [m];
+            None where the episode was over.
+        largest: of these distances at any time [m].
+    """
+
+    first: float
+    body: str
+    growth: Mapping[float, float | None]
+    largest: float
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """Distances between the cubes of two episodes at the same moment of the same operation.
+
+    Attributes:
+        time: simulated time in the first episode [s], (n,).
+        distance: between the positions of each cube [m], (n, n_free).
+        position: in the first episode [m], (n, n_free, 3).
+    """
+
+    time: FloatArray
+    distance: FloatArray
+    position: FloatArray
+
+    def largest(self) -> FloatArray:
+        """Over the cubes [m], (n,)."""
+        if self.distance.shape[1] == 0:
+            return np.zeros(len(self.time))
+        return np.asarray(self.distance.max(axis=1))
+
+    def first_beyond(self, limit: float) -> tuple[int, int] | None:
+        """Sample and cube where a distance first exceeds `limit` [m]."""
+        beyond = np.flatnonzero(self.largest() > limit)
+        if not len(beyond):
+            return None
+        sample = int(beyond[0])
+        return sample, int(self.distance[sample].argmax())
+
+    def after(self, time: float) -> float | None:
+        """The largest distance at a time, None when the episodes were over by then [m]."""
+        at = int(np.searchsorted(self.time, time - 1e-9))
+        return None if at >= len(self.time) else float(self.largest()[at])
+
+
+def gaps(first: Sequence[Motion], second: Sequence[Motion]) -> Gaps:
+    """Compare two episodes operation by operation, for as long as both lasted.
+
+    Each operation starts its own clock, because operations last a whole number of steps and steps
+    differ between simulators. Between samples the second episode is interpolated by cubics
+    through positions and velocities.
+
+    Args:
+        first, second: `TapedWorld.motions` of both: the state at the start, then one motion for
+            each operation.
+    """
+    times, distances, positions = [], [], []
+    for number, (a, b) in enumerate(zip(first, second, strict=False)):
+        here = a.bodies[:, :, :3]
+        if number == 0 or np.array_equal(a.time, b.time):
+            there = b.bodies[: len(here), :, :3]
+        else:
+            clock = a.time - first[number - 1].time[-1]
+            before = second[number - 1]
+            until = b.time[-1] - before.time[-1]
+            here, a_time = here[clock <= until + 1e-9], a.time[clock <= until + 1e-9]
+            there = _at(clock[clock <= until + 1e-9], before, b)
+            times.append(a_time)
+            distances.append(np.linalg.norm(here - there, axis=2))
+            positions.append(here)
+            continue
+        times.append(a.time)
+        distances.append(np.linalg.norm(here - there, axis=2))
+        positions.append(here)
+    return Gaps(np.concatenate(times), np.concatenate(distances), np.concatenate(positions))
+
+
+def _at(clock: FloatArray, before: Motion, motion: Motion) -> FloatArray:
+    """Positions of the cubes so long after the operation began, (n, n_free, 3)."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    start = before.time[-1]
+    time = np.concatenate([[0.0], motion.time - start])
+    states = np.concatenate([before.bodies[-1:], motion.bodies])
+    spline = CubicHermiteSpline(time, states[:, :, :3], states[:, :, 7:10], axis=0)
+    return np.asarray(spline(np.minimum(clock, time[-1])))
+
+
+def difference(
+    first: Sequence[Motion], second: Sequence[Motion], bodies: Sequence[str]
+) -> Difference | None:
+    """How two runs in one simulator part; None when every sampled bit is the same.
+
+    Args:
+        first, second: `TapedWorld.motions` of both.
+        bodies: names of the free bodies.
+    """
+    found = _first_difference(first, second)
+    if found is None:
+        return None
+    time, body = found
+    between = gaps(first, second)
+    growth = {after: between.after(time + after) for after in GROWTH_TIMES}
+    largest = float(between.largest().max(initial=0.0))
+    return Difference(time, bodies[body] if body is not None else "", growth, largest)
+
+
+def _first_difference(
+    first: Sequence[Motion], second: Sequence[Motion]
+) -> tuple[float, int | None] | None:
+    for number, (a, b) in enumerate(zip(first, second, strict=False)):
+        if a.bodies.shape != b.bodies.shape:
+            return float(first[max(0, number - 1)].time[-1]), None
+        bodies = (_bits(a.bodies) != _bits(b.bodies)).any(axis=2)
+        joints = (_bits(a.joints) != _bits(b.joints)).reshape(len(a), -1).any(axis=1)
+        differs = bodies.any(axis=1) | joints | (_bits(a.time) != _bits(b.time))
+        if differs.any():
+            sample = int(differs.argmax())
+            body = int(bodies[sample].argmax()) if bodies[sample].any() else None
+            return float(a.time[sample]), body
+    if len(first) != len(second):
+        shorter = min(first, second, key=len)
+        return float(shorter[-1].time[-1]), None
+    return None
+
+
+def _bits(values: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.uint64]]:
+    """The bit patterns, so that 0 and -0 differ and not-a-number equals itself."""
+    return np.ascontiguousarray(values, dtype=np.float64).view(np.uint64)
