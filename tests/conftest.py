@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from pytest_simbench.client.environments import Environment, interpreter, missing
 from pytest_simbench.session.case import Case
@@ -13,6 +14,9 @@ from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter, registered
 
 pytest_plugins = ["pytester"]
+
+settings.register_profile("simbench-tests", deadline=None)  # speed is measured in benchmarks/
+settings.load_profile("simbench-tests")
 
 ADAPTERS = {name: entry.value for name, entry in registered().items()}
 """Every registered adapter, as workers name it."""

@@ -35,7 +35,8 @@ def saved(
         *(sys.executable, "-m", "pytest", *ARGUMENTS, "--sim-output=base"),
         *("--benchmark-json=base.json", "--benchmark-autosave"),
     ]
-    environment = {**os.environ, "PYTHONPATH": str(request.config.rootpath)}
+    outer = {k: v for k, v in os.environ.items() if not k.startswith("PYTEST_XDIST")}
+    environment = {**outer, "PYTHONPATH": str(request.config.rootpath)}
     subprocess.run(command, cwd=folder, env=environment, check=True, capture_output=True)
     yield folder
     shutil.rmtree(folder)
@@ -93,6 +94,7 @@ def test_limits_in_the_ini_file_wait_for_a_baseline_which_alone_fails_nothing(
     pytester: pytest.Pytester, baseline: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DURATION", "0.05")
+    monkeypatch.setenv("COLUMNS", "160")  # no table is cut
     result = pytester.runpytest_subprocess(*ARGUMENTS, "--sim-baseline=base")
     assert result.ret == pytest.ExitCode.OK
     result.stdout.fnmatch_lines(["test_falling*landed*100 %*0 %*"])
