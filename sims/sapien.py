@@ -41,6 +41,9 @@ ROBOT, WORLD = 1, 2
 class SAPIENSettings(Settings):
     """SAPIEN's options; defaults are those that SAPIEN 3.0.3 and its PhysX 5.3 report.
 
+    `tuned` is explained in docs/engines/sapien.md: few iterations of a short step hold cubes and
+    let an impact through.
+
     Attributes:
         timestep: [s]; a new SAPIEN scene has 0.01.
         position_iterations, velocity_iterations: of the solver, for bodies and articulation.
@@ -94,7 +97,10 @@ class SAPIEN(Simulator):
                 Capability.DETERMINISTIC,
             }
         ),
-        deviations=(Deviation("gripper/coupled", "SAPIEN does not report its tendons"),),
+        deviations=(
+            Deviation("gripper/coupled", "SAPIEN does not report its tendons"),
+            Deviation("", "a restored world has the saved poses and velocities, but new contacts"),
+        ),
         install_size_mb=340,
     )
     profiles: ClassVar[Mapping[str, Settings]] = {
