@@ -140,7 +140,6 @@ class Drake(Simulator):
             ),
         ),
         install_size_mb=310,
-        language="C++",
     )
     profiles: ClassVar[Mapping[str, Settings]] = {
         "default": DrakeSettings(),
