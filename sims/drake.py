@@ -139,7 +139,7 @@ class Drake(Simulator):
                 "the next free port, which the worker's log names",
             ),
         ),
-        install_size_mb=220,
+        install_size_mb=310,
     )
     profiles: ClassVar[Mapping[str, Settings]] = {
         "default": DrakeSettings(),
@@ -440,7 +440,12 @@ class Drake(Simulator):
     def render(self, width: int, height: int) -> NDArray[np.uint8]:
         if not self._has_camera:
             context = self.scene_graph.GetMyMutableContextFromRoot(self.root)
-            engine = geometry.MakeRenderEngineVtk(geometry.RenderEngineVtkParams())
+            light = geometry.LightParameter(
+                type="directional", frame="world", direction=[0.5, 0.4, -1.0], intensity=0.8
+            )
+            fill = geometry.LightParameter(type="directional", frame="camera", intensity=0.6)
+            look = geometry.RenderEngineVtkParams(lights=[light, fill])
+            engine = geometry.MakeRenderEngineVtk(look)
             self.scene_graph.AddRenderer(context, "vtk", engine)
             self._has_camera = True
         lens = sensors.CameraInfo(width, height, np.pi / 4)
