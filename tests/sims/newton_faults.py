@@ -61,6 +61,12 @@ def gain(column: int) -> Callable[[Any], None]:
     return plant
 
 
+def effort_limit(s: Any) -> None:
+    model = s.solver.mj_model
+    model.actuator_forcerange[model.actuator_trnid[:, 0] == joint(s)] *= 2.0
+    model.jnt_actfrcrange[joint(s)] *= 2.0
+
+
 def in_model(array: str, value: float) -> Callable[[Any], None]:
     """Sets the row of joint 4 in an array of MuJoCo's joints or degrees of freedom."""
 
@@ -106,7 +112,7 @@ FAULTS: dict[str, Callable[[Any], None]] = {
     "ground/friction": lambda s: geom(s, "ground").friction.__setitem__(0, 0.5),
     "joint/panda_joint4/stiffness": gain(1),
     "joint/panda_joint4/damping": gain(2),
-    "joint/panda_joint4/effort_limit": in_model("jnt_actfrcrange", 200.0),
+    "joint/panda_joint4/effort_limit": effort_limit,
     "joint/panda_joint4/armature": in_model("dof_armature", 0.0),
     "joint/panda_joint4/limits": in_model("jnt_range", 1.0),
     "joint/panda_joint4/initial_position": in_data,
