@@ -10,6 +10,7 @@ import importlib.util
 import os
 import signal
 import sys
+import tempfile
 from importlib.machinery import ModuleSpec
 from typing import Any
 
@@ -49,11 +50,15 @@ def main(channel: Any) -> None:
     # Ctrl-C goes to the whole process group; the client decides what becomes of its workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     config = channel.receive()
-    if config["log"]:
-        redirect_output(config["log"])
+    folder, log = config["folder"], config["log"]
+    if folder and not os.path.isdir(folder):  # another host
+        folder = tempfile.mkdtemp(prefix="simbench-")
+        log = os.path.join(folder, os.path.basename(log))
+    if log:
+        redirect_output(log)
     sys.path[:] = [entry for entry in sys.path if entry not in ("", os.getcwd())]
-    if config["folder"]:
-        os.chdir(config["folder"])  # engines leave logs and caches where they run
+    if folder:
+        os.chdir(folder)  # engines leave logs and caches where they run
     sys.meta_path.insert(0, PackageFinder(config["packages"]))
 
     from pytest_simbench.worker.server import serve
