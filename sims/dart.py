@@ -103,9 +103,7 @@ class DART(Simulator):
     )
     profiles: ClassVar[Mapping[str, Settings]] = {
         "default": DARTSettings(),
-        "tuned": DARTSettings(
-            detector="ode", solver="nsgs", tolerance=1e-4, position_gain=0.5, sleeping=False
-        ),
+        "tuned": DARTSettings(detector="ode", solver="nsgs", tolerance=1e-4, position_gain=0.5),
     }
     settings: DARTSettings
 
