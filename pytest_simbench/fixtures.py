@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,21 +19,6 @@ if TYPE_CHECKING:
     from pytest_simbench.session.case import Case
     from pytest_simbench.session.handle import SimulatorHandle
     from pytest_simbench.tasks.base import Task
-
-
-class WorkerClock:
-    """pytest-benchmark's timer: it advances by the seconds that a worker spent stepping."""
-
-    __name__ = "simbench_worker_seconds"
-
-    def __init__(self) -> None:
-        self.seconds = 0.0
-
-    def __call__(self) -> float:
-        return self.seconds
-
-
-worker_clock = WorkerClock()
 
 
 @pytest.fixture(scope="session")
@@ -127,77 +111,13 @@ def simbench_case(
 @pytest.fixture
 def repeat(
     request: pytest.FixtureRequest, simbench_case: Case, benchmark: Any
-) -> Callable[[Task], ResultSet]:
+) -> Iterator[Callable[[Task], ResultSet]]:
     """Runs a task `--reps` times: `result = repeat(Stacking())`."""
-    from pytest_simbench.selection import number_mark
-    from pytest_simbench.session.repeat import Repeater
+    from pytest_simbench.repeating import Repeating
 
-    config, this = request.config, run(request.config)
-    reps = (
-        options.value(config, "reps")
-        or number_mark(request.node, "reps")
-        or simbench_case.protocol.repetitions
-    )
-
-    def repeat_task(task: Task) -> ResultSet:
-        this.declare(task.smoke() if simbench_case.protocol.smallest else task)
-        this.begin_lines()
-        repeater = Repeater(
-            simbench_case, options.value(config, "sim_jobs"), this.progress, this.keep
-        )
-        result = repeater.run(task, range(1, int(reps) + 1))
-        request.node.user_properties.extend(_properties(result))
-        _benchmark(benchmark, result)
-        return result
-
-    return repeat_task
-
-
-def _properties(result: ResultSet) -> Iterator[tuple[str, float]]:
-    """For JUnit: the mean of each metric and cost and the ends of its 95 % interval."""
-    yield "repetitions", len(result.ok) + len(result.failures)
-    yield "failures", len(result.failures)
-    for name in result.known:
-        found = result.interval(name)
-        if found.n:
-            yield name, found.mean
-            if isfinite(found.half_width):
-                yield f"{name}.low", found.low
-                yield f"{name}.high", found.high
-
-
-def _benchmark(benchmark: Any, result: ResultSet) -> None:
-    """Hand the finished repetitions to pytest-benchmark as rounds of worker seconds."""
-    if not result.ok:
-        return
-    seconds = iter([record.stepping["wall"] for record in result.ok])
-
-    def advance() -> None:
-        worker_clock.seconds += next(seconds, 0.0)
-
-    from pytest_simbench.measure import saved
-
-    first = result.ok[0]
-    benchmark.extra_info.update(
-        {
-            "simulator": first.simulator,
-            "mode": first.mode,
-            "profile": first.profile,
-            "protocol": first.protocol,
-            "settings": dict(first.settings),
-            "versions": dict(first.versions),
-            "host": dict(first.host),
-            "failures": len(result.failures),
-            "metrics": {name: result.values(name) for name in result.metrics},
-            "seeds": [record.seed for record in result.ok],
-            "costs": {
-                name: [record.cost(name) for record in result.ok]
-                for name in ("rtf", "cpu", "ram", "ram_peak", "cpu_cost", "start", "end", "total")
-            },
-            saved.KEY: saved.to_extra_info(result.records),
-        }
-    )
-    benchmark.pedantic(advance, rounds=len(result.ok), iterations=1, warmup_rounds=0)
+    repeating = Repeating(request.node, simbench_case, run(request.config))
+    yield repeating
+    repeating.finish(benchmark)
 
 
 @pytest.fixture

@@ -38,7 +38,8 @@ OPTIONS = (
            "list", "NAME"),
     Option("--gui", False, "run in the simulators' own windows", "flag"),
     Option("--headless", False, "run without windows (default; with --gui: both)", "flag"),
-    Option("--reps", None, "repetitions per test (default: the protocol's, 20)", "int", "N"),
+    Option("--reps", None, "repetitions per test (default: the protocol's, 20), or auto: until "
+           "each asserted claim is decided, at most 160; auto:LIMIT", "text", "N"),
     Option("--protocol", "fast", "fast, as fast as possible; paper, as the study; smoke, smallest",
            "text", "NAME", ("fast", "paper", "smoke")),
     Option("--jitter", 1.0, "scale of the start jitter; 1 is 1 mm and 1 degree, 0 is none",
@@ -72,7 +73,17 @@ OPTIONS = (
            "baseline, and by more than this: placed:5%,ram:10%,rtf:20%",
            "text", "METRIC:LIMIT,..."),
 )  # fmt: skip
-"""Every option; `--sims` and `--sim-install` are added apart: they do their work and exit."""
+"""Every option that is a setting; those of a single run are added apart and have no ini twin."""
+
+AUTO_LIMIT = 160
+"""Repetitions at which `--reps auto` gives up: with the looks before it 10, 20, 40, 80 and 160."""
+
+
+@dataclass(frozen=True)
+class Auto:
+    """`--reps auto`: repeat until the claims are decided, at most `limit` times."""
+
+    limit: int = AUTO_LIMIT
 
 
 def add_options(parser: pytest.Parser) -> None:
@@ -88,6 +99,21 @@ def add_options(parser: pytest.Parser) -> None:
                 arguments["action"] = "append"
         group.addoption(option.flag, **arguments)
         parser.addini(option.name, option.help, default=None)
+    group.addoption(
+        "--sim-resume",
+        nargs="?",
+        const="",
+        metavar="RUN",
+        help="complete an interrupted run, without repeating what is recorded: its folder "
+        "(default: --sim-output, else the newest in .simbench)",
+    )
+    group.addoption(
+        "--sim-merge",
+        nargs="+",
+        metavar="RUN",
+        help="join runs with different seeds (--sim-seed), made on several machines for instance, "
+        "into one in --sim-output, and exit",
+    )
     group.addoption(
         "--sims", action="store_true", help="list the known simulators and exit", dest="sims_list"
     )
@@ -125,6 +151,30 @@ def value(config: pytest.Config, name: str) -> Any:
     if option.choices and given not in option.choices:
         raise pytest.UsageError(f"{option.flag} {given}: choose from {', '.join(option.choices)}")
     return given
+
+
+def repetitions(config: pytest.Config) -> int | Auto | None:
+    """What `--reps` asks for; None when it is not given.
+
+    Raises:
+        pytest.UsageError: neither a number nor auto, or less than 1.
+    """
+    text = value(config, "reps")
+    if text is None:
+        return None
+    word, colon, limit = str(text).strip().partition(":")
+    auto = word == "auto"
+    if auto and not colon:
+        return Auto()
+    try:
+        number = int(limit if auto else text)
+    except ValueError:
+        raise pytest.UsageError(
+            f"--reps takes a whole number, auto or auto:LIMIT, not {text!r}"
+        ) from None
+    if number < 1:
+        raise pytest.UsageError(f"--reps {text}: give at least 1")
+    return Auto(number) if auto else number
 
 
 def assignments(config: pytest.Config, name: str) -> dict[str, str]:

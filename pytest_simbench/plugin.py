@@ -72,8 +72,10 @@ def pytest_benchmark_compare_machine_info(config: pytest.Config, compared_benchm
 
 @pytest.hookimpl(tryfirst=True)  # before xdist starts its workers
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Complain of a bad baseline or limit before anything runs."""
+    """Complain of a bad baseline or limit, or of no run to resume, before anything runs."""
     config = session.config
+    if config.getoption("sim_resume") is not None:
+        run(config)
     asked = options.value(config, "sim_compare_fail") or options.value(config, "sim_baseline")
     if hasattr(config, "workerinput") or not (asked or SAVED in config.stash):
         return
@@ -87,6 +89,10 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 def pytest_cmdline_main(config: pytest.Config) -> int | None:
     if config.getoption("sim_install"):
         return _install(config.getoption("sim_install"))
+    if config.getoption("sim_merge"):
+        from pytest_simbench.merge import merge_runs
+
+        return merge_runs(config)
     if not config.getoption("sims_list"):
         return None
     from pytest_simbench.report.simulators import list_simulators
@@ -134,7 +140,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             raise pytest.UsageError(found)
     for item in items:
         if "repeat" in getattr(item, "fixturenames", ()):
-            from pytest_simbench.fixtures import worker_clock
+            from pytest_simbench.worker_clock import worker_clock
 
             group = item.name.partition("[")[0]
             item.add_marker(pytest.mark.benchmark(timer=worker_clock, group=group))

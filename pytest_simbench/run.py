@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pytest_simbench.measure.metrics import Metric
     from pytest_simbench.measure.record import Record
     from pytest_simbench.report.progress import Progress
+    from pytest_simbench.resume import Resumed
     from pytest_simbench.tasks.base import Task
 
 
@@ -27,6 +28,7 @@ class Run:
     Attributes:
         folder: of this run; made when the first record is written.
         records: made or received by this process.
+        resumed: the interrupted run that this one completes, if it does.
     """
 
     def __init__(self, config: pytest.Config) -> None:
@@ -40,11 +42,22 @@ class Run:
         self._metrics: dict[str, list[Metric]] = {}
         self._references: dict[str, dict[str, float]] = {}
         self._problems: list[str] = []
+        self.resumed: Resumed | None = None
+        if config.getoption("sim_resume") is not None:
+            from pytest_simbench.resume import Resumed
+
+            self.resumed = Resumed(self.folder)
 
     def _choose_folder(self) -> Path:
         shared = getattr(self.config, "workerinput", {}).get("simbench_folder")
         if shared:
             return Path(shared)
+        if self.config.getoption("sim_resume") is not None:
+            from pytest_simbench.resume import folder_to_resume
+
+            folder = folder_to_resume(self.config)
+            if folder is not None:
+                return folder
         given = options.value(self.config, "sim_output")
         if given:
             return Path(self.config.invocation_params.dir, given)
@@ -92,6 +105,13 @@ class Run:
             if self._file is None:
                 self._file = RecordFile(self.folder / RECORDS_NAME)
             self._file.append(record)
+
+    def resume(self, test: str, task: str) -> dict[int, Record]:
+        """By repetition what the run that is completed has recorded of a test; now of this run."""
+        found = [] if self.resumed is None else self.resumed.records
+        ours = {r.repetition: r for r in found if r.test == test and r.task == task}
+        self.records |= {_key(record): record for record in ours.values()}
+        return ours
 
     def declare(self, task: Task) -> None:
         """Remember a task's metrics and references for the report."""

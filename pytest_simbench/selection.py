@@ -124,8 +124,9 @@ def check_numbers(config: pytest.Config) -> None:
     Raises:
         pytest.UsageError: zero repetitions, a negative time-out and the like.
     """
+    options.repetitions(config)
     for name, least in (
-        ("reps", 1), ("sim_jobs", 1), ("jitter", 0), ("sim_seed", 0), ("sim_timeout", 1e-3),
+        ("sim_jobs", 1), ("jitter", 0), ("sim_seed", 0), ("sim_timeout", 1e-3),
         ("sim_stall_timeout", 1e-3), ("sim_memory_limit", 1),
     ):  # fmt: skip
         number = options.value(config, name)

@@ -24,15 +24,16 @@ COMPARED = (
 Runs = Mapping[str, tuple[Sequence[Record], Sequence[Record]]]
 
 
-def differences(runs: Runs) -> list[str]:
+def differences(runs: Runs, compared: Sequence[str] = COMPARED) -> list[str]:
     """One sentence for each value that differs, with the tests it differs in.
 
     Args:
         runs: for each test the records before and now.
+        compared: fields of a record.
     """
     found: dict[str, list[str]] = {}
     for test, (before, now) in runs.items():
-        old, new = _values(before), _values(now)
+        old, new = _values(before, compared), _values(now, compared)
         for key in [*old, *(key for key in new if key not in old)]:
             first, second = old.get(key, ["absent"]), new.get(key, ["absent"])
             if first != second:
@@ -44,12 +45,12 @@ def differences(runs: Runs) -> list[str]:
     ]
 
 
-def _values(records: Sequence[Record]) -> dict[str, list[str]]:
+def _values(records: Sequence[Record], compared: Sequence[str]) -> dict[str, list[str]]:
     """The different values of each key in a set of records, as JSON, sorted."""
     found: dict[str, set[str]] = {}
     for record in records:
         data = record.to_dict()
-        for name in COMPARED:
+        for name in compared:
             for key, value in _flat(name, data[name]):
                 found.setdefault(key, set()).add(json.dumps(value))
     return {key: sorted(values) for key, values in found.items()}

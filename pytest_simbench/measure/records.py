@@ -138,7 +138,8 @@ def read_records(path: Path | str) -> Reading:
     """The records in a file, or in `records.jsonl` of a run folder.
 
     A line that was cut short (by a crash, or a full disk) is a problem and is left out. A line that
-    is there twice counts once: it was written again because the disk did not confirm it.
+    is there twice counts once: it was written again because the disk did not confirm it. A
+    repetition that was interrupted and then run again (`--sim-resume`) counts as the latter.
 
     Raises:
         RecordError: there is no such file, or a whole line is not a record.
@@ -165,7 +166,17 @@ def read_records(path: Path | str) -> Reading:
             problems.append(f"{where}: the line was cut short and is left out")
         else:
             records.append(Record.from_json(line, where))
-    return Reading(tuple(records), tuple(problems))
+    return Reading(_settled(records), tuple(problems))
+
+
+def _settled(records: list[Record]) -> tuple[Record, ...]:
+    """The records without interrupted repetitions that came to an end later."""
+    ended = {(r.test, r.repetition, r.seed) for r in records if r.status != "interrupted"}
+    return tuple(
+        r
+        for r in records
+        if r.status != "interrupted" or (r.test, r.repetition, r.seed) not in ended
+    )
 
 
 _STRING = re.compile(rb'"(?:\\.|[^"\\])*"')

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
-from pytest_simbench.measure.intervals import Interval, interval, wilson
+from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval, wilson
 from pytest_simbench.measure.metrics import COSTS, Metric, UnknownMetric
 from pytest_simbench.measure.record import Record
 from pytest_simbench.measure.verdicts import Claim, Judgement, Verdict, at_least, at_most, judge
@@ -26,13 +26,18 @@ class ResultSet:
     Args:
         records: of one task, simulator, mode and profile.
         metrics: that the task declares; the costs of `metrics.COSTS` are known besides.
+
+    Attributes:
+        confidence: of the intervals by which claims are judged.
     """
+
+    confidence: float = CONFIDENCE
 
     def __init__(self, records: Iterable[Record], metrics: Iterable[Metric]) -> None:
         self.records: tuple[Record, ...] = tuple(records)
         self.metrics: dict[str, Metric] = {metric.name: metric for metric in metrics}
         self._costs = {metric.name: metric for metric in COSTS if metric.name not in self.metrics}
-        self._intervals: dict[str, Interval] = {}
+        self._intervals: dict[tuple[str, float], Interval] = {}
 
     def __len__(self) -> int:
         return len(self.records)
@@ -104,24 +109,30 @@ class ResultSet:
         found = {record.seed: self.value(record, name) for record in self.ok}
         return {seed: value for seed, value in found.items() if value is not None}
 
-    def interval(self, name: str) -> Interval:
-        """The 95 % interval of a metric's mean; without values its mean is nan and n is 0."""
-        if name not in self._intervals:
+    def interval(self, name: str, confidence: float = CONFIDENCE) -> Interval:
+        """The interval of a metric's mean; without values its mean is nan and n is 0."""
+        key = (name, confidence)
+        if key not in self._intervals:
             bounded = self.metric(name).bounded
-            self._intervals[name] = interval(self.values(name), bounded=bounded)
-        return self._intervals[name]
+            self._intervals[key] = interval(
+                self.values(name), bounded=bounded, confidence=confidence
+            )
+        return self._intervals[key]
 
-    def failure_interval(self) -> Interval:
-        """The 95 % interval of the share of repetitions that fail, interrupted ones left out.
+    def failure_interval(self, confidence: float = CONFIDENCE) -> Interval:
+        """The interval of the share of repetitions that fail, interrupted ones left out.
 
         Raises:
             ValueError: no repetition has ended.
         """
-        return wilson(len(self.failures), len(self.ok) + len(self.failures))
+        return wilson(len(self.failures), len(self.ok) + len(self.failures), confidence)
 
     def judge(self, name: str, claim: Claim) -> Judgement:
         """What the repetitions say of a claim about a metric's true mean."""
-        return judge(claim, self.interval(name))
+        return self._decide(claim, lambda: self.interval(name, self.confidence))
+
+    def _decide(self, claim: Claim, interval: Callable[[], Interval]) -> Judgement:
+        return judge(claim, interval())
 
     def assert_at_least(self, name: str, threshold: float) -> None:
         """Fail when the true mean is below `threshold`; shares are in 0..1."""
@@ -153,8 +164,8 @@ class ResultSet:
         if not 0 <= share <= 1:
             raise ValueError(f"a share of failures lies in 0..1, not {share:g}")
         self._assert_recorded()
-        found = judge(at_most(share), self.failure_interval())
-        sentence = f"{self._failed()}; 95 % interval {_percents(found.interval)}"
+        found = self._decide(at_most(share), lambda: self.failure_interval(self.confidence))
+        sentence = f"{self._failed()}; {self._level} % interval {_percents(found.interval)}"
         if found.verdict is Verdict.REFUTED:
             raise AssertionError(f"{sentence}, which is above {100 * share:g} %")
         if found.verdict is Verdict.INCONCLUSIVE:
@@ -194,13 +205,17 @@ class ResultSet:
         if len(self.interrupted) == len(self.records):
             raise AssertionError(f"{self.label}: no repetition has ended, nothing can be judged")
 
+    @property
+    def _level(self) -> str:
+        return f"{100 * self.confidence:.4g}"
+
     def _measured(self, metric: Metric) -> str:
         """What was measured, with simulator, mode, profile, interval and number of repetitions."""
-        found = self.interval(metric.name)
+        found = self.interval(metric.name, self.confidence)
         failed = f", {len(self.failures)} failed" if self.failures else ""
         return (
-            f"{self.label}: {metric.name} is {metric.format(found.mean)} on average (95 % interval "
-            f"{metric.format(found.low)} to {metric.format(found.high)}, "
+            f"{self.label}: {metric.name} is {metric.format(found.mean)} on average "
+            f"({self._level} % interval {metric.format(found.low)} to {metric.format(found.high)}, "
             f"{found.n} repetition{'s' if found.n > 1 else ''}{failed})"
         )
 

@@ -88,7 +88,33 @@ class Repetition:
         self._write_trace(failed=error is not None)
         return self._record(outcome, error, resources), error
 
+    def probe(self) -> tuple[Record, BaseException | None]:
+        """Start and end the simulator alone: the record's settings and versions are what counts."""
+        error: BaseException | None = None
+        try:
+            self._construct()
+        except BaseException as raised:
+            error = raised
+        finally:
+            self._finish(error)
+        return self._record(Outcome(), error, {}), error
+
     def _perform(self) -> Outcome:
+        case, process = self.case, self._construct()
+        scene = self.task.scene(self.seed, _scaled(case.jitter))
+        world = self._world = World(
+            process,
+            scene,
+            stopwatch=self.stopwatch,
+            on_phase=self._enter,
+            trace_period=None if case.trace == "off" else TRACE_PERIOD,
+        )
+        outcome = self.task.perform(world, self.seed, self._on_count)
+        self._stats = world.stats()
+        return outcome
+
+    def _construct(self) -> WorkerProcess:
+        """Launch the worker and give the simulator its settings."""
         case = self.case
         deadline = time.monotonic() + (case.timeout or self.task.study_timeout)
         self._enter("launch")
@@ -111,17 +137,7 @@ class Repetition:
                 gui=case.mode == "gui",
                 real_time=case.protocol.real_time,
             )
-        scene = self.task.scene(self.seed, _scaled(case.jitter))
-        world = self._world = World(
-            process,
-            scene,
-            stopwatch=self.stopwatch,
-            on_phase=self._enter,
-            trace_period=None if case.trace == "off" else TRACE_PERIOD,
-        )
-        outcome = self.task.perform(world, self.seed, self._on_count)
-        self._stats = world.stats()
-        return outcome
+        return process
 
     def _worker(self) -> WorkerProcess:
         process = self._idle.take() if self._idle is not None else None

@@ -17,7 +17,9 @@ TEST = """
     [
         (["--sim=mujocco"], "unknown simulator 'mujocco'; choose from *mujoco, pybullet*all"),
         (["--reps=0"], "--reps 0: give at least 1"),
-        (["--reps=many"], "--reps takes a whole number, not 'many'"),
+        (["--reps=many"], "--reps takes a whole number, auto or auto:LIMIT, not 'many'"),
+        (["--reps=auto:x"], "--reps takes a whole number, auto or auto:LIMIT, not 'auto:x'"),
+        (["--reps=auto:0"], "--reps auto:0: give at least 1"),
         (["--jitter=-1"], "--jitter -1.0: give at least 0"),
         (["--protocol=quick"], "--protocol quick: choose from fast, paper, smoke"),
         (["--sim-trace=maybe"], "--sim-trace maybe: choose from off, on, retain-on-failure"),

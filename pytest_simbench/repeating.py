@@ -1,0 +1,128 @@
+"""The repetitions of one test: those recorded, those to run, and what pytest is told of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from pytest_simbench import options
+from pytest_simbench.measure import saved
+from pytest_simbench.measure.record import Record
+from pytest_simbench.measure.results import ResultSet
+from pytest_simbench.selection import number_mark
+from pytest_simbench.session.case import Case
+from pytest_simbench.session.repeat import Repeater
+from pytest_simbench.session.sequential import Plan, SequentialResultSet
+from pytest_simbench.worker_clock import worker_clock
+
+if TYPE_CHECKING:
+    from pytest_simbench.run import Run
+    from pytest_simbench.tasks.base import Task
+
+SAVED_COSTS = ("rtf", "cpu", "ram", "ram_peak", "cpu_cost", "start", "end", "total")
+
+
+class Repeating:
+    """What the fixture `repeat` does.
+
+    Args:
+        node: the test.
+        case: simulator and settings.
+        run: takes the records.
+    """
+
+    def __init__(self, node: pytest.Item, case: Case, run: Run) -> None:
+        self.node = node
+        self.case = case
+        self.this = run
+        self.results: list[ResultSet] = []
+
+    def __call__(self, task: Task) -> ResultSet:
+        """Run a task's repetitions, as many as options and marks say."""
+        self.this.declare(task.smoke() if self.case.protocol.smallest else task)
+        wanted = options.repetitions(self.node.config)
+        metrics = (task.smoke() if self.case.protocol.smallest else task).metrics
+        found = self.this.resume(self.node.nodeid, task.name)
+        if isinstance(wanted, options.Auto):
+            plan = Plan.up_to(wanted.limit)
+            first = self._up_to(plan.looks[0], task, found)
+            result: ResultSet = SequentialResultSet(
+                first, metrics, plan, lambda number: self._up_to(number, task, found)
+            )
+        else:
+            number = wanted or number_mark(self.node, "reps") or self.case.protocol.repetitions
+            result = ResultSet(self._up_to(int(number), task, found), metrics)
+        self.results.append(result)
+        return result
+
+    def _up_to(self, number: int, task: Task, found: dict[int, Record]) -> list[Record]:
+        """Records of all repetitions from 1 to `number`, and of what a resumed run has beyond.
+
+        Args:
+            number: of repetitions wanted.
+            task: to perform where one is missing.
+            found: the records so far, by repetition; takes the new ones.
+        """
+        missing = [k for k in range(1, number + 1) if k not in found]
+        if self.this.resumed is not None:
+            refusal = self.this.resumed.refusal(self.case, task, run_more=bool(missing))
+            if refusal:
+                pytest.fail(refusal, pytrace=False)
+        if missing:
+            self.this.begin_lines()
+            jobs = options.value(self.node.config, "sim_jobs")
+            repeater = Repeater(self.case, jobs, self.this.progress, self.this.keep)
+            found |= {r.repetition: r for r in repeater.run(task, missing).records}
+        return [found[k] for k in sorted(found)]
+
+    def finish(self, benchmark: Any) -> None:
+        """Tell pytest-benchmark and JUnit; called when the test has ended."""
+        for result in self.results:
+            self.node.user_properties.extend(_properties(result))
+        if self.results:
+            _benchmark(benchmark, self.results[0])
+
+
+def _properties(result: ResultSet) -> Iterator[tuple[str, float]]:
+    """For JUnit: the mean of each metric and cost and the ends of its 95 % interval."""
+    yield "repetitions", len(result.ok) + len(result.failures)
+    yield "failures", len(result.failures)
+    for name in result.known:
+        found = result.interval(name)
+        if found.n:
+            yield name, found.mean
+            if isfinite(found.half_width):
+                yield f"{name}.low", found.low
+                yield f"{name}.high", found.high
+
+
+def _benchmark(benchmark: Any, result: ResultSet) -> None:
+    """Hand the finished repetitions to pytest-benchmark as rounds of worker seconds."""
+    if not result.ok:
+        return
+    seconds = iter([record.stepping["wall"] for record in result.ok])
+
+    def advance() -> None:
+        worker_clock.seconds += next(seconds, 0.0)
+
+    first = result.ok[0]
+    benchmark.extra_info.update(
+        {
+            "simulator": first.simulator,
+            "mode": first.mode,
+            "profile": first.profile,
+            "protocol": first.protocol,
+            "settings": dict(first.settings),
+            "versions": dict(first.versions),
+            "host": dict(first.host),
+            "failures": len(result.failures),
+            "metrics": {name: result.values(name) for name in result.metrics},
+            "seeds": [record.seed for record in result.ok],
+            "costs": {name: [record.cost(name) for record in result.ok] for name in SAVED_COSTS},
+            saved.KEY: saved.to_extra_info(result.records),
+        }
+    )
+    benchmark.pedantic(advance, rounds=len(result.ok), iterations=1, warmup_rounds=0)

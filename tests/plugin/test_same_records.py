@@ -1,0 +1,172 @@
+"""However a run is cut up, its records are the same, byte for byte but for times and resources."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+
+TEST = """
+    import os
+    from pathlib import Path
+    from tests.tiny import Falling
+
+    class Stopped(Falling):
+        def perform(self, world, seed, count):
+            outcome = super().perform(world, seed, count)
+            outcome.details["bodies"] = world.bodies  # every bit of the state at the end
+            if str(seed) == os.environ.get("STOP_AT"):
+                raise KeyboardInterrupt
+            return outcome
+
+    def test_one(repeat):
+        repeat(Stopped()).assert_at_least("landed", 0.1)
+
+    def test_two(repeat):
+        repeat(Stopped(duration=0.3)).assert_at_least("landed", 0.1)
+"""
+TIMES = ("seconds", "stepping", "timeline", "resources")
+"""Differ from run to run."""
+
+
+def kept(folder: Path, *, jobs: bool = False) -> list[str]:
+    """The records of a run as JSON lines, sorted, without times and resources."""
+    lines = {}
+    for line in (folder / "records.jsonl").read_text().splitlines():
+        record = json.loads(line)
+        for name in TIMES:
+            del record[name]
+        if jobs:
+            assert record["contended"] is True  # this is about times: they are not comparable
+            record["contended"] = False
+        if record["status"] != "interrupted":
+            key = (record["test"], record["repetition"])
+            assert key not in lines, f"{key} was run twice"
+            lines[key] = json.dumps(record)
+    return [lines[key] for key in sorted(lines)]
+
+
+@pytest.fixture(scope="module")
+def straight(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[list[str]]:
+    """The records of one straight run."""
+    folder = tmp_path_factory.mktemp("straight")
+    (folder / "test_it.py").write_text(dedent(TEST))
+    command = [sys.executable, "-m", "pytest", "--sim=mujoco", "--reps=4", "--sim-output=out"]
+    environment = {**os.environ, "PYTHONPATH": str(request.config.rootpath)}
+    subprocess.run(command, cwd=folder, env=environment, check=True, capture_output=True)
+    found = kept(folder / "out")
+    assert len(found) == 8
+    assert all('"bodies": [[' in line for line in found)
+    yield found
+    shutil.rmtree(folder)
+
+
+@pytest.fixture
+def folder(pytester: pytest.Pytester) -> Path:
+    (pytester.path / "test_it.py").write_text(dedent(TEST))
+    return pytester.path
+
+
+def run(pytester: pytest.Pytester, *arguments: str) -> pytest.RunResult:
+    return pytester.runpytest_subprocess("--sim=mujoco", *arguments)
+
+
+@pytest.mark.parametrize("arguments", [["-n2"], ["--sim-jobs=2"]], ids=["xdist", "jobs"])
+def test_side_by_side(
+    pytester: pytest.Pytester, folder: Path, straight: list[str], arguments: list[str]
+) -> None:
+    run(pytester, "--reps=4", "--sim-output=out", *arguments).assert_outcomes(passed=2)
+    assert kept(folder / "out", jobs="--sim-jobs=2" in arguments) == straight
+
+
+@pytest.mark.parametrize("arguments", [[], ["-n2"]], ids=["plain", "xdist"])
+def test_interrupted_and_resumed(
+    pytester: pytest.Pytester,
+    folder: Path,
+    straight: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+) -> None:
+    monkeypatch.setenv("STOP_AT", "2024")
+    stopped = run(pytester, "--reps=4", "--sim-output=out")
+    assert stopped.ret == pytest.ExitCode.INTERRUPTED
+    assert kept(folder / "out") == straight[:2]
+    monkeypatch.delenv("STOP_AT")
+    result = run(pytester, "--reps=4", "--sim-resume=out", *arguments)
+    result.assert_outcomes(passed=2)
+    assert kept(folder / "out") == straight
+    assert "2 interrupted" not in result.stdout.str()
+    result.stdout.fnmatch_lines(["falling: 4 repetitions*"])
+
+
+def test_sharded_and_merged_then_judged_without_running(
+    pytester: pytest.Pytester, folder: Path, straight: list[str]
+) -> None:
+    run(pytester, "--reps=3", "--sim-output=a").assert_outcomes(passed=2)
+    run(pytester, "--reps=1", "--sim-seed=2025", "--sim-output=b").assert_outcomes(passed=2)
+    merged = run(pytester, "--sim-merge", "b", "a", "--sim-output=whole")
+    assert merged.ret == pytest.ExitCode.OK
+    merged.stdout.fnmatch_lines(["falling: 4 repetitions*"])
+    assert kept(folder / "whole") == straight
+    logs = sorted(path.name for path in (folder / "whole" / "logs").iterdir())
+    assert logs == [f"test_{t}_mujoco-headless-{k}.log" for t in ("one", "two") for k in "1234"]
+    run(pytester, "--reps=4", "--sim-resume=whole").assert_outcomes(passed=2)
+    assert kept(folder / "whole") == straight
+
+
+def test_resuming_is_refused_with_the_difference(pytester: pytest.Pytester, folder: Path) -> None:
+    run(pytester, "--reps=1", "--sim-output=out", "-k", "one").assert_outcomes(passed=1)
+    text = (folder / "out" / "records.jsonl").read_text()
+    for arguments, difference in (
+        (["--sim-set=mujoco.timestep=0.002"], "settings.timestep was 0.001, is 0.002"),
+        (["--jitter=0.5"], "jitter was 1.0, is 0.5"),
+        (["--sim-seed=3000"], "--sim-seed was 2022, is 3000"),
+    ):
+        result = run(pytester, "--reps=2", "--sim-resume=out", "-k", "one", *arguments)
+        result.assert_outcomes(failed=1)
+        result.stdout.fnmatch_lines([f"test_one*would not be comparable: {difference}"])
+        assert "Traceback" not in result.stdout.str()
+    # Another test of the same simulator may have other settings, but not another version.
+    path = folder / "out" / "records.jsonl"
+    path.write_text(text.replace('"mujoco": "', '"mujoco": "0.'))
+    result = run(pytester, "--reps=1", "--sim-resume=out")
+    result.assert_outcomes(passed=1, failed=1)
+    result.stdout.fnmatch_lines(['test_two*would not be comparable: versions.mujoco was "0.*'])
+    assert len(path.read_text().splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--sim-resume"], "there is no run to resume in *.simbench; write --sim-resume=RUN *"),
+        (["--sim-resume=none"], "there is no run to resume in *none (it has no records.jsonl); *"),
+        (["--sim-resume=a", "--sim-output=b"], "--sim-resume a and --sim-output b: *"),
+        (["--sim-resume=bad"], "--sim-resume: *bad/records.jsonl:1: not JSON*"),
+        (["--sim-merge", "none"], "--sim-merge none: cannot read records from *"),
+        (["--sim-merge", "a", "a"], "--sim-merge a: the run is given twice"),
+        (["--sim-merge", "a", "b"], "--sim-merge: a and b overlap: both have seed 2022 of *"),
+        (["--sim-merge", "a", "--sim-output=b"], "--sim-merge: *b already holds a run; *"),
+        (["--sim-merge", "empty"], "--sim-merge: none of the runs holds a repetition that ended"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_bad_input_is_one_sentence(
+    pytester: pytest.Pytester, request: pytest.FixtureRequest, arguments: list[str], message: str
+) -> None:
+    real = Path(request.config.rootpath, "tests/measure/stacking_records.jsonl")
+    first = real.read_text().splitlines()[0] + "\n"
+    for name, text in (("a", first), ("b", first), ("bad", "no record\n"), ("empty", "")):
+        pytester.mkdir(name).joinpath("records.jsonl").write_text(text)
+    result = run(pytester, *arguments)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines([f"ERROR: {message}"])
+    assert "Traceback" not in result.stderr.str() + result.stdout.str()
