@@ -84,6 +84,7 @@ class World:
             )
         self.excused: list[str] = answer["excused"]
         self._take(answer)
+        self._enter("task")  # between the phases that the task names
 
     def _take(self, answer: Mapping[str, Any]) -> None:
         self.time = float(answer["time"])

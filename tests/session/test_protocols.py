@@ -24,6 +24,14 @@ def test_paper_runs_in_real_time_and_records_before(case: Case) -> None:
     assert record.stepping["wall"] < 0.5  # waiting for the clock is not the simulator's time
 
 
+def test_phases_follow_each_other(case: Case) -> None:
+    phases: list[str] = []
+    Repetition(case, Falling(), 1, on_phase=phases.append).run()
+    assert [name for k, name in enumerate(phases) if phases[k - 1 : k] != [name]] == [
+        *("launch", "load", "launch", "task", "fall", "task"),
+    ]
+
+
 def test_fast_does_not_wait(case: Case) -> None:
     record, _ = Repetition(case, Falling(duration=100.0), 1).run()
     assert record.timeline["end"] - record.timeline["start"] < 50.0
