@@ -29,24 +29,17 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Mapping
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pytest_simbench.sims.drake_shapes import (
-    corner_centres,
-    fitting_radius,
-    pad_centres,
-    stl_points,
-)
+from pytest_simbench.sims.drake_parity import ReadBack
+from pytest_simbench.sims.drake_world import DrakeSettings, World, transform
 
-from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene
+from pytest_simbench.scene import FloatArray, Robot, Scene
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
-    PreparedRobot,
     Settings,
     Simulator,
     SimulatorInfo,
@@ -54,53 +47,10 @@ from pytest_simbench.simulator import (
 )
 
 analysis = lazy_import("pydrake.systems.analysis")
-eigen = lazy_import("pydrake.common.eigen_geometry")
 framework = lazy_import("pydrake.systems.framework")
 geometry = lazy_import("pydrake.geometry")
 math = lazy_import("pydrake.math")
-plants = lazy_import("pydrake.multibody.plant")
 sensors = lazy_import("pydrake.systems.sensors")
-trees = lazy_import("pydrake.multibody.tree")
-
-GREY = (0.5, 0.5, 0.5, 1.0)
-LIGHT = (0.85, 0.85, 0.85, 1.0)
-
-
-@dataclass(frozen=True)
-class DrakeSettings(Settings):
-    """Drake's options; defaults are those of its MultibodyPlantConfig and SceneGraphConfig.
-
-    Attributes:
-        timestep: of the discrete update [s].
-        contact_model: points, or hydroelastic surfaces where both shapes have a compliance.
-        approximation: of the discrete contact problem, each solved by SAP.
-        near_rigid_threshold: SAP softens contacts stiffer than this allows, for conditioning.
-        stiction_tolerance: slip below which `lagged` and `similar` regularise friction [m/s].
-        compliance: of every surface; `undefined` leaves the pair to point contact.
-        hydroelastic_modulus: [Pa].
-        point_stiffness: of a contact point [N/m].
-        hunt_crossley_dissipation: of `lagged` and `similar` [s/m].
-        relaxation_time: of `sap`'s linear dissipation [s].
-        corner_radius: of the spheres in the corners of free boxes [m]; 0: none, plain boxes.
-        pad_radius: of the spheres behind the fingers' gripping faces [m]; 0: none.
-        shrink: what a free box with corner spheres loses on each face [m].
-    """
-
-    timestep: float = 0.001
-    contact_model: Literal["point", "hydroelastic", "hydroelastic_with_fallback"] = (
-        "hydroelastic_with_fallback"
-    )
-    approximation: Literal["sap", "similar", "lagged"] = "lagged"
-    near_rigid_threshold: float = 1.0
-    stiction_tolerance: float = 1e-4
-    compliance: Literal["undefined", "rigid", "compliant"] = "undefined"
-    hydroelastic_modulus: float = 1e7
-    point_stiffness: float = 1e6
-    hunt_crossley_dissipation: float = 50.0
-    relaxation_time: float = 0.1
-    corner_radius: float = 0.0
-    pad_radius: float = 0.0
-    shrink: float = 0.0
 
 
 class Drake(Simulator):
@@ -157,36 +107,19 @@ class Drake(Simulator):
 
     def load(self, scene: Scene) -> None:
         self.close()
-        self.scene = scene
-        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         builder = framework.DiagramBuilder()
-        self.plant, self.scene_graph = plants.AddMultibodyPlant(self._options(), builder)
-        self.scene_graph.set_config(self._surfaces())
-        self.plant.mutable_gravity_field().set_gravity_vector(scene.gravity)
-        self._spheres: list[Any] = []
-        self._shapes: dict[str, list[Any]] = {}
-        world = self.plant.world_body()
-        self._add_shape(
-            world, "ground", "plane", geometry.HalfSpace(), Pose(), scene.ground_friction
-        )
-        slab = geometry.Box(10.0, 10.0, 0.02)
-        self._add_picture(world, "ground", slab, Pose((0.0, 0.0, -0.01)), GREY)
-        self._bodies = {box.name: self._add_box(box) for box in scene.bodies}
-        if self.prepared is not None:
-            self._add_robot(self.prepared)
-        self.plant.Finalize()
-        self._filter_collisions()
+        self.world = World(scene, self.settings, builder)
+        self.plant, self.scene_graph = self.world.plant, self.world.scene_graph
         self._meshcat = self._open_window(builder) if self.gui else None
-        diagram = builder.Build()
-        self.simulator = analysis.Simulator(diagram)
+        self.simulator = analysis.Simulator(builder.Build())
         self.root = self.simulator.get_mutable_context()
         self.context = self.plant.GetMyMutableContextFromRoot(self.root)
-        free = [self._bodies[box.name] for box in scene.free_bodies]
+        free = [self.world.bodies[box.name] for box in scene.free_bodies]
         for box, body in zip(scene.free_bodies, free, strict=True):
-            self.plant.SetFreeBodyPose(self.context, body, _transform(box.pose))
+            self.plant.SetFreeBodyPose(self.context, body, transform(box.pose))
         self._joints_at = np.empty((2, 0), dtype=int)
-        if self.prepared is not None:
-            self._start_drives(self.prepared.robot)
+        if scene.robot is not None:
+            self._start_drives(scene.robot)
         nq = self.plant.num_positions()
         q = np.array([body.floating_positions_start() for body in free], int).reshape(-1, 1)
         v = np.array([body.floating_velocities_start_in_v() for body in free], int).reshape(-1, 1)
@@ -198,118 +131,8 @@ class Drake(Simulator):
         self._has_camera = False
         self.simulator.Initialize()
 
-    def _options(self) -> Any:
-        s = self.settings
-        return plants.MultibodyPlantConfig(
-            time_step=s.timestep,
-            use_sampled_output_ports=False,  # they would add state, and only cost time here
-            contact_model=s.contact_model,
-            discrete_contact_approximation=s.approximation,
-            sap_near_rigid_threshold=s.near_rigid_threshold,
-            stiction_tolerance=s.stiction_tolerance,
-        )
-
-    def _surfaces(self) -> Any:
-        s, config = self.settings, geometry.SceneGraphConfig()
-        surface = config.default_proximity_properties
-        surface.compliance_type = s.compliance
-        surface.hydroelastic_modulus = s.hydroelastic_modulus
-        surface.point_stiffness = s.point_stiffness
-        surface.hunt_crossley_dissipation = s.hunt_crossley_dissipation
-        surface.relaxation_time = s.relaxation_time
-        return config
-
-    def _add_shape(
-        self, body: Any, owner: str, part: str, shape: Any, pose: Pose, friction: float
-    ) -> Any:
-        """A collision shape. Of two surfaces' friction Drake takes the harmonic mean."""
-        surface = geometry.ProximityProperties()
-        geometry.AddContactMaterial(
-            properties=surface, friction=plants.CoulombFriction(friction, friction)
-        )
-        made = self.plant.RegisterCollisionGeometry(
-            body, _transform(pose), shape, f"{owner}/{part}", surface
-        )
-        self._shapes.setdefault(owner, []).append(made)
-        return made
-
-    def _add_picture(self, body: Any, name: str, shape: Any, pose: Pose, colour: Any) -> None:
-        self.plant.RegisterVisualGeometry(body, _transform(pose), shape, name, np.array(colour))
-
-    def _add_spheres(
-        self, body: Any, name: str, centres: FloatArray, radius: float, friction: float
-    ) -> None:
-        for k, (x, y, z) in enumerate(centres):
-            pose = Pose((float(x), float(y), float(z)))
-            sphere = geometry.Sphere(radius)
-            made = self._add_shape(body, name, f"sphere{k}", sphere, pose, friction)
-            self._spheres.append(made)
-
-    def _add_box(self, box: Box) -> Any:
-        s = self.settings
-        if box.fixed:
-            body, pose, gone = self.plant.world_body(), box.pose, 0.0
-        else:
-            inertia = trees.SpatialInertia.SolidBoxWithMass(box.mass, *box.size)
-            body, pose = self.plant.AddRigidBody(box.name, inertia), Pose()
-            gone = s.shrink if s.corner_radius else 0.0
-            if s.corner_radius:
-                radius = fitting_radius(box.size, s.corner_radius)
-                centres = corner_centres(box.size, radius)
-                self._add_spheres(body, box.name, centres, radius, box.friction)
-        core = geometry.Box(*(np.asarray(box.size) - 2 * gone))
-        self._add_shape(body, box.name, "box", core, pose, box.friction)
-        self._add_picture(body, box.name, geometry.Box(*box.size), pose, box.colour)
-        return body
-
-    def _add_robot(self, prepared: PreparedRobot) -> None:
-        plant, robot, s = self.plant, prepared.robot, self.settings
-        self._model = plant.AddModelInstance(robot.name)
-        self._links = {}
-        for link in prepared.links.values():
-            body = plant.AddRigidBody(link.name, self._model, _inertia(link))
-            self._links[link.name] = body
-            for k, shape in enumerate(link.shapes):
-                made = _robot_shape(shape, f"{link.name}_{k}")
-                self._add_shape(body, link.name, str(k), made, shape.pose, robot.friction)
-                self._add_picture(body, f"{link.name}/{k}", made, shape.pose, LIGHT)
-        plant.WeldFrames(plant.world_frame(), self._links[prepared.root].body_frame())
-        self._joints = {}
-        for joint in prepared.joints:
-            kind = trees.RevoluteJoint if joint.kind == "revolute" else trees.PrismaticJoint
-            parent, child = self._links[joint.parent], self._links[joint.child]
-            offset = trees.FixedOffsetFrame(
-                f"{joint.name}/origin", parent.body_frame(), _transform(joint.origin)
-            )
-            ends = plant.AddFrame(offset), child.body_frame()
-            limits = prepared.limits[joint.name]
-            made = plant.AddJoint(kind(joint.name, *ends, joint.axis, *limits))
-            self._joints[joint.name] = made
-            if s.pad_radius and joint.name in robot.gripper.joints:
-                centres = pad_centres(prepared, joint, s.pad_radius)
-                self._add_spheres(child, joint.child, centres, s.pad_radius, robot.friction)
-        self._drives = {}
-        for drive in robot.joints:
-            made = plant.AddJointActuator(drive.name, self._joints[drive.name], drive.effort_limit)
-            made.set_default_rotor_inertia(drive.armature)
-            made.set_controller_gains(trees.PdControllerGains(p=drive.stiffness, d=drive.damping))
-            self._drives[drive.name] = made
-        first, second = (self._joints[name] for name in robot.gripper.joints)
-        self._coupling = plant.AddCouplerConstraint(first, second, 1.0)
-
-    def _filter_collisions(self) -> None:
-        manager = self.scene_graph.collision_filter_manager()
-        apart = []
-        if self.prepared is not None:
-            frames = [self.plant.GetBodyFrameIdOrThrow(b.index()) for b in self._links.values()]
-            apart.append(geometry.GeometrySet(frames))
-        if self._spheres:  # they carry flat faces; one on top of another would roll off
-            apart.append(geometry.GeometrySet(self._spheres))
-        for group in apart:
-            manager.Apply(geometry.CollisionFilterDeclaration().ExcludeWithin(group))
-
     def _start_drives(self, robot: Robot) -> None:
-        joints = [self._joints[name] for name in robot.joint_names]
+        joints = [self.world.joints[name] for name in robot.joint_names]
         initial, rest = robot.column("initial_position"), np.zeros(len(joints))
         nq = self.plant.num_positions()
         self._joints_at = np.array(
@@ -318,81 +141,14 @@ class Drake(Simulator):
         state = self.plant.GetPositionsAndVelocities(self.context).copy()
         state[self._joints_at[0]] = initial
         self.plant.SetPositionsAndVelocities(self.context, state)
-        targets = self.plant.get_desired_state_input_port(self._model)
-        efforts = self.plant.get_actuation_input_port(self._model)
+        targets = self.plant.get_desired_state_input_port(self.world.model)
+        efforts = self.plant.get_actuation_input_port(self.world.model)
         self._targets = targets.FixValue(self.context, np.concatenate([initial, rest]))
         self._efforts = efforts.FixValue(self.context, rest)
         self._commanded = (initial, rest, rest)
 
     def read_back(self) -> dict[str, Any]:
-        context, inspector = self.context, self._query().inspector()
-        ground = self._shapes["ground"][0]
-        reported: dict[str, Any] = {
-            "gravity": self.plant.gravity_field().gravity_vector(),
-            "timestep": self.plant.time_step(),
-            "ground/height": inspector.GetPoseInFrame(ground).translation()[2],
-            "ground/friction": self._friction("ground"),
-        }
-        for name, body in self._bodies.items():
-            pose, size = self._place(name, body)
-            reported[f"body/{name}/size"] = size
-            reported[f"body/{name}/pose"] = pose
-            reported[f"body/{name}/friction"] = self._friction(name)
-            if body.is_floating_base_body():
-                inertia = body.CalcSpatialInertiaInBodyFrame(context)
-                reported[f"body/{name}/mass"] = inertia.get_mass()
-                moments = inertia.CalcRotationalInertia().get_moments()
-                reported[f"body/{name}/inertia"] = moments
-        if self.prepared is not None:
-            self._read_back_robot(self.prepared, reported)
-        return reported
-
-    def _place(self, name: str, body: Any) -> tuple[FloatArray, FloatArray]:
-        """Pose (7,) of a box, and its extents along its axes (3,), spheres included [m]."""
-        inspector = self._query().inspector()
-        low, high = np.full(3, np.inf), np.full(3, -np.inf)
-        pose = self.plant.EvalBodyPoseInWorld(self.context, body)
-        for made in self._shapes[name]:
-            shape, place = inspector.GetShape(made), inspector.GetPoseInFrame(made)
-            if body.index() == self.plant.world_body().index():
-                pose, place = pose @ place, math.RigidTransform()
-            sphere = isinstance(shape, geometry.Sphere)
-            half = np.full(3, shape.radius()) if sphere else shape.size() / 2
-            low = np.minimum(low, place.translation() - half)
-            high = np.maximum(high, place.translation() + half)
-        turn = pose.rotation().ToQuaternion().wxyz()
-        return np.concatenate([pose.translation(), turn]), high - low
-
-    def _friction(self, name: str) -> Any:
-        """The one friction coefficient of all shapes of a body; all of them if they differ."""
-        inspector = self._query().inspector()
-        values = set()
-        for made in self._shapes[name]:
-            surface = inspector.GetProximityProperties(made)
-            friction = surface.GetProperty("material", "coulomb_friction")
-            values |= {friction.static_friction(), friction.dynamic_friction()}
-        return values.pop() if len(values) == 1 else sorted(values)
-
-    def _read_back_robot(self, prepared: PreparedRobot, reported: dict[str, Any]) -> None:
-        context = self.context
-        coupled = self.plant.GetConstraintActiveStatus(context, self._coupling)
-        reported["gripper/coupled"] = float(coupled)
-        for name in prepared.robot.joint_names:
-            joint, drive = self._joints[name], self._drives[name]
-            limits = [joint.position_lower_limits()[0], joint.position_upper_limits()[0]]
-            reported[f"joint/{name}/limits"] = limits
-            reported[f"joint/{name}/effort_limit"] = drive.effort_limit()
-            reported[f"joint/{name}/stiffness"] = drive.get_controller_gains().p
-            reported[f"joint/{name}/damping"] = drive.get_controller_gains().d
-            reported[f"joint/{name}/armature"] = drive.calc_reflected_inertia(context)
-            reported[f"joint/{name}/initial_position"] = joint.GetOnePosition(context)
-        for link in prepared.moving_links:
-            inertia = self._links[link.name].CalcSpatialInertiaInBodyFrame(context)
-            central = inertia.Shift(inertia.get_com()).CalcRotationalInertia()
-            reported[f"link/{link.name}/mass"] = inertia.get_mass()
-            reported[f"link/{link.name}/inertia"] = np.sort(central.CalcPrincipalMomentsOfInertia())
-            if link.shapes:
-                reported[f"link/{link.name}/friction"] = self._friction(link.name)
+        return ReadBack(self.world, self.context).all()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self._commanded = (position, velocity, effort)
@@ -481,28 +237,6 @@ class Drake(Simulator):
 
 EYE, LOOK_AT = (2.0, -1.4, 1.3), (0.5, 0.0, 0.35)
 """Of the camera, in the world [m]."""
-
-
-def _transform(pose: Pose) -> Any:
-    q = np.asarray(pose.quaternion)
-    return math.RigidTransform(eigen.Quaternion(q / np.linalg.norm(q)), pose.position)
-
-
-def _inertia(link: Any) -> Any:
-    if link.mass == 0:
-        return trees.SpatialInertia.Zero()
-    i = link.inertia
-    central = trees.RotationalInertia(i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2])
-    return trees.SpatialInertia.MakeFromCentralInertia(link.mass, link.centre, central)
-
-
-def _robot_shape(shape: Any, label: str) -> Any:
-    """A box, or the convex hull of a mesh; Drake reads no STL files."""
-    if shape.size is not None:
-        return geometry.Box(*shape.size)
-    if Path(shape.mesh).suffix.lower() == ".stl":
-        return geometry.Convex(points=stl_points(shape.mesh).T, label=label)
-    return geometry.Convex(shape.mesh)
 
 
 def _camera() -> Any:

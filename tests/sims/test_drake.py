@@ -37,7 +37,7 @@ def inertia(s: Drake) -> None:
     from pydrake.multibody.tree import SpatialInertia
 
     brick = SpatialInertia.SolidBoxWithMass(0.1, 0.06, 0.05, 0.05)
-    s._bodies["cube_05"].SetSpatialInertiaInBodyFrame(s.context, brick)
+    s.world.bodies["cube_05"].SetSpatialInertiaInBodyFrame(s.context, brick)
 
 
 def gravity(s: Drake) -> None:
@@ -48,13 +48,13 @@ def gains(p: float, d: float) -> Callable[[Drake], None]:
     def plant(s: Drake) -> None:
         from pydrake.multibody.tree import PdControllerGains
 
-        s._drives["panda_joint4"].set_controller_gains(PdControllerGains(p=p, d=d))
+        s.world.drives["panda_joint4"].set_controller_gains(PdControllerGains(p=p, d=d))
 
     return plant
 
 
 def coupling(s: Drake) -> None:
-    s.plant.SetConstraintActiveStatus(s.context, s._coupling, False)
+    s.plant.SetConstraintActiveStatus(s.context, s.world.coupling, False)
 
 
 def slippery(owner: str) -> Callable[[Drake], None]:
@@ -69,7 +69,7 @@ def slippery(owner: str) -> Callable[[Drake], None]:
         s.scene_graph.AssignRole(
             context=shapes_context(s),
             source_id=s.plant.get_source_id(),
-            geometry_id=s._shapes[owner][-1],
+            geometry_id=s.world.shapes[owner][-1],
             properties=surface,
             assign=RoleAssign.kReplace,
         )
@@ -84,7 +84,7 @@ def reshaped(owner: str, index: int, shape: Callable[[Any], Any]) -> Callable[[D
         s.scene_graph.ChangeShape(
             context=shapes_context(s),
             source_id=s.plant.get_source_id(),
-            geometry_id=s._shapes[owner][index],
+            geometry_id=s.world.shapes[owner][index],
             shape=shape(geometry),
         )
 
@@ -95,13 +95,13 @@ def turned(s: Drake) -> None:
     from pydrake.math import RigidTransform, RollPitchYaw
 
     pose = RigidTransform(RollPitchYaw(0, 0, 0.1), SCENE.body("cube_05").pose.position)
-    s.plant.SetFreeBodyPose(s.context, s._bodies["cube_05"], pose)
+    s.plant.SetFreeBodyPose(s.context, s.world.bodies["cube_05"], pose)
 
 
 FAULTS: dict[str, Callable[[Drake], None]] = {
     "gravity": gravity,
     "ground/friction": slippery("ground"),
-    "body/cube_05/mass": lambda s: s._bodies["cube_05"].SetMass(s.context, 1.0),
+    "body/cube_05/mass": lambda s: s.world.bodies["cube_05"].SetMass(s.context, 1.0),
     "body/cube_05/inertia": inertia,
     "body/cube_05/friction": slippery("cube_05"),
     "body/cube_05/pose": turned,
@@ -109,15 +109,19 @@ FAULTS: dict[str, Callable[[Drake], None]] = {
     "body/table/size": reshaped("table", 0, lambda g: g.Box(0.914, 0.914, 0.276)),
     "joint/panda_joint4/stiffness": gains(3000.0, 350.0),
     "joint/panda_joint4/damping": gains(3500.0, 300.0),
-    "joint/panda_joint4/effort_limit": lambda s: s._drives["panda_joint4"].set_effort_limit(174.0),
-    "joint/panda_joint4/armature": lambda s: s._drives["panda_joint4"].SetRotorInertia(
+    "joint/panda_joint4/effort_limit": lambda s: s.world.drives["panda_joint4"].set_effort_limit(
+        174.0
+    ),
+    "joint/panda_joint4/armature": lambda s: s.world.drives["panda_joint4"].SetRotorInertia(
         s.context, 0.0
     ),
-    "joint/panda_joint4/limits": lambda s: s._joints["panda_joint4"].set_position_limits([-1], [0]),
-    "joint/panda_joint4/initial_position": lambda s: s._joints["panda_joint4"].set_angle(
+    "joint/panda_joint4/limits": lambda s: s.world.joints["panda_joint4"].set_position_limits(
+        [-1], [0]
+    ),
+    "joint/panda_joint4/initial_position": lambda s: s.world.joints["panda_joint4"].set_angle(
         s.context, -2.0
     ),
-    "link/panda_link4/mass": lambda s: s._links["panda_link4"].SetMass(s.context, 5.0),
+    "link/panda_link4/mass": lambda s: s.world.links["panda_link4"].SetMass(s.context, 5.0),
     "link/panda_leftfinger/friction": slippery("panda_leftfinger"),
     "gripper/coupled": coupling,
 }
@@ -141,8 +145,8 @@ def test_a_wrong_step_is_caught(loaded: Drake) -> None:
 def test_only_tuned_adds_spheres(profile: str, spheres: int) -> None:
     simulator = Drake(Drake.profiles[profile])
     simulator.load(SCENE)
-    assert len(simulator._shapes["cube_05"]) == 1 + spheres
-    assert len(simulator._shapes["table"]) == 1
+    assert len(simulator.world.shapes["cube_05"]) == 1 + spheres
+    assert len(simulator.world.shapes["table"]) == 1
     simulator.close()
 
 

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numpy.typing import NDArray
 from pytest_simbench.sims.drake_shapes import (
     corner_centres,
     fitting_radius,
@@ -57,12 +59,12 @@ def test_pads_lie_on_the_gripping_faces_of_both_fingers() -> None:
     assert np.ptp(left[:, 2]) > 0.01
 
 
-triangles = st.lists(
-    st.lists(st.floats(-10, 10, width=32), min_size=9, max_size=9), min_size=1, max_size=20
+triangles = arrays(
+    np.float32, st.tuples(st.integers(1, 20), st.just(9)), elements=st.floats(-10, 10, width=32)
 )
 
 
-def written(path: Path, corners: list[list[float]]) -> bytes:
+def written(path: Path, corners: NDArray[np.float32]) -> bytes:
     records = [struct.pack("<12fH", 0, 0, 1, *values, 0) for values in corners]
     data = bytes(80) + struct.pack("<I", len(corners)) + b"".join(records)
     path.write_bytes(data)
@@ -71,18 +73,18 @@ def written(path: Path, corners: list[list[float]]) -> bytes:
 
 @given(triangles)
 def test_stl_gives_the_corners_that_were_written(
-    tmp_path_factory: pytest.TempPathFactory, corners: list[list[float]]
+    tmp_path_factory: pytest.TempPathFactory, corners: NDArray[np.float32]
 ) -> None:
     path = tmp_path_factory.mktemp("stl") / "part.stl"
     written(path, corners)
-    expected = np.unique(np.array(corners).reshape(-1, 3), axis=0)
+    expected = np.unique(corners.reshape(-1, 3).astype(float), axis=0)
     np.testing.assert_array_equal(stl_points(str(path)), expected)
 
 
 @pytest.mark.parametrize("damage", ["cut", "longer", "text", "empty"])
 def test_damaged_stl_is_refused_by_name(tmp_path: Path, damage: str) -> None:
     path = tmp_path / "part.stl"
-    data = written(path, [[float(k) for k in range(9)]])
+    data = written(path, np.arange(9, dtype=np.float32)[None])
     damaged = {
         "cut": data[:-1],
         "longer": data + b"x",
