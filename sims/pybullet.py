@@ -69,6 +69,7 @@ class PyBulletSettings(Settings):
         spinning_friction: torsional friction coefficient of the cubes [m].
         friction_anchor: tie contacts of the robot to where they first touched, by friction_erp.
         sleeping: whether bodies at rest are frozen.
+        ordered_pairs: sort the overlapping pairs before each step.
     """
 
     timestep: float = 1.0 / 240.0
@@ -84,6 +85,12 @@ class PyBulletSettings(Settings):
     spinning_friction: float = 0.0
     friction_anchor: bool = False
     sleeping: bool = False
+    ordered_pairs: bool = False
+
+
+def _single(number: float) -> float:
+    """Rounded to single precision, as Bullet's own default damping of 0.04 is."""
+    return float(np.float32(number))
 
 
 class PyBullet(Simulator):
@@ -120,6 +127,7 @@ class PyBullet(Simulator):
     profiles: ClassVar[Mapping[str, Settings]] = {
         "default": PyBulletSettings(),
         "tuned": PyBulletSettings(
+            ordered_pairs=True,
             position_gain=0.3,
             linear_damping=0.0,
             angular_damping=0.0,
@@ -152,7 +160,7 @@ class PyBullet(Simulator):
             contactERP=s.contact_erp,
             frictionERP=s.friction_erp,
             enableConeFriction=int(s.cone_friction),
-            deterministicOverlappingPairs=1,
+            deterministicOverlappingPairs=int(s.ordered_pairs),
             physicsClientId=c,
         )
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=c)
@@ -201,8 +209,8 @@ class PyBullet(Simulator):
             pybullet.changeDynamics(
                 body,
                 -1,
-                linearDamping=s.linear_damping,
-                angularDamping=s.angular_damping,
+                linearDamping=_single(s.linear_damping),
+                angularDamping=_single(s.angular_damping),
                 activationState=(
                     pybullet.ACTIVATION_STATE_ENABLE_SLEEPING
                     if s.sleeping

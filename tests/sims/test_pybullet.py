@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from pytest_simbench.sims.pybullet import PyBullet
 
+from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.simulator import ParityError
 from pytest_simbench.simulator.parity import check, expected_quantities
 from pytest_simbench.tasks import Jitter, Throwing
@@ -82,3 +83,51 @@ def test_fault_is_caught(loaded: PyBullet, quantity: str) -> None:
     FAULTS[quantity](loaded)
     with pytest.raises(ParityError, match=f"{quantity}: scene .*, pybullet "):
         check(expected, loaded.read_back(), info.deviations, info.name)
+
+
+def test_default_is_what_the_engine_does_by_itself() -> None:
+    """Tumbling boxes end bit for bit where an engine leaves them whose parameters nobody set."""
+    import pybullet
+
+    boxes = [
+        Box(
+            f"box{k}",
+            (0.05, 0.06, 0.07),
+            Pose((0.02 * k, 0.0, 0.2 + 0.1 * k), Pose.at(0, 0, 0, yaw=0.5 + k).quaternion),
+            0.1,
+        )
+        for k in range(3)
+    ]
+    scene = Scene("tumbling", tuple(boxes))
+    simulator = PyBullet(PyBullet.profiles["default"])
+    simulator.load(scene)
+    for _ in range(480):
+        simulator.step()
+    ours = simulator.body_state()
+    simulator.close()
+
+    client = pybullet.connect(pybullet.DIRECT)
+    pybullet.setGravity(*scene.gravity, physicsClientId=client)
+    plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
+    bodies = [pybullet.createMultiBody(0, plane, physicsClientId=client)]
+    for box in boxes:
+        half = [edge / 2 for edge in box.size]
+        shape = pybullet.createCollisionShape(
+            pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client
+        )
+        w, x, y, z = box.pose.quaternion
+        bodies.append(
+            pybullet.createMultiBody(
+                box.mass, shape, -1, box.pose.position, [x, y, z, w], physicsClientId=client
+            )
+        )
+    for body in bodies:  # the scene's friction; nothing else
+        pybullet.changeDynamics(body, -1, lateralFriction=1.0, physicsClientId=client)
+    for _ in range(480):
+        pybullet.stepSimulation(physicsClientId=client)
+    alone = [
+        pybullet.getBasePositionAndOrientation(body, physicsClientId=client)[0]
+        for body in bodies[1:]
+    ]
+    pybullet.disconnect(client)
+    assert np.array_equal(ours[:, :3], np.array(alone))
