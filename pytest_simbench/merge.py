@@ -80,13 +80,15 @@ def _write(folder: Path, joined: list[Joined], folders: dict[str, Path]) -> list
 
 def _report(folder: Path, records: list[Record]) -> str:
     from pytest_simbench.report.files import write_report
+    from pytest_simbench.report.matrix import with_wins
     from pytest_simbench.report.summary import summarise
     from pytest_simbench.report.tables import render_run
     from pytest_simbench.tasks import Stacking, Throwing
 
     tasks = (Stacking(), Throwing())
     metrics = {task.name: task.metrics for task in tasks}
-    summaries = summarise(records, metrics, {task.name: task.references for task in tasks})
+    references = {task.name: task.references for task in tasks}
+    summaries = with_wins(summarise(records, metrics, references), records)
     with suppress(OSError):
         write_report(folder, summaries, records)
     return render_run(summaries, shutil.get_terminal_size().columns, folder)

@@ -184,11 +184,12 @@ class Run:
         from pytest_simbench.report import markdown
         from pytest_simbench.report.files import write_report
         from pytest_simbench.report.github import append_summary
+        from pytest_simbench.report.matrix import with_wins
         from pytest_simbench.report.summary import summarise
         from pytest_simbench.report.tables import render_run
 
         records = sorted(self.records.values(), key=lambda r: (r.test, r.repetition))
-        summaries = summarise(records, self._metrics, self._references)
+        summaries = with_wins(summarise(records, self._metrics, self._references), records)
         reporter.write_sep("=", "simulator comparison")
         reporter.write_line(render_run(summaries, reporter._tw.fullwidth, self.folder))
         problems = list(self._problems)

@@ -25,6 +25,9 @@ ALPHA = 1 - CONFIDENCE
 PERMUTATIONS = 9999
 """Random permutations where not all are tried; p is then exact to about 0.002 at 0.05."""
 
+COMMON_SEEDS = 0.9
+"""Pair by seed when at least this share of the smaller side's seeds is on both sides."""
+
 Alternative = Literal["two-sided", "less", "greater"]
 FloatArray = NDArray[np.float64]
 Method = Literal["permutation", "wilcoxon", "brunner-munzel"]
@@ -64,6 +67,20 @@ def pair(first: Mapping[int, float], second: Mapping[int, float]) -> tuple[Float
         np.array([first[seed] for seed in seeds], dtype=float),
         np.array([second[seed] for seed in seeds], dtype=float),
     )
+
+
+def compare_by_seed(
+    first: Mapping[int, float], second: Mapping[int, float], alternative: Alternative = "two-sided"
+) -> Comparison:
+    """Test whether `second` differs from `first`, paired where nearly all seeds are on both sides.
+
+    Raises:
+        ValueError: an empty side.
+    """
+    shared = len(first.keys() & second.keys())
+    paired = shared >= max(2, math.ceil(COMMON_SEEDS * min(len(first), len(second))))
+    sides = pair(first, second) if paired else ([*first.values()], [*second.values()])
+    return compare(*sides, paired=paired, alternative=alternative)
 
 
 def compare(

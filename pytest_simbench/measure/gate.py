@@ -7,10 +7,9 @@ comparisons of the run, so that a run without a true change fails in at most one
 What it needs: a change of d with a spread of s between repetitions is found in 4 of 5 cases by
 about 12 (s / d)^2 repetitions (`power.repetitions_to_detect`), if its limit is well below d. A loss
 of 10 points in *placed* against `placed:5%,ram:10%,rtf:20%` is found by 20 repetitions in 99 of 100
-runs when every cube is lost a little more often (s = 8 points), but only in 14 to 21 when one
-repetition in five loses half its tower cubes (s = 20): that takes about 45, and one in ten that
-loses all of them about 90 (real records, resampled; the first case is tested in
-tests/measure/test_gate.py).
+runs when every cube is lost a little more often (s = 9 points), but only in 25 when one repetition
+in five loses half its cubes (s = 20): that takes about 45, and one in ten that loses all of them
+about 90 (docs/gate.md; real records, resampled; tests/measure/test_gate.py).
 """
 
 from __future__ import annotations
@@ -24,9 +23,8 @@ from pytest_simbench.measure.comparison import (
     PERMUTATIONS,
     Alternative,
     Comparison,
-    compare,
+    compare_by_seed,
     holm,
-    pair,
 )
 from pytest_simbench.measure.differences import differences
 from pytest_simbench.measure.limits import FAILURES, Limit
@@ -34,9 +32,6 @@ from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.measure.record import Record
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.speed import without_speed
-
-COMMON_SEEDS = 0.9
-"""Pair by seed when at least this share of the smaller side's seeds is on both sides."""
 
 
 @dataclass(frozen=True)
@@ -217,12 +212,8 @@ def _change(
         return None
     if metric.better is None or not first or not second:
         return None
-    shared = len(first.keys() & second.keys())
-    paired = shared >= max(2, math.ceil(COMMON_SEEDS * min(len(first), len(second))))
-    sides = pair(first, second) if paired else ([*first.values()], [*second.values()])
     worse: Alternative = "less" if metric.better == "higher" else "greater"
-    tested: Alternative = "two-sided" if both_ways else worse
-    comparison = compare(*sides, paired=paired, alternative=tested)
+    comparison = compare_by_seed(first, second, "two-sided" if both_ways else worse)
     loss = limit.loss(metric, comparison.first, comparison.second)
     return Change(test, metric, limit, comparison, comparison.p_value, loss, normalised)
 

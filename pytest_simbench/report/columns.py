@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pytest_simbench.report import cells
+from pytest_simbench.report.answer import short_labels
 from pytest_simbench.report.grid import Column
 from pytest_simbench.report.summary import PHASES, Row, TaskSummary
 
@@ -15,6 +16,10 @@ LEGEND = (
     "and end of the task: seconds from launch."
 )
 """How to read the tables, in one paragraph."""
+
+
+MATRIX = "the row beats the column at (permutation tests, corrected)"
+"""Title of the matrix."""
 
 
 def study(summary: TaskSummary) -> list[Column]:
@@ -105,11 +110,34 @@ def failures(summary: TaskSummary) -> list[Column]:
     ]
 
 
+def matrix(summary: TaskSummary) -> list[Column]:
+    """Which row beats which column at what; without rows that never won nor lost."""
+    places = sorted({place for win in summary.wins for place in (win.winner, win.loser)})
+    if not places:
+        return []
+    names = short_labels(summary.rows)
+    found: dict[tuple[int, int], list[str]] = {}
+    for win in summary.wins:
+        found.setdefault((win.winner, win.loser), []).append(win.metric.name)
+    columns = [Column("simulator", [[names[place]] for place in places], left=True)]
+    for loser in places:
+        cells_ = [_beaten(found.get((place, loser), []), place == loser) for place in places]
+        columns.append(Column(names[loser], cells_, names[loser], left=True))
+    return columns
+
+
+def _beaten(metrics: list[str], same: bool) -> list[str]:
+    if not metrics:
+        return ["" if same else cells.MISSING]
+    return [f"{name}," for name in metrics[:-1]] + metrics[-1:]
+
+
 def details(summary: TaskSummary) -> list[tuple[str, list[Column]]]:
     """The tables below the study's, each with its title; a table without columns is left out."""
     found = [
         ("failures", failures(summary)),
         ("beyond the study: mean [95 % interval]", stricter(summary)),
+        (MATRIX, matrix(summary)),
         ("where the time went: mean wall seconds and share", time_spent(summary)),
     ]
     return [(name, columns) for name, columns in found if columns]

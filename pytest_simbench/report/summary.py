@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from pytest_simbench.measure.contest import Win
 from pytest_simbench.measure.intervals import interval
 from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.measure.record import Record
@@ -127,6 +128,7 @@ class TaskSummary:
         metrics: what the task declares; those with `study` make its first table.
         references: the value a perfect run would give, by metric name.
         protocol: the protocol of its records; several are joined by commas.
+        wins: which row beats which at what, by the rows' places; from `matrix.with_wins`.
     """
 
     task: str
@@ -134,6 +136,7 @@ class TaskSummary:
     rows: tuple[Row, ...]
     references: Mapping[str, float] = field(default_factory=dict)
     protocol: str = ""
+    wins: tuple[Win, ...] = ()
 
     @property
     def study(self) -> tuple[Metric, ...]:
@@ -174,8 +177,8 @@ def summarise(
     for task, found in by_task.items():
         declared = tuple(metrics.get(task) or _undeclared(found))
         groups: dict[tuple[str, ...], list[Record]] = {}
-        for record in sorted(found, key=lambda r: (_row_key(r), r.repetition)):
-            groups.setdefault(_row_key(record), []).append(record)
+        for record in sorted(found, key=lambda r: (row_key(r), r.repetition)):
+            groups.setdefault(row_key(record), []).append(record)
         same = Counter(key[:4] for key in groups)
         rows = tuple(
             _row(group, declared, key[4] if same[key[:4]] > 1 else "", ends)
@@ -188,7 +191,8 @@ def summarise(
     return summaries
 
 
-def _row_key(record: Record) -> tuple[str, ...]:
+def row_key(record: Record) -> tuple[str, ...]:
+    """What records of one row share; rows are sorted by it."""
     # Headless before gui, as in the study's table; the test's name without its parameters.
     shown = "1" if record.mode == "gui" else "0"
     return (record.simulator, shown + record.mode, record.profile, "", record.test.split("[")[0])

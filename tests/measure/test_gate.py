@@ -63,6 +63,24 @@ def test_a_planted_loss_is_caught_and_no_change_is_not(
     assert false <= 5
 
 
+def test_a_loss_in_clusters_needs_more_repetitions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One repetition in five loses half its cubes: 10 points too, but 20 repetitions are too few."""
+    monkeypatch.setattr(comparison, "PERMUTATIONS", 499)
+    rng = np.random.default_rng(25)
+    pool = [item.metrics["placed"] or 0.0 for item in REAL if item.simulator == "mujoco"]
+
+    def caught(number: int, runs: int) -> float:
+        found = 0
+        for _ in range(runs):
+            before, after = rng.choice(pool, (2, number))
+            after = np.where(rng.random(number) < 0.2, after / 2, after)
+            found += bool(run(made(before), made(after), "placed:5%").failures)
+        return found / runs
+
+    assert caught(20, 30) < 0.8
+    assert caught(45, 30) >= 0.8
+
+
 def test_false_alarms_stay_below_one_in_twenty_even_without_a_margin(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -1,0 +1,91 @@
+"""Which simulator beats which, on which metric: all pairs tested, corrected for their number."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+from pytest_simbench.measure.comparison import ALPHA, Comparison, compare_by_seed
+from pytest_simbench.measure.limits import FAILURES
+from pytest_simbench.measure.metrics import COSTS, Metric
+from pytest_simbench.measure.record import Record
+
+COMPARED_COSTS = ("rtf", "cpu_cost", "ram")
+"""Of the costs those that belong to the simulator alone: the others hold planning and start-up."""
+
+FEWEST = 2
+"""Values on each side without which nothing is tested."""
+
+
+@dataclass(frozen=True)
+class Win:
+    """One side is better at one metric, and not by chance.
+
+    Attributes:
+        winner, loser: keys of the two sides.
+        metric: at which.
+        comparison: of the loser with the winner: difference, test, p value before correction.
+        p_value: corrected.
+    """
+
+    winner: Any
+    loser: Any
+    metric: Metric
+    comparison: Comparison
+    p_value: float
+
+
+def wins(
+    sides: Mapping[Any, Sequence[Record]],
+    metrics: Iterable[Metric],
+    comparable: Callable[[Any, Any], bool] = lambda a, b: True,
+    alpha: float = ALPHA,
+) -> list[Win]:
+    """Every metric on which one side beats another.
+
+    Each pair is tested at each metric that has a good direction, two-sided, paired by seed where
+    both sides ran the same seeds. Of the wins at most `alpha` are expected to be chance (Benjamini
+    and Hochberg's false-discovery rate), and where no side differs, a run without any win is had
+    with a probability of 1 - `alpha`.
+
+    Args:
+        sides: records by side: simulator, mode, profile.
+        metrics: of the task; failures, speed, CPU cost and memory are compared besides.
+        comparable: which pairs are of interest.
+        alpha: see above.
+    """
+    from scipy.stats import false_discovery_control
+
+    judged = [FAILURES, *(m for m in metrics if m.better)]
+    judged += [
+        m for m in COSTS if m.name in COMPARED_COSTS and m.name not in {j.name for j in judged}
+    ]
+    values = {(key, m.name): _values(run, m) for key, run in sides.items() for m in judged}
+    found: list[tuple[Any, Any, Metric, Comparison]] = []
+    for (a, b), metric in ((p, m) for p in combinations(sides, 2) for m in judged):
+        first, second = values[a, metric.name], values[b, metric.name]
+        if comparable(a, b) and min(len(first), len(second)) >= FEWEST:
+            found.append((a, b, metric, compare_by_seed(first, second)))
+    if not found:
+        return []
+    corrected = false_discovery_control([c.p_value for *_, c in found])
+    result = []
+    for (a, b, metric, comparison), p in zip(found, corrected, strict=True):
+        if p <= alpha and comparison.difference:
+            second_wins = (comparison.difference > 0) == (metric.better == "higher")
+            winner, loser = (b, a) if second_wins else (a, b)
+            result.append(Win(winner, loser, metric, comparison, float(p)))
+    return result
+
+
+def _values(records: Sequence[Record], metric: Metric) -> dict[int, float]:
+    """The metric's values by seed; of failures every repetition that came to an end has one."""
+    if metric.name == FAILURES.name:
+        return {r.seed: float(not r.ok) for r in records if r.status != "interrupted"}
+    cost = metric.name in COMPARED_COSTS and all(metric.name not in r.metrics for r in records)
+    found = {
+        r.seed: r.cost(metric.name) if cost else r.metrics.get(metric.name) for r in records if r.ok
+    }
+    return {seed: float(value) for seed, value in found.items() if value is not None}
