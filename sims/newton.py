@@ -15,13 +15,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pytest_simbench.sims.newton_world import NewtonSettings, build_model, make_solver, names
 
-from pytest_simbench.scene import Box, FloatArray, Joint, Pose, Scene
+from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
@@ -35,34 +35,6 @@ from pytest_simbench.simulator import (
 newton = lazy_import("newton")
 wp = lazy_import("warp")
 mujoco = lazy_import("mujoco")
-
-
-@dataclass(frozen=True)
-class NewtonSettings(Settings):
-    """Options of SolverMuJoCo; defaults are the engine's own.
-
-    Attributes:
-        timestep: [s]; Newton's examples of SolverMuJoCo mostly take 1/60 s in 10 substeps.
-        integrator: of MuJoCo; Newton's default is `implicitfast`.
-        cone: friction cone.
-        impratio: ratio of friction to normal constraint impedance.
-        condim: dimension of the contact space: 3 sliding, 4 with torsional friction.
-        ke: contact stiffness [N/m]; SolverMuJoCo makes of it and `kd` MuJoCo's time constant of
-            contacts, 2 / kd [s], and damping ratio, kd / (2 sqrt(ke)).
-        kd: contact damping [N s/m].
-        solimp: contact impedance: minimum, maximum, width [m].
-        gap: distance within which contacts are looked for [m]; Newton's default is 0.1.
-    """
-
-    timestep: float = 1 / 600
-    integrator: Literal["euler", "implicit", "implicitfast", "rk4"] = "implicitfast"
-    cone: Literal["pyramidal", "elliptic"] = "pyramidal"
-    impratio: float = 1.0
-    condim: Literal[3, 4, 6] = 3
-    ke: float = 2500.0
-    kd: float = 100.0
-    solimp: tuple[float, float, float] = (0.9, 0.95, 0.001)
-    gap: float = 0.1
 
 
 class Newton(Simulator):
@@ -106,7 +78,7 @@ class Newton(Simulator):
             "pillow==13.0.0",
         ),
         caches={"WARP_CACHE_PATH": "warp"},
-        install_size_mb=720,
+        install_size_mb=900,
         environment={"MUJOCO_GL": "egl"},
     )
     profiles: ClassVar[Mapping[str, Settings]] = {
@@ -141,31 +113,10 @@ class Newton(Simulator):
         wp.config.log_level = wp.LOG_WARNING
         self.scene = scene
         self._viewer = None
-        builder = self._builder(scene)
-        self.prepared = None
-        if scene.robot is not None:
-            self.prepared = PreparedRobot(scene.robot)
-            self._add_robot(builder, self.prepared)
-        builder.add_ground_plane(cfg=self._surface(scene.ground_friction), label="ground")
-        for box in scene.bodies:
-            self._add_box(builder, box)
-        self.model = builder.finalize(device="cpu")
-        self._set_contacts()
+        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
+        self.model = build_model(scene, self.prepared, self.settings)
         self._number(scene)
-        s = self.settings
-        self.solver = newton.solvers.SolverMuJoCo(
-            self.model,
-            use_mujoco_cpu=True,
-            integrator=s.integrator,
-            cone=s.cone,
-            impratio=s.impratio,
-        )
-        options = self.solver.mj_model.opt
-        options.timestep = s.timestep
-        # On a state that is not finite MuJoCo would start over from its initial state, silently.
-        options.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-        for equality in range(self.solver.mj_model.neq):  # as stiff as the step allows
-            self.solver.mj_model.eq_solref[equality] = (2 * s.timestep, 1.0)
+        self.solver = make_solver(self.model, self.settings)
         self._states = [self.model.state(), self.model.state()]
         self._control = self.model.control()
         ctrl = self._control.mujoco.ctrl if scene.robot is not None else None
@@ -188,56 +139,12 @@ class Newton(Simulator):
         numbers = self.solver.mjc_jnt_to_newton_jnt.numpy()[0].tolist()
         return [numbers.index(joint) for joint in self._joints]
 
-    def _builder(self, scene: Scene) -> Any:
-        builder = newton.ModelBuilder(gravity=scene.gravity)
-        newton.solvers.SolverMuJoCo.register_custom_attributes(builder)
-        return builder
-
-    def _surface(self, friction: float) -> Any:
-        """A shape's settings, with its mass left to the body that it belongs to."""
-        s = self.settings
-        return newton.ModelBuilder.ShapeConfig(
-            mu=friction, ke=s.ke, kd=s.kd, gap=s.gap, density=0.0
-        )
-
-    def _add_robot(self, builder: Any, prepared: PreparedRobot) -> None:
-        robot = prepared.robot
-        builder.default_shape_cfg = self._surface(robot.friction)
-        builder.add_urdf(
-            prepared.to_urdf(),
-            parse_visuals_as_colliders=True,
-            enable_self_collisions=False,
-        )
-        builder.default_shape_cfg = newton.ModelBuilder.ShapeConfig()
-        names = _labels(builder.joint_label)
-        for joint in robot.joints:
-            _set_drive(builder, names.index(joint.name), joint)
-        first, second = (names.index(name) for name in robot.gripper.joints)
-        builder.set_joint_mimic(second, first)
-
-    def _add_box(self, builder: Any, box: Box) -> None:
-        pose, cfg = _transform(box.pose), self._surface(box.friction)
-        body = -1
-        if not box.fixed:
-            cfg.density = box.mass / float(np.prod(box.size))
-            body, pose = builder.add_body(xform=pose, label=box.name), None
-        hx, hy, hz = (edge / 2 for edge in box.size)
-        builder.add_shape_box(
-            body, xform=pose, hx=hx, hy=hy, hz=hz, cfg=cfg, color=box.colour[:3], label=box.name
-        )
-
-    def _set_contacts(self) -> None:
-        """What MuJoCo needs of a contact beyond Newton's own parameters, the same everywhere."""
-        attributes, s = self.model.mujoco, self.settings
-        attributes.condim.fill_(s.condim)
-        attributes.geom_solimp.numpy()[:] = (*s.solimp, 0.5, 2.0)
-
     def _number(self, scene: Scene) -> None:
         """Where Newton's arrays hold the driven joints and the free bodies."""
         model = self.model
-        labels = _labels(model.joint_label)
-        names = scene.robot.joint_names if scene.robot else ()
-        self._joints = joints = np.array([labels.index(name) for name in names], dtype=int)
+        labels = names(model.joint_label)
+        driven = scene.robot.joint_names if scene.robot else ()
+        self._joints = joints = np.array([labels.index(name) for name in driven], dtype=int)
         self._q = model.joint_q_start.numpy()[joints]
         self._v = model.joint_qd_start.numpy()[joints]
         self._free = [model.body_label.index(body.name) for body in scene.free_bodies]
@@ -294,20 +201,21 @@ class Newton(Simulator):
         for name, at in ids.items():
             dof = model.jnt_dofadr[at]
             drive = int(np.flatnonzero(model.actuator_trnid[:, 0] == at)[0])
-            bias, passive = model.actuator_biasprm[drive], np.ravel(model.dof_damping[dof])[0]
-            limits = model.actuator_forcerange[drive, 1], model.jnt_actfrcrange[at, 1]
+            gain, bias = model.actuator_gainprm[drive], model.actuator_biasprm[drive]
+            passive = np.ravel(model.dof_damping[dof])[0]
+            limit = model.actuator_forcerange[drive, 1] * model.actuator_forcelimited[drive]
             reported[f"joint/{name}/limits"] = model.jnt_range[at]
-            reported[f"joint/{name}/effort_limit"] = min(limits)
-            reported[f"joint/{name}/stiffness"] = -bias[1]
+            reported[f"joint/{name}/effort_limit"] = min(limit, model.jnt_actfrcrange[at, 1])
+            reported[f"joint/{name}/stiffness"] = _only([gain[0], -bias[1]])
             reported[f"joint/{name}/damping"] = passive - bias[2]
             reported[f"joint/{name}/armature"] = model.dof_armature[dof]
             reported[f"joint/{name}/initial_position"] = data.qpos[model.jnt_qposadr[at]]
         for link in prepared.moving_links:
-            body = model.body(bodies.index(_labels(self.model.body_label).index(link.name)))
+            body = model.body(bodies.index(names(self.model.body_label).index(link.name)))
             reported[f"link/{link.name}/mass"] = body.mass[0]
             reported[f"link/{link.name}/inertia"] = np.sort(body.inertia)
-            values = np.unique(model.geom_friction[model.geom_bodyid == body.id, 0])
-            reported[f"link/{link.name}/friction"] = values[0] if len(values) == 1 else values
+            frictions = model.geom_friction[model.geom_bodyid == body.id, 0]
+            reported[f"link/{link.name}/friction"] = _only(frictions)
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self._ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness
@@ -419,30 +327,10 @@ _STATE = ("joint_q", "joint_qd", "body_q", "body_qd")
 """Arrays of Newton's state."""
 
 
-def _transform(pose: Pose) -> Any:
-    w, x, y, z = pose.quaternion
-    return wp.transform(pose.position, wp.quat(x, y, z, w))
-
-
-def _labels(paths: list[str]) -> list[str]:
-    """Names without the robot's, which Newton puts before those of its links and joints."""
-    return [path.rpartition("/")[2] for path in paths]
-
-
-def _set_drive(builder: Any, number: int, joint: Joint) -> None:
-    dof = builder.joint_qd_start[number]
-    builder.joint_target_mode[dof] = newton.JointTargetMode.NONE
-    builder.joint_armature[dof] = joint.armature
-    builder.joint_q[builder.joint_q_start[number]] = joint.initial_position
-    drives = newton.solvers.mujoco
-    drives.add_actuator_position(
-        builder,
-        drives.ActuatorTarget.joint(number),
-        kp=joint.stiffness,
-        kv=joint.damping,
-        forcerange=(-joint.effort_limit, joint.effort_limit),
-        ctrl=joint.initial_position,
-    )
+def _only(values: Any) -> Any:
+    """The value that all have; all of them where they differ, which no scene asks for."""
+    different = np.unique(values)
+    return different[0] if len(different) == 1 else different
 
 
 def _inertia(body: Any) -> FloatArray:

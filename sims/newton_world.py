@@ -1,0 +1,135 @@
+"""The scene as a model of Newton and a solver for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from pytest_simbench.scene import Box, Joint, Pose, Scene
+from pytest_simbench.simulator import PreparedRobot, Settings, lazy_import
+
+newton = lazy_import("newton")
+wp = lazy_import("warp")
+mujoco = lazy_import("mujoco")
+
+
+@dataclass(frozen=True)
+class NewtonSettings(Settings):
+    """Options of SolverMuJoCo; defaults are the engine's own.
+
+    Attributes:
+        timestep: [s]; Newton's examples of SolverMuJoCo mostly take 1/60 s in 10 substeps.
+        integrator: of MuJoCo; Newton's default is `implicitfast`.
+        cone: friction cone.
+        impratio: ratio of friction to normal constraint impedance.
+        condim: dimension of the contact space: 3 sliding, 4 with torsional friction.
+        ke: contact stiffness [N/m]; SolverMuJoCo makes of it and `kd` MuJoCo's time constant of
+            contacts, 2 / kd [s], and damping ratio, kd / (2 sqrt(ke)).
+        kd: contact damping [N s/m].
+        solimp: contact impedance: minimum, maximum, width [m].
+        gap: distance within which contacts are looked for [m]; Newton's default is 0.1.
+    """
+
+    timestep: float = 1 / 600
+    integrator: Literal["euler", "implicit", "implicitfast", "rk4"] = "implicitfast"
+    cone: Literal["pyramidal", "elliptic"] = "pyramidal"
+    impratio: float = 1.0
+    condim: Literal[3, 4, 6] = 3
+    ke: float = 2500.0
+    kd: float = 100.0
+    solimp: tuple[float, float, float] = (0.9, 0.95, 0.001)
+    gap: float = 0.1
+
+
+def build_model(scene: Scene, prepared: PreparedRobot | None, settings: NewtonSettings) -> Any:
+    """Newton's model of the scene, on the CPU; labels are the scene's names."""
+    builder = newton.ModelBuilder(gravity=scene.gravity)
+    newton.solvers.SolverMuJoCo.register_custom_attributes(builder)
+    if prepared is not None:
+        _add_robot(builder, prepared, _surface(prepared.robot.friction, settings))
+    builder.add_ground_plane(cfg=_surface(scene.ground_friction, settings), label="ground")
+    for box in scene.bodies:
+        _add_box(builder, box, _surface(box.friction, settings))
+    model = builder.finalize(device="cpu")
+    # What MuJoCo needs of a contact beyond Newton's own parameters, the same everywhere.
+    model.mujoco.condim.fill_(settings.condim)
+    model.mujoco.geom_solimp.numpy()[:] = (*settings.solimp, 0.5, 2.0)
+    return model
+
+
+def make_solver(model: Any, settings: NewtonSettings) -> Any:
+    """SolverMuJoCo with MuJoCo's C code, and what Newton has no parameters for."""
+    solver = newton.solvers.SolverMuJoCo(
+        model,
+        use_mujoco_cpu=True,
+        integrator=settings.integrator,
+        cone=settings.cone,
+        impratio=settings.impratio,
+    )
+    options = solver.mj_model.opt
+    options.timestep = settings.timestep
+    # On a state that is not finite MuJoCo would start over from its initial state, silently.
+    options.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    # The fingers' coupling, as stiff as the step allows.
+    solver.mj_model.eq_solref[:] = (2 * settings.timestep, 1.0)
+    return solver
+
+
+def names(paths: list[str]) -> list[str]:
+    """Names without the robot's, which Newton puts before those of its links and joints."""
+    return [path.rpartition("/")[2] for path in paths]
+
+
+def _surface(friction: float, settings: NewtonSettings) -> Any:
+    """A shape's settings, with its mass left to the body that it belongs to."""
+    return newton.ModelBuilder.ShapeConfig(
+        mu=friction, ke=settings.ke, kd=settings.kd, gap=settings.gap, density=0.0
+    )
+
+
+def _add_robot(builder: Any, prepared: PreparedRobot, surface: Any) -> None:
+    robot = prepared.robot
+    builder.default_shape_cfg = surface
+    builder.add_urdf(
+        prepared.to_urdf(), parse_visuals_as_colliders=True, enable_self_collisions=False
+    )
+    builder.default_shape_cfg = newton.ModelBuilder.ShapeConfig()
+    joints = names(builder.joint_label)
+    for joint in robot.joints:
+        _set_drive(builder, joints.index(joint.name), joint)
+    first, second = (joints.index(name) for name in robot.gripper.joints)
+    builder.set_joint_mimic(second, first)
+
+
+def _add_box(builder: Any, box: Box, surface: Any) -> None:
+    pose, body = _transform(box.pose), -1
+    if not box.fixed:
+        surface.density = box.mass / float(np.prod(box.size))
+        body, pose = builder.add_body(xform=pose, label=box.name), None
+    hx, hy, hz = (edge / 2 for edge in box.size)
+    builder.add_shape_box(
+        body, xform=pose, hx=hx, hy=hy, hz=hz, cfg=surface, color=box.colour[:3], label=box.name
+    )
+
+
+def _transform(pose: Pose) -> Any:
+    w, x, y, z = pose.quaternion
+    return wp.transform(pose.position, wp.quat(x, y, z, w))
+
+
+def _set_drive(builder: Any, number: int, joint: Joint) -> None:
+    dof = builder.joint_qd_start[number]
+    builder.joint_target_mode[dof] = newton.JointTargetMode.NONE
+    builder.joint_armature[dof] = joint.armature
+    builder.joint_q[builder.joint_q_start[number]] = joint.initial_position
+    drives = newton.solvers.mujoco
+    drives.add_actuator_position(
+        builder,
+        drives.ActuatorTarget.joint(number),
+        kp=joint.stiffness,
+        kv=joint.damping,
+        forcerange=(-joint.effort_limit, joint.effort_limit),
+        ctrl=joint.initial_position,
+    )
