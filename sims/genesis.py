@@ -120,21 +120,23 @@ class Genesis(Simulator):
     def compile(self, scene: Scene) -> None:
         """Build and step such a world once; kernels depend on options and on the kinds of bodies.
 
-        The engine would write new machine code to disk as its interpreter ends, but a worker
-        leaves by a shorter way.
+        The engine writes new machine code to disk when it is shut down, which is why that is done
+        here: the worker's end leaves it no time. Nothing less will do: writing it out meanwhile
+        (`dump_cache_data_to_disk`) makes kernels of later worlds crash.
         """
         several = len(scene.free_bodies) + (scene.robot is not None) > 1  # solved by islands
         options = dataclasses.replace(self.settings, timestep=1.0)
         kind = (options, several, scene.robot is not None, bool(scene.free_bodies))
-        if kind not in self.compiled:
-            self.load(scene)
-            self.step()
-            self.joint_state()
-            self.body_state()
-            self.close()
-            runtime = importlib.import_module("quadrants.lang.impl").get_runtime()
-            runtime.prog.dump_cache_data_to_disk()
-            self.compiled.add(kind)
+        if kind in self.compiled:
+            return
+        self.load(scene)
+        self.step()
+        self.body_state()
+        self.read_back()
+        self.restore(self.save())
+        self.close()
+        genesis.destroy()
+        self.compiled.add(kind)
 
     def load(self, scene: Scene) -> None:
         self.scene, self._steps, self._camera = scene, 0, None
@@ -215,19 +217,19 @@ class Genesis(Simulator):
     def read_back(self) -> dict[str, Any]:
         info, rigid = self.solver.dyn_info, self.solver.rigid_info
         ground = self._ground.geoms[0].idx
-        frictions = info.geoms.friction.to_numpy()
+        frictions = array_of(info.geoms.friction)
         poses = self._poses([entity.links[0].idx for entity in self._boxes.values()])
         reported: dict[str, Any] = {
-            "gravity": rigid.gravity.to_numpy().reshape(3),
-            "timestep": rigid.substep_dt.to_numpy().item() * self.settings.substeps,
+            "gravity": array_of(rigid.gravity).reshape(3),
+            "timestep": array_of(rigid.substep_dt).item() * self.settings.substeps,
             "ground/height": _numbers(self.solver.get_geoms_pos([ground]))[0, 2],
             "ground/friction": frictions[ground],
         }
-        masses = info.links.inertial_mass.to_numpy()
-        inertias = info.links.inertial_i.to_numpy()
+        masses = array_of(info.links.inertial_mass)
+        inertias = array_of(info.links.inertial_i)
         for (name, entity), pose in zip(self._boxes.items(), poses, strict=True):
             geom, link = entity.geoms[0].idx, entity.links[0].idx
-            reported[f"body/{name}/size"] = info.geoms.data.to_numpy()[geom, :3]
+            reported[f"body/{name}/size"] = array_of(info.geoms.data)[geom, :3]
             reported[f"body/{name}/friction"] = frictions[geom]
             reported[f"body/{name}/pose"] = pose
             if entity.n_dofs:
@@ -248,17 +250,17 @@ class Genesis(Simulator):
         dofs, equalities = self.solver.dyn_info.dofs, self.solver.dyn_info.equalities
         fingers = {self._robot.get_joint(name).idx for name in prepared.robot.gripper.joints}
         pairs = zip(
-            equalities.eq_obj1id.to_numpy()[:, 0],
-            equalities.eq_obj2id.to_numpy()[:, 0],
-            equalities.eq_type.to_numpy()[:, 0],
+            array_of(equalities.eq_obj1id)[:, 0],
+            array_of(equalities.eq_obj2id)[:, 0],
+            array_of(equalities.eq_type)[:, 0],
             strict=True,
         )
         reported["gripper/coupled"] = any(
             {a, b} == fingers and kind == genesis.EQUALITY_TYPE.JOINT for a, b, kind in pairs
         )
-        limits, forces = dofs.limit.to_numpy(), dofs.force_range.to_numpy()
-        gains, biases = dofs.act_gain.to_numpy(), dofs.act_bias.to_numpy()
-        damping, armature = dofs.damping.to_numpy(), dofs.armature.to_numpy()
+        limits, forces = array_of(dofs.limit), array_of(dofs.force_range)
+        gains, biases = array_of(dofs.act_gain), array_of(dofs.act_bias)
+        damping, armature = array_of(dofs.damping), array_of(dofs.armature)
         positions = self.joint_state()[0]
         for name, dof, position in zip(
             prepared.robot.joint_names, self._dofs, positions, strict=True
@@ -310,12 +312,12 @@ class Genesis(Simulator):
         )
 
     def save(self) -> tuple[int, list[NDArray[Any]]]:
-        return self._steps, [tensor.to_numpy() for tensor in self._tensors()]
+        return self._steps, [array_of(tensor) for tensor in self._tensors()]
 
     def restore(self, state: tuple[int, list[NDArray[Any]]]) -> None:
         self._steps = state[0]
         for tensor, values in zip(self._tensors(), state[1], strict=True):
-            tensor.from_numpy(values)
+            array_of(tensor, copy=False)[...] = values
 
     def _tensors(self) -> Iterator[Any]:
         """All that a step reads and writes: motion, targets, warm starts, cached contact normals.
@@ -332,7 +334,7 @@ class Genesis(Simulator):
             yield from _tensors_in(part)
 
     def contact_count(self) -> int:
-        return int(self.solver.collider._collider_state.n_contacts.to_numpy()[0])
+        return int(array_of(self.solver.collider._collider_state.n_contacts)[0])
 
     def render(self, width: int, height: int) -> NDArray[np.uint8]:
         if self._camera is None or self._camera.res != (width, height):
@@ -427,6 +429,15 @@ def _add_robot(world: Any, prepared: PreparedRobot) -> Any:
 def _numbers(tensor: Any) -> FloatArray:
     """A PyTorch tensor or an array, in double precision."""
     return np.asarray(tensor.cpu() if hasattr(tensor, "cpu") else tensor, dtype=float)
+
+
+def array_of(tensor: Any, *, copy: bool = True) -> NDArray[Any]:
+    """Values of one of the engine's tensors, or its own memory.
+
+    The tensors' `to_numpy` and `from_numpy` would compile and launch kernels.
+    """
+    values: NDArray[Any] = genesis.utils.misc.qd_to_numpy(tensor, copy=copy)
+    return values
 
 
 def _tensors_in(struct: Any) -> Iterator[Any]:

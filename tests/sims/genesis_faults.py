@@ -1,6 +1,6 @@
 """Genesis with a fault planted in the engine's own data after loading, one for each quantity.
 
-Runs in Genesis' own interpreter, so it imports nothing but the adapter and numpy.
+Runs in Genesis' own interpreter, so it imports nothing but the adapter.
 """
 
 from __future__ import annotations
@@ -9,8 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
-import numpy as np
-from pytest_simbench.sims.genesis import Genesis, GenesisSettings
+from pytest_simbench.sims.genesis import Genesis, GenesisSettings, array_of
 
 from pytest_simbench.scene import Scene
 from pytest_simbench.simulator import Settings
@@ -25,9 +24,7 @@ def changed(path: str, *index: int, to: float) -> Callable[[Any, int], None]:
         tensor = simulator.solver
         for name in path.split("."):
             tensor = getattr(tensor, name)
-        values = tensor.to_numpy()
-        values[(row, *index)] = to
-        tensor.from_numpy(values)
+        array_of(tensor, copy=False)[(row, *index)] = to
 
     return plant
 
@@ -49,36 +46,30 @@ def of_drive(plant: Callable[[Any, int], None]) -> Fault:
 
 
 def scaled_inertia(s: Any) -> None:
-    tensor = s.solver.dyn_info.links.inertial_i
-    values = tensor.to_numpy()
-    values[s._boxes["cube_05"].links[0].idx] *= 1.2
-    tensor.from_numpy(values)
+    inertias = array_of(s.solver.dyn_info.links.inertial_i, copy=False)
+    inertias[s._boxes["cube_05"].links[0].idx] *= 1.2
 
 
 def one_finger_shape(s: Any) -> None:
     shape = s._robot.get_link("panda_leftfinger").geoms[-1].idx
-    s.solver.set_geom_friction(0.3, shape)
+    array_of(s.solver.dyn_info.geoms.friction, copy=False)[shape] = 0.3
 
 
 def lower_table(s: Any) -> None:
-    tensor = s.solver.dyn_state.links.pos
-    values = tensor.to_numpy()
-    values[s._boxes["table"].links[0].idx, 0, 2] -= 0.012
-    tensor.from_numpy(values)
+    table = s._boxes["table"].links[0].idx
+    array_of(s.solver.dyn_state.links.pos, copy=False)[table, 0, 2] -= 0.012
 
 
 def other_gravity(s: Any) -> None:
-    s.solver.set_gravity(np.array([0.0, 0.0, -9.7], dtype=np.float32))
+    array_of(s.solver.rigid_info.gravity, copy=False)[..., 2] = -9.7
 
 
 def other_timestep(s: Any) -> None:
-    tensor = s.solver.rigid_info.substep_dt
-    tensor.from_numpy(np.full_like(tensor.to_numpy(), 0.005))
+    array_of(s.solver.rigid_info.substep_dt, copy=False)[...] = 0.005
 
 
 def uncoupled(s: Any) -> None:
-    tensor = s.solver.dyn_info.equalities.eq_obj1id
-    tensor.from_numpy(np.zeros_like(tensor.to_numpy()))
+    array_of(s.solver.dyn_info.equalities.eq_obj1id, copy=False)[...] = 0
 
 
 FAULTS: dict[str, Fault] = {
