@@ -106,7 +106,7 @@ class Genesis(Simulator):
         compile_timeout=1800.0,
         requirements=("torch==2.13.0", "genesis-world==1.2.3"),
         caches={"QD_OFFLINE_CACHE_FILE_PATH": "quadrants", "GS_CACHE_FILE_PATH": "genesis"},
-        install_size_mb=3600,
+        install_size_mb=3700,
         language="Python (Quadrants)",
     )
     profiles: ClassVar[Mapping[str, Settings]] = {
