@@ -64,7 +64,7 @@ def test_a_planted_loss_is_caught_and_no_change_is_not(
 
 
 def test_a_loss_in_clusters_needs_more_repetitions(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One repetition in five loses half its cubes: 10 points too, but 20 repetitions are too few."""
+    """One repetition in five loses half its cubes: 10 points too; 20 repetitions are too few."""
     monkeypatch.setattr(comparison, "PERMUTATIONS", 499)
     rng = np.random.default_rng(25)
     pool = [item.metrics["placed"] or 0.0 for item in REAL if item.simulator == "mujoco"]
