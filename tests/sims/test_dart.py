@@ -4,13 +4,14 @@ sides though one finger only follows, and parity faults are caught."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from pytest_simbench.sims.dart import DART
 
-from pytest_simbench.scene import Scene
+from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import ParityError
 from pytest_simbench.simulator.parity import check, expected_quantities
 from pytest_simbench.simulator.settings import changed
@@ -87,9 +88,37 @@ def test_the_chosen_solver_is_the_engines(solver: str) -> None:
     assert solver in type(engine.getBoxedLcpSolver()).__name__.lower()
 
 
-def test_sleeping_is_switched(loaded: DART) -> None:
-    assert not loaded.world.getDeactivationOptions().mEnabled
-    assert world(scenes.tower(), "default").world.getDeactivationOptions().mEnabled
+@pytest.mark.parametrize("sleeping", [True, False])
+def test_sleeping_is_switched(sleeping: bool) -> None:
+    options = world(scenes.tower(), sleeping=sleeping).world.getDeactivationOptions()
+    assert options.mEnabled == sleeping
+
+
+def test_restore_of_bodies_asleep_continues_as_if_uninterrupted() -> None:
+    """DART tells nobody who sleeps, so that is not part of the saved state. A cube falls on a tower
+    asleep, which wakes: restored or not, the same happens."""
+    tower = scenes.tower()
+    late = scenes.cube("late", Pose.at(0.405, 0.003, 5.0))
+    simulator = world(replace(tower, bodies=(*tower.bodies, late)))
+    advance(simulator, 0.8)
+    before = simulator.body_state()
+    advance(simulator, 0.1)
+    saved, state = simulator.body_state(), simulator.save()
+    assert np.array_equal(saved[:3], before[:3])  # asleep
+    straight = advance(simulator, 0.5)
+    simulator.restore(state)
+    assert np.array_equal(advance(simulator, 0.5), straight)
+    assert not np.array_equal(straight[-1, :3], saved[:3])  # woken
+
+
+def advance(simulator: DART, duration: float) -> FloatArray:
+    """Body states at every 20th step of `duration` [s]."""
+    states = []
+    for k in range(round(duration / simulator.settings.timestep)):
+        simulator.step()
+        if k % 20 == 19:
+            states.append(simulator.body_state())
+    return np.array(states)
 
 
 def surface(shape: Any, friction: float) -> None:
