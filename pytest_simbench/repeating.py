@@ -39,6 +39,7 @@ class Repeating:
         self.case = case
         self.this = run
         self.results: list[ResultSet] = []
+        self._may_resume = False
 
     def __call__(self, task: Task) -> ResultSet:
         """Run a task's repetitions, as many as options and marks say."""
@@ -67,10 +68,11 @@ class Repeating:
             found: the records so far, by repetition; takes the new ones.
         """
         missing = [k for k in range(1, number + 1) if k not in found]
-        if self.this.resumed is not None:
+        if self.this.resumed is not None and not self._may_resume:
             refusal = self.this.resumed.refusal(self.case, task, run_more=bool(missing))
             if refusal:
                 pytest.fail(refusal, pytrace=False)
+            self._may_resume = bool(missing)  # else it was not looked at the worker
         if missing:
             self.this.begin_lines()
             jobs = options.value(self.node.config, "sim_jobs")

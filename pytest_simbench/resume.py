@@ -87,7 +87,11 @@ class Resumed:
         seeds = _seeds(of_test, case.seed)
         if seeds:
             return self._sentence(case, [seeds])
-        others = [r for r in self.records if (r.simulator, r.mode) == (case.simulator, case.mode)]
+        # A repetition that failed at its start knows neither settings nor versions.
+        of_test = [r for r in of_test if r.ok]
+        others = [
+            r for r in self.records if r.ok and (r.simulator, r.mode) == (case.simulator, case.mode)
+        ]
         if not run_more or not others:
             return ""
         from pytest_simbench.session.repetition import Repetition

@@ -80,7 +80,9 @@ def _check(test: str, parts: Mapping[str, Sequence[Record]]) -> None:
                 f"{a} and {b} overlap: both have {seeds}{span} of {test}; give each machine seeds "
                 "of its own with --sim-seed"
             )
-        other = differences({test: (first, second)}, SAME)
+        # A repetition that failed at its start knows neither settings nor versions.
+        known = [r for r in first if r.ok], [r for r in second if r.ok]
+        other = differences({test: known}, SAME) if all(known) else []
         if other:
             raise JoinError(
                 f"{a} and {b} are not parts of one run: {'; '.join(other)} (the first is {a})"

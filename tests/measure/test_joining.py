@@ -89,6 +89,13 @@ def test_differences_are_refused_and_named(name: str) -> None:
         join({"a": straight(3), "b": other})
 
 
+def test_what_failed_before_it_knew_its_settings_may_be_joined() -> None:
+    dead = [
+        replace(r, status="failed", settings={}, versions={}, metrics={}) for r in straight(2, 2025)
+    ]
+    assert len(join({"a": straight(3), "b": dead})) == 5
+
+
 def test_machines_may_differ() -> None:
     other = [replace(r, host={"cpu": "another"}) for r in straight(3, 2025)]
     assert len(join({"a": straight(3), "b": other})) == 6
