@@ -83,9 +83,14 @@ class Perturbation:
 
     def __str__(self) -> str:
         """In words: "0.7 mm in x of cube_12"."""
-        quantity = QUANTITIES[self.quantity]
-        number = f"{self.amount * quantity.shown:.4g} {quantity.unit}"
-        return " ".join(part for part in (number, quantity.phrase, self.body) if part)
+        phrase = QUANTITIES[self.quantity].phrase
+        number = self.size(self.quantity, self.amount)
+        return " ".join(part for part in (number, phrase, self.body) if part)
+
+    @staticmethod
+    def size(quantity: str, amount: float) -> str:
+        """An amount [SI units or share] as it is told: "0.7 mm"."""
+        return f"{amount * QUANTITIES[quantity].shown:.4g} {QUANTITIES[quantity].unit}"
 
     def applied(self, scene: Scene) -> Scene:
         """The scene with this change (a delay changes no scene).

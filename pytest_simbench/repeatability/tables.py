@@ -78,7 +78,7 @@ def replay_columns(lines: Sequence[Line]) -> list[Column]:
     ways = list(dict.fromkeys(again.way for line in lines for again in _agains(line)))
     columns = [
         Column("simulator", [[line.label] for line in lines], left=True),
-        Column("claims", [["same" if line.result["claims"] else "no"] for line in lines]),
+        Column("claims to repeat", [["yes" if line.result["claims"] else "no"] for line in lines]),
     ]
     for way in ways:
         cells = []

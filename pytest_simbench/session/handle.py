@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import os
-import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import count
-from pathlib import Path
 from typing import Any
 
 from pytest_simbench.client.errors import Where, WorkerError
@@ -17,6 +14,7 @@ from pytest_simbench.client.tape import TapedWorld
 from pytest_simbench.client.world import World
 from pytest_simbench.scene import Scene
 from pytest_simbench.session.case import Case
+from pytest_simbench.session.example import replay_command, write_example
 
 _numbers = count(1)
 """Of the workers that handles of this process started: their logs have names of their own."""
@@ -97,26 +95,12 @@ class SimulatorHandle:
         return TapedWorld(self._process, scene, parity=parity, **options)
 
     def _keep_example(self, error: Exception, scene: Scene, tape: list[Any]) -> None:
-        """Write the failing episode to the run folder; under Hypothesis the last one, which is
-        the smallest, overwrites those before."""
+        """Write the failing episode to the run folder."""
         case = self.case
         test = os.environ.get("PYTEST_CURRENT_TEST", case.short_name).rpartition(" ")[0]
-        name = re.sub(r"[^A-Za-z0-9_.=-]+", "_", test.rpartition("::")[2] or "episode").strip("_")
-        path = case.folder / "examples" / f"{name}-{case.simulator}-{case.mode}.json"
-        example = {
-            "simulator": case.simulator,
-            "adapter": case.adapter,
-            "mode": case.mode,
-            "profile": case.profile,
-            "changes": dict(case.changes),
-            "python": case.python,
-            "spec": case.spec,
-            "scene": scene.to_wire(),
-            "tape": [operation.to_wire() for operation in tape],
-        }
+        name = f"{test.rpartition('::')[2] or 'episode'}-{case.simulator}-{case.mode}"
         with suppress(OSError):  # a full disk must not hide the failure itself
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(json.dumps(example) + "\n", encoding="utf-8")
+            path = write_example(case, name, scene, tape)
             error.add_note(f"replay this episode: {replay_command(path)}")
 
     def close(self) -> None:
@@ -127,13 +111,6 @@ class SimulatorHandle:
             with suppress(WorkerError):
                 self._process.close(timeout=5.0)
             self._process = None
-
-
-def replay_command(path: Path) -> str:
-    """What to type to see the episode in `path` again."""
-    with suppress(ValueError):
-        path = path.absolute().relative_to(Path.cwd())
-    return f"python -m pytest_simbench.repeatability {path}"
 
 
 def _of_hypothesis(error: Exception) -> bool:

@@ -1,0 +1,102 @@
+"""When and where two simulators part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pytest_simbench.client.world import Motion
+from pytest_simbench.repeatability.agreement import FOLDER, Sample, agreement, agreements
+from pytest_simbench.repeatability.episode import Experiment
+
+
+def sample(label: str, times: Sequence[float], x: Sequence[float]) -> Sample:
+    """One cube at positions x, at rest, in one wait; another that stays where it is."""
+    bodies = np.zeros((len(x), 2, 13))
+    bodies[:, 0, 0] = x
+    bodies[:, 1, 0] = 0.5
+    motion = Motion(np.array(times), np.zeros((len(x), 2, 0)), bodies)
+    start = Motion(np.zeros(1), np.zeros((1, 2, 0)), bodies[:1])
+    return Sample(label, "t", 1, ["moving", "resting"], [start, motion], [None], [1.0], {"n": 1.0})
+
+
+TIMES = (0.1, 0.2, 0.3, 0.4)
+
+
+def test_time_and_place() -> None:
+    first = sample("a", TIMES, [0.2, 0.2, 0.2, 0.2])
+    second = sample("b", TIMES, [0.2, 0.2005, 0.2015, 0.25])
+    found = agreement(first, second)
+    millimetre, centimetre = found.partings[0.001], found.partings[0.01]
+    assert millimetre is not None
+    assert centimetre is not None
+    assert (millimetre.time, millimetre.body) == (0.3, "moving")
+    assert millimetre.position == (0.2, 0.0, 0.0)
+    assert str(centimetre) == "0.40 s, moving at (0.20, 0.00, 0.00)"
+    assert (found.until, found.commands_part, found.same_outcome) == (0.4, None, True)
+
+
+def test_never() -> None:
+    found = agreement(sample("a", TIMES, [0.2] * 4), sample("b", TIMES, [0.2009] * 4))
+    assert found.partings == {0.001: None, 0.01: None}
+
+
+@pytest.mark.parametrize(
+    "changes", [{"task": "other"}, {"seed": 2}, {"bodies": ["moving", "other"]}]
+)
+def test_only_the_same_can_be_compared(changes: dict[str, object]) -> None:
+    first = sample("a", TIMES, [0.2] * 4)
+    with pytest.raises(ValueError, match="a ran"):
+        agreement(first, replace(first, **changes))  # type: ignore[arg-type]
+
+
+def test_commands_that_part() -> None:
+    first = replace(sample("a", TIMES, [0.2] * 4), commands=[np.array([0.1, 0.2])])
+    near = replace(first, commands=[np.array([0.1, 0.2005])])
+    far = replace(first, commands=[np.array([0.1, 0.21])])
+    longer = replace(first, durations=[1.1])
+    assert agreement(first, near).commands_part is None
+    for other in (far, longer, replace(first, commands=[None]), replace(first, commands=[])):
+        assert agreement(first, other).commands_part == 0.0
+        assert agreement(other, first).commands_part == 0.0
+
+
+def test_kept_and_read_back(tmp_path: Path) -> None:
+    for name in ("a", "b", "c"):
+        kept = replace(
+            sample(name, TIMES, [0.2] * 4),
+            commands=[None, np.array([1.0, 2.0])],
+            seed=1 + (name == "c"),
+        )
+        kept.save(tmp_path / FOLDER / f"{name}.npz")
+    read = Sample.load(tmp_path / FOLDER / "c.npz")
+    assert (read.label, read.seed, read.bodies, read.counts) == (
+        "c",
+        2,
+        ["moving", "resting"],
+        {"n": 1.0},
+    )
+    assert read.commands[0] is None
+    assert list(read.commands[1]) == [1.0, 2.0]  # type: ignore[arg-type]
+    assert [len(motion) for motion in read.motions] == [1, 4]
+    assert [(a.first, a.second) for a in agreements(tmp_path)] == [("a", "b")]
+    assert agreements(tmp_path / "nothing") == []
+
+
+def test_engines_with_the_same_law_agree_until_things_collide(
+    tumbling: Callable[..., Experiment],
+) -> None:
+    """Falling is the same everywhere; from the first contact on, engines go their own ways. The
+    steps are 1 ms and 1/240 s and the first-order integrators differ by g h t / 2 on the way."""
+    samples = [
+        Sample.of(tumbling(name).run(), name, "tumbling", 1) for name in ("mujoco", "pybullet")
+    ]
+    found = agreement(*samples)
+    centimetre = found.partings[0.01]
+    assert centimetre is not None
+    assert 0.1 < centimetre.time < 1.6
+    assert agreement(samples[0], samples[0]).partings == {0.001: None, 0.01: None}

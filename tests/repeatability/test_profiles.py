@@ -1,0 +1,72 @@
+"""Hypothesis profiles: there when they are asked for, never loaded by themselves."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+from hypothesis import settings
+
+from pytest_simbench.repeatability.profiles import PROFILES
+
+ALL_CHECKS = len(settings.get_profile("default").suppress_health_check)
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_registered_with_no_deadline_and_no_silenced_check(name: str) -> None:
+    profile = settings.get_profile(name)
+    assert profile.deadline is None
+    assert profile.print_blob
+    assert len(profile.suppress_health_check) == ALL_CHECKS == 0
+    assert profile.max_examples == PROFILES[name]["max_examples"]
+
+
+def test_importing_hypothesis_loads_none_of_them() -> None:
+    code = (
+        "from hypothesis import settings; settings.get_profile('sim-ci'); "
+        "assert settings().max_examples == 100; assert settings().deadline is not None; "
+        "import sys; assert 'numpy' not in sys.modules"
+    )
+    environment = {"PATH": "/usr/bin:/bin"}
+    subprocess.run([sys.executable, "-c", code], check=True, env=environment, cwd="/")
+
+
+def test_pytest_without_hypothesis_does_not_import_it(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        """
+        import sys
+
+        def test_it():
+            assert "pytest_simbench.repeatability.fixtures" in sys.modules
+            assert "hypothesis.core" not in sys.modules
+        """
+    )
+    others = ("benchmark", "hypothesispytest")
+    plugins = [part for name in others for part in ("-p", f"no:{name}")]
+    pytester.runpytest_subprocess(*plugins).assert_outcomes(passed=1)
+
+
+def test_the_user_chooses(pytester: pytest.Pytester) -> None:
+    pytester.makeconftest("")
+    pytester.makepyfile(
+        """
+        from hypothesis import given, settings, strategies as st
+        runs = []
+
+        @given(st.integers())
+        def test_it(number):
+            runs.append(number)
+
+        def test_count(pytestconfig):
+            wanted = 10 if pytestconfig.getoption("hypothesis_profile") else 100
+            assert len(runs) == wanted
+        """
+    )
+    arguments = ("-p", "no:randomly", "-p", "no:cacheprovider")
+    environment = pytest.MonkeyPatch()
+    with environment.context() as patch:
+        patch.delenv("CI", raising=False)
+        chosen = pytester.runpytest_subprocess("--hypothesis-profile=sim-dev", *arguments)
+        chosen.assert_outcomes(passed=2)
+        pytester.runpytest_subprocess(*arguments).assert_outcomes(passed=2)

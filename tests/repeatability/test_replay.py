@@ -1,0 +1,166 @@
+"""Replay tells simulators that repeat themselves from those that do not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from pytest_simbench.repeatability.episode import Experiment
+from pytest_simbench.repeatability.motions import Difference
+from pytest_simbench.repeatability.replay import Again, Moment, Replay, replay
+from pytest_simbench.session.handle import SimulatorHandle
+from pytest_simbench.simulator import Capability
+from pytest_simbench.tasks import Jitter, Throwing
+
+EVERYTHING = frozenset(Capability)
+MOMENTS = (Moment("in flight", "fly"),)
+WAYS = (
+    "after a reset",
+    "after another episode",
+    "restored in flight",
+    "fresh process",
+    "with a window",
+)
+
+
+@pytest.fixture
+def replayed(
+    tumbling: Callable[..., Experiment], handle_of: Callable[..., SimulatorHandle]
+) -> Callable[..., Replay]:
+    """Falling cubes, run again in a simulator that claims to be deterministic."""
+
+    def run(name: str, *, gui: bool = False, claims: bool = True) -> Replay:
+        other = handle_of(name, "gui") if gui else "no display"
+        return replay(
+            tumbling(name),
+            claims=claims,
+            capabilities=EVERYTHING,
+            fresh=handle_of(name),
+            other_mode=other,
+            moments=MOMENTS,
+        )
+
+    return run
+
+
+def broken(result: Replay) -> set[str]:
+    return {again.way for again in result.again if again.difference is not None}
+
+
+@pytest.mark.parametrize("name", ["mujoco", "pybullet"])
+def test_engines_keep_their_claim(replayed: Callable[..., Replay], name: str) -> None:
+    result = replayed(name)
+    result.assert_as_claimed()
+    assert tuple(again.way for again in result.again) == WAYS
+    assert [again.identical for again in result.again] == [True] * 4 + [False]
+    assert result.again[-1].text == "no display"
+
+
+def test_noise_is_found_everywhere_and_grows(replayed: Callable[..., Replay]) -> None:
+    result = replayed("Noisy")
+    assert broken(result) == set(WAYS[:4])
+    first = result.again[0].difference
+    assert first is not None
+    assert first.first == pytest.approx(0.02)  # the first sample
+    assert first.growth[1.0] is not None
+    assert 1e-12 < first.largest < 0.1
+    with pytest.raises(AssertionError, match="Noisy claims to be deterministic, but\n.*0.02 s"):
+        result.assert_as_claimed()
+
+
+def test_noise_without_a_claim_is_a_result(replayed: Callable[..., Replay]) -> None:
+    result = replayed("Noisy", claims=False)
+    assert broken(result)
+    result.assert_as_claimed()
+
+
+def test_memory_of_earlier_worlds_is_found(replayed: Callable[..., Replay]) -> None:
+    result = replayed("Haunted")
+    assert broken(result) == {"after a reset", "after another episode", "restored in flight"}
+    with pytest.raises(AssertionError, match="after a reset"):
+        result.assert_as_claimed()
+
+
+def test_half_a_restore_is_found(replayed: Callable[..., Replay]) -> None:
+    result = replayed("Forgetful")
+    assert broken(result) == {"restored in flight"}
+    with pytest.raises(AssertionError, match="restored in flight: first differs at t = 0.07 s"):
+        result.assert_as_claimed()
+
+
+def test_an_effect_of_the_window_is_found(replayed: Callable[..., Replay]) -> None:
+    result = replayed("Windowed", gui=True)
+    assert broken(result) == {"with a window"}
+    with pytest.raises(AssertionError, match="with a window"):
+        result.assert_as_claimed()
+
+
+def test_failure_to_run_again_is_a_failure_without_a_claim(
+    replayed: Callable[..., Replay],
+) -> None:
+    result = replayed("Refusing", claims=False)
+    assert [again.failure for again in result.again if again.failure] == [
+        "EngineFailed: RuntimeError: no way back"
+    ]
+    assert result.again[3].identical  # the next one got a fresh worker
+    with pytest.raises(AssertionError, match="Refusing could not run again\n.*no way back"):
+        result.assert_as_claimed()
+
+
+def test_what_cannot_be_done_is_told(
+    tumbling: Callable[..., Experiment], handle_of: Callable[..., SimulatorHandle]
+) -> None:
+    def run(capabilities: frozenset[Capability], moment: Moment) -> Again:
+        result = replay(
+            tumbling(),
+            claims=True,
+            capabilities=capabilities,
+            fresh=handle_of(),
+            other_mode="no display",
+            moments=(moment,),
+        )
+        result.assert_as_claimed()
+        return result.again[2]
+
+    assert run(frozenset(), MOMENTS[0]).text == "mujoco cannot save and restore"
+    assert run(EVERYTHING, Moment("x", "swim")).text == "the task never came to swim"
+
+
+def test_a_throw_with_the_cube_in_the_grip_and_in_flight(
+    handle_of: Callable[..., SimulatorHandle],
+) -> None:
+    experiment = Experiment(handle_of(), replace(Throwing(), settle=0.5), 2022, Jitter())
+    result = replay(
+        experiment,
+        claims=True,
+        capabilities=EVERYTHING,
+        fresh=handle_of(),
+        other_mode="no display",
+    )
+    result.assert_as_claimed()
+    assert [again.way for again in result.again if again.identical][2:4] == [
+        "restored in the grip",
+        "restored in flight",
+    ]
+
+
+@pytest.mark.parametrize(
+    "again",
+    [
+        Again("a"),
+        Again("b", Difference(1.5, "cube", {1.0: 0.1, 20.0: None}, 0.2), ("left",), 1.0),
+        Again("c", skipped="no display"),
+        Again("d", failure="WorkerExited: x"),
+    ],
+)
+def test_results_travel(again: Again) -> None:
+    assert Again.from_wire(again.to_wire()) == again
+
+
+def test_text_of_a_difference() -> None:
+    again = Again("b", Difference(1.5, "cube", {1.0: 0.1, 20.0: None}, 0.2), ("left",))
+    assert again.text == (
+        "first differs at t = 1.50 s (cube), then 100 mm 1 s later, 200 mm at most; changed left"
+    )

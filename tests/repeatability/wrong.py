@@ -1,0 +1,68 @@
+"""MuJoCo with one planted fault each: engines that claim determinism and do not keep it."""
+
+from __future__ import annotations
+
+import os
+import signal
+from typing import Any, ClassVar
+
+import numpy as np
+from pytest_simbench.sims.mujoco import MuJoCo
+
+from pytest_simbench.scene import FloatArray, Scene
+
+
+class Noisy(MuJoCo):
+    """Adds noise that nobody seeded, a micrometre per second at most, to free bodies."""
+
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        self._noise = np.random.default_rng()
+
+    def step(self) -> None:
+        self.data.qvel[self._body_v] += self._noise.uniform(-1e-6, 1e-6, self._body_v.shape)
+        super().step()
+
+
+class Haunted(MuJoCo):
+    """Gravity remembers how many worlds the process has seen."""
+
+    worlds: ClassVar[int] = 0
+
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        self.model.opt.gravity[0] = 1e-9 * Haunted.worlds
+        Haunted.worlds += 1
+
+
+class Forgetful(MuJoCo):
+    """Restores positions, but not velocities."""
+
+    def restore(self, state: FloatArray) -> None:
+        now = self.data.qvel.copy()
+        super().restore(state)
+        self.data.qvel[:] = now
+
+
+class Refusing(MuJoCo):
+    """Cannot be restored."""
+
+    def restore(self, state: Any) -> None:
+        raise RuntimeError("no way back")
+
+
+class Windowed(MuJoCo):
+    """Computes something else when it has a window (which it only pretends to open)."""
+
+    def _open_window(self) -> None:
+        self._viewer = None
+        self.model.opt.gravity[0] = 1e-9
+
+
+class Brittle(MuJoCo):
+    """Dies of friction above 1.05."""
+
+    def load(self, scene: Scene) -> None:
+        if scene.ground_friction > 1.05:
+            os.kill(os.getpid(), signal.SIGSEGV)
+        super().load(scene)
