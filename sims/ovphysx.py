@@ -58,6 +58,7 @@ class OvPhysXSettings(Settings):
         rest_offset: distance at which they rest [m]; None lets PhysX choose.
         friction_offset_threshold: distance below which a contact has friction [m].
         friction_correlation_distance: below which contacts share a friction anchor [m].
+        forces_every_iteration: apply gravity in each position iteration instead of once a step.
         contact_last: solve the articulation's contacts after everything else.
         threads: workers of PhysX; 0 computes in the calling thread. Its own default is 8, which
             computes the same bits, five times as slowly in a scene this small.
@@ -76,6 +77,7 @@ class OvPhysXSettings(Settings):
     rest_offset: float | None = None
     friction_offset_threshold: float = 0.04
     friction_correlation_distance: float = 0.025
+    forces_every_iteration: bool = True
     contact_last: bool = False
     threads: int = 0
 
@@ -113,7 +115,13 @@ class OvPhysX(Simulator):
     )
     profiles: ClassVar[Mapping[str, Settings]] = {
         "default": OvPhysXSettings(),
-        "tuned": OvPhysXSettings(timestep=0.004, angular_damping=0.0, sleeping=False),
+        "tuned": OvPhysXSettings(
+            timestep=0.004,
+            body_iterations=6,
+            arm_iterations=6,
+            angular_damping=0.0,
+            sleeping=False,
+        ),
     }
     settings: OvPhysXSettings
 
@@ -273,6 +281,7 @@ def _attributes(s: OvPhysXSettings) -> dict[str, dict[str, Any]]:
             "disableSleeping": not s.sleeping,
             "frictionOffsetThreshold": s.friction_offset_threshold,
             "frictionCorrelationDistance": s.friction_correlation_distance,
+            "enableExternalForcesEveryIteration": s.forces_every_iteration,
             "solveArticulationContactLast": s.contact_last,
         },
         "physxRigidBody": {
