@@ -15,7 +15,6 @@ the contacts' memory, so restoring is not claimed.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
@@ -126,8 +125,6 @@ class OvPhysX(Simulator):
     settings: OvPhysXSettings
 
     def load(self, scene: Scene) -> None:
-        # Deprecated bindings are used on purpose, see above.
-        warnings.filterwarnings("ignore", category=DeprecationWarning, module=__name__)
         self.scene, self._steps = scene, 0
         self.prepared = PreparedRobot(scene.robot) if scene.robot is not None else None
         self._waiting: tuple[FloatArray, FloatArray] | None = None
