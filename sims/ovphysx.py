@@ -9,22 +9,26 @@ session (`ovphysx_session`) takes 0.4 ms. They are deprecated; the version is pi
 touch of a binding runs a step of its own, so before the first step only sessions are used.
 
 It has no renderer: ovphysx is a headless library, and Isaac Sim's window is not part of it.
-Contacts could be counted, but their reports cost 15 % of stepping. States can be written, yet not
-the contacts' memory, so restoring is not claimed.
+Contacts could be counted, but their reports cost 15 % of stepping.
+
+The contacts' memory cannot be saved, so `restore` builds the world anew, runs the one step that
+bindings need, and writes the saved state: every restore has the same future, bit for bit, though
+not quite that of the uninterrupted run.
 """
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pytest_simbench.sims import ovphysx_stage as usd
+from pytest_simbench.sims.ovphysx_readback import read_back
 from pytest_simbench.sims.ovphysx_session import Session
 
-from pytest_simbench.scene import FloatArray, Pose, Scene
+from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
@@ -37,12 +41,15 @@ from pytest_simbench.simulator import (
 
 ovphysx_types = lazy_import("ovphysx.types")
 
-_FRICTIONS = ("staticFriction", "dynamicFriction")
+_Saved = tuple[int, dict[str, NDArray[np.float32]], tuple[FloatArray, FloatArray] | None]
 
 
 @dataclass(frozen=True)
 class OvPhysXSettings(Settings):
     """PhysX's options; defaults are those of its USD schemas.
+
+    `tuned` takes a short step with few iterations, which lets an impact through: with many, a
+    pyramid takes it as one block. What that costs the drives is told in docs/engines/ovphysx.md.
 
     Attributes:
         timestep: [s]; 1/60 is what PhysxSceneAPI says.
@@ -58,6 +65,7 @@ class OvPhysXSettings(Settings):
         rest_offset: distance at which they rest [m]; None lets PhysX choose.
         friction_offset_threshold: distance below which a contact has friction [m].
         friction_correlation_distance: below which contacts share a friction anchor [m].
+        forces_every_iteration: apply gravity in each position iteration instead of once a step.
         contact_last: solve the articulation's contacts after everything else.
         threads: workers of PhysX; 0 computes in the calling thread. Its own default is 8, which
             computes the same bits, five times as slowly in a scene this small.
@@ -76,6 +84,7 @@ class OvPhysXSettings(Settings):
     rest_offset: float | None = None
     friction_offset_threshold: float = 0.04
     friction_correlation_distance: float = 0.025
+    forces_every_iteration: bool = True
     contact_last: bool = False
     threads: int = 0
 
@@ -93,7 +102,7 @@ class OvPhysX(Simulator):
         engine="PhysX 5",
         language="C++",
         tested_version="0.7.0.74035321",
-        capabilities=frozenset({Capability.DETERMINISTIC}),
+        capabilities=frozenset({Capability.DETERMINISTIC, Capability.SAVE_RESTORE}),
         deviations=(
             Deviation("timestep", "an argument of each step, which PhysX does not report"),
             Deviation("gravity", "PhysX reports no gravity through this package"),
@@ -113,21 +122,24 @@ class OvPhysX(Simulator):
     )
     profiles: ClassVar[Mapping[str, Settings]] = {
         "default": OvPhysXSettings(),
-        "tuned": OvPhysXSettings(timestep=0.004, angular_damping=0.0, sleeping=False),
+        "tuned": OvPhysXSettings(
+            timestep=0.002,
+            body_iterations=4,
+            arm_iterations=4,
+            angular_damping=0.0,
+            sleeping=False,
+        ),
     }
     settings: OvPhysXSettings
 
     def load(self, scene: Scene) -> None:
-        # Deprecated bindings are used on purpose, see above.
-        warnings.filterwarnings("ignore", category=DeprecationWarning, module=__name__)
-        self.scene, self._steps = scene, 0
+        self.scene = scene
         self.prepared = PreparedRobot(scene.robot) if scene.robot is not None else None
-        self._waiting: tuple[FloatArray, FloatArray] | None = None
-        self._bindings: dict[str, tuple[Any, Any]] = {}
-        text = usd.Stage(scene, self.prepared, _attributes(self.settings)).text()
-        self.session = Session(text, self.settings.threads)
+        self._text = usd.Stage(scene, self.prepared, _attributes(self.settings)).text()
+        self._start()
         self._free = [usd.body_path(i) for i, box in enumerate(scene.bodies) if not box.fixed]
         self._joints: list[str] = []
+        self._unit = np.empty(0)
         if self.prepared is not None:
             robot = self.prepared.robot
             self._joints = [usd.joint_path(i) for i in range(len(robot.joints))]
@@ -135,6 +147,13 @@ class OvPhysX(Simulator):
             kinds = {joint.name: joint.kind for joint in self.prepared.joints}
             turning = [kinds[name] == "revolute" for name in robot.joint_names]
             self._unit = np.where(turning, np.pi / 180, 1.0)  # of the sessions, which count degrees
+
+    def _start(self) -> None:
+        """Begin the world anew."""
+        self.close()
+        self._steps = 0
+        self._targets: tuple[FloatArray, FloatArray] | None = None
+        self.session = Session(self._text, self.settings.threads)
 
     def _binding(self, kind: str) -> tuple[Any, Any]:
         """A tensor binding of the robot or the free bodies, with a buffer of its shape."""
@@ -148,21 +167,21 @@ class OvPhysX(Simulator):
         return self._bindings[kind]
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
-        targets = position + effort / self._stiffness, velocity
-        if self._steps == 0:
-            self._waiting = targets
-            return
+        self._targets = position + effort / self._stiffness, velocity
+        if self._steps > 0:
+            self._write_targets(self._targets)
+
+    def _write_targets(self, targets: tuple[FloatArray, FloatArray]) -> None:
         for kind, values in zip(("POSITION", "VELOCITY"), targets, strict=True):
             binding, buffer = self._binding(f"ARTICULATION_DOF_{kind}_TARGET")
             buffer[0, self._columns] = values
             binding.write(buffer)
 
     def step(self) -> None:
-        if self._waiting is not None:
-            for kind, values in zip(("Position", "Velocity"), self._waiting, strict=True):
+        if self._steps == 0 and self._targets is not None:
+            for kind, values in zip(("Position", "Velocity"), self._targets, strict=True):
                 given = zip(self._joints, values / self._unit, strict=True)
                 self.session.write_joints(f"joint{kind}Target", dict(given))
-            self._waiting = None
         self.session.physx.step_sync(self.settings.timestep)
         self._steps += 1
         if self._steps == 1 and self._joints:
@@ -206,46 +225,34 @@ class OvPhysX(Simulator):
         return state
 
     def read_back(self) -> dict[str, Any]:
-        reported: dict[str, Any] = {"ground/height": self.session.height(usd.GROUND)}
-        names = ("position", "orientation", "mass", "inertia", "shapeCount", *_FRICTIONS)
-        values = self.session.read("RIGID_BODY", *names)
-        for index, box in enumerate(self.scene.bodies):
-            path, prefix = usd.body_path(index), f"body/{box.name}"
-            x, y, z, w = values["orientation"][path]
-            pose = Pose.from_array([*values["position"][path], w, x, y, z])
-            reported[f"{prefix}/pose"] = pose.as_array()
-            reported[f"{prefix}/size"] = self.session.size(f"{path}/shape", pose)
-            reported[f"{prefix}/friction"] = _friction(values, path)
-            if not box.fixed:
-                reported[f"{prefix}/mass"] = values["mass"][path]
-                reported[f"{prefix}/inertia"] = np.diag(values["inertia"][path].reshape(3, 3))
-        if self.prepared is not None:
-            self._read_back_robot(self.prepared, reported)
-        return reported
+        return read_back(self.session, self.scene, self.prepared, self._unit)
 
-    def _read_back_robot(self, prepared: PreparedRobot, reported: dict[str, Any]) -> None:
-        ones = np.ones_like(self._unit)
-        attributes = {
-            "jointLimit": ("limits", self._unit),
-            "jointMaxForce": ("effort_limit", ones),
-            "jointStiffness": ("stiffness", 1 / self._unit),
-            "jointDamping": ("damping", 1 / self._unit),
-            "jointArmature": ("armature", ones),
-            "jointPosition": ("initial_position", self._unit),
-        }
-        joints = self.session.read("ARTICULATION_JOINT", *attributes)
-        for attribute, (quantity, units) in attributes.items():
-            named = zip(prepared.robot.joint_names, self._joints, units, strict=True)
-            for name, path, unit in named:
-                reported[f"joint/{name}/{quantity}"] = joints[attribute][path][0] * unit
-        links = self.session.read("ARTICULATION_LINK", "mass", "inertia", "shapeCount", *_FRICTIONS)
-        names = list(prepared.links)
-        for link in prepared.moving_links:
-            path, prefix = usd.link_path(names.index(link.name)), f"link/{link.name}"
-            reported[f"{prefix}/mass"] = links["mass"][path]
-            tensor = links["inertia"][path].reshape(3, 3)
-            reported[f"{prefix}/inertia"] = np.sort(np.linalg.eigvalsh(tensor))
-            reported[f"{prefix}/friction"] = _friction(links, path)
+    def save(self) -> _Saved:
+        values = {}
+        for kind in self._state_kinds() if self._steps > 0 else ():
+            binding, buffer = self._binding(kind)
+            binding.read(buffer)
+            values[kind] = buffer.copy()
+        return self._steps, values, self._targets
+
+    def restore(self, state: _Saved) -> None:
+        steps, values, targets = state
+        self._start()
+        if steps > 0:
+            self.step()
+        for kind, saved in values.items():
+            binding, buffer = self._binding(kind)
+            buffer[:] = saved
+            binding.write(buffer)
+        self._steps, self._targets = steps, targets
+        if targets is not None and steps > 0:
+            self._write_targets(targets)
+
+    def _state_kinds(self) -> list[str]:
+        """Bindings that hold the state; positions come first, since they reset velocities."""
+        bodies = ["RIGID_BODY_POSE", "RIGID_BODY_VELOCITY"] if self._free else []
+        joints = ["ARTICULATION_DOF_POSITION", "ARTICULATION_DOF_VELOCITY"] if self._joints else []
+        return bodies + joints
 
     def close(self) -> None:
         for binding, _ in getattr(self, "_bindings", {}).values():
@@ -254,13 +261,6 @@ class OvPhysX(Simulator):
         session, self.session = getattr(self, "session", None), None
         if session is not None:  # not so when loading failed before
             session.close()
-
-
-def _friction(values: Mapping[str, Mapping[str, FloatArray]], path: str) -> Any:
-    """The one coefficient of all shapes of a prim, static and dynamic; else all of them."""
-    count = int(values["shapeCount"][path])
-    found = np.unique([np.atleast_1d(values[name][path])[:count] for name in _FRICTIONS])
-    return found[0] if len(found) == 1 else found
 
 
 def _attributes(s: OvPhysXSettings) -> dict[str, dict[str, Any]]:
@@ -273,6 +273,7 @@ def _attributes(s: OvPhysXSettings) -> dict[str, dict[str, Any]]:
             "disableSleeping": not s.sleeping,
             "frictionOffsetThreshold": s.friction_offset_threshold,
             "frictionCorrelationDistance": s.friction_correlation_distance,
+            "enableExternalForcesEveryIteration": s.forces_every_iteration,
             "solveArticulationContactLast": s.contact_last,
         },
         "physxRigidBody": {

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import tempfile
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -20,7 +21,6 @@ ovphysx = lazy_import("ovphysx")
 ovphysx_types = lazy_import("ovphysx.types")
 ovstage = lazy_import("ovstage")
 schema_support = lazy_import("ovphysx.samples.python_samples.schema_support")
-warp = lazy_import("warp")
 
 REACH = 5.0
 """How far outside a body the rays begin that measure it [m]."""
@@ -40,7 +40,9 @@ class Session:
     """
 
     def __init__(self, text: str, threads: int) -> None:
-        warp.config.quiet = True
+        # Deprecated calls are made on purpose, and that Warp could use a GPU is no trouble.
+        warnings.filterwarnings("ignore", category=DeprecationWarning, module="pytest_simbench")
+        warnings.filterwarnings("ignore", message="ovphysx is in CPU-only mode")
         ovphysx.PhysX.set_cpu_mode(True)
         ovphysx.set_global_config(ovphysx_types.GlobalConfigKey.NUM_THREADS, threads)
         self.physx = ovphysx.PhysX()

@@ -61,6 +61,7 @@ def test_two_processes_agree_bit_for_bit(start: Callable[[Scene], World]) -> Non
     assert np.array_equal(first[1], second[1])
 
 
+@pytest.mark.parametrize("start", able_to(Capability.SAVE_RESTORE), indirect=True)
 def test_restore_in_the_grip_repeats_itself(start: Callable[[Scene], World]) -> None:
     world = start(SCENE)
     manipulator = grasped(world)

@@ -6,19 +6,15 @@ are skipped with the command that makes it.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from pytest_simbench.sims.ovphysx import OvPhysX
 
-from pytest_simbench.client.environments import interpreter, missing
+from pytest_simbench.client.environments import missing
 from pytest_simbench.client.errors import WorkerError
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Trajectory
-from pytest_simbench.session.case import Case
-from pytest_simbench.session.repetition import Repetition
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
 from pytest_simbench.testing import Subject, scenes
 
@@ -104,31 +100,3 @@ def test_threads_change_nothing() -> None:
             world.wait(0.5)
             ends.append(world.bodies.tobytes())
     assert ends[0] == ends[1]
-
-
-@pytest.fixture
-def own_case(case: Case, tmp_path: Path) -> Case:
-    return replace(
-        case,
-        simulator="ovphysx",
-        adapter="pytest_simbench.sims.ovphysx:OvPhysX",
-        python=interpreter(OvPhysX.info),
-        test="t[ovphysx-headless]",
-        stall_timeout=60.0,
-    )
-
-
-def test_two_cubes_are_stacked(own_case: Case) -> None:
-    record, error = Repetition(own_case, Stacking().smoke(), 1).run()
-    assert error is None
-    assert record.metrics["at_end_strict"] == 1.0
-    assert record.metrics["untouched_moved"] == 0.0
-
-
-def test_the_throw_lands_and_repeats_itself(own_case: Case) -> None:
-    first, second = (Repetition(own_case, Throwing().smoke(), 2).run()[0] for _ in range(2))
-    assert first.metrics["lost_in_transit"] == 0.0
-    assert first.metrics["landing_error"] is not None
-    assert first.metrics["landing_error"] < 0.03
-    assert first.metrics == second.metrics
-    assert first.details["projectile_end"] == second.details["projectile_end"]
