@@ -31,8 +31,8 @@ SHRINKS = 60
 AT_ONCE = 12
 """Perturbations that are tried at once. Together they hit a weak spot sooner than alone, and
 shrinking drops those that are not needed. For the statics of a leaning tower with 8 mm to spare
-(five quantities, up to 12 mm in x) a search found it with one at once in 14 of 30 seeds, with six in
-24 of 30, with twelve in 20 of 20, after 12 examples in the median."""
+(five quantities, up to 12 mm in x) a search found it with one at once in 14 of 30 seeds, with six
+in 24 of 30, with twelve in 20 of 20, after 12 examples in the median."""
 
 Perturbations = tuple[Perturbation, ...]
 
