@@ -70,6 +70,7 @@ def test_kept_and_read_back(tmp_path: Path) -> None:
         kept = replace(
             sample(name, TIMES, [0.2] * 4),
             commands=[None, np.array([1.0, 2.0])],
+            durations=[0.2, 0.2],
             seed=1 + (name == "c"),
         )
         kept.save(tmp_path / FOLDER / f"{name}.npz")

@@ -1,0 +1,127 @@
+"""`replay`, `perturb` and `simulator.episode` as users type them."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+TEST = """
+    from pytest_simbench.repeatability.replay import Moment
+    from pytest_simbench.tasks import LeaningTowers
+    from tests.repeatability.conftest import Tumbling
+
+    def test_again(replay):
+        result = replay(Tumbling(), moments=(Moment("in flight", "fly"),))
+        result.assert_as_claimed()
+
+    def test_push(perturb):
+        towers = perturb(LeaningTowers())
+        assert len(towers.task.margins) == 1  # the smoke version
+        towers.stability({"x": 0.001}, examples=3).assert_kept_at_least(0.9)
+        towers.search({"x": 0.012}, shrinks=10).assert_found()
+        towers.sensitivity("cube_01").assert_below(10.0, until=1.0)
+"""
+
+
+@pytest.fixture(autouse=True)
+def importable(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The inner pytest can import these tests' tasks, and finds no display."""
+    monkeypatch.setenv("PYTHONPATH", str(request.config.rootpath))
+
+
+@pytest.mark.parametrize("workers", [(), ("-n2",)], ids=["one process", "xdist"])
+def test_results_tables_and_files(pytester: pytest.Pytester, workers: tuple[str, ...]) -> None:
+    pytester.makepyfile(TEST)
+    result = pytester.runpytest_subprocess(
+        "--sim=mujoco,pybullet", "--protocol=smoke", "--sim-output=out", *workers
+    )
+    result.assert_outcomes(passed=4)
+    out = pytester.path / "out"
+    lines = [json.loads(text) for text in (out / "repeatability.jsonl").read_text().splitlines()]
+    kinds = sorted((line["simulator"], line["kind"]) for line in lines)
+    assert kinds == [
+        (name, kind)
+        for name in ("mujoco", "pybullet")
+        for kind in ("replay", "search", "sensitivity", "stability")
+    ]
+    assert all(line["settings"]["timestep"] > 0 for line in lines)
+    assert all(line["versions"] for line in lines)
+    text = result.stdout.str()
+    assert text.count("= repeatability =") == 1
+    for part in ("Replay: tumbling, seed 2022", "topples tower 1", "Agreement"):
+        assert part in text
+    assert "# Repeatability" in (out / "repeatability.md").read_text()
+
+
+def test_a_broken_claim_fails_the_test(pytester: pytest.Pytester) -> None:
+    site = pytester.mkdir("site")
+    info = site / "noisy_simbench-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: noisy-simbench\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(
+        "[pytest_simbench.simulators]\nnoisy = noisy_simbench:Noisy\n"
+    )
+    (site / "noisy_simbench.py").write_text(
+        "from dataclasses import replace\n"
+        "from tests.repeatability import wrong\n\n"
+        "class Noisy(wrong.Noisy):\n"
+        "    info = replace(wrong.Noisy.info, name='noisy')\n"
+    )
+    pytester.makepyfile(TEST)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", os.pathsep.join([str(site), os.environ["PYTHONPATH"]]))
+        result = pytester.runpytest_subprocess(
+            "--sim=noisy", "--protocol=smoke", "--sim-output=out", "-k", "again"
+        )
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(
+        [
+            "*noisy claims to be deterministic, but*",
+            "*after a reset: first differs at t = 0.02 s*",
+            "*Replay: tumbling, growth*",
+        ]
+    )
+
+
+def test_a_failing_example_shrinks_and_tells_how_to_replay(pytester: pytest.Pytester) -> None:
+    """No health check is silenced, a crash is a failing example, the worker is reused, and the
+    line that is printed replays the smallest example."""
+    pytester.makepyfile(
+        """
+        import os, signal
+        from hypothesis import given, settings, strategies as st
+        from pytest_simbench.scene import Pose, Scene
+        from pytest_simbench.tasks.base import cube
+
+        @settings(settings.get_profile("sim-dev"), max_examples=30, derandomize=True)
+        @given(height=st.integers(10, 100))
+        def test_falls(simulator, sim_name, sim_mode, height):
+            body = cube("a", Pose.at(0, 0, height / 100), (1, 1, 1, 1))
+            with simulator.episode(Scene("s", (body,))) as world:
+                world.wait(0.1)
+                if height >= 42:
+                    os.kill(world.process.pid, signal.SIGSEGV)
+                world.wait(0.1)
+        """
+    )
+    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=out")
+    result.assert_outcomes(failed=1)
+    text = result.stdout.str()
+    assert "WorkerExited: the worker was killed by SIGSEGV" in text
+    assert "height=42" in text
+    assert "HealthCheck" not in text
+    (example,) = (pytester.path / "out" / "examples").iterdir()
+    command = f"python -m pytest_simbench.repeatability out/examples/{example.name}"
+    assert f"replay this episode: {command}" in text
+    replayed = subprocess.run(
+        [sys.executable, *command.split()[1:]],
+        cwd=pytester.path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert replayed.stdout.startswith("mujoco headless tuned, t = 0.200 s\n  a: 0.0000 0.0000 0.2")
