@@ -153,18 +153,20 @@ class OvPhysX(Simulator):
         self.close()
         self._steps = 0
         self._targets: tuple[FloatArray, FloatArray] | None = None
+        self._bindings: dict[str, tuple[Any, Any]] = {}
         self.session = Session(self._text, self.settings.threads)
 
     def _binding(self, kind: str) -> tuple[Any, Any]:
         """A tensor binding of the robot or the free bodies, with a buffer of its shape."""
-        if kind not in self._bindings:
+        found = self._bindings.get(kind)
+        if found is None:
             tensor = getattr(ovphysx_types.TensorType, kind)
             prims = [usd.ROOT] if kind.startswith("ARTICULATION") else self._free
             binding = self.session.physx.create_tensor_binding(
                 tensor_type=tensor, prim_paths=prims, raise_if_empty=True
             )
-            self._bindings[kind] = binding, np.zeros(binding.shape, np.float32)
-        return self._bindings[kind]
+            found = self._bindings[kind] = binding, np.zeros(binding.shape, np.float32)
+        return found
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self._targets = position + effort / self._stiffness, velocity
@@ -255,11 +257,11 @@ class OvPhysX(Simulator):
         return bodies + joints
 
     def close(self) -> None:
-        for binding, _ in getattr(self, "_bindings", {}).values():
+        opened = self.__dict__  # in which either is missing, when loading failed before
+        for binding, _ in opened.pop("_bindings", {}).values():
             binding.destroy()
-        self._bindings = {}
-        session, self.session = getattr(self, "session", None), None
-        if session is not None:  # not so when loading failed before
+        session: Session | None = opened.pop("session", None)
+        if session is not None:
             session.close()
 
 

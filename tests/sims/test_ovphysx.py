@@ -100,3 +100,17 @@ def test_threads_change_nothing() -> None:
             world.wait(0.5)
             ends.append(world.bodies.tobytes())
     assert ends[0] == ends[1]
+
+
+def test_a_state_from_before_the_first_step_comes_back() -> None:
+    """Saved before any step there is no contact to forget: the run from it is the same one."""
+    scene = scenes.grip()
+    with Subject(OvPhysX).world(scene) as world:
+        world.save()
+        ends = []
+        for _ in range(2):
+            world.wait(0.1)
+            ends.append((world.time, world.bodies.tobytes(), world.joints.tobytes()))
+            world.restore()
+            assert world.time == 0
+    assert ends[0] == ends[1]
