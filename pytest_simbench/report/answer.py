@@ -36,7 +36,7 @@ def sentences(summary: TaskSummary) -> list[str]:
         found.append(f"failures: {', '.join(failed)}.")
     elif attempts:
         found.append(f"failures: none in {attempts} repetitions.")
-    return [sentence for sentence in found if sentence]
+    return [sentence for sentence in [*found, *summary.modes] if sentence]
 
 
 def short_labels(rows: Sequence[Row]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pytest_simbench.measure.intervals import wilson
 from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.report.summary import Row, Sampled, Spread
 
@@ -53,25 +54,40 @@ def mean_interval(found: Spread | None, metric: Metric) -> list[str]:
     return [metric_value(found.mean, metric), interval(found, metric)]
 
 
-def deviation(found: Spread | None, digits: int = 2) -> list[str]:
-    """Two lines: mean, and deviation between repetitions."""
+def cost(found: Spread | None, digits: int = 2) -> list[str]:
+    """Two lines: the mean, and the interval."""
     if found is None:
         return [MISSING]
-    return [number(found.mean, digits), f"+- {number(found.std, digits)}"]
+    return [number(found.mean, digits), _ends(found, digits)]
+
+
+def _ends(found: Spread | Sampled, digits: int) -> str:
+    if found.low is None or found.high is None:
+        return ""
+    return f"[{number(found.low, digits)}, {number(found.high, digits)}]"
 
 
 def sampled(found: Sampled | None) -> list[str]:
-    """Two lines: mean +- deviation over all samples, and the peak where there is one."""
+    """Mean +- deviation over all samples, the interval of the mean, the peak where there is one."""
     if found is None:
         return [MISSING]
-    peak = "" if found.peak is None else f"(peak {found.peak:.0f})"
-    return [f"{found.mean:.0f} +- {found.std:.0f}", peak]
+    lines = [f"{found.mean:.0f} +- {found.std:.0f}"]
+    if found.low is not None and found.high is not None:
+        lines.append(f"[{found.low:.0f}, {found.high:.0f}]")
+    if found.peak is not None:
+        lines.append(f"(peak {found.peak:.0f})")
+    return lines
 
 
 def failures(row: Row) -> list[str]:
-    """Failed repetitions of those that count, and the interrupted ones below."""
-    more = f"{row.interrupted} cut" if row.interrupted else ""
-    return [f"{row.failed} of {row.attempts}", more]
+    """Failed repetitions of those that count, the interval of their share, the interrupted ones."""
+    lines = [f"{row.failed} of {row.attempts}"]
+    if row.attempts:
+        found = wilson(row.failed, row.attempts)
+        lines.append(f"[{100 * found.low:.0f}, {100 * found.high:.0f}] %")
+    if row.interrupted:
+        lines.append(f"{row.interrupted} cut")
+    return lines
 
 
 def heading(metric: Metric) -> str:

@@ -38,10 +38,10 @@ def study(summary: TaskSummary) -> list[Column]:
         ),
         Column("CPU %", [cells.sampled(row.cpu_percent) for row in rows], "cost"),
         Column("RAM MB", [cells.sampled(row.rss_mb) for row in rows], "cost"),
-        Column("x real time", [cells.deviation(row.real_time_factor) for row in rows], "cost"),
-        Column("CPU s/sim s", [cells.deviation(row.cpu_cost) for row in rows], "cost"),
-        Column("start s", [cells.deviation(row.start) for row in rows], "cost"),
-        Column("end s", [cells.deviation(row.end) for row in rows], "cost"),
+        Column("x real time", [cells.cost(row.real_time_factor) for row in rows], "cost"),
+        Column("CPU s/sim s", [cells.cost(row.cpu_cost) for row in rows], "cost"),
+        Column("start s", [cells.cost(row.start) for row in rows], "cost"),
+        Column("end s", [cells.cost(row.end) for row in rows], "cost"),
     ]
 
 

@@ -1,4 +1,4 @@
-"""Adds to a summary which of its rows beats which; apart, since its tests take a moment."""
+"""Adds what needs tests between rows: which beats which, and whether the modes agree."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from pytest_simbench.measure.contest import wins
+from pytest_simbench.measure.modes import compare_modes
 from pytest_simbench.measure.record import Record
 from pytest_simbench.report.summary import TaskSummary, row_key
 
 
 def with_wins(summaries: Iterable[TaskSummary], records: Sequence[Record]) -> list[TaskSummary]:
-    """The summaries with their `wins`; rows are compared within their mode and profile.
+    """The summaries with their `wins` and `modes`; wins are within a mode and profile.
 
     Args:
         summaries: from `summary.summarise`.
@@ -34,5 +35,7 @@ def with_wins(summaries: Iterable[TaskSummary], records: Sequence[Record]) -> li
                 == (rows[b].mode, rows[b].profile, rows[b].test)
             ),
         )
-        found.append(replace(summary, wins=tuple(result)))
+        own = [record for group in groups.values() for record in group]
+        modes = tuple(c.sentence for c in compare_modes(own, summary.metrics))
+        found.append(replace(summary, wins=tuple(result), modes=modes))
     return found

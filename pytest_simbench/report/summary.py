@@ -21,6 +21,9 @@ from pytest_simbench.measure.record import Record
 Ends = Callable[[Sequence[float], Metric], tuple[float, float]]
 """Gives the lower and upper end of the interval of a metric's mean; infinite where not known."""
 
+AMOUNT = Metric("amount", "any cost")
+"""For the intervals of what is not a share."""
+
 PHASES = ("launch", "compile", "load", "plan", "step", "other")
 """Where the wall time of a repetition goes, in order."""
 
@@ -46,11 +49,19 @@ class Spread:
 
 @dataclass(frozen=True)
 class Sampled:
-    """A resource over all samples of all repetitions of a row: mean, deviation, largest value."""
+    """A resource over all samples of all repetitions of a row.
+
+    Attributes:
+        mean, std: over the samples.
+        peak: the largest value.
+        low, high: the 95 % interval of the mean over the repetitions, None for too few.
+    """
 
     mean: float
     std: float
     peak: float | None = None
+    low: float | None = None
+    high: float | None = None
 
 
 @dataclass(frozen=True)
@@ -129,6 +140,7 @@ class TaskSummary:
         references: the value a perfect run would give, by metric name.
         protocol: the protocol of its records; several are joined by commas.
         wins: which row beats which at what, by the rows' places; from `matrix.with_wins`.
+        modes: whether headless and GUI agree, in sentences; from there too.
     """
 
     task: str
@@ -137,6 +149,7 @@ class TaskSummary:
     references: Mapping[str, float] = field(default_factory=dict)
     protocol: str = ""
     wins: tuple[Win, ...] = ()
+    modes: tuple[str, ...] = ()
 
     @property
     def study(self) -> tuple[Metric, ...]:
@@ -224,12 +237,12 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str, ends: 
             metric.name: spread([r.metrics.get(metric.name) for r in done], metric, ends)
             for metric in metrics
         },
-        cpu_percent=_sampled(done, "cpu_percent"),
-        rss_mb=_sampled(done, "rss_mb"),
-        real_time_factor=spread([r.cost("rtf") for r in done]),
-        cpu_cost=spread([r.cost("cpu_cost") for r in done]),
-        start=spread([r.cost("start") for r in done]),
-        end=spread([r.cost("end") for r in done]),
+        cpu_percent=_sampled(done, "cpu_percent", ends),
+        rss_mb=_sampled(done, "rss_mb", ends),
+        real_time_factor=spread([r.cost("rtf") for r in done], AMOUNT, ends),
+        cpu_cost=spread([r.cost("cpu_cost") for r in done], AMOUNT, ends),
+        start=spread([r.cost("start") for r in done], AMOUNT, ends),
+        end=spread([r.cost("end") for r in done], AMOUNT, ends),
         seconds=_seconds(done),
         causes=_causes(records),
         deviations=tuple(dict.fromkeys(text for r in records for text in r.deviations)),
@@ -258,7 +271,7 @@ def spread(
     return Spread(len(found), min(found), statistics.fmean(found), max(found), std, low, high)
 
 
-def _sampled(records: Sequence[Record], name: str) -> Sampled | None:
+def _sampled(records: Sequence[Record], name: str, ends: Ends) -> Sampled | None:
     """Mean and deviation over all samples, as if they had been taken in one go.
 
     The deviation is within and between repetitions: n samples of mean m_i and deviation s_i add
@@ -278,7 +291,9 @@ def _sampled(records: Sequence[Record], name: str) -> Sampled | None:
     total = sum(count for count, _, _ in parts)
     mean = sum(count * m for count, m, _ in parts) / total
     variance = sum(count * (s**2 + (m - mean) ** 2) for count, m, s in parts) / total
-    return Sampled(mean, math.sqrt(variance), max(peaks, default=None))
+    over = spread([m for _, m, _ in parts], AMOUNT, ends)
+    low, high = (None, None) if over is None else (over.low, over.high)
+    return Sampled(mean, math.sqrt(variance), max(peaks, default=None), low, high)
 
 
 def _seconds(records: Sequence[Record]) -> dict[str, float]:

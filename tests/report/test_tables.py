@@ -35,16 +35,21 @@ def test_study_table_and_what_explains_it_at_100_columns() -> None:
         at the end: mujoco 97 % [94, 99] is ahead of pybullet 90 % [87, 94].
         failures: pybullet 3 of 20.
 
-        simulator                 failed                 placed %            at the end %
-        ---------------------------------------------------------------------------------
-        mujoco headless tuned    0 of 20  93 / 99 / 100 [97, 100]  87 / 97 / 100 [94, 99]
-        pybullet headless tuned  3 of 20    67 / 77 / 87 [73, 80]  80 / 90 / 100 [87, 94]
+        simulator                           failed                 placed %            at the end %
+        -------------------------------------------------------------------------------------------
+        mujoco headless tuned    0 of 20 [0, 16] %  93 / 99 / 100 [97, 100]  87 / 97 / 100 [94, 99]
+        pybullet headless tuned  3 of 20 [5, 36] %    67 / 77 / 87 [73, 80]  80 / 90 / 100 [87, 94]
 
-                                                                x real   CPU s/sim
-        simulator                  CPU %               RAM MB     time           s    start s     end s
-        -----------------------------------------------------------------------------------------------
-        mujoco headless tuned    99 +- 3  150 +- 2 (peak 161)  20 +- 0  0.048 +- 0  0.80 +- 0  9.8 +- 0
-        pybullet headless tuned  99 +- 3  150 +- 2 (peak 161)  20 +- 0  0.048 +- 0  0.80 +- 0  9.8 +- 0
+                                                x real
+        simulator          CPU %      RAM MB      time     CPU s/sim s       start s       end s
+        ----------------------------------------------------------------------------------------
+        mujoco           99 +- 3    150 +- 2        20           0.048          0.80         9.8
+        headless tuned  [99, 99]  [150, 150]  [20, 20]  [0.048, 0.048]  [0.80, 0.80]  [9.8, 9.8]
+                                  (peak 161)
+
+        pybullet         99 +- 3    150 +- 2        20           0.048          0.80         9.8
+        headless tuned  [99, 99]  [150, 150]  [20, 20]  [0.048, 0.048]  [0.80, 0.80]  [9.8, 9.8]
+                                  (peak 161)
 
         stacking, failures
         simulator                count  failure     phase   repetitions  message
@@ -77,14 +82,16 @@ def test_study_table_and_what_explains_it_at_100_columns() -> None:
 def test_study_table_at_140_columns_is_one_table() -> None:
     assert render(columns.study(stacking()), 140) == text(
         """
-                                                                                    x real      CPU  start   end
-        simulator        failed       placed %   at the end %    CPU %      RAM MB    time  s/sim s      s     s
-        --------------------------------------------------------------------------------------------------------
-        mujoco          0 of 20  93 / 99 / 100  87 / 97 / 100  99 +- 3    150 +- 2      20    0.048   0.80   9.8
-        headless tuned               [97, 100]       [94, 99]           (peak 161)    +- 0     +- 0   +- 0  +- 0
+                                                                                         x real
+        simulator          failed       placed %   at the end %     CPU %      RAM MB      time     CPU s/sim s       start s       end s
+        ---------------------------------------------------------------------------------------------------------------------------------
+        mujoco            0 of 20  93 / 99 / 100  87 / 97 / 100   99 +- 3    150 +- 2        20           0.048          0.80         9.8
+        headless tuned  [0, 16] %      [97, 100]       [94, 99]  [99, 99]  [150, 150]  [20, 20]  [0.048, 0.048]  [0.80, 0.80]  [9.8, 9.8]
+                                                                           (peak 161)
 
-        pybullet        3 of 20   67 / 77 / 87  80 / 90 / 100  99 +- 3    150 +- 2      20    0.048   0.80   9.8
-        headless tuned                [73, 80]       [87, 94]           (peak 161)    +- 0     +- 0   +- 0  +- 0
+        pybullet          3 of 20   67 / 77 / 87  80 / 90 / 100   99 +- 3    150 +- 2        20           0.048          0.80         9.8
+        headless tuned  [5, 36] %       [73, 80]       [87, 94]  [99, 99]  [150, 150]  [20, 20]  [0.048, 0.048]  [0.80, 0.80]  [9.8, 9.8]
+                                                                           (peak 161)
         """  # noqa: E501
     )
 
@@ -152,7 +159,7 @@ def test_a_simulator_that_only_failed_still_has_its_row() -> None:
     (summary,) = summarise([failed("WorkerDied", "load", "gone", repetition=1)], METRICS)
     table = render(columns.study(summary), 140)
     assert table.splitlines()[-1].split() == [
-        *["mujoco", "headless", "tuned", "1", "of", "1"],
+        *["mujoco", "headless", "tuned", "1", "of", "1", "[21,", "100]", "%"],
         *["-"] * 8,
     ]
     assert columns.time_spent(summary) == []
