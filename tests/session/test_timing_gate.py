@@ -22,6 +22,7 @@ TASK = Falling(duration=15.0)
 
 def repetitions(case: Case) -> list[Record]:
     kept: list[Record] = []
+    case = replace(case, timeout=600.0, stall_timeout=120.0)  # a machine that is very busy
     Repeater(case, 1, Progress(lambda text: None, is_tty=False), kept.append).run(TASK, range(1, 7))
     assert all(record.ok for record in kept)
     return kept

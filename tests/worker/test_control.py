@@ -56,9 +56,9 @@ def test_the_control_takes_its_share_and_no_more() -> None:
     assert control.runs == 1  # also the shortest repetition has one
     control.keep_up(0.0)
     assert control.runs == 1
-    control.keep_up(0.05)
-    least = 1e-5  # of a machine ten times as fast as those of today
-    assert 1 < control.runs <= SHARE * 0.05 / least + 1
+    control.keep_up(0.2)
+    assert control.runs > 1
+    assert control.wall - control.waited < 3 * SHARE * 0.2  # of runs that are not the shortest
     runs = control.runs
     control.keep_up(1e6)  # steps that take forever do not keep the engine waiting
     assert control.runs == runs + MOST_AT_ONCE
