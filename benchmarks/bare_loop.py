@@ -28,6 +28,7 @@ def main() -> None:
     if cls.info.costly_start:
         simulator.compile(scene)
     simulator.load(scene)
+    simulator.read_back()  # as in the worker: what engines load when first asked is not stepping
     rows = (np.array(order[part]) for part in ("position", "velocity", "effort"))
     points = Trajectory(order["tick"], *rows).resampled(simulator.settings.timestep)
     commands = list(zip(points.position, points.velocity, points.effort, strict=True))
