@@ -87,6 +87,8 @@ def worker(name: str) -> tuple[float, float]:
         path,
         python=interpreter(info),
         environment=Environment.of(info).variables(),
+        start_timeout=600.0,
+        stall_timeout=600.0,
         compile_timeout=info.compile_timeout if info.costly_start else 0.0,
     )
     process = WorkerProcess(launch, Where(name, "headless"))
