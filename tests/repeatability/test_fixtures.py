@@ -22,7 +22,7 @@ TEST = """
         towers = perturb(LeaningTowers())
         assert len(towers.task.margins) == 1  # the smoke version
         towers.stability({"x": 0.001}, examples=3).assert_kept_at_least(0.9)
-        towers.search({"x": 0.012}, shrinks=10).assert_found()
+        towers.search({"x": 0.012}, shrinks=10, at_once=1).assert_found()
         towers.sensitivity("cube_01").assert_below(10.0, until=1.0)
 """
 
