@@ -41,8 +41,8 @@ ROBOT, WORLD = 1, 2
 class SAPIENSettings(Settings):
     """SAPIEN's options; defaults are those that SAPIEN 3.0.3 and its PhysX 5.3 report.
 
-    `tuned` is explained in docs/engines/sapien.md: few iterations of a short step hold cubes and
-    let an impact through.
+    `tuned` is explained in docs/engines/sapien.md: few iterations hold cubes and let an impact
+    through.
 
     Attributes:
         timestep: [s]; a new SAPIEN scene has 0.01.
@@ -106,8 +106,9 @@ class SAPIEN(Simulator):
     profiles: ClassVar[Mapping[str, Settings]] = {
         "default": SAPIENSettings(),
         "tuned": SAPIENSettings(
-            timestep=0.001,
+            timestep=0.004,
             position_iterations=4,
+            velocity_iterations=0,
             sleep_threshold=0.0,
             angular_damping=0.0,
             link_damping=0.0,
