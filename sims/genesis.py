@@ -111,7 +111,12 @@ class Genesis(Simulator):
     )
     profiles: ClassVar[Mapping[str, Settings]] = {
         "default": GenesisSettings(),
-        "tuned": GenesisSettings(timestep=0.004, friction_cone="elliptic", box_box_detection=True),
+        "tuned": GenesisSettings(
+            timestep=0.002,
+            constraint_timeconst=0.004,
+            friction_cone="elliptic",
+            box_box_detection=True,
+        ),
     }
     settings: GenesisSettings
     world: Any = None
@@ -126,7 +131,9 @@ class Genesis(Simulator):
         (`dump_cache_data_to_disk`) makes kernels of later worlds crash.
         """
         several = len(scene.free_bodies) + (scene.robot is not None) > 1  # solved by islands
-        options = dataclasses.replace(self.settings, timestep=1.0)
+        options = dataclasses.replace(  # what is data, not code
+            self.settings, timestep=1.0, substeps=1, constraint_timeconst=1.0, impedance=(0.9, 0.95)
+        )
         kind = (options, several, scene.robot is not None, bool(scene.free_bodies))
         if kind in self.compiled:
             return
