@@ -347,8 +347,23 @@ class Genesis(Simulator):
 
     def render(self, width: int, height: int) -> NDArray[np.uint8]:
         if self._camera is None or self._camera.res != (width, height):
-            self._camera = self.world.add_camera(
-                res=(width, height), pos=_EYE, lookat=_LOOK_AT, fov=_FOV
+            # `Scene.add_camera` refuses once a scene is built; the visualiser does not.
+            self._camera = self.world.visualizer.add_camera(
+                res=(width, height),
+                pos=_EYE,
+                lookat=_LOOK_AT,
+                up=(0.0, 0.0, 1.0),
+                model="pinhole",
+                fov=_FOV,
+                aperture=2.0,
+                focus_dist=None,
+                GUI=False,
+                spp=1,
+                denoise=False,
+                near=0.1,
+                far=20.0,
+                env_idx=None,
+                debug=False,
             )
             self._camera.build()
         picture = self._camera.render(rgb=True, force_render=True)[0]
