@@ -96,6 +96,7 @@ class Genesis(Simulator):
                 Capability.OFFSCREEN,
                 Capability.SAVE_RESTORE,
                 Capability.CONTACT_COUNT,
+                Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -111,7 +112,12 @@ class Genesis(Simulator):
     )
     profiles: ClassVar[Mapping[str, Settings]] = {
         "default": GenesisSettings(),
-        "tuned": GenesisSettings(timestep=0.004, friction_cone="elliptic", box_box_detection=True),
+        "tuned": GenesisSettings(
+            timestep=0.002,
+            constraint_timeconst=0.004,
+            friction_cone="elliptic",
+            box_box_detection=True,
+        ),
     }
     settings: GenesisSettings
     world: Any = None
@@ -126,7 +132,9 @@ class Genesis(Simulator):
         (`dump_cache_data_to_disk`) makes kernels of later worlds crash.
         """
         several = len(scene.free_bodies) + (scene.robot is not None) > 1  # solved by islands
-        options = dataclasses.replace(self.settings, timestep=1.0)
+        options = dataclasses.replace(  # what is data, not code
+            self.settings, timestep=1.0, substeps=1, constraint_timeconst=1.0, impedance=(0.9, 0.95)
+        )
         kind = (options, several, scene.robot is not None, bool(scene.free_bodies))
         if kind in self.compiled:
             return
@@ -339,8 +347,23 @@ class Genesis(Simulator):
 
     def render(self, width: int, height: int) -> NDArray[np.uint8]:
         if self._camera is None or self._camera.res != (width, height):
-            self._camera = self.world.add_camera(
-                res=(width, height), pos=_EYE, lookat=_LOOK_AT, fov=_FOV
+            # `Scene.add_camera` refuses once a scene is built; the visualiser does not.
+            self._camera = self.world.visualizer.add_camera(
+                res=(width, height),
+                pos=_EYE,
+                lookat=_LOOK_AT,
+                up=(0.0, 0.0, 1.0),
+                model="pinhole",
+                fov=_FOV,
+                aperture=2.0,
+                focus_dist=None,
+                GUI=False,
+                spp=1,
+                denoise=False,
+                near=0.1,
+                far=20.0,
+                env_idx=None,
+                debug=False,
             )
             self._camera.build()
         picture = self._camera.render(rgb=True, force_render=True)[0]
