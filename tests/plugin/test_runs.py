@@ -28,7 +28,7 @@ def records(folder: Path) -> list[dict[str, object]]:
 
 def test_ids_table_records_and_logs(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(TEST)
-    result = pytester.runpytest_subprocess("--sim=all", "--reps=2", "--sim-output=out", "-v")
+    result = pytester.runpytest_subprocess("--sim=mujoco,pybullet", "--reps=2", "--sim-output=out", "-v")
     result.assert_outcomes(passed=2)
     result.stdout.fnmatch_lines(
         [
@@ -72,7 +72,7 @@ def test_marks(pytester: pytest.Pytester) -> None:
             raise AssertionError
         """
     )
-    result = pytester.runpytest_subprocess("--sim=all", "-rs")
+    result = pytester.runpytest_subprocess("--sim=mujoco,pybullet", "-rs")
     result.assert_outcomes(passed=3, skipped=3, xfailed=1)
     result.stdout.fnmatch_lines(["*pybullet has no gpu*"])
 
@@ -88,7 +88,7 @@ def test_ini_twins(pytester: pytest.Pytester) -> None:
 def test_xdist_merges_records_and_prints_one_table(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(TEST)
     result = pytester.runpytest_subprocess(
-        "--sim=all", "--reps=2", "--sim-output=out", "-n2", "-p", "no:randomly"
+        "--sim=mujoco,pybullet", "--reps=2", "--sim-output=out", "-n2", "-p", "no:randomly"
     )
     result.assert_outcomes(passed=2)
     assert len(records(pytester.path / "out")) == 4
@@ -193,7 +193,7 @@ def test_k_and_x_choose_and_stop(pytester: pytest.Pytester) -> None:
         repeat(Falling()).assert_at_most("landed", -1.0)
 """
     )
-    arguments = ["--sim=all", "--reps=1", "--sim-output=out"]
+    arguments = ["--sim=mujoco,pybullet", "--reps=1", "--sim-output=out"]
     result = pytester.runpytest_subprocess(*arguments, "-k", "falling and mujoco")
     result.assert_outcomes(passed=1, deselected=3)
     result = pytester.runpytest_subprocess(*arguments, "-k", "impossible", "-x")
