@@ -136,9 +136,17 @@ def compare(
 def _permutation(a: FloatArray, b: FloatArray, paired: bool, alternative: Alternative) -> float:
     from scipy import stats
 
+    if min(a.size, b.size) < 2:
+        return 1.0  # one repetition cannot be told from chance; scipy refuses it
+    scale = max(float(np.abs(a).max()), float(np.abs(b).max())) or 1.0
+
+    def mean_difference(second: Any, first: Any, axis: int = -1) -> Any:
+        difference = np.mean(second, axis=axis) - np.mean(first, axis=axis)
+        return np.round(difference / scale, 12)  # sums in another order are still ties
+
     found = stats.permutation_test(
         (b, a),
-        _mean_difference,
+        mean_difference,
         permutation_type="samples" if paired else "independent",
         vectorized=True,
         n_resamples=PERMUTATIONS,
@@ -146,10 +154,6 @@ def _permutation(a: FloatArray, b: FloatArray, paired: bool, alternative: Altern
         rng=np.random.default_rng(SEED),
     )
     return float(found.pvalue)
-
-
-def _mean_difference(second: Any, first: Any, axis: int = -1) -> Any:
-    return np.mean(second, axis=axis) - np.mean(first, axis=axis)
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

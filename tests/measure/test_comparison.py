@@ -106,6 +106,18 @@ def test_exchanging_the_sides_mirrors_the_comparison(
     assert 0 < found.p_value <= 1
 
 
+@pytest.mark.parametrize(("first", "second"), [([1.0], [2.0]), ([1.0], [2.0] * 20)])
+def test_one_repetition_is_never_significant(first: list[float], second: list[float]) -> None:
+    assert compare(first, second).p_value == 1.0
+    assert compare(first[:1], second[:1], paired=True).p_value == 1.0
+
+
+def test_equal_up_to_rounding_is_equal() -> None:
+    """The means of a permuted sum differ in the last bits; that is no difference."""
+    first = [0.1, 0.2, 0.3, 0.7, 1e-18]
+    assert compare(first, [*reversed(first)]).p_value == 1.0
+
+
 def test_only_common_seeds_are_paired() -> None:
     first, second = pair({3: 0.3, 1: 0.1, 2: 0.2}, {1: 1.1, 3: 1.3, 9: 1.9})
     assert list(first) == [0.1, 0.3]

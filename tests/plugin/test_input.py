@@ -15,7 +15,7 @@ TEST = """
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--sim=mujocco"], "unknown simulator 'mujocco'; choose from *mujoco, pybullet*all"),
+        (["--sim=mujocco"], "unknown simulator 'mujocco'; choose from *mujoco, *pybullet*all"),
         (["--reps=0"], "--reps 0: give at least 1"),
         (["--reps=many"], "--reps takes a whole number, auto or auto:LIMIT, not 'many'"),
         (["--reps=auto:x"], "--reps takes a whole number, auto or auto:LIMIT, not 'auto:x'"),
@@ -50,7 +50,7 @@ def test_bad_option(pytester: pytest.Pytester, arguments: list[str], message: st
 @pytest.mark.parametrize(
     ("mark", "message"),
     [
-        ("only_sim('mujocco')", "unknown simulator 'mujocco'; choose from *mujoco, pybullet*"),
+        ("only_sim('mujocco')", "unknown simulator 'mujocco'; choose from *mujoco, *pybullet*"),
         ("skip_sim()", "skip_sim needs the name of a simulator"),
         ("skip_sim(['mujoco'])", "unknown simulator \"['mujoco']\"; choose from"),
         ("skip_sim('mujoco', reson='x')", "skip_sim has no keyword argument 'reson'; *reason"),

@@ -28,7 +28,9 @@ def records(folder: Path) -> list[dict[str, object]]:
 
 def test_ids_table_records_and_logs(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(TEST)
-    result = pytester.runpytest_subprocess("--sim=mujoco,pybullet", "--reps=2", "--sim-output=out", "-v")
+    result = pytester.runpytest_subprocess(
+        "--sim=mujoco,pybullet", "--reps=2", "--sim-output=out", "-v"
+    )
     result.assert_outcomes(passed=2)
     result.stdout.fnmatch_lines(
         [
