@@ -151,7 +151,10 @@ def test_limits_need_a_baseline(pytester: pytest.Pytester) -> None:
     result.stderr.fnmatch_lines(["ERROR: --sim-compare-fail needs a run to compare with: *"])
 
 
-def test_junit_has_a_property_for_each_metric(pytester: pytest.Pytester) -> None:
+def test_junit_has_a_property_for_each_metric(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DURATION", "200")  # long enough for the resources to be sampled
     pytester.makepyfile(TEST)
     result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=2", "--junitxml=junit.xml")
     result.assert_outcomes(passed=1)

@@ -72,8 +72,9 @@ def test_nothing_found_is_a_sentence_and_a_failed_assertion(
 ) -> None:
     finding = search(towers(), {"y": 0.001}, examples=5)
     assert finding.smallest is None
-    assert finding.runs == 5
-    assert finding.sentence == "nothing within 1 mm in y changed the outcome in 5 examples"
+    assert 3 <= finding.runs <= 5  # Hypothesis does not run an example twice
+    tried = f"{finding.runs} examples"
+    assert finding.sentence == f"nothing within 1 mm in y changed the outcome in {tried}"
     finding.assert_not_below("y", 0.001)
     with pytest.raises(AssertionError, match="mujoco: nothing within 1 mm in y"):
         finding.assert_found()
