@@ -53,7 +53,7 @@ def tower_stands(subject: Subject) -> None:
 
 def _slide(subject: Subject, direction: float) -> None:
     slope, mu = 0.75, 0.5
-    motion = subject.motion(scenes.incline(slope, mu, direction), 0.8, 0.05)
+    motion = subject.motion(scenes.incline(slope, mu, direction), 0.8, 0.01)
     along = motion.bodies[:, 0, 7:9] @ [math.cos(direction), math.sin(direction)]
     used = motion.time > 0.25  # the contact has settled
     measured = float(np.polyfit(motion.time[used], along[used], 1)[0])
@@ -73,6 +73,15 @@ def slides_above_mu(subject: Subject) -> None:
 def slides_alike_diagonally(subject: Subject) -> None:
     """The same along a diagonal of the axes, where a friction pyramid differs from the cone."""
     _slide(subject, math.pi / 4)
+
+
+@check()
+def slides_flat(subject: Subject) -> None:
+    """A sliding slab, 2 cm high and five times as wide, stays on the slope within 1 mm."""
+    motion = subject.motion(scenes.incline(0.75, 0.5), 0.8, 0.01)
+    height = motion.bodies[motion.time > 0.1, 0, 2]
+    highest = float(height[np.argmax(abs(height - 0.01))])
+    require_close("height of the slab's centre while it slides", highest, 0.01, 1e-3, "m")
 
 
 @check()
