@@ -30,6 +30,7 @@ from pytest_simbench.simulator import (
     Simulator,
     SimulatorInfo,
     lazy_import,
+    one_value,
 )
 
 dartpy = lazy_import("dartpy")
@@ -243,7 +244,9 @@ class DART(Simulator):
             joint = robot.getJoint(name)
             limits = [joint.getPositionLowerLimit(0), joint.getPositionUpperLimit(0)]
             reported[f"joint/{name}/limits"] = limits
-            reported[f"joint/{name}/effort_limit"] = joint.getForceUpperLimit(0)
+            reported[f"joint/{name}/effort_limit"] = one_value(
+                [-joint.getForceLowerLimit(0), joint.getForceUpperLimit(0)]
+            )
             reported[f"joint/{name}/initial_position"] = joint.getPosition(0)
         for link in prepared.moving_links:
             body = robot.getBodyNode(link.name)

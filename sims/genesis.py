@@ -32,6 +32,7 @@ from pytest_simbench.simulator import (
     Simulator,
     SimulatorInfo,
     lazy_import,
+    one_value,
 )
 
 genesis = lazy_import("genesis")
@@ -251,8 +252,8 @@ class Genesis(Simulator):
                 reported[f"link/{link.name}/mass"] = masses[part.idx]
                 moments = np.linalg.eigvalsh(inertias[part.idx].astype(float))
                 reported[f"link/{link.name}/inertia"] = moments
-                values = np.unique(frictions[[geom.idx for geom in part.geoms]])
-                reported[f"link/{link.name}/friction"] = values[0] if len(values) == 1 else values
+                shapes = [geom.idx for geom in part.geoms]
+                reported[f"link/{link.name}/friction"] = one_value(frictions[shapes])
         return reported
 
     def _read_back_robot(self, prepared: PreparedRobot, reported: dict[str, Any]) -> None:
@@ -275,7 +276,7 @@ class Genesis(Simulator):
             prepared.robot.joint_names, self._dofs, positions, strict=True
         ):
             reported[f"joint/{name}/limits"] = limits[dof]
-            reported[f"joint/{name}/effort_limit"] = min(-forces[dof, 0], forces[dof, 1])
+            reported[f"joint/{name}/effort_limit"] = one_value(forces[dof] * [-1, 1])
             reported[f"joint/{name}/stiffness"] = gains[dof]
             reported[f"joint/{name}/damping"] = damping[dof] - biases[dof, 2]
             reported[f"joint/{name}/armature"] = armature[dof]

@@ -33,6 +33,7 @@ from pytest_simbench.simulator import (
     Simulator,
     SimulatorInfo,
     lazy_import,
+    one_value,
 )
 
 mujoco = lazy_import("mujoco")
@@ -220,7 +221,7 @@ class MuJoCo(Simulator):
         for name in prepared.robot.joint_names:
             joint, drive = model.joint(name), model.actuator(name)
             reported[f"joint/{name}/limits"] = joint.range
-            reported[f"joint/{name}/effort_limit"] = drive.forcerange[1]
+            reported[f"joint/{name}/effort_limit"] = one_value(drive.forcerange * [-1, 1])
             reported[f"joint/{name}/stiffness"] = -drive.biasprm[1]
             reported[f"joint/{name}/damping"] = -drive.biasprm[2] + float(joint.damping[0])
             reported[f"joint/{name}/armature"] = joint.armature[0]
@@ -230,8 +231,7 @@ class MuJoCo(Simulator):
             geoms = np.flatnonzero(model.geom_bodyid == body.id)
             reported[f"link/{link.name}/mass"] = body.mass[0]
             reported[f"link/{link.name}/inertia"] = np.sort(body.inertia)
-            values = np.unique(model.geom_friction[geoms, 0])
-            reported[f"link/{link.name}/friction"] = values[0] if len(values) == 1 else values
+            reported[f"link/{link.name}/friction"] = one_value(model.geom_friction[geoms, 0])
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self.data.ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness

@@ -30,6 +30,7 @@ from pytest_simbench.simulator import (
     Simulator,
     SimulatorInfo,
     lazy_import,
+    one_value,
 )
 
 newton = lazy_import("newton")
@@ -203,10 +204,11 @@ class Newton(Simulator):
             drive = int(np.flatnonzero(model.actuator_trnid[:, 0] == at)[0])
             gain, bias = model.actuator_gainprm[drive], model.actuator_biasprm[drive]
             passive = np.ravel(model.dof_damping[dof])[0]
-            limit = model.actuator_forcerange[drive, 1] * model.actuator_forcelimited[drive]
+            range_ = model.actuator_forcerange[drive] * model.actuator_forcelimited[drive]
+            limit = one_value(np.minimum(range_ * [-1, 1], model.jnt_actfrcrange[at] * [-1, 1]))
             reported[f"joint/{name}/limits"] = model.jnt_range[at]
-            reported[f"joint/{name}/effort_limit"] = min(limit, model.jnt_actfrcrange[at, 1])
-            reported[f"joint/{name}/stiffness"] = _only([gain[0], -bias[1]])
+            reported[f"joint/{name}/effort_limit"] = limit
+            reported[f"joint/{name}/stiffness"] = one_value([gain[0], -bias[1]])
             reported[f"joint/{name}/damping"] = passive - bias[2]
             reported[f"joint/{name}/armature"] = model.dof_armature[dof]
             reported[f"joint/{name}/initial_position"] = data.qpos[model.jnt_qposadr[at]]
@@ -215,7 +217,7 @@ class Newton(Simulator):
             reported[f"link/{link.name}/mass"] = body.mass[0]
             reported[f"link/{link.name}/inertia"] = np.sort(body.inertia)
             frictions = model.geom_friction[model.geom_bodyid == body.id, 0]
-            reported[f"link/{link.name}/friction"] = _only(frictions)
+            reported[f"link/{link.name}/friction"] = one_value(frictions)
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self._ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness
@@ -325,12 +327,6 @@ _LOOK_AT = (0.5, 0.0, 0.35)
 
 _STATE = ("joint_q", "joint_qd", "body_q", "body_qd")
 """Arrays of Newton's state."""
-
-
-def _only(values: Any) -> Any:
-    """The value that all have; all of them where they differ, which no scene asks for."""
-    different = np.unique(values)
-    return different[0] if len(different) == 1 else different
 
 
 def _inertia(body: Any) -> FloatArray:

@@ -10,7 +10,7 @@ from pytest_simbench.sims import ovphysx_stage as usd
 from pytest_simbench.sims.ovphysx_session import Session
 
 from pytest_simbench.scene import FloatArray, Pose, Scene
-from pytest_simbench.simulator import PreparedRobot
+from pytest_simbench.simulator import PreparedRobot, one_value
 
 _FRICTIONS = ("staticFriction", "dynamicFriction")
 
@@ -79,5 +79,4 @@ def _links(session: Session, prepared: PreparedRobot) -> dict[str, Any]:
 def _friction(values: Mapping[str, Mapping[str, FloatArray]], path: str) -> Any:
     """The one coefficient of all shapes of a prim, static and dynamic; else all of them."""
     count = int(values["shapeCount"][path])
-    found = np.unique([np.atleast_1d(values[name][path])[:count] for name in _FRICTIONS])
-    return found[0] if len(found) == 1 else found
+    return one_value([np.atleast_1d(values[name][path])[:count] for name in _FRICTIONS])

@@ -28,6 +28,7 @@ from pytest_simbench.simulator import (
     Simulator,
     SimulatorInfo,
     lazy_import,
+    one_value,
 )
 
 sapien = lazy_import("sapien")
@@ -327,5 +328,4 @@ def _pose(component: Any) -> FloatArray:
 def _friction(component: Any) -> Any:
     """The friction of all shapes of a body, static and dynamic; one number when they agree."""
     materials = [shape.physical_material for shape in component.collision_shapes]
-    values = np.unique([[m.static_friction, m.dynamic_friction] for m in materials])
-    return values[0] if len(values) == 1 else values
+    return one_value([[m.static_friction, m.dynamic_friction] for m in materials])

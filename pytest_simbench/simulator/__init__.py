@@ -12,6 +12,7 @@ from pytest_simbench.simulator.errors import (
 )
 from pytest_simbench.simulator.info import Capability, Deviation, SimulatorInfo
 from pytest_simbench.simulator.lazy import lazy_import
+from pytest_simbench.simulator.parity import one_value
 from pytest_simbench.simulator.settings import Settings
 from pytest_simbench.simulator.urdf import PreparedRobot
 
@@ -30,4 +31,5 @@ __all__ = [
     "SimulatorError",
     "SimulatorInfo",
     "lazy_import",
+    "one_value",
 ]

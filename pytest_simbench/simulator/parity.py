@@ -103,6 +103,15 @@ def check(
     return excused
 
 
+def one_value(values: Any) -> Any:
+    """The number that all values are (frictions of a body's shapes, both ends of a force range).
+
+    Where they differ: all of them, as an array (n,), which no scene asks for.
+    """
+    different = np.unique(values)
+    return different[0] if len(different) == 1 else different
+
+
 def _equal(name: str, expected: Any, reported: Any) -> bool:
     a, b = np.asarray(expected, dtype=float), np.asarray(reported, dtype=float)
     if a.shape != b.shape:

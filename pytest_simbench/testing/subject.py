@@ -42,7 +42,8 @@ def require_close(what: str, value: float, expected: float, tolerance: float, un
 TIMEOUT = 120.0
 """For anything but compiling [s]."""
 
-_shared: dict[tuple[str | None, str], WorkerProcess] = {}
+_shared: dict[tuple[str | None, str, str], WorkerProcess] = {}
+"""By interpreter, the adapter's top package (all that a worker can import of it), and name."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,7 @@ class Subject:
 
     def shared(self) -> WorkerProcess:
         """The process that checks share; started when first needed."""
-        key = (self.python, self.name)
+        key = (self.python, self.adapter.partition(".")[0], self.name)
         if key not in _shared or not _shared[key].alive:
             _shared[key] = self.launch()
         return _shared[key]

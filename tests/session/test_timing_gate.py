@@ -47,7 +47,7 @@ def test_a_busy_machine_passes_and_a_slower_engine_does_not(
     assert report.changes[0].normalised
     assert report.failures == ()
     waited = [record.stepping["waited"] / record.stepping["wall"] for record in busy]
-    assert sum(waited) / len(waited) > 0.3  # of two busy processes a core it gets its third
+    assert sum(waited) / len(waited) > 0.12  # as it is, the time would have fired the gate
 
     slower = repetitions(replace(case, adapter="tests.slower:Slower"))
     assert [r.metrics for r in slower] == [r.metrics for r in baseline]

@@ -73,7 +73,7 @@ def gain(index: int) -> Callable[[Any], None]:
 
 
 def effort_limit(s: Any) -> None:
-    s.model.actuator("panda_joint4").forcerange[:] *= 2
+    s.model.actuator("panda_joint4").forcerange[1] *= 2  # one end only
 
 
 def rotor(s: Any) -> None:
