@@ -98,7 +98,7 @@ class Drake(Simulator):
             contact_model="point",
             approximation="sap",
             relaxation_time=0.01,
-            corner_radius=0.004,
+            corner_radius=0.001,
             pad_radius=0.003,
             shrink=1e-4,
         ),
