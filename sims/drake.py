@@ -71,6 +71,7 @@ class Drake(Simulator):
                 Capability.WINDOW,
                 Capability.OFFSCREEN,
                 Capability.SAVE_RESTORE,
+                Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,

@@ -96,6 +96,7 @@ class Genesis(Simulator):
             {
                 Capability.OFFSCREEN,
                 Capability.SAVE_RESTORE,
+                Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,

@@ -86,6 +86,7 @@ class MuJoCo(Simulator):
                 Capability.WINDOW,
                 Capability.OFFSCREEN,
                 Capability.SAVE_RESTORE,
+                Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,

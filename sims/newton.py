@@ -56,6 +56,7 @@ class Newton(Simulator):
                 Capability.WINDOW,
                 Capability.OFFSCREEN,
                 Capability.SAVE_RESTORE,
+                Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,

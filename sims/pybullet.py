@@ -111,6 +111,7 @@ class PyBullet(Simulator):
                 Capability.WINDOW,
                 Capability.OFFSCREEN,
                 Capability.SAVE_RESTORE,
+                Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,

@@ -7,7 +7,7 @@ again, to the last bit, after each of the things that should not matter.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pytest_simbench.client.errors import WorkerError
@@ -53,6 +53,7 @@ class Again:
         left_at: when the task no longer asked for what the tape has next [s].
         skipped: why it was not run, "" when it was.
         failure: the error that ended it, "" when there was none.
+        claimed: whether the adapter claims that this way gives the same.
     """
 
     way: str
@@ -61,6 +62,7 @@ class Again:
     left_at: float | None = None
     skipped: str = ""
     failure: str = ""
+    claimed: bool = True
 
     @property
     def identical(self) -> bool:
@@ -99,6 +101,7 @@ class Again:
             "left_at": self.left_at,
             "skipped": self.skipped,
             "failure": self.failure,
+            "claimed": self.claimed,
         }
 
     @classmethod
@@ -114,6 +117,7 @@ class Again:
             data["left_at"],
             data["skipped"],
             data["failure"],
+            data.get("claimed", True),
         )
 
 
@@ -142,15 +146,20 @@ class Replay:
         }
 
     def assert_as_claimed(self) -> None:
-        """Raise AssertionError when a simulator that claims determinism is not, or when one could
-        not run again what it ran before."""
+        """Raise AssertionError when a way that is claimed to give the same does not, or when the
+        simulator could not run again what it ran before.
+
+        Claimed are, with the capability `deterministic`, all ways but those that restore a state,
+        and with `exact_restore` those.
+        """
         bad = [
             f"{again.way}: {again.text}"
             for again in self.again
-            if again.failure or (self.claims and not again.identical and not again.skipped)
+            if again.failure or (again.claimed and not again.identical and not again.skipped)
         ]
         if bad:
-            head = "claims to be deterministic, but" if self.claims else "could not run again"
+            claimed = any(again.claimed for again in self.again)
+            head = "claims to be deterministic, but" if claimed else "could not run again"
             raise AssertionError(f"{self.simulator} {head}\n  " + "\n  ".join(bad))
 
 
@@ -178,6 +187,7 @@ def replay(
         WorkerError: in the first run; later ones are results.
     """
     simulator = experiment.handle.case.simulator
+    restores = Capability.EXACT_RESTORE in capabilities
     first = experiment.run()
     results = [
         _again("after a reset", first, lambda: experiment.run(play=first.tape)),
@@ -188,7 +198,8 @@ def replay(
         if Capability.SAVE_RESTORE not in capabilities:
             results.append(Again(way, skipped=f"{simulator} cannot save and restore"))
         else:
-            results.append(_restored(way, moment, experiment, first))
+            restored = _restored(way, moment, experiment, first)
+            results.append(replace(restored, claimed=restores))
     results.append(
         _again("fresh process", first, lambda: experiment.run(play=first.tape, handle=fresh))
     )
@@ -198,6 +209,8 @@ def replay(
     else:
         other = other_mode
         results.append(_again(mode, first, lambda: experiment.run(play=first.tape, handle=other)))
+    if not claims:
+        results = [replace(again, claimed=False) for again in results]
     return Replay(simulator, claims, first, tuple(results))
 
 

@@ -12,6 +12,7 @@ MARKS: tuple[tuple[str, Capability], ...] = (
     ("offscreen picture", Capability.OFFSCREEN),
     ("deterministic", Capability.DETERMINISTIC),
     ("save and restore", Capability.SAVE_RESTORE),
+    ("restores exactly", Capability.EXACT_RESTORE),
     ("contact forces", Capability.CONTACT_FORCES),
     ("GPU", Capability.GPU),
 )

@@ -14,6 +14,8 @@ class Capability(StrEnum):
     WINDOW = "window"
     OFFSCREEN = "offscreen"
     SAVE_RESTORE = "save_restore"
+    EXACT_RESTORE = "exact_restore"
+    """A restored run equals, bit for bit, the one that was neither saved nor restored."""
     CONTACT_COUNT = "contact_count"
     CONTACT_FORCES = "contact_forces"
     DETERMINISTIC = "deterministic"

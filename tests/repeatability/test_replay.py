@@ -31,12 +31,18 @@ def replayed(
 ) -> Callable[..., Replay]:
     """Falling cubes, run again in a simulator that claims to be deterministic."""
 
-    def run(name: str, *, gui: bool = False, claims: bool = True) -> Replay:
+    def run(
+        name: str,
+        *,
+        gui: bool = False,
+        claims: bool = True,
+        capabilities: frozenset[Capability] = EVERYTHING,
+    ) -> Replay:
         other = handle_of(name, "gui") if gui else "no display"
         return replay(
             tumbling(name),
             claims=claims,
-            capabilities=EVERYTHING,
+            capabilities=capabilities,
             fresh=handle_of(name),
             other_mode=other,
             moments=MOMENTS,
@@ -88,6 +94,14 @@ def test_half_a_restore_is_found(replayed: Callable[..., Replay]) -> None:
     assert broken(result) == {"restored in flight"}
     with pytest.raises(AssertionError, match="restored in flight: first differs at t = 0.07 s"):
         result.assert_as_claimed()
+
+
+def test_a_restore_that_nobody_claims_to_be_exact_is_a_result(
+    replayed: Callable[..., Replay],
+) -> None:
+    result = replayed("Forgetful", capabilities=EVERYTHING - {Capability.EXACT_RESTORE})
+    assert broken(result) == {"restored in flight"}
+    result.assert_as_claimed()
 
 
 def test_an_effect_of_the_window_is_found(replayed: Callable[..., Replay]) -> None:
