@@ -154,6 +154,11 @@ def test_full_disk_loses_nothing(
     assert len(saved.read_text().splitlines()) == 2
 
 
+def interruptible() -> None:
+    """Undo what a shell's `&` does to its children: they would not hear of Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.parametrize(
     "arguments", [[], ["--sim-jobs=3"], ["-n2"]], ids=["plain", "jobs", "xdist"]
 )
@@ -167,6 +172,7 @@ def test_interrupt_prints_the_table_and_keeps_the_records(
         stdout=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=interruptible,
     )
     path = pytester.path / "out" / "records.jsonl"
     for _ in range(600):
