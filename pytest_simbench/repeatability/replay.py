@@ -158,8 +158,7 @@ class Replay:
             if again.failure or (again.claimed and not again.identical and not again.skipped)
         ]
         if bad:
-            claimed = any(again.claimed for again in self.again)
-            head = "claims to be deterministic, but" if claimed else "could not run again"
+            head = "claims to be deterministic, but" if self.claims else "could not run again"
             raise AssertionError(f"{self.simulator} {head}\n  " + "\n  ".join(bad))
 
 

@@ -35,7 +35,8 @@ def test_the_throw_hits(any_case: Case) -> None:
     assert record.metrics["hit"] == 1.0
     assert record.metrics["lost_in_transit"] == 0.0
     assert record.metrics["landing_error"] is not None
-    assert record.metrics["landing_error"] < 0.05
+    # within 3 cm; Genesis' contacts are softer (docs/engines/genesis.md)
+    assert record.metrics["landing_error"] < (0.05 if any_case.simulator == "genesis" else 0.03)
 
 
 def test_the_same_seed_gives_the_same_outcome(any_case: Case) -> None:
