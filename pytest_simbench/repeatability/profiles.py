@@ -3,7 +3,9 @@
 Hypothesis calls `register` when it is imported (entry-point group `hypothesis`), so the profiles
 are there in a conftest as well as for `--hypothesis-profile=sim-ci`, and a pytest run that does not
 use Hypothesis never imports it. None of them is ever loaded here: that is the user's choice.
-They silence no health check.
+They silence no health check, and are the same wherever they run: they derive from Hypothesis'
+`default`, not from the profile in force, which in CI is its `ci` (derandomized, `too_slow`
+silenced).
 """
 
 from __future__ import annotations
@@ -23,5 +25,6 @@ def register() -> None:
     """Make the profiles known to Hypothesis; the loaded profile stays as it is."""
     from hypothesis import settings
 
+    plain = settings.get_profile("default")
     for name, values in PROFILES.items():
-        settings.register_profile(name, **values)
+        settings.register_profile(name, plain, **values)

@@ -10,16 +10,33 @@ from hypothesis import settings
 
 from pytest_simbench.repeatability.profiles import PROFILES
 
-ALL_CHECKS = len(settings.get_profile("default").suppress_health_check)
-
 
 @pytest.mark.parametrize("name", PROFILES)
 def test_registered_with_no_deadline_and_no_silenced_check(name: str) -> None:
     profile = settings.get_profile(name)
     assert profile.deadline is None
     assert profile.print_blob
-    assert len(profile.suppress_health_check) == ALL_CHECKS == 0
+    assert tuple(profile.suppress_health_check) == ()
     assert profile.max_examples == PROFILES[name]["max_examples"]
+    assert profile.derandomize == (name == "sim-ci")
+
+
+def test_the_same_in_ci() -> None:
+    """Hypothesis loads its own `ci` profile where `CI` is set: ours must not inherit from it."""
+    code = "from hypothesis import settings; print(*map(settings.get_profile, %r), sep='\\n')"
+    outputs = [
+        subprocess.run(
+            [sys.executable, "-c", code % list(PROFILES)],
+            check=True,
+            env={"PATH": "/usr/bin:/bin"} | more,
+            cwd="/",
+            capture_output=True,
+            text=True,
+        ).stdout
+        for more in ({}, {"CI": "true"})
+    ]
+    assert "max_examples=500" in outputs[0]
+    assert outputs[0] == outputs[1]
 
 
 def test_importing_hypothesis_loads_none_of_them() -> None:
