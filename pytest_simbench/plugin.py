@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Generator
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -150,6 +152,27 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_configure_node(node: Any) -> None:
     """Tell an xdist worker which run folder all of them share."""
     node.workerinput["simbench_folder"] = str(run(node.config).folder.absolute())
+
+
+def _skipping_unavailable() -> Generator[None, Any, Any]:
+    """A test that asks for what this machine lacks is skipped, with the reason."""
+    try:
+        return (yield)
+    except Exception as error:
+        errors = sys.modules.get("pytest_simbench.client.errors")
+        if errors is not None and isinstance(error, errors.Unavailable):
+            pytest.skip(error.what)
+        raise
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup(item: pytest.Item) -> Generator[None, Any, Any]:
+    return (yield from _skipping_unavailable())
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
+    return (yield from _skipping_unavailable())
 
 
 @pytest.hookimpl(hookwrapper=True)

@@ -18,6 +18,8 @@ from typing import Any, ClassVar
 from xml.etree import ElementTree
 
 import numpy as np
+from numpy.typing import NDArray
+from pytest_simbench.sims.sapien_drawing import Drawing
 
 from pytest_simbench.scene import Box, FloatArray, Scene
 from pytest_simbench.simulator import (
@@ -92,6 +94,8 @@ class SAPIEN(Simulator):
         tested_version="3.0.3",
         capabilities=frozenset(
             {
+                Capability.WINDOW,
+                Capability.OFFSCREEN,
                 Capability.SAVE_RESTORE,
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
@@ -100,6 +104,7 @@ class SAPIEN(Simulator):
         ),
         deviations=(
             Deviation("gripper/coupled", "SAPIEN does not report its tendons"),
+            Deviation("", "window and pictures take a Vulkan device"),
             Deviation("", "a restored world has the saved poses and velocities, but new contacts"),
         ),
         install_size_mb=340,
@@ -122,7 +127,10 @@ class SAPIEN(Simulator):
         self.scene = scene
         self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         self._steps = 0
+        self._drawing: Drawing | None = None
         self._build(scene)
+        if self.gui:
+            self.refresh_window()
 
     def _build(self, scene: Scene) -> None:
         self._configure(scene)
@@ -304,7 +312,27 @@ class SAPIEN(Simulator):
     def contact_count(self) -> int:
         return sum(len(contact.points) for contact in self._system.get_contacts())
 
+    def render(self, width: int, height: int) -> NDArray[np.uint8]:
+        return self._drawn().picture(width, height)
+
+    def refresh_window(self) -> None:
+        if self.gui:
+            self._drawn().show()
+
+    def _drawn(self) -> Drawing:
+        """The drawing, up to date; made when it is first asked for."""
+        if self._drawing is None:
+            self._drawing = Drawing(self.scene, self.prepared)
+        poses = {name: body.entity.pose for name, body in self._bodies.items()}
+        if self.prepared is not None:
+            poses |= {name: self._links[name].entity.pose for name in self.prepared.links}
+        self._drawing.follow(poses)
+        return self._drawing
+
     def close(self) -> None:
+        drawing = getattr(self, "_drawing", None)
+        if drawing is not None:
+            drawing.close()
         # Everything that holds on to the scene must go, else PhysX keeps it.
         for name in list(vars(self)):
             if name.startswith("_"):

@@ -76,6 +76,10 @@ class Diverged(WorkerError):
     """The engine's state is not finite."""
 
 
+class Unavailable(WorkerError):
+    """This machine lacks what was asked for, a driver for instance; such a test is skipped."""
+
+
 class EngineFailed(WorkerError):
     """The engine or its adapter raised an exception, or rejected the scene or settings."""
 
@@ -84,6 +88,7 @@ REMOTE_ERRORS: dict[str, type[WorkerError]] = {
     "ParityError": WorldParityError,
     "DivergedError": Diverged,
     "MemoryError": OutOfMemory,
+    "UnavailableError": Unavailable,
 }
 """Worker-side error names and what they become here; all others are `EngineFailed`."""
 

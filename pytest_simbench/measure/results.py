@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Sequence
+from math import isfinite
 
 from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval, wilson
 from pytest_simbench.measure.metrics import COSTS, Metric, UnknownMetric
@@ -213,10 +214,13 @@ class ResultSet:
         """What was measured, with simulator, mode, profile, interval and number of repetitions."""
         found = self.interval(metric.name, self.confidence)
         failed = f", {len(self.failures)} failed" if self.failures else ""
+        certainty = f"no {self._level} % interval yet"
+        if isfinite(found.high - found.low):
+            bounds = f"{metric.format(found.low)} to {metric.format(found.high)}"
+            certainty = f"{self._level} % interval {bounds}"
         return (
             f"{self.label}: {metric.name} is {metric.format(found.mean)} on average "
-            f"({self._level} % interval {metric.format(found.low)} to {metric.format(found.high)}, "
-            f"{found.n} repetition{'s' if found.n > 1 else ''}{failed})"
+            f"({certainty}, {found.n} repetition{'s' if found.n > 1 else ''}{failed})"
         )
 
     def _failed(self) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from pytest_simbench.client.errors import WorkerError
+from pytest_simbench.client.errors import Unavailable, WorkerError
 from pytest_simbench.client.tape import Operation, TapedWorld
 from pytest_simbench.repeatability.episode import Episode, Experiment, changed
 from pytest_simbench.repeatability.motions import Difference, difference
@@ -216,6 +216,8 @@ def replay(
 def _again(way: str, first: Episode, run: Callable[[], Episode]) -> Again:
     try:
         second = run()
+    except Unavailable as error:
+        return Again(way, skipped=error.what)
     except WorkerError as error:
         return Again(way, failure=f"{type(error).__name__}: {error.what}")
     return Again(

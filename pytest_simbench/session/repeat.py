@@ -8,7 +8,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import replace
 from typing import Protocol as Interface
 
-from pytest_simbench.client.errors import WorkerError, WorldParityError
+from pytest_simbench.client.errors import Unavailable, WorkerError, WorldParityError
 from pytest_simbench.measure.record import Record
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.session.case import Case
@@ -53,6 +53,7 @@ class Repeater:
         """Run the repetitions of these numbers.
 
         Raises:
+            Unavailable: the machine lacks what it takes, in this mode at least.
             WorldParityError: the engine builds another world; more repetitions would not help.
             KeyboardInterrupt: after the records of what was running are kept.
         """
@@ -84,6 +85,8 @@ class Repeater:
         progress.repetition(number, repetition.seed)
         record, error = repetition.run()
         self._active.discard(repetition)
+        if isinstance(error, Unavailable):  # nothing was simulated: there is nothing to record
+            raise error
         if self._stopping.is_set() and record.status == "failed":
             record = replace(record, status="interrupted")
         self.keep(record)

@@ -9,6 +9,7 @@ from pytest_simbench.simulator.errors import (
     ParityError,
     SettingsError,
     SimulatorError,
+    UnavailableError,
 )
 from pytest_simbench.simulator.info import Capability, Deviation, SimulatorInfo
 from pytest_simbench.simulator.lazy import lazy_import
@@ -30,6 +31,7 @@ __all__ = [
     "Simulator",
     "SimulatorError",
     "SimulatorInfo",
+    "UnavailableError",
     "lazy_import",
     "one_value",
 ]

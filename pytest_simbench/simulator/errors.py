@@ -27,19 +27,9 @@ class NotSupportedError(SimulatorError):
     """The adapter was asked for something that its engine does not have."""
 
 
+class UnavailableError(SimulatorError):
+    """This machine lacks what was asked for, a driver for instance; the message says what helps."""
+
+
 class EngineError(SimulatorError):
     """An exception out of the engine or its adapter; the message names its type."""
-
-
-ERRORS: dict[str, type[SimulatorError]] = {
-    error.__name__: error
-    for error in (
-        SettingsError,
-        DescriptionError,
-        ParityError,
-        DivergedError,
-        NotSupportedError,
-        EngineError,
-    )
-}
-"""The errors that a worker may report, by the name they travel under."""

@@ -93,6 +93,12 @@ def test_a_claim_that_is_not_decided_warns_with_the_repetitions_needed() -> None
     assert caught[0].filename == __file__
 
 
+def test_one_value_has_no_interval() -> None:
+    with pytest.warns(InconclusiveWarning) as caught:
+        placed(1.0).assert_at_least("rtf", 10)
+    assert "is 17.5 on average (no 95 % interval yet, 1 repetition)" in str(caught[0].message)
+
+
 def test_without_a_good_repetition_a_metric_fails_with_the_causes() -> None:
     made = [failed(0), failed(1), failed(2, "WorkerDied", "step")]
     with pytest.raises(AssertionError) as caught:

@@ -1,0 +1,161 @@
+"""SAPIEN's renderer: a scene of its own, without physics, that follows the simulated one.
+
+Drawing needs a Vulkan device, which simulating does not. Apart from it the simulated scene is the
+same with and without a picture, and a restore may build it anew under an open window.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_simbench.scene import Pose, Scene, Vector3
+from pytest_simbench.simulator import PreparedRobot, UnavailableError, lazy_import
+
+sapien = lazy_import("sapien")
+rendering = lazy_import("sapien.render")
+viewing = lazy_import("sapien.utils.viewer")
+
+EYE, TARGET = np.array([2.0, 1.6, 1.3]), np.array([0.5, 0.0, 0.35])
+"""Of camera and window [m]."""
+
+FIELD_OF_VIEW = math.radians(40.0)
+"""Vertical [rad]."""
+
+NEAR, FAR = 0.1, 100.0
+"""What the camera sees [m]."""
+
+LINK_COLOUR, GROUND_COLOUR = (0.9, 0.9, 0.9, 1.0), (0.4, 0.45, 0.5, 1.0)
+
+NO_VULKAN = (
+    "SAPIEN draws with Vulkan and finds no device for it ({error}); it takes a graphics card's "
+    "driver, or Mesa's software driver from 24.3 on: apt-get install mesa-vulkan-drivers, on "
+    "Debian 12 from bookworm-backports"
+)
+
+
+class Drawing:
+    """What a scene looks like, in a window and in pictures.
+
+    Args:
+        scene: its boxes are drawn, and the ground.
+        prepared: its links are drawn, by their collision shapes.
+
+    Raises:
+        UnavailableError: there is no Vulkan device.
+    """
+
+    def __init__(self, scene: Scene, prepared: PreparedRobot | None) -> None:
+        try:
+            system = rendering.RenderSystem()
+        except RuntimeError as error:
+            raise UnavailableError(NO_VULKAN.format(error=error)) from None
+        self._world = sapien.Scene([system])
+        self._world.set_ambient_light([0.4] * 3)
+        self._world.add_directional_light([-0.5, -0.3, -1.0], [1.0] * 3, shadow=True)
+        self._entities: dict[str, Any] = {}
+        self._add_ground()
+        for box in scene.bodies:
+            shape = self._box(box.size, Pose(), box.colour)
+            self._add(box.name, [shape]).set_pose(_pose(box.pose))
+        for link in () if prepared is None else prepared.links.values():
+            shapes = [
+                self._box(shape.size, shape.pose, LINK_COLOUR)
+                if shape.size is not None
+                else self._mesh(str(shape.mesh), shape.pose)
+                for shape in link.shapes
+            ]
+            self._add(link.name, shapes)
+        self._camera: Any = None
+        self._viewer: Any = None
+
+    def _add(self, name: str, shapes: list[Any]) -> Any:
+        entity, component = sapien.Entity(), rendering.RenderBodyComponent()
+        entity.name = name
+        for shape in shapes:
+            component.attach(shape)
+        entity.add_component(component)
+        self._world.add_entity(entity)
+        self._entities[name] = entity
+        return entity
+
+    def _add_ground(self) -> None:
+        size = np.array([0.0, 10.0, 10.0])  # SAPIEN's plane faces along x
+        shape = rendering.RenderShapePlane(size, _material(GROUND_COLOUR))
+        upward = sapien.Pose([0, 0, 0], [math.sqrt(0.5), 0, -math.sqrt(0.5), 0])
+        self._add("ground", [shape]).set_pose(upward)
+
+    def _box(self, size: Vector3, pose: Pose, colour: tuple[float, ...]) -> Any:
+        shape = rendering.RenderShapeBox(np.array(size) / 2, _material(colour))
+        shape.local_pose = _pose(pose)
+        return shape
+
+    def _mesh(self, path: str, pose: Pose) -> Any:
+        shape = rendering.RenderShapeTriangleMesh(path, np.ones(3), _material(LINK_COLOUR))
+        shape.local_pose = _pose(pose)
+        return shape
+
+    def follow(self, poses: Mapping[str, Any]) -> None:
+        """Put bodies and links, by name, where the simulated ones are (SAPIEN poses)."""
+        for name, pose in poses.items():
+            self._entities[name].set_pose(pose)
+        self._world.update_render()
+
+    def picture(self, width: int, height: int) -> NDArray[np.uint8]:
+        """What the camera sees, (height, width, 3), RGB."""
+        if self._camera is None or (self._camera.width, self._camera.height) != (width, height):
+            self._camera = self._world.add_camera("eye", width, height, FIELD_OF_VIEW, NEAR, FAR)
+            self._camera.entity.set_pose(_looking())
+            self._world.update_render()
+        self._camera.take_picture()
+        colours = self._camera.get_picture("Color")[..., :3]
+        return np.asarray(np.clip(colours, 0.0, 1.0) * 255, dtype=np.uint8)
+
+    def show(self) -> None:
+        """Draw the window, which is opened the first time; nothing once the user has closed it."""
+        if self._viewer is None:
+            # The viewer leaves its panels' layout in a file, by default in the working folder.
+            layout = Path(tempfile.gettempdir()) / "simbench-sapien" / "imgui.ini"
+            rendering.set_imgui_ini_filename(str(layout))
+            # Of its panels the one for the camera; the others would cover the scene, and tell of a
+            # physics that is not here.
+            self._viewer = viewing.Viewer(
+                resolutions=(1280, 720), plugins=[viewing.control_window.ControlWindow()]
+            )
+            self._viewer.set_scene(self._world)
+            self._viewer.window.set_camera_parameters(NEAR, FAR, FIELD_OF_VIEW)
+            self._viewer.set_camera_pose(_looking())
+        self._viewer.render()
+
+    def close(self) -> None:
+        """Close the window."""
+        if self._viewer is not None and not self._viewer.closed:
+            self._viewer.close()
+        self._viewer = self._camera = None
+
+
+def _material(colour: tuple[float, ...]) -> Any:
+    material = rendering.RenderMaterial()
+    material.base_color = colour
+    material.roughness, material.specular = 0.8, 0.2
+    return material
+
+
+def _pose(pose: Pose) -> Any:
+    return sapien.Pose(pose.position, pose.quaternion)
+
+
+def _looking() -> Any:
+    """From the eye to the target; SAPIEN's cameras look along x, with z up."""
+    forward = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
+    left = np.cross([0.0, 0.0, 1.0], forward)
+    left /= np.linalg.norm(left)
+    matrix = np.eye(4)
+    matrix[:3] = np.column_stack([forward, left, np.cross(forward, left), EYE])
+    return sapien.Pose(matrix)

@@ -1,0 +1,79 @@
+"""SAPIEN's pictures and window: they show what is simulated, and take a Vulkan device."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pytest_simbench.sims.sapien import SAPIEN
+from pytest_simbench.sims.sapien_drawing import EYE, FIELD_OF_VIEW, TARGET
+
+from pytest_simbench.scene import FloatArray, Pose, Scene
+from pytest_simbench.simulator import UnavailableError
+from pytest_simbench.testing import scenes
+
+pytest.importorskip("sapien")
+
+WIDTH, HEIGHT = 320, 240
+RED = (0.9, 0.05, 0.05, 1.0)
+
+
+@contextmanager
+def drawn(scene: Scene) -> Iterator[SAPIEN]:
+    """The loaded simulator; skips the test where nothing can be drawn."""
+    simulator = SAPIEN(SAPIEN.profiles["tuned"])
+    simulator.load(scene)
+    try:
+        simulator.render(WIDTH, HEIGHT)
+        yield simulator
+    except UnavailableError as reason:
+        pytest.skip(str(reason))
+    finally:
+        simulator.close()
+
+
+def pixel(point: FloatArray) -> tuple[int, int]:
+    """Row and column of a point in the picture of a pinhole camera at `EYE`, upright."""
+    forward = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    down = np.cross(forward, right)
+    offset = point - EYE
+    focal = HEIGHT / 2 / np.tan(FIELD_OF_VIEW / 2)
+    x, y = focal * np.array([offset @ right, offset @ down]) / (offset @ forward)
+    return int(HEIGHT / 2 + y), int(WIDTH / 2 + x)
+
+
+def red_at(simulator: SAPIEN, point: FloatArray) -> bool:
+    red, green, blue = simulator.render(WIDTH, HEIGHT)[pixel(point)].astype(int)
+    return bool(red > 2 * max(green, blue))
+
+
+def test_a_picture_shows_a_falling_cube_where_it_is_also_after_a_restore() -> None:
+    cube = replace(scenes.cube("cube", Pose.at(0.5, 0.0, 0.9)), colour=RED)
+    with drawn(Scene("falling", bodies=(cube,))) as simulator:
+        start = simulator.save()
+        high = simulator.body_state()[0, :3]
+        assert red_at(simulator, high)
+        while simulator.time < 0.3:  # falls by 0.44 m
+            simulator.step()
+        low = simulator.body_state()[0, :3]
+        assert red_at(simulator, low)
+        assert not red_at(simulator, high)
+        simulator.restore(start)
+        assert red_at(simulator, high)
+        assert not red_at(simulator, low)
+
+
+def test_the_robot_is_in_the_picture() -> None:
+    with drawn(scenes.arm_alone()) as simulator:
+        assert simulator.prepared is not None
+        with_arm = simulator.render(WIDTH, HEIGHT).astype(int)
+        elbow = simulator._links["panda_link4"].entity.pose.p
+    with drawn(Scene("nothing")) as simulator:
+        changed = np.abs(with_arm - simulator.render(WIDTH, HEIGHT)).sum(axis=2) > 60
+    assert changed[pixel(elbow)]
+    assert 0.01 < changed.mean() < 0.5
