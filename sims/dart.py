@@ -114,7 +114,8 @@ class DART(Simulator):
         self._ground = self._add_ground(scene.ground_friction)
         self._bodies = {box.name: self._add_box(box) for box in scene.bodies}
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
-        self._robot = self.prepared = None
+        self._robot: Any = None
+        self.prepared = None
         self._base = np.empty(0)
         if scene.robot is not None:
             self.prepared = PreparedRobot(scene.robot)

@@ -12,18 +12,23 @@ from __future__ import annotations
 
 import dataclasses
 import gc
-import importlib
-import inspect
-import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pytest_simbench.sims.genesis_engine import array_of, numbers, start_engine, tensors_in
+from pytest_simbench.sims.genesis_world import (
+    LEAST_FRICTION,
+    GenesisSettings,
+    add_box,
+    add_camera,
+    add_robot,
+    material,
+    new_world,
+)
 
-from pytest_simbench.scene import Box, FloatArray, Scene
+from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
@@ -36,48 +41,6 @@ from pytest_simbench.simulator import (
 )
 
 genesis = lazy_import("genesis")
-
-LEAST_FRICTION = 0.01
-"""A material must have at least this coefficient, and so has every contact (`func_add_contact`)."""
-
-
-@dataclass(frozen=True)
-class GenesisSettings(Settings):
-    """Genesis' options; defaults are the engine's own, `RigidOptions` and `SimOptions`.
-
-    Attributes:
-        timestep: [s].
-        substeps: steps of the solver in one time step.
-        precision: of all floating-point numbers, in bits.
-        integrator: `approximate_implicitfast` adds the drives' damping to the mass matrix for good,
-            `implicitfast` only while integrating velocities.
-        friction_cone: shape of the friction cone.
-        impratio: ratio of friction to normal constraint impedance; 0 leaves it to the engine, which
-            takes 100 with the elliptic cone and 1 with the pyramid.
-        constraint_timeconst: of contacts [s], at least two steps of the solver.
-        impedance: of contacts: smallest, largest.
-        iterations: largest number, of the constraint solver.
-        tolerance: at which it stops; 0 leaves it to the engine (1e-5, in 64 bits 1e-8).
-        noslip_iterations: of the friction post-processing, for the pyramid only.
-        box_box_detection: two boxes are collided by an algorithm of their own.
-        gjk: collide other convex shapes by GJK instead of MPR.
-    """
-
-    timestep: float = 0.01
-    substeps: int = 1
-    precision: Literal["32", "64"] = "32"
-    integrator: Literal["approximate_implicitfast", "implicitfast", "Euler"] = (
-        "approximate_implicitfast"
-    )
-    friction_cone: Literal["pyramidal", "elliptic"] = "pyramidal"
-    impratio: float = 0.0
-    constraint_timeconst: float = 0.01
-    impedance: tuple[float, float] = (0.9, 0.95)
-    iterations: int = 50
-    tolerance: float = 0.0
-    noslip_iterations: int = 0
-    box_box_detection: bool = False
-    gjk: bool = False
 
 
 class Genesis(Simulator):
@@ -94,6 +57,7 @@ class Genesis(Simulator):
         tested_version="1.2.3",
         capabilities=frozenset(
             {
+                Capability.WINDOW,
                 Capability.OFFSCREEN,
                 Capability.SAVE_RESTORE,
                 Capability.EXACT_RESTORE,
@@ -150,15 +114,16 @@ class Genesis(Simulator):
         self.compiled.add(kind)
 
     def load(self, scene: Scene) -> None:
-        self.scene, self._steps, self._camera = scene, 0, None
+        self.scene, self._steps = scene, 0
+        self._camera: Any = None
         self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
-        _start_engine(self.settings.precision)
-        self.world = world = self._new_world(scene)
+        start_engine(self.settings.precision)
+        self.world = world = new_world(scene, self.settings, window=self.gui)
         self._ground = world.add_entity(
-            genesis.morphs.Plane(), material=_material(scene.ground_friction)
+            genesis.morphs.Plane(), material=material(scene.ground_friction)
         )
-        self._boxes = {box.name: _add_box(world, box) for box in scene.bodies}
-        self._robot = None if self.prepared is None else _add_robot(world, self.prepared)
+        self._boxes = {box.name: add_box(world, box) for box in scene.bodies}
+        self._robot: Any = None if self.prepared is None else add_robot(world, self.prepared)
         world.build()
         self.solver = world.rigid_solver
         self._set_contacts(scene)
@@ -166,32 +131,6 @@ class Genesis(Simulator):
         self._dofs: list[int] = []
         if scene.robot is not None:
             self._set_drives(scene.robot)
-
-    def _new_world(self, scene: Scene) -> Any:
-        s, options = self.settings, genesis.options
-        return genesis.Scene(
-            sim_options=options.SimOptions(
-                dt=s.timestep, substeps=s.substeps, gravity=scene.gravity
-            ),
-            rigid_options=options.RigidOptions(
-                enable_self_collision=False,  # of a robot; boxes are entities of their own
-                integrator=getattr(genesis.integrator, s.integrator),
-                friction_cone=getattr(genesis.friction_cone, s.friction_cone),
-                impratio=s.impratio or None,
-                constraint_timeconst=s.constraint_timeconst,
-                iterations=s.iterations,
-                tolerance=s.tolerance or None,
-                noslip_iterations=s.noslip_iterations,
-                box_box_detection=s.box_box_detection,
-                use_gjk_collision=s.gjk,
-            ),
-            vis_options=options.VisOptions(show_world_frame=False),
-            viewer_options=options.ViewerOptions(
-                res=(1024, 768), camera_pos=_EYE, camera_lookat=_LOOK_AT, camera_fov=_FOV
-            ),
-            profiling_options=options.ProfilingOptions(show_FPS=False),
-            show_viewer=self.gui,
-        )
 
     def _set_contacts(self, scene: Scene) -> None:
         """Impedance of contacts, and frictions that a material refuses."""
@@ -233,7 +172,7 @@ class Genesis(Simulator):
         reported: dict[str, Any] = {
             "gravity": array_of(rigid.gravity).reshape(3),
             "timestep": array_of(rigid.substep_dt).item() * self.settings.substeps,
-            "ground/height": _numbers(self.solver.get_geoms_pos([ground]))[0, 2],
+            "ground/height": numbers(self.solver.get_geoms_pos([ground]))[0, 2],
             "ground/friction": frictions[ground],
         }
         masses = array_of(info.links.inertial_mass)
@@ -300,16 +239,16 @@ class Genesis(Simulator):
         state = np.empty((len(self._free), 13))
         if self._free:
             state[:, :7] = self._poses(self._free)
-            state[:, 7:10] = _numbers(self.solver.get_links_vel(self._free, ref="link_com"))
-            state[:, 10:] = _numbers(self.solver.get_links_ang(self._free))
+            state[:, 7:10] = numbers(self.solver.get_links_vel(self._free, ref="link_com"))
+            state[:, 10:] = numbers(self.solver.get_links_ang(self._free))
         return state
 
     def _poses(self, links: list[int]) -> FloatArray:
         """Positions and quaternions of links, (n, 7)."""
         if not links:
             return np.empty((0, 7))
-        position = _numbers(self.solver.get_links_pos(links))
-        quaternion = _numbers(self.solver.get_links_quat(links))
+        position = numbers(self.solver.get_links_pos(links))
+        quaternion = numbers(self.solver.get_links_quat(links))
         return np.hstack([position, quaternion / np.linalg.norm(quaternion, axis=1)[:, None]])
 
     def joint_state(self) -> FloatArray:
@@ -317,8 +256,8 @@ class Genesis(Simulator):
             return np.empty((2, 0))
         return np.stack(
             [
-                _numbers(self.solver.get_dofs_position(self._dofs)),
-                _numbers(self.solver.get_dofs_velocity(self._dofs)),
+                numbers(self.solver.get_dofs_position(self._dofs)),
+                numbers(self.solver.get_dofs_velocity(self._dofs)),
             ]
         )
 
@@ -342,34 +281,16 @@ class Genesis(Simulator):
             solver.collider._collider_state,
             solver.constraint_solver.constraint_state,
         ):
-            yield from _tensors_in(part)
+            yield from tensors_in(part)
 
     def contact_count(self) -> int:
         return int(array_of(self.solver.collider._collider_state.n_contacts)[0])
 
     def render(self, width: int, height: int) -> NDArray[np.uint8]:
         if self._camera is None or self._camera.res != (width, height):
-            # `Scene.add_camera` refuses once a scene is built; the visualiser does not.
-            self._camera = self.world.visualizer.add_camera(
-                res=(width, height),
-                pos=_EYE,
-                lookat=_LOOK_AT,
-                up=(0.0, 0.0, 1.0),
-                model="pinhole",
-                fov=_FOV,
-                aperture=2.0,
-                focus_dist=None,
-                GUI=False,
-                spp=1,
-                denoise=False,
-                near=0.1,
-                far=20.0,
-                env_idx=None,
-                debug=False,
-            )
-            self._camera.build()
+            self._camera = add_camera(self.world, width, height)
         picture = self._camera.render(rgb=True, force_render=True)[0]
-        return np.array(_numbers(picture)[..., :3], dtype=np.uint8)
+        return np.array(numbers(picture)[..., :3], dtype=np.uint8)
 
     def refresh_window(self) -> None:
         if self.gui:
@@ -382,94 +303,3 @@ class Genesis(Simulator):
             self.world.destroy()
             self.world = None
             gc.collect()  # scene, solver and entities refer to each other
-
-
-_EYE, _LOOK_AT, _FOV = (2.0, 1.6, 1.3), (0.5, 0.0, 0.35), 40.0
-"""Of camera and window [m], [degrees]."""
-
-
-def _start_engine(precision: str) -> None:
-    """Initialise Genesis, which a process does once for each precision."""
-    if genesis._initialized:
-        if genesis.np_float == np.dtype(f"float{precision}"):
-            return
-        genesis.destroy()
-    genesis.init(backend=genesis.cpu, precision=precision, logging_level="warning", seed=0)
-    with quick_inspection():
-        importlib.import_module("genesis.engine.simulator")
-
-
-@contextmanager
-def quick_inspection() -> Iterator[None]:
-    """Spare the import of Genesis' solvers most of its time.
-
-    Every function with Quadrants' decorators asks `inspect` about the frame that imports it. Those
-    of Python's own import system have no source file, and `inspect.getmodule` looks through all
-    3000 modules before it answers None, 2000 times. Measured on 2 cores: 6.9 s of CPU, 0.8 s when
-    the answer is given at once.
-    """
-    original = inspect.getmodule
-
-    def getmodule(object: Any, _filename: Any = None) -> Any:
-        code = object.f_code if inspect.isframe(object) else object
-        if inspect.iscode(code) and code.co_filename.startswith("<frozen "):
-            return None
-        return original(object, _filename)
-
-    inspect.getmodule = getmodule
-    try:
-        yield
-    finally:
-        inspect.getmodule = original
-
-
-def _material(friction: float, density: float | None = None) -> Any:
-    return genesis.materials.Rigid(rho=density, friction=max(friction, LEAST_FRICTION))
-
-
-def _add_box(world: Any, box: Box) -> Any:
-    morph = genesis.morphs.Box(
-        size=box.size, pos=box.pose.position, quat=box.pose.quaternion, fixed=box.fixed
-    )
-    density = None if box.fixed else box.mass / float(np.prod(box.size))
-    surface = genesis.surfaces.Default(color=box.colour)
-    return world.add_entity(morph, material=_material(box.friction, density), surface=surface)
-
-
-def _add_robot(world: Any, prepared: PreparedRobot) -> Any:
-    xml = ET.fromstring(prepared.to_urdf())
-    first, second = prepared.robot.gripper.joints
-    for joint in xml.findall("joint"):
-        if joint.attrib["name"] == second:  # becomes an equality constraint
-            ET.SubElement(joint, "mimic", joint=first, multiplier="1", offset="0")
-    morph = genesis.morphs.URDF(
-        file=ET.tostring(xml, encoding="unicode"),
-        fixed=True,
-        merge_fixed_links=False,
-        default_armature=None,
-        requires_jac_and_IK=False,
-    )
-    return world.add_entity(morph, material=_material(prepared.robot.friction))
-
-
-def _numbers(tensor: Any) -> FloatArray:
-    """A PyTorch tensor or an array, in double precision."""
-    return np.asarray(tensor.cpu() if hasattr(tensor, "cpu") else tensor, dtype=float)
-
-
-def array_of(tensor: Any, *, copy: bool = True) -> NDArray[Any]:
-    """Values of one of the engine's tensors, or its own memory.
-
-    The tensors' `to_numpy` and `from_numpy` would compile and launch kernels.
-    """
-    values: NDArray[Any] = genesis.utils.misc.qd_to_numpy(tensor, copy=copy)
-    return values
-
-
-def _tensors_in(struct: Any) -> Iterator[Any]:
-    """Every tensor of nested dataclasses, in their order."""
-    if dataclasses.is_dataclass(struct):
-        for field in dataclasses.fields(struct):
-            yield from _tensors_in(getattr(struct, field.name))
-    elif hasattr(struct, "to_numpy"):
-        yield struct

@@ -151,8 +151,8 @@ class MuJoCo(Simulator):
         self._body_v = np.array([j.dofadr[0] + np.arange(3) for j in free], int).reshape(-1, 3)
         self._rotations = np.array([model.body(b.name).id for b in scene.free_bodies], dtype=int)
         mujoco.mj_forward(model, data)
-        self._viewer = None
-        self._renderer = None
+        self._viewer: Any = None
+        self._renderer: Any = None
         if self.gui:
             self._open_window()
 

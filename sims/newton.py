@@ -114,7 +114,7 @@ class Newton(Simulator):
     def load(self, scene: Scene) -> None:
         wp.config.log_level = wp.LOG_WARNING
         self.scene = scene
-        self._viewer = None
+        self._viewer: Any = None
         self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         self.model = build_model(scene, self.prepared, self.settings)
         self._number(scene)
@@ -122,7 +122,7 @@ class Newton(Simulator):
         self._states = [self.model.state(), self.model.state()]
         self._control = self.model.control()
         ctrl = self._control.mujoco.ctrl if scene.robot is not None else None
-        self._ctrl = None if ctrl is None else ctrl.numpy()  # a view: the device is the CPU
+        self._ctrl: Any = None if ctrl is None else ctrl.numpy()  # a view: the device is the CPU
         self._steps = 0
         for state in self._states:
             newton.eval_fk(self.model, self.model.joint_q, self.model.joint_qd, state)

@@ -170,7 +170,8 @@ class PyBullet(Simulator):
         self._bodies = {box.name: self._add_box(box) for box in scene.bodies}
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
         self.prepared = None
-        self._robot, self._joints = -1, []
+        self._robot = -1
+        self._joints: list[int] = []
         if scene.robot is not None:
             self.prepared = PreparedRobot(scene.robot)
             self._load_robot(self.prepared)

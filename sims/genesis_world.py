@@ -1,0 +1,144 @@
+"""The scene as a world of Genesis: settings, materials, boxes, robot, camera."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from pytest_simbench.scene import Box, Scene
+from pytest_simbench.simulator import PreparedRobot, Settings, lazy_import
+
+genesis = lazy_import("genesis")
+
+LEAST_FRICTION = 0.01
+"""A material must have at least this coefficient, and so has every contact (`func_add_contact`)."""
+
+EYE, LOOK_AT = (2.0, 1.6, 1.3), (0.5, 0.0, 0.35)
+"""Of camera and window [m]."""
+
+FIELD_OF_VIEW = 40.0
+"""[degrees]."""
+
+
+@dataclass(frozen=True)
+class GenesisSettings(Settings):
+    """Genesis' options; defaults are the engine's own, `RigidOptions` and `SimOptions`.
+
+    Attributes:
+        timestep: [s].
+        substeps: steps of the solver in one time step.
+        precision: of all floating-point numbers, in bits.
+        integrator: `approximate_implicitfast` adds the drives' damping to the mass matrix for good,
+            `implicitfast` only while integrating velocities.
+        friction_cone: shape of the friction cone.
+        impratio: ratio of friction to normal constraint impedance; 0 leaves it to the engine, which
+            takes 100 with the elliptic cone and 1 with the pyramid.
+        constraint_timeconst: of contacts [s], at least two steps of the solver.
+        impedance: of contacts: smallest, largest.
+        iterations: largest number, of the constraint solver.
+        tolerance: at which it stops; 0 leaves it to the engine (1e-5, in 64 bits 1e-8).
+        noslip_iterations: of the friction post-processing, for the pyramid only.
+        box_box_detection: two boxes are collided by an algorithm of their own.
+        gjk: collide other convex shapes by GJK instead of MPR.
+    """
+
+    timestep: float = 0.01
+    substeps: int = 1
+    precision: Literal["32", "64"] = "32"
+    integrator: Literal["approximate_implicitfast", "implicitfast", "Euler"] = (
+        "approximate_implicitfast"
+    )
+    friction_cone: Literal["pyramidal", "elliptic"] = "pyramidal"
+    impratio: float = 0.0
+    constraint_timeconst: float = 0.01
+    impedance: tuple[float, float] = (0.9, 0.95)
+    iterations: int = 50
+    tolerance: float = 0.0
+    noslip_iterations: int = 0
+    box_box_detection: bool = False
+    gjk: bool = False
+
+
+def new_world(scene: Scene, settings: GenesisSettings, *, window: bool) -> Any:
+    """An empty world with the settings, not yet built."""
+    s, options = settings, genesis.options
+    return genesis.Scene(
+        sim_options=options.SimOptions(dt=s.timestep, substeps=s.substeps, gravity=scene.gravity),
+        rigid_options=options.RigidOptions(
+            enable_self_collision=False,  # of a robot; boxes are entities of their own
+            integrator=getattr(genesis.integrator, s.integrator),
+            friction_cone=getattr(genesis.friction_cone, s.friction_cone),
+            impratio=s.impratio or None,
+            constraint_timeconst=s.constraint_timeconst,
+            iterations=s.iterations,
+            tolerance=s.tolerance or None,
+            noslip_iterations=s.noslip_iterations,
+            box_box_detection=s.box_box_detection,
+            use_gjk_collision=s.gjk,
+        ),
+        vis_options=options.VisOptions(show_world_frame=False),
+        viewer_options=options.ViewerOptions(
+            res=(1024, 768), camera_pos=EYE, camera_lookat=LOOK_AT, camera_fov=FIELD_OF_VIEW
+        ),
+        profiling_options=options.ProfilingOptions(show_FPS=False),
+        show_viewer=window,
+    )
+
+
+def material(friction: float, density: float | None = None) -> Any:
+    """Of a friction coefficient, the least at least, and a density [kg/m^3] or the engine's own."""
+    return genesis.materials.Rigid(rho=density, friction=max(friction, LEAST_FRICTION))
+
+
+def add_box(world: Any, box: Box) -> Any:
+    """The entity of a box, fixed or free."""
+    morph = genesis.morphs.Box(
+        size=box.size, pos=box.pose.position, quat=box.pose.quaternion, fixed=box.fixed
+    )
+    density = None if box.fixed else box.mass / float(np.prod(box.size))
+    surface = genesis.surfaces.Default(color=box.colour)
+    return world.add_entity(morph, material=material(box.friction, density), surface=surface)
+
+
+def add_robot(world: Any, prepared: PreparedRobot) -> Any:
+    """The entity of the reduced robot, its fingers held together by an equality constraint."""
+    xml = ET.fromstring(prepared.to_urdf())
+    first, second = prepared.robot.gripper.joints
+    for joint in xml.findall("joint"):
+        if joint.attrib["name"] == second:  # becomes an equality constraint
+            ET.SubElement(joint, "mimic", joint=first, multiplier="1", offset="0")
+    morph = genesis.morphs.URDF(
+        file=ET.tostring(xml, encoding="unicode"),
+        fixed=True,
+        merge_fixed_links=False,
+        default_armature=None,
+        requires_jac_and_IK=False,
+    )
+    return world.add_entity(morph, material=material(prepared.robot.friction))
+
+
+def add_camera(world: Any, width: int, height: int) -> Any:
+    """A camera for pictures, ready to be used, in a world that is built."""
+    # `Scene.add_camera` refuses once a scene is built; the visualiser does not.
+    camera = world.visualizer.add_camera(
+        res=(width, height),
+        pos=EYE,
+        lookat=LOOK_AT,
+        up=(0.0, 0.0, 1.0),
+        model="pinhole",
+        fov=FIELD_OF_VIEW,
+        aperture=2.0,
+        focus_dist=None,
+        GUI=False,
+        spp=1,
+        denoise=False,
+        near=0.1,
+        far=20.0,
+        env_idx=None,
+        debug=False,
+    )
+    camera.build()
+    return camera
