@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.report import cells
-from pytest_simbench.report.summary import Row, Spread, TaskSummary
+from pytest_simbench.report.pooling import Spread
+from pytest_simbench.report.summary import Row, TaskSummary
 
 NAMED = 3
 """How many simulators a sentence names; the table below has them all."""

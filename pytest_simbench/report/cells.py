@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pytest_simbench.measure.intervals import wilson
 from pytest_simbench.measure.metrics import Metric
-from pytest_simbench.report.summary import Row, Sampled, Spread
+from pytest_simbench.report.pooling import Sampled, Spread
+from pytest_simbench.report.summary import Row
 
 MISSING = "-"
 

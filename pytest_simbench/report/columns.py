@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pytest_simbench.report import cells
 from pytest_simbench.report.answer import short_labels
 from pytest_simbench.report.grid import Column
+from pytest_simbench.report.pooling import merged_order
 from pytest_simbench.report.summary import PHASES, Row, TaskSummary
 
 LEGEND = (
@@ -86,6 +87,22 @@ def time_spent(summary: TaskSummary) -> list[Column]:
     return [*columns, Column("total s", totals, "time")]
 
 
+def by_phase(summary: TaskSummary) -> list[Column]:
+    """CPU and RAM in each phase of the task: means over all samples taken in it."""
+    rows = [row for row in summary.rows if row.by_phase]
+    columns = [labels(rows)] if rows else []
+    for phase in merged_order(row.by_phase for row in rows):
+        texts = []
+        for row in rows:
+            if phase in row.by_phase:
+                cpu, memory = row.by_phase[phase]
+                texts.append([f"{cpu.mean:.0f} %", f"{memory.mean:.0f} MB"])
+            else:
+                texts.append([cells.MISSING])
+        columns.append(Column(phase, texts, "resources"))
+    return columns
+
+
 def failures(summary: TaskSummary) -> list[Column]:
     """What went wrong: count, type, phase, message, and where to read on."""
     found = [(row, cause) for row in summary.rows for cause in row.causes]
@@ -141,6 +158,10 @@ def details(summary: TaskSummary) -> list[tuple[str, list[Column]]]:
         ("where the time went: mean wall seconds and share", time_spent(summary)),
     ]
     return [(name, columns) for name, columns in found if columns]
+
+
+BY_PHASE = "CPU and RAM by phase: means over all samples taken in it"
+"""Title of the table that only the written report has, for its width."""
 
 
 def title(summary: TaskSummary) -> str:

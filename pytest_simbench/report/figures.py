@@ -12,7 +12,8 @@ from typing import Any
 
 from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.report.answer import short_labels
-from pytest_simbench.report.summary import Row, Spread, TaskSummary
+from pytest_simbench.report.pooling import Spread
+from pytest_simbench.report.summary import Row, TaskSummary
 
 DPI = 120
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")

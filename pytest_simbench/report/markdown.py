@@ -35,7 +35,8 @@ def render_task(summary: TaskSummary, level: int = 2) -> str:
     title = f"{'#' * level} {columns.title(summary)}"
     parts = [title, "\n".join(f"- {escape(text)}" for text in sentences(summary))]
     parts.append(table(columns.study(summary)))
-    for name, found in columns.details(summary):
+    tables = [*columns.details(summary), (columns.BY_PHASE, columns.by_phase(summary))]
+    for name, found in tables:
         if found:
             parts.append(f"{'#' * (level + 1)} {name[0].upper()}{name[1:]}\n\n{table(found)}")
     notes = columns.notes(summary)

@@ -7,61 +7,27 @@ reference study.
 
 from __future__ import annotations
 
-import math
 import statistics
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from pytest_simbench.measure.contest import Win
-from pytest_simbench.measure.intervals import interval
 from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.measure.record import Record
-
-Ends = Callable[[Sequence[float], Metric], tuple[float, float]]
-"""Gives the lower and upper end of the interval of a metric's mean; infinite where not known."""
-
-AMOUNT = Metric("amount", "any cost")
-"""For the intervals of what is not a share."""
+from pytest_simbench.report.pooling import (
+    AMOUNT,
+    Ends,
+    Sampled,
+    Spread,
+    interval_ends,
+    pooled,
+    pooled_by_phase,
+    spread,
+)
 
 PHASES = ("launch", "compile", "load", "plan", "step", "other")
 """Where the wall time of a repetition goes, in order."""
-
-
-@dataclass(frozen=True)
-class Spread:
-    """A number over the repetitions of a row.
-
-    Attributes:
-        count: repetitions that have it.
-        std: deviation between repetitions; 0 for a single one.
-        low, high: the 95 % interval of the mean, or None where too few repetitions tell one.
-    """
-
-    count: int
-    min: float
-    mean: float
-    max: float
-    std: float = 0.0
-    low: float | None = None
-    high: float | None = None
-
-
-@dataclass(frozen=True)
-class Sampled:
-    """A resource over all samples of all repetitions of a row.
-
-    Attributes:
-        mean, std: over the samples.
-        peak: the largest value.
-        low, high: the 95 % interval of the mean over the repetitions, None for too few.
-    """
-
-    mean: float
-    std: float
-    peak: float | None = None
-    low: float | None = None
-    high: float | None = None
 
 
 @dataclass(frozen=True)
@@ -92,6 +58,7 @@ class Row:
         finished, failed, interrupted: counts of repetitions.
         metrics: by metric name; None where no repetition has the value.
         start, end: seconds from launch to the start and the end of the task.
+        by_phase: CPU in % of a core and RAM in MB by the task's phase, in order.
         seconds: mean wall seconds by phase (`PHASES`, `total`).
         notes: what a reader must know of these numbers (parallel repetitions, reused worker).
     """
@@ -107,6 +74,7 @@ class Row:
     metrics: Mapping[str, Spread | None] = field(default_factory=dict)
     cpu_percent: Sampled | None = None
     rss_mb: Sampled | None = None
+    by_phase: Mapping[str, tuple[Sampled, Sampled]] = field(default_factory=dict)
     real_time_factor: Spread | None = None
     cpu_cost: Spread | None = None
     start: Spread | None = None
@@ -160,12 +128,6 @@ class TaskSummary:
     def stricter(self) -> tuple[Metric, ...]:
         """What this project measures beside it."""
         return tuple(metric for metric in self.metrics if not metric.study)
-
-
-def interval_ends(values: Sequence[float], metric: Metric) -> tuple[float, float]:
-    """Ends of the 95 % interval that the assertions use, see `measure.intervals`."""
-    found = interval(values, bounded=metric.bounded)
-    return found.low, found.high
 
 
 def summarise(
@@ -237,8 +199,9 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str, ends: 
             metric.name: spread([r.metrics.get(metric.name) for r in done], metric, ends)
             for metric in metrics
         },
-        cpu_percent=_sampled(done, "cpu_percent", ends),
-        rss_mb=_sampled(done, "rss_mb", ends),
+        cpu_percent=pooled([r.resources for r in done], "cpu_percent", ends),
+        rss_mb=pooled([r.resources for r in done], "rss_mb", ends),
+        by_phase=pooled_by_phase([r.resources for r in done]),
         real_time_factor=spread([r.cost("rtf") for r in done], AMOUNT, ends),
         cpu_cost=spread([r.cost("cpu_cost") for r in done], AMOUNT, ends),
         start=spread([r.cost("start") for r in done], AMOUNT, ends),
@@ -248,52 +211,6 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str, ends: 
         deviations=tuple(dict.fromkeys(text for r in records for text in r.deviations)),
         notes=tuple(notes),
     )
-
-
-def spread(
-    values: Iterable[float | None], metric: Metric | None = None, ends: Ends = interval_ends
-) -> Spread | None:
-    """Smallest, mean and largest of the values that are there, with the interval of the mean.
-
-    Without a metric no interval is computed, nor where a share lies outside 0..1: a report shows
-    a wrong record rather than fail on it.
-    """
-    found = [float(value) for value in values if value is not None and math.isfinite(value)]
-    if not found:
-        return None
-    low: float | None = None
-    high: float | None = None
-    if metric is not None and (not metric.bounded or (min(found) >= 0 and max(found) <= 1)):
-        low, high = ends(found, metric)
-        if not (math.isfinite(low) and math.isfinite(high)):
-            low = high = None
-    std = statistics.stdev(found) if len(found) > 1 else 0.0
-    return Spread(len(found), min(found), statistics.fmean(found), max(found), std, low, high)
-
-
-def _sampled(records: Sequence[Record], name: str, ends: Ends) -> Sampled | None:
-    """Mean and deviation over all samples, as if they had been taken in one go.
-
-    The deviation is within and between repetitions: n samples of mean m_i and deviation s_i add
-    n (s_i^2 + (m_i - m)^2) to the sum of squares.
-    """
-    parts = []
-    peaks = []
-    for record in records:
-        found = record.resources.get(name) or {}
-        mean, count = found.get("mean"), record.resources.get("samples") or 0
-        if mean is not None and count > 0:
-            parts.append((count, mean, found.get("std") or 0.0))
-        if found.get("peak") is not None:
-            peaks.append(float(found["peak"]))
-    if not parts:
-        return None
-    total = sum(count for count, _, _ in parts)
-    mean = sum(count * m for count, m, _ in parts) / total
-    variance = sum(count * (s**2 + (m - mean) ** 2) for count, m, s in parts) / total
-    over = spread([m for _, m, _ in parts], AMOUNT, ends)
-    low, high = (None, None) if over is None else (over.low, over.high)
-    return Sampled(mean, math.sqrt(variance), max(peaks, default=None), low, high)
 
 
 def _seconds(records: Sequence[Record]) -> dict[str, float]:

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.report.answer import overlaps, sentences, short_labels
-from pytest_simbench.report.summary import Row, Spread, TaskSummary, summarise
+from pytest_simbench.report.pooling import Spread
+from pytest_simbench.report.summary import Row, TaskSummary, summarise
 
 from .samples import METRICS, stacking_run, throwing_run, two_errors
 

@@ -1,0 +1,71 @@
+"""Samples of several repetitions as one, by phase; and the order of phases."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pytest_simbench.report import columns
+from pytest_simbench.report.markdown import render_task
+from pytest_simbench.report.pooling import merged_order, pooled_by_phase
+from pytest_simbench.report.summary import summarise
+from pytest_simbench.report.tables import render_run
+from tests.report.samples import METRICS, record
+
+
+def use(cpu: float, memory: float, samples: int) -> dict[str, Any]:
+    return {
+        "cpu_percent": {"mean": cpu, "std": 0.0},
+        "rss_mb": {"mean": memory, "std": 0.0},
+        "samples": samples,
+    }
+
+
+def test_phases_are_weighted_by_their_samples() -> None:
+    found = pooled_by_phase(
+        [
+            {"phases": {"load": use(50.0, 100.0, 1), "pick": use(90.0, 200.0, 10)}},
+            {"phases": {"load": use(80.0, 130.0, 2)}},
+            {},
+        ]
+    )
+    assert list(found) == ["load", "pick"]
+    cpu, memory = found["load"]
+    assert (cpu.mean, memory.mean) == pytest.approx((70.0, 120.0))
+    assert found["pick"][0].mean == 90.0
+
+
+def test_a_phase_that_was_never_sampled_is_left_out() -> None:
+    assert pooled_by_phase([{"phases": {"load": use(50.0, 100.0, 0)}}]) == {}
+
+
+def test_a_late_phase_comes_after_the_one_that_it_follows() -> None:
+    assert merged_order([["pick", "settle"], ["load", "pick", "retreat"]]) == [
+        "load",
+        "pick",
+        "retreat",
+        "settle",
+    ]
+
+
+@given(st.lists(st.lists(st.sampled_from("abcdef"), unique=True)))
+def test_the_order_has_every_name_once_and_keeps_the_first_sequence(names: list[list[str]]) -> None:
+    order = merged_order(names)
+    assert sorted(order) == sorted({name for part in names for name in part})
+    first = names[0] if names else []
+    assert [name for name in order if name in first] == first
+
+
+def test_the_written_report_has_the_table_and_the_terminal_has_not() -> None:
+    phases = {"phases": {"pick": use(90.0, 200.0, 10)}, **use(90.0, 200.0, 10)}
+    other = {**phases, "phases": {}}
+    found = summarise(
+        [record(resources=phases), record(simulator="other", resources=other)], METRICS
+    )
+    written = render_task(found[0])
+    assert "| 90 % 200 MB |" in written
+    assert columns.BY_PHASE in written
+    assert columns.BY_PHASE not in "\n".join(render_run(found, 100))
