@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pytest_simbench.measure.intervals import Interval, interval, wilson
+from pytest_simbench.repeatability.attack import Attack, Perturbations
 from pytest_simbench.repeatability.episode import Experiment
 from pytest_simbench.repeatability.motions import gaps
 from pytest_simbench.repeatability.perturbation import (
@@ -15,7 +16,7 @@ from pytest_simbench.repeatability.perturbation import (
     described,
     perturbations,
 )
-from pytest_simbench.repeatability.search import Attack, Perturbations, bounds_in_words
+from pytest_simbench.repeatability.search import bounds_in_words
 
 SENSITIVITY_TIMES = (0.1, 1.0, 5.0, 20.0)
 """Simulated times at which sensitivity is told [s]."""

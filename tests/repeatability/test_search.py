@@ -9,11 +9,10 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.repeatability.__main__ import main
+from pytest_simbench.repeatability.attack import Attack
 from pytest_simbench.repeatability.episode import Experiment
 from pytest_simbench.repeatability.perturbation import Perturbation
-from pytest_simbench.repeatability.search import Attack, Finding, effect, search, to_wire
-from pytest_simbench.tasks import LeaningTowers, Stacking
-from pytest_simbench.tasks.base import Outcome
+from pytest_simbench.repeatability.search import Finding, search, to_wire
 
 WIDE = {"x": 0.012, "y": 0.012, "yaw": math.radians(10), "mass": 0.5, "friction": 0.5}
 """Enough to topple a tower with 8 mm to spare, among much that is not."""
@@ -134,16 +133,6 @@ def test_noise_is_no_finding(towers: Callable[..., Experiment]) -> None:
     finding = search(towers("Noisy"), {"x": 0.012}, shrinks=30, at_once=1)
     assert finding.effect == "topples tower 1"
     assert 0.007 < finding.amount("x") < 0.009
-
-
-def test_effects_in_words() -> None:
-    towers, stacking = LeaningTowers(), Stacking()
-    up, down = Outcome({}, {"toppled": []}), Outcome({}, {"toppled": ["tower 1", "tower 2"]})
-    assert effect(towers, up, down, ["standing"]) == "topples tower 1 and tower 2"
-    assert effect(towers, down, up, ["standing"]) == "saves tower 1 and tower 2 from toppling"
-    before, after = Outcome({"at_end": 1.0}), Outcome({"at_end": 0.8})
-    assert effect(stacking, before, after, ["at_end"]) == "changes at the end from 100 % to 80 %"
-    assert effect(stacking, before, before, []) == ""
 
 
 def test_example_files_are_in_the_run_folder(
