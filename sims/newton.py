@@ -13,7 +13,6 @@ drive. Joint 1 of the Panda then gains 58 % of the momentum that its effort limi
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -297,19 +296,13 @@ class Newton(Simulator):
         self._viewer = newton.viewer.ViewerGL(width=960, height=720)
         self._viewer.set_model(self.model)
         self._viewer.set_camera(pos=wp.vec3(2.0, -1.3, 1.3), pitch=-25.0, yaw=140.0)
-        self._next_picture = 0.0
         self.refresh_window()
 
     def refresh_window(self) -> None:
-        """Draw, unless the last picture is so fresh that drawing would take most of the time."""
-        began = time.perf_counter()
-        if self._viewer is None or began < self._next_picture:
-            return
-        self._viewer.begin_frame(self.time)
-        self._viewer.log_state(self._states[0])
-        self._viewer.end_frame()
-        ended = time.perf_counter()
-        self._next_picture = ended + (ended - began)
+        if self._viewer is not None:
+            self._viewer.begin_frame(self.time)
+            self._viewer.log_state(self._states[0])
+            self._viewer.end_frame()
 
     def close(self) -> None:
         if self.__dict__.get("_viewer") is not None:

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from pytest_simbench import options as session_options
 from pytest_simbench.plugin import run
 
 if TYPE_CHECKING:
     from pytest_simbench.repeatability.episode import Experiment
-    from pytest_simbench.repeatability.replay import Replay
+    from pytest_simbench.repeatability.replay_result import Replay
     from pytest_simbench.repeatability.search import Finding
     from pytest_simbench.repeatability.stability import Sensitivity, Stability
     from pytest_simbench.run import Run
@@ -50,6 +51,7 @@ def replay(request: pytest.FixtureRequest, simbench_case: Case) -> Callable[[Tas
                 capabilities=info.capabilities,
                 fresh=handle(case),
                 other_mode=_other_mode(run(request.config), case, info.modes, handle),
+                jobs=session_options.value(request.config, "sim_jobs"),
                 **options,
             )
         with suppress(OSError):
@@ -147,6 +149,8 @@ class Perturber:
         """The smallest perturbation that changes the outcome, see `search.search`."""
         from pytest_simbench.repeatability import search
 
+        if self.case.protocol.smallest:
+            options["shrinks"] = min(10, options.get("shrinks", 10))
         finding = search.search(self.experiment, bounds, **options)
         _keep(self.case, "search", self.experiment, search.to_wire(finding))
         return finding
@@ -155,6 +159,8 @@ class Perturber:
         """What random perturbations leave, see `stability.stability`."""
         from pytest_simbench.repeatability import stability
 
+        if self.case.protocol.smallest:
+            options["examples"] = min(5, options.get("examples", 5))
         result = stability.stability(self.experiment, bounds, **options)
         _keep(self.case, "stability", self.experiment, result.to_wire())
         return result

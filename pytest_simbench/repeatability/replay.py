@@ -6,14 +6,17 @@ again, to the last bit, after each of the things that should not matter.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
 
 from pytest_simbench.client.errors import Unavailable, WorkerError
 from pytest_simbench.client.tape import Operation, TapedWorld
 from pytest_simbench.repeatability.episode import Episode, Experiment, changed
-from pytest_simbench.repeatability.motions import Difference, difference
+from pytest_simbench.repeatability.motions import difference
+from pytest_simbench.repeatability.replay_result import Again, Replay
 from pytest_simbench.session.handle import SimulatorHandle
 from pytest_simbench.simulator.info import Capability
 from pytest_simbench.tasks import Jitter, LeaningTowers
@@ -42,126 +45,6 @@ THROWING_MOMENTS = (Moment("in the grip", "wind up"), Moment("in flight", "throw
 ended, by when the cube is on its way."""
 
 
-@dataclass(frozen=True)
-class Again:
-    """One way of running again, and what came of it.
-
-    Attributes:
-        way: what was done in between, for tables.
-        difference: where it parted from the first run; None: nowhere.
-        changed: counts of the task's outcome that are not the same.
-        left_at: when the task no longer asked for what the tape has next [s].
-        skipped: why it was not run, "" when it was.
-        failure: the error that ended it, "" when there was none.
-        claimed: whether the adapter claims that this way gives the same.
-    """
-
-    way: str
-    difference: Difference | None = None
-    changed: tuple[str, ...] = ()
-    left_at: float | None = None
-    skipped: str = ""
-    failure: str = ""
-    claimed: bool = True
-
-    @property
-    def identical(self) -> bool:
-        """Whether it ran and every bit was the same."""
-        return not (self.skipped or self.failure or self.difference)
-
-    @property
-    def text(self) -> str:
-        """The result in words."""
-        if self.skipped or self.failure:
-            return self.skipped or self.failure
-        if self.difference is None:
-            return "bit-identical"
-        d = self.difference
-        growth = ", ".join(
-            f"{1000 * gap:.3g} mm {after:g} s later"
-            for after, gap in d.growth.items()
-            if gap is not None
-        )
-        what = f"first differs at t = {d.first:.2f} s"
-        what += f" ({d.body})" if d.body else " (robot)"
-        what += f", then {growth}" if growth else ""
-        what += f", {1000 * d.largest:.3g} mm at most"
-        return what + (f"; changed {', '.join(self.changed)}" if self.changed else "")
-
-    def to_wire(self) -> dict[str, Any]:
-        d = self.difference
-        return {
-            "way": self.way,
-            "identical": self.identical,
-            "first": None if d is None else d.first,
-            "body": None if d is None else d.body,
-            "growth": None if d is None else {f"{k:g}": v for k, v in d.growth.items()},
-            "largest": None if d is None else d.largest,
-            "changed": list(self.changed),
-            "left_at": self.left_at,
-            "skipped": self.skipped,
-            "failure": self.failure,
-            "claimed": self.claimed,
-        }
-
-    @classmethod
-    def from_wire(cls, data: Mapping[str, Any]) -> Again:
-        found = None
-        if data["first"] is not None:
-            growth = {float(key): value for key, value in data["growth"].items()}
-            found = Difference(data["first"], data["body"], growth, data["largest"])
-        return cls(
-            data["way"],
-            found,
-            tuple(data["changed"]),
-            data["left_at"],
-            data["skipped"],
-            data["failure"],
-            data.get("claimed", True),
-        )
-
-
-@dataclass(frozen=True)
-class Replay:
-    """All ways of running one seed again in one simulator.
-
-    Attributes:
-        simulator: its name.
-        claims: whether its adapter claims that it is deterministic.
-        first: the run that the others are compared with.
-        again: the ways, with their results.
-    """
-
-    simulator: str
-    claims: bool
-    first: Episode
-    again: tuple[Again, ...]
-
-    def to_wire(self) -> dict[str, Any]:
-        """Plain data for the run's records."""
-        return {
-            "claims": self.claims,
-            "counts": dict(self.first.counts),
-            "again": [again.to_wire() for again in self.again],
-        }
-
-    def assert_as_claimed(self) -> None:
-        """Raise AssertionError when a way that is claimed to give the same does not, or when the
-        simulator could not run again what it ran before.
-
-        Claimed are, with the capability `deterministic`, all ways but those that restore a state,
-        and with `exact_restore` those.
-        """
-        bad = [
-            f"{again.way}: {again.text}"
-            for again in self.again
-            if again.failure or (again.claimed and not again.identical and not again.skipped)
-        ]
-        if bad:
-            head = "claims to be deterministic, but" if self.claims else "could not run again"
-            raise AssertionError(f"{self.simulator} {head}\n  " + "\n  ".join(bad))
-
-
 def replay(
     experiment: Experiment,
     *,
@@ -170,6 +53,7 @@ def replay(
     fresh: SimulatorHandle,
     other_mode: SimulatorHandle | str,
     moments: tuple[Moment, ...] = THROWING_MOMENTS,
+    jobs: int = 1,
 ) -> Replay:
     """Run an experiment and run it again in every way.
 
@@ -181,36 +65,81 @@ def replay(
         other_mode: a handle in the other mode (with a window, when the first has none), or why
             there is none.
         moments: at which to save and restore.
+        jobs: how many workers may run side by side.
 
     Raises:
         WorkerError: in the first run; later ones are results.
     """
     simulator = experiment.handle.case.simulator
-    restores = Capability.EXACT_RESTORE in capabilities
     first = experiment.run()
-    results = [
-        _again("after a reset", first, lambda: experiment.run(play=first.tape)),
-        _again("after another episode", first, lambda: _after_another(experiment, first)),
-    ]
-    for moment in moments:
-        way = f"restored {moment.name}"
-        if Capability.SAVE_RESTORE not in capabilities:
-            results.append(Again(way, skipped=f"{simulator} cannot save and restore"))
-        else:
-            restored = _restored(way, moment, experiment, first)
-            results.append(replace(restored, claimed=restores))
-    results.append(
-        _again("fresh process", first, lambda: experiment.run(play=first.tape, handle=fresh))
-    )
     mode = "headless" if experiment.handle.case.mode == "gui" else "with a window"
-    if isinstance(other_mode, str):
-        results.append(Again(mode, skipped=other_mode))
-    else:
-        other = other_mode
-        results.append(_again(mode, first, lambda: experiment.run(play=first.tape, handle=other)))
+    elsewhere = [_Elsewhere("fresh process", fresh), _Elsewhere(mode, other_mode)]
+    with _side_by_side(jobs - 1, elsewhere, experiment, first) as started:
+        results = [
+            _again("after a reset", first, lambda: experiment.run(play=first.tape)),
+            _again("after another episode", first, lambda: _after_another(experiment, first)),
+            *_restored_at(moments, capabilities, experiment, first),
+        ]
+        results += [again() for again in started]
     if not claims:
         results = [replace(again, claimed=False) for again in results]
     return Replay(simulator, claims, first, tuple(results))
+
+
+@dataclass(frozen=True)
+class _Elsewhere:
+    """A way that has a worker of its own, or the reason why it cannot be gone."""
+
+    way: str
+    handle: SimulatorHandle | str
+
+    def run(self, experiment: Experiment, first: Episode) -> Again:
+        handle = self.handle
+        if isinstance(handle, str):
+            return Again(self.way, skipped=handle)
+        return _again(self.way, first, lambda: experiment.run(play=first.tape, handle=handle))
+
+    def end(self) -> None:
+        if isinstance(self.handle, SimulatorHandle):
+            self.handle.close()
+
+
+@contextmanager
+def _side_by_side(
+    threads: int, ways: Sequence[_Elsewhere], experiment: Experiment, first: Episode
+) -> Iterator[list[Callable[[], Again]]]:
+    """Functions that give the results, from that many threads (0: when they are called)."""
+    if threads < 1:
+        yield [partial(way.run, experiment, first) for way in ways]
+        return
+    with ThreadPoolExecutor(threads, thread_name_prefix="simbench-replay") as pool:
+        futures = [pool.submit(way.run, experiment, first) for way in ways]
+        try:
+            yield [future.result for future in futures]
+        except BaseException:
+            for future in futures:
+                future.cancel()
+            while True:  # a worker that was just being started is there only in the next round
+                for way in ways:
+                    way.end()
+                if not wait(futures, timeout=0.1).not_done:
+                    raise
+
+
+def _restored_at(
+    moments: Sequence[Moment],
+    capabilities: frozenset[Capability],
+    experiment: Experiment,
+    first: Episode,
+) -> Iterator[Again]:
+    for moment in moments:
+        way = f"restored {moment.name}"
+        if Capability.SAVE_RESTORE not in capabilities:
+            simulator = experiment.handle.case.simulator
+            yield Again(way, skipped=f"{simulator} cannot save and restore")
+        else:
+            restored = _restored(way, moment, experiment, first)
+            yield replace(restored, claimed=Capability.EXACT_RESTORE in capabilities)
 
 
 def _again(way: str, first: Episode, run: Callable[[], Episode]) -> Again:

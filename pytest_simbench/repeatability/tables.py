@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from pytest_simbench.repeatability.agreement import LIMITS, Agreement
 from pytest_simbench.repeatability.motions import GROWTH_TIMES
-from pytest_simbench.repeatability.replay import Again
+from pytest_simbench.repeatability.replay_result import Again
 from pytest_simbench.repeatability.store import Line
 from pytest_simbench.report.grid import Column, fill, render
 from pytest_simbench.report.markdown import escape, table

@@ -104,13 +104,13 @@ class SimulatorHandle:
             error.add_note(f"replay this episode: {replay_command(path)}")
 
     def close(self) -> None:
-        """End the worker, if there is one."""
-        if self._process is not None:
-            if self._process.busy:
-                self._process.kill()
+        """End the worker, if there is one; also from another thread than the one that uses it."""
+        process, self._process = self._process, None
+        if process is not None:
+            if process.busy:
+                process.kill()
             with suppress(WorkerError):
-                self._process.close(timeout=5.0)
-            self._process = None
+                process.close(timeout=5.0)
 
 
 def _of_hypothesis(error: Exception) -> bool:

@@ -17,7 +17,8 @@ HEARTBEAT_PERIOD = 0.5
 """Wall time between two signs of life while stepping [s]."""
 
 WINDOW_PERIOD = 1 / 30
-"""Wall time between two pictures in the window [s]."""
+"""Least wall time between two pictures in the window [s]; of a slow window, at least the time that
+a picture takes, so that half of the time is left for stepping."""
 
 CHECK_PERIOD = 0.1
 """Simulated time between two looks at the state for values that are not finite [s]."""
@@ -83,6 +84,7 @@ class Stepper:
         self._clock = Clock()
         self.control = Control(self._clock)
         self.real_time = False
+        self._next_picture = 0.0
 
     def follow(self, trajectory: Trajectory, log_period: float | None) -> dict[str, Any]:
         """Command the trajectory's set points step by step; see `_advance`."""
@@ -116,7 +118,7 @@ class Stepper:
         totals, keep_up = self.clocks, self.control.keep_up
         cpu_began = time.process_time()
         began, waited = clock()
-        beat = window = resumed = began
+        beat = resumed = began
         for k in range(1, steps + 1):
             if rows is not None:
                 command(*rows[k - 1])
@@ -135,9 +137,10 @@ class Stepper:
             if stopped - beat > HEARTBEAT_PERIOD:
                 beat = stopped
                 self.heartbeat(simulator.time)
-            if simulator.gui and stopped - window > WINDOW_PERIOD:
-                window = stopped
+            if simulator.gui and stopped > self._next_picture:
                 simulator.refresh_window()
+                drawn = time.perf_counter()
+                self._next_picture = drawn + max(WINDOW_PERIOD, drawn - stopped)
             if self.real_time:
                 ahead = k * timestep - (time.perf_counter() - began)
                 if ahead > 0:

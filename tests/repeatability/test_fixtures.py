@@ -21,7 +21,9 @@ TEST = """
     def test_push(perturb):
         towers = perturb(LeaningTowers())
         assert len(towers.task.margins) == 1  # the smoke version
-        towers.stability({"x": 0.001}, examples=3).assert_kept_at_least(0.9)
+        gentle = towers.stability({"x": 0.001}, examples=20)
+        gentle.assert_kept_at_least(0.9)
+        assert len(gentle.kept) == 5  # of the smoke protocol too
         towers.search({"x": 0.012}, shrinks=10, at_once=1).assert_found()
         towers.sensitivity("cube_01").assert_below(10.0, until=1.0)
 """

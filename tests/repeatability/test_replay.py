@@ -9,7 +9,8 @@ import pytest
 
 from pytest_simbench.repeatability.episode import Experiment
 from pytest_simbench.repeatability.motions import Difference
-from pytest_simbench.repeatability.replay import Again, Moment, Replay, replay
+from pytest_simbench.repeatability.replay import Moment, replay
+from pytest_simbench.repeatability.replay_result import Again, Replay
 from pytest_simbench.session.handle import SimulatorHandle
 from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks import Jitter, Throwing
@@ -158,6 +159,49 @@ def test_a_throw_with_the_cube_in_the_grip_and_in_flight(
         "restored in the grip",
         "restored in flight",
     ]
+
+
+def test_side_by_side_gives_the_same(
+    tumbling: Callable[..., Experiment], handle_of: Callable[..., SimulatorHandle]
+) -> None:
+    def run(jobs: int) -> Replay:
+        return replay(
+            tumbling("mujoco"),
+            claims=True,
+            capabilities=EVERYTHING,
+            fresh=handle_of("mujoco"),
+            other_mode=handle_of("mujoco"),
+            moments=MOMENTS,
+            jobs=jobs,
+        )
+
+    one, three = run(1), run(3)
+    assert tuple(again.way for again in three.again) == WAYS
+    assert three.to_wire() == one.to_wire()
+    assert all(again.identical for again in three.again)
+
+
+def test_an_interrupt_ends_what_runs_side_by_side(
+    tumbling: Callable[..., Experiment],
+    handle_of: Callable[..., SimulatorHandle],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pytest_simbench.repeatability.replay._after_another", interrupted)
+    workers = [handle_of("mujoco"), handle_of("mujoco")]
+    with pytest.raises(KeyboardInterrupt):
+        replay(
+            tumbling("mujoco"),
+            claims=True,
+            capabilities=EVERYTHING,
+            fresh=workers[0],
+            other_mode=workers[1],
+            moments=MOMENTS,
+            jobs=3,
+        )
+    assert [handle._process for handle in workers] == [None, None]
 
 
 @pytest.mark.parametrize(

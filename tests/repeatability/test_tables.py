@@ -6,7 +6,7 @@ import pytest
 
 from pytest_simbench.repeatability.agreement import Agreement, Parting
 from pytest_simbench.repeatability.motions import Difference
-from pytest_simbench.repeatability.replay import Again
+from pytest_simbench.repeatability.replay_result import Again
 from pytest_simbench.repeatability.store import Line
 from pytest_simbench.repeatability.tables import render_markdown, render_terminal, tables
 

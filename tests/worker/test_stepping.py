@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -55,6 +56,26 @@ def test_a_trajectory_is_followed_and_its_end_held(stepper: Stepper) -> None:
     assert np.abs(stepper.simulator.joint_state()[0] - start - way)[:7].max() < 0.02
     stepper.wait(0.5, None)
     assert np.abs(stepper.simulator.joint_state()[0] - start - way)[:7].max() < 0.02
+
+
+def test_a_slow_window_takes_at_most_half_of_the_time(
+    stepper: Stepper, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pictures = []
+
+    def draw() -> None:
+        began = time.perf_counter()
+        time.sleep(0.05)
+        pictures.append(time.perf_counter() - began)
+
+    monkeypatch.setattr(stepper.simulator, "gui", True)
+    monkeypatch.setattr(stepper.simulator, "refresh_window", draw)
+    began = time.perf_counter()
+    for _ in range(4):
+        stepper.wait(1.0, None)
+    elapsed = time.perf_counter() - began
+    assert pictures
+    assert sum(pictures) <= elapsed / 2 + pictures[-1]
 
 
 def test_a_state_that_is_no_number_is_an_error(stepper: Stepper) -> None:
