@@ -149,8 +149,6 @@ class Perturber:
         """The smallest perturbation that changes the outcome, see `search.search`."""
         from pytest_simbench.repeatability import search
 
-        if self.case.protocol.smallest:
-            options["shrinks"] = min(10, options.get("shrinks", 10))
         finding = search.search(self.experiment, bounds, **options)
         _keep(self.case, "search", self.experiment, search.to_wire(finding))
         return finding
