@@ -9,7 +9,6 @@ stiffness that its URDF loader gives a mimic joint. See docs/engines/sapien.md.
 
 from __future__ import annotations
 
-import math
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
-from pytest_simbench.sims.sapien_drawing import Drawing
+from pytest_simbench.sims.sapien_drawing import Drawing, facing_up
 
 from pytest_simbench.scene import Box, FloatArray, Scene
 from pytest_simbench.simulator import (
@@ -163,9 +162,7 @@ class SAPIEN(Simulator):
 
     def _add_ground(self, friction: float) -> Any:
         builder = self._world.create_actor_builder()
-        # PhysX's plane faces along x; turned by -90 degrees about y it faces up.
-        upward = sapien.Pose([0, 0, 0], [math.sqrt(0.5), 0, -math.sqrt(0.5), 0])
-        builder.add_plane_collision(upward, physx.PhysxMaterial(friction, friction, 0.0))
+        builder.add_plane_collision(facing_up(), physx.PhysxMaterial(friction, friction, 0.0))
         builder.collision_groups = [WORLD, WORLD | ROBOT, 0, 0]
         entity = builder.build_static("ground")
         return entity.find_component_by_type(physx.PhysxRigidStaticComponent)

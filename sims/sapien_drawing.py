@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -74,6 +73,7 @@ class Drawing:
             self._add(link.name, shapes)
         self._camera: Any = None
         self._viewer: Any = None
+        self._layout: tempfile.TemporaryDirectory[str] | None = None
 
     def _add(self, name: str, shapes: list[Any]) -> Any:
         entity, component = sapien.Entity(), rendering.RenderBodyComponent()
@@ -86,10 +86,9 @@ class Drawing:
         return entity
 
     def _add_ground(self) -> None:
-        size = np.array([0.0, 10.0, 10.0])  # SAPIEN's plane faces along x
+        size = np.array([0.0, 10.0, 10.0])
         shape = rendering.RenderShapePlane(size, _material(GROUND_COLOUR))
-        upward = sapien.Pose([0, 0, 0], [math.sqrt(0.5), 0, -math.sqrt(0.5), 0])
-        self._add("ground", [shape]).set_pose(upward)
+        self._add("ground", [shape]).set_pose(facing_up())
 
     def _box(self, size: Vector3, pose: Pose, colour: tuple[float, ...]) -> Any:
         shape = rendering.RenderShapeBox(np.array(size) / 2, _material(colour))
@@ -121,8 +120,8 @@ class Drawing:
         """Draw the window, which is opened the first time; nothing once the user has closed it."""
         if self._viewer is None:
             # The viewer leaves its panels' layout in a file, by default in the working folder.
-            layout = Path(tempfile.gettempdir()) / "simbench-sapien" / "imgui.ini"
-            rendering.set_imgui_ini_filename(str(layout))
+            self._layout = tempfile.TemporaryDirectory(prefix="simbench-sapien-")
+            rendering.set_imgui_ini_filename(f"{self._layout.name}/imgui.ini")
             # Of its panels the one for the camera; the others would cover the scene, and tell of a
             # physics that is not here.
             self._viewer = viewing.Viewer(
@@ -138,6 +137,13 @@ class Drawing:
         if self._viewer is not None and not self._viewer.closed:
             self._viewer.close()
         self._viewer = self._camera = None
+        if self._layout is not None:
+            self._layout.cleanup()
+
+
+def facing_up() -> Any:
+    """Pose of the ground: a plane faces along x; turned by -90 degrees about y, it faces up."""
+    return sapien.Pose([0, 0, 0], [math.sqrt(0.5), 0, -math.sqrt(0.5), 0])
 
 
 def _material(colour: tuple[float, ...]) -> Any:

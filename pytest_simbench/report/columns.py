@@ -22,6 +22,9 @@ LEGEND = (
 MATRIX = "the row beats the column at (permutation tests, corrected)"
 """Title of the matrix."""
 
+BY_PHASE = "CPU and RAM by phase: means over all samples taken in it"
+"""Title of the table that only the written report has, for its width."""
+
 
 def study(summary: TaskSummary) -> list[Column]:
     """The study's table: failures, its metrics, CPU, RAM, speed, start and end."""
@@ -158,10 +161,6 @@ def details(summary: TaskSummary) -> list[tuple[str, list[Column]]]:
         ("where the time went: mean wall seconds and share", time_spent(summary)),
     ]
     return [(name, columns) for name, columns in found if columns]
-
-
-BY_PHASE = "CPU and RAM by phase: means over all samples taken in it"
-"""Title of the table that only the written report has, for its width."""
 
 
 def title(summary: TaskSummary) -> str:
