@@ -13,8 +13,10 @@ from pytest_simbench.plugin import run, selection
 
 if TYPE_CHECKING:
     from pytest_simbench.client.world import World
+    from pytest_simbench.display import Displays
     from pytest_simbench.measure.resources import ResourceSampler
     from pytest_simbench.measure.results import ResultSet
+    from pytest_simbench.run import Run
     from pytest_simbench.scene import Scene
     from pytest_simbench.session.case import Case
     from pytest_simbench.session.handle import SimulatorHandle
@@ -74,10 +76,8 @@ def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: A
         changes={**settings, **chosen.changes.get(name, {})},
         python=chosen.python(name),
         spec=chosen.specs.get(name),
-        environment={
-            **chosen.environment(name).variables(),
-            **(this.displays.environment() if mode == "gui" else {}),
-        },
+        environment=chosen.environment(name).variables(),
+        display=_display(this) if mode == "gui" else None,
         costly_start=info.costly_start,
         compile_timeout=info.compile_timeout,
         fresh=options.value(config, "sim_fresh"),
@@ -89,6 +89,17 @@ def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: A
         trace=options.value(config, "sim_trace"),
         **more,
     )
+
+
+def _display(this: Run) -> Displays:
+    """The displays of a run, if there are any; skips the test where there are none."""
+    from pytest_simbench.client.errors import DisplayError
+
+    try:
+        this.displays.environment()
+    except DisplayError as error:
+        pytest.skip(str(error))
+    return this.displays
 
 
 @pytest.fixture
@@ -144,7 +155,8 @@ def simulator(
     """
     from pytest_simbench.session.handle import SimulatorHandle
 
-    handle = SimulatorHandle(_case(request.config, sim_case, "simulator"))
+    timeout = options.value(request.config, "sim_timeout")
+    handle = SimulatorHandle(_case(request.config, sim_case, "simulator", timeout=timeout))
     yield handle
     handle.close()
 

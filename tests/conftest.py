@@ -6,9 +6,11 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import psutil
 import pytest
 from hypothesis import settings
 
+from pytest_simbench.client import reaper
 from pytest_simbench.client.environments import Environment, interpreter, missing
 from pytest_simbench.session.case import Case
 from pytest_simbench.simulator import Capability
@@ -64,6 +66,11 @@ def case_of(case: Case, name: str) -> Case:
         compile_timeout=info.compile_timeout,
         stall_timeout=120.0 if info.costly_start else case.stall_timeout,
     )
+
+
+def workers() -> set[psutil.Process]:
+    """Living processes that this one's workers are, or that these left behind."""
+    return set(reaper.marked(reaper.new_mark().partition(".")[0]))
 
 
 @pytest.fixture

@@ -5,14 +5,23 @@ nor this package is installed. It sends all output to the log file, makes this p
 from the folders that the client names (and nothing else from there), and serves requests.
 """
 
+import ctypes
 import faulthandler
 import importlib.util
+import io
 import os
+import queue
 import signal
 import sys
 import tempfile
 from importlib.machinery import ModuleSpec
 from typing import Any
+
+PR_SET_CHILD_SUBREAPER = 36
+"""Of Linux, `man prctl`: children of children that lost their parent become ours."""
+
+GONE = object()
+"""In place of a request: the client is gone."""
 
 
 class PackageFinder:
@@ -34,6 +43,24 @@ class PackageFinder:
         )
 
 
+class Log(io.FileIO):
+    """A file that takes what a full disk does not: a log must not end a repetition."""
+
+    def write(self, data: Any) -> int:
+        try:
+            return super().write(data)
+        except OSError:
+            return len(data)
+
+
+def log_stream(descriptor: int) -> io.TextIOWrapper:
+    """A text stream on stdout or stderr that raises nothing, whatever is written."""
+    raw = Log(descriptor, "w", closefd=False)
+    return io.TextIOWrapper(
+        io.BufferedWriter(raw), "utf-8", errors="backslashreplace", line_buffering=True
+    )
+
+
 def redirect_output(path: str) -> None:
     """Send stdout and stderr, also those of C code, to the log file."""
     log = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
@@ -41,9 +68,28 @@ def redirect_output(path: str) -> None:
     sys.stderr.flush()
     os.dup2(log, 1)
     os.dup2(log, 2)
-    sys.stdout = os.fdopen(1, "w", buffering=1, errors="replace", closefd=False)
-    sys.stderr = os.fdopen(2, "w", buffering=1, errors="replace", closefd=False)
+    os.close(log)
+    sys.stdout, sys.stderr = log_stream(1), log_stream(2)
     faulthandler.enable(file=sys.stderr)
+
+
+def adopt_orphans() -> None:
+    """Stay the ancestor of all that the engine starts, so that the client finds and ends it."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+
+
+def requests_of(channel: Any) -> "queue.SimpleQueue[Any]":
+    """The client's requests. The process ends with its connection, whatever it is doing then."""
+    requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
+
+    def take(request: Any) -> None:  # in execnet's thread
+        if request is GONE:
+            os._exit(1)
+        requests.put(request)
+
+    channel.setcallback(take, endmarker=GONE)
+    return requests
 
 
 def main(channel: Any) -> None:
@@ -60,10 +106,11 @@ def main(channel: Any) -> None:
     if folder:
         os.chdir(folder)  # engines leave logs and caches where they run
     sys.meta_path.insert(0, PackageFinder(config["packages"]))
+    adopt_orphans()
 
     from pytest_simbench.worker.server import serve
 
-    serve(channel.receive, channel.send)
+    serve(requests_of(channel).get, channel.send)
     # Windows and engines may crash while the interpreter tears them down; everything is sent.
     sys.stdout.flush()
     sys.stderr.flush()

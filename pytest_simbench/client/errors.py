@@ -64,6 +64,14 @@ class OutOfMemory(WorkerError):
     """The worker used more memory than allowed, or its allocation failed."""
 
 
+class Interrupted(WorkerError):
+    """The run was interrupted, and the worker ended for that."""
+
+
+class DisplayLost(WorkerError):
+    """The virtual display of a window ended, or could not be started."""
+
+
 class ProtocolError(WorkerError):
     """The worker sent something that is no answer."""
 
@@ -84,11 +92,16 @@ class EngineFailed(WorkerError):
     """The engine or its adapter raised an exception, or rejected the scene or settings."""
 
 
+class DisplayError(Exception):
+    """There is no display to be had."""
+
+
 REMOTE_ERRORS: dict[str, type[WorkerError]] = {
     "ParityError": WorldParityError,
     "DivergedError": Diverged,
     "MemoryError": OutOfMemory,
     "UnavailableError": Unavailable,
+    "SystemExit": WorkerExited,
 }
 """Worker-side error names and what they become here; all others are `EngineFailed`."""
 
@@ -97,9 +110,15 @@ def exit_text(code: int | None) -> str:
     """A process's exit status in words: "was killed by SIGSEGV", "exited with status 3"."""
     if code is None:
         return "broke the connection"
+    if code in _OF_A_SHELL:
+        return f"exited with status {code}, a shell's word for {_OF_A_SHELL[code]}"
     if code < 0:
         try:
             return f"was killed by {signal.Signals(-code).name}"
         except ValueError:
             return f"was killed by signal {-code}"
     return f"exited with status {code}"
+
+
+_OF_A_SHELL = {128 + number: number.name for number in signal.Signals}
+"""What a shell that starts the interpreter makes of a signal that ended it."""

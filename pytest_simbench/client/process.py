@@ -1,28 +1,25 @@
-"""A worker's process, started through execnet: requests, time-outs, death. Knows execnet alone."""
+"""A worker's process: requests, limits of their time, death. `connection` knows execnet."""
 
 from __future__ import annotations
 
 import contextlib
 import importlib.util
-import os
-import shlex
-import sys
 import threading
 import time
-import uuid
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import execnet
 import psutil
 
 from pytest_simbench import __version__
-from pytest_simbench.client import bootstrap
+from pytest_simbench.client import bootstrap, reaper
+from pytest_simbench.client.connection import Connection, RemoteError
 from pytest_simbench.client.errors import (
     REMOTE_ERRORS,
     EngineFailed,
+    Interrupted,
     OutOfMemory,
     ProtocolError,
     RepetitionTimeout,
@@ -33,16 +30,18 @@ from pytest_simbench.client.errors import (
     WorkerStartError,
     exit_text,
 )
+from pytest_simbench.client.logs import shorten_log, tail_of_log
+from pytest_simbench.worker.text import named, readable
 from pytest_simbench.worker.wire import pack, unpack
 
-TOKEN = "PYTEST_SIMBENCH_WORKER"
-"""Environment variable by which a worker's process is found before it has told its pid."""
+LOOK_PERIOD = 1.0
+"""Wall time between two looks at the log and the limits while waiting for an answer [s]."""
 
-IGNORING_INTERRUPTS = ("sh", "-c", 'trap "" INT; exec "$@"', "sh")
-"""Prefix of a worker's command. Ctrl-C reaches the whole process group, also a worker that is just
-starting; its death would be recorded as a failure of its own before the client can intervene."""
+EXIT_TIMEOUT = 2.0
+"""The pipe breaks a moment before the process can be waited for [s]."""
 
-LOG_TAIL_LINES = 30
+CLOSE_TIMEOUT = 10.0
+"""For an engine to release what it holds [s]; then it is ended, and the record says so."""
 
 
 @dataclass(frozen=True)
@@ -55,9 +54,10 @@ class Launch:
         spec: whole execnet specification, which overrides `python` (another host).
         environment: variables set in the worker's environment.
         log: file that takes all of the worker's output, None to leave it alone.
-        start_timeout: for interpreter start and handshake [s].
+        start_timeout: for interpreter start and handshake, each [s].
         stall_timeout: longest silence before the worker counts as hung [s].
-        compile_timeout: for `Simulator.compile` [s]; 0 where there is nothing to compile.
+        compile_timeout: for `Simulator.compile` [s], if that is longer; 0 where there is nothing
+            to compile.
     """
 
     adapter: str
@@ -71,84 +71,66 @@ class Launch:
 
 
 class WorkerProcess:
-    """One worker, from its start to its end.
+    """One worker, from its start to its end. No method waits longer than the limits say.
+
+    Args:
+        launch: how to start it.
+        where: kept up to date by the owner; every error carries it.
+        deadline: see below; counts while starting, too.
+        made: told of this object before the start, so that another thread may `interrupt` it.
 
     Attributes:
         pid: of the worker's process; of its host when that is another one.
-        where: kept up to date by the owner; every error carries it.
         deadline: `time.monotonic()` at which the repetition times out, None for never.
         busy: a request was sent and its answer not received; after an exception from elsewhere
             (Ctrl-C, a time-out of the test) the next answer would be the wrong one.
     """
 
-    def __init__(self, launch: Launch, where: Where) -> None:
+    def __init__(
+        self,
+        launch: Launch,
+        where: Where,
+        *,
+        deadline: float | None = None,
+        made: Callable[[WorkerProcess], None] = lambda process: None,
+    ) -> None:
         self.launch = launch
         self.where = where
-        self.deadline: float | None = None
+        self.deadline = deadline
         self.busy = False
         self.pid: int | None = None
-        self._process: psutil.Process | None = None
-        self._killed: tuple[type[WorkerError], str] | None = None
-        self._token = uuid.uuid4().hex
-        self._group = execnet.Group()
-        self._gateway, self._channel = self._start()
+        self.python_version = ""
+        self._mark = reaper.new_mark()
+        self._family: set[psutil.Process] = set()
+        self._reason: tuple[type[WorkerError], str] | None = None
+        self._ended = False
+        self._lock = threading.Lock()
+        self._connection = Connection(
+            launch.spec,
+            launch.python,
+            {**launch.environment, reaper.VARIABLE: self._mark},
+            launch.log,
+        )
+        made(self)
+        try:
+            self._start()
+        except BaseException:
+            self.kill()
+            raise
+
+    def _start(self) -> None:
+        launch = self.launch
+        self._connection.open(bootstrap, self._configuration())
+        self._next(launch.start_timeout, self._not_started)
         hello = self.request("hello", timeout=launch.start_timeout)
         self.pid = hello["pid"]
-        self.python_version: str = hello["python"]
+        self.python_version = hello["python"]
         if hello["version"] != __version__:
-            self.kill()
             raise WorkerStartError(
                 f"the worker runs pytest-simbench {hello['version']}, this is {__version__}; "
                 "install the same version on both sides",
-                where,
+                self.where,
             )
-
-    def _start(self) -> tuple[Any, Any]:
-        """Start the interpreter. execnet's own start has no time-out, so it runs in a thread."""
-        made: list[Any] = []
-        failed: list[BaseException] = []
-
-        def start() -> None:
-            try:
-                gateway = self._group.makegateway(self._spec())
-                channel = gateway.remote_exec(bootstrap)
-                channel.send(self._configuration())
-                made.append((gateway, channel))
-            except BaseException as error:
-                failed.append(error)
-
-        thread = threading.Thread(target=start, name="simbench-launch", daemon=True)
-        thread.start()
-        thread.join(self.launch.start_timeout)
-        self._process = self._find_process()
-        if made:
-            return made[0]  # type: ignore[no-any-return]
-        self._kill_tree()
-        if self._process is not None:
-            with contextlib.suppress(psutil.Error):
-                self._process.wait(1.0)
-        interpreter = self.launch.spec or self.launch.python or "this interpreter"
-        if failed:
-            reason = f"{type(failed[0]).__name__}: {failed[0]}"
-        else:
-            reason = f"no handshake within {self.launch.start_timeout:g} s"
-        raise WorkerStartError(
-            f"cannot start a worker with {interpreter} ({reason}); check the path given "
-            "with --sim-python or --sim-spec: it must be a Python interpreter with the engine "
-            "and numpy, printing nothing of its own",
-            self.where,
-            self.log_tail(),
-        )
-
-    def _spec(self) -> str:
-        if self.launch.spec:
-            return self.launch.spec
-        # Not execnet's own `env:`, which is set only once the interpreter answers.
-        variables = {**self.launch.environment, TOKEN: self._token}
-        command = [*IGNORING_INTERRUPTS, "env"]
-        command += [f"{key}={value}" for key, value in variables.items()]
-        command.append(self.launch.python or sys.executable)
-        return f"popen//execmodel=main_thread_only//python={shlex.join(command)}"
 
     def _configuration(self) -> dict[str, Any]:
         log = self.launch.log
@@ -167,157 +149,182 @@ class WorkerProcess:
         specs = {name: importlib.util.find_spec(name) for name in names}
         return {name: s.origin for name, s in specs.items() if s is not None and s.origin}
 
-    def _find_process(self) -> psutil.Process | None:
-        # Until `env` has become the interpreter, the token stands in its arguments.
-        argument = f"{TOKEN}={self._token}"
-        for child in psutil.Process().children(recursive=True):
-            with contextlib.suppress(psutil.Error):
-                if child.environ().get(TOKEN) == self._token or argument in child.cmdline():
-                    return child
-        return None
-
     def request(self, operation: str, *, timeout: float | None = None, **arguments: Any) -> Any:
         """Send one request and wait for its answer.
 
         Args:
             operation: of `worker.server.Server`.
-            timeout: for the whole request [s]; silence ends it after `stall_timeout` anyway,
-                unless the timeout is longer than that.
+            timeout: for the whole request [s]; None: silence ends it after `stall_timeout`.
 
         Raises:
             WorkerError: one of its kinds; the worker is dead then, unless it is `EngineFailed`.
         """
-        started = time.monotonic()
+        if self._connection.unread and not self._ended:
+            self._unread()
         self.busy = True
+        self._connection.send({"op": operation, **pack(arguments)})
+        answer = self._next(timeout, self._hung)
+        self.busy = False
         try:
-            self._channel.send({"op": operation, **pack(arguments)})
-        except OSError:
-            raise self._exited() from None
-        while True:
-            answer = self._receive(started, timeout)
-            if not isinstance(answer, dict):
-                self.kill()
-                raise ProtocolError(
-                    f"unreadable answer {answer!r:.80}", self.where, self.log_tail()
-                )
-            if "alive" in answer:
-                continue
-            self.busy = False
             if "error" in answer:
-                raise self._remote_error(answer["error"])
-            return unpack(answer["ok"])
+                error = self._remote_error(answer["error"])
+            else:
+                return unpack(answer["ok"])
+        except Exception:
+            raise self._ended_by(ProtocolError, f"unreadable answer {answer!r:.80}") from None
+        raise error
 
-    def _receive(self, started: float, timeout: float | None) -> Any:
-        silence = max(self.launch.stall_timeout, timeout or 0.0)
-        now = time.monotonic()
-        limits: list[tuple[float, Callable[[], WorkerError]]] = [(now + silence, self._hung)]
-        if timeout is not None:
-            limits.append((started + timeout, self._hung))
-        if self.deadline is not None:
-            limits.append((self.deadline, self._timed_out))
-        until, error = min(limits, key=lambda limit: limit[0])
-        try:
-            return self._channel.receive(timeout=max(0.001, until - now))
-        except self._channel.TimeoutError:
-            raise error() from None
-        except EOFError:
-            raise self._exited() from None
-        except self._channel.RemoteError as remote:
-            tail = self.log_tail() or str(remote)[-2000:]
-            self.kill()
-            raise WorkerStartError("the worker failed to start", self.where, tail) from None
+    def _unread(self) -> None:
+        """Something came between two requests: the end, or what nobody asked for."""
+        message = self._next(EXIT_TIMEOUT, self._hung)
+        raise self._ended_by(ProtocolError, f"{message!r:.80} came, and nobody had asked")
+
+    def _next(self, timeout: float | None, late: Callable[[float], WorkerError]) -> Any:
+        """The worker's next message.
+
+        Args:
+            timeout: [s]; None: the limit of silence.
+            late: the error when that time is over.
+        """
+        began = time.monotonic()
+        limit = self.launch.stall_timeout if timeout is None else timeout
+        while True:
+            # Signs of life put the end off, unless the request as a whole is limited.
+            since = max(began, self._connection.heard) if timeout is None else began
+            now, until, error = time.monotonic(), since + limit, late
+            if self.deadline is not None and self.deadline < until:
+                until, error = self.deadline, self._timed_out
+            if now >= until:
+                raise error(limit)
+            try:
+                return self._connection.receive(min(until - now, LOOK_PERIOD))
+            except TimeoutError:
+                shorten_log(self.launch.log)
+            except EOFError:
+                raise self._exited() from None
+            except Exception as problem:  # of starting, of sending, or out of the bootstrap there
+                raise self._exited(problem) from None
 
     def _remote_error(self, error: dict[str, str]) -> WorkerError:
         kind = REMOTE_ERRORS.get(error["type"], EngineFailed)
         return kind(error["message"], self.where, self.log_tail())
 
-    def _hung(self) -> WorkerError:
-        tail = self.log_tail()
-        self.kill()
-        return WorkerHung(
-            "the worker gave no sign of life and was killed; raise the ini option "
-            f"sim_stall_timeout if the engine is only slow (now {self.launch.stall_timeout:g} s)",
-            self.where,
-            tail,
+    def _hung(self, limit: float) -> WorkerError:
+        what = (
+            f"the worker gave no sign of life for {limit:g} s and was killed; raise "
+            "--sim-stall-timeout if the engine is only slow"
+        )
+        return self._ended_by(WorkerHung, what)
+
+    def _not_started(self, limit: float) -> WorkerError:
+        return self._ended_by(
+            WorkerStartError, self._start_text(f"no handshake within {limit:g} s")
         )
 
-    def _timed_out(self) -> WorkerError:
-        tail = self.log_tail()
-        self.kill()
-        return RepetitionTimeout(
+    def _timed_out(self, limit: float) -> WorkerError:
+        what = (
             "the repetition took longer than its time-out and was ended; raise --sim-timeout if "
-            "the simulator is only slow",
-            self.where,
-            tail,
+            "the simulator is only slow"
+        )
+        return self._ended_by(RepetitionTimeout, what)
+
+    def _start_text(self, reason: str) -> str:
+        interpreter = self.launch.spec or self.launch.python or "this interpreter"
+        return (
+            f"cannot start a worker with {interpreter} ({reason}); check the path given "
+            "with --sim-python or --sim-spec: it must be a Python interpreter with the engine "
+            "and numpy, printing nothing of its own"
         )
 
-    def _exited(self) -> WorkerError:
-        code = self._exit_code()
-        self.kill()
-        if self._killed is not None:
-            kind, what = self._killed
-            return kind(what, self.where, self.log_tail())
-        return WorkerExited(f"the worker {exit_text(code)}", self.where, self.log_tail())
+    def _exited(self, problem: Exception | None = None) -> WorkerError:
+        """The error for a connection that ended, or never began."""
+        there = isinstance(problem, RemoteError)  # out of the bootstrap: the process lives on
+        code = None if self._ended or there else self._connection.status(EXIT_TIMEOUT)
+        if code is not None and (code < 0 or self.pid is not None):
+            return self._ended_by(WorkerExited, f"the worker {exit_text(code)}")
+        if self.pid is None:
+            if code is not None:
+                reason = f"it {exit_text(code)}"
+            elif there:
+                reason = readable(str(problem).strip().rpartition("\n")[2])
+            else:
+                reason = named(problem) if problem else exit_text(None)
+            return self._ended_by(WorkerStartError, self._start_text(reason))
+        if problem is not None:
+            return self._ended_by(ProtocolError, f"the connection failed: {named(problem)}")
+        return self._ended_by(WorkerExited, f"the worker {exit_text(code)}")
 
-    def _exit_code(self) -> int | None:
-        # The pipe breaks a moment before the process can be waited for.
-        popen = getattr(getattr(self._gateway, "_io", None), "popen", None)
-        if popen is None:
-            return None
-        try:
-            code: int | None = popen.wait(timeout=5)
-        except Exception:
-            return None
-        return code
+    def _ended_by(self, kind: type[WorkerError], what: str) -> WorkerError:
+        """End the worker; the error for it, which is the first reason that anybody gave."""
+        self._give_reason(kind, what)
+        tail = self.log_tail()
+        self.kill()
+        assert self._reason is not None
+        kind, what = self._reason
+        return kind(what, self.where, tail)
+
+    def _give_reason(self, kind: type[WorkerError], what: str) -> None:
+        with self._lock:
+            self._reason = self._reason or (kind, what)
 
     def log_tail(self) -> str:
         """The last lines of the worker's log."""
-        if self.launch.log is None or not self.launch.log.is_file():
-            return ""
-        with self.launch.log.open("rb") as log:
-            log.seek(max(0, os.fstat(log.fileno()).st_size - 8192))
-            text = log.read().decode("utf-8", "replace")
-        return "\n".join(text.splitlines()[-LOG_TAIL_LINES:])
+        return tail_of_log(self.launch.log)
 
     def kill_for_memory(self, used_mb: float, limit_mb: float) -> None:
         """End a worker that eats memory; the request under way raises `OutOfMemory`."""
-        self._killed = (
+        self._give_reason(
             OutOfMemory,
             f"the worker used {used_mb:.0f} MB of memory, more than the limit of {limit_mb:.0f} MB "
             "(--sim-memory-limit), and was killed",
         )
-        self._kill_tree()
+        self.kill()
+
+    def interrupt(self) -> None:
+        """End the worker from another thread; the request under way raises `Interrupted`."""
+        self._give_reason(Interrupted, "the run was interrupted")
+        self.kill()
 
     @property
     def alive(self) -> bool:
-        """Whether the worker's process still runs."""
-        return self._process is not None and self._process.is_running()
+        """Whether the worker can take a request."""
+        if self._ended or self._connection.unread:
+            return False
+        popen = self._connection.popen
+        return popen is None or popen.poll() is None
 
-    def close(self, timeout: float = 10.0) -> str | None:
+    def close(self, timeout: float = CLOSE_TIMEOUT) -> str | None:
         """End the worker; returns what went wrong while closing, which fails nothing."""
         problem = None
+        self.deadline = None
+        self._know_family()
         try:
             self.request("close", timeout=timeout)
-            if self._process is not None:
-                self._process.wait(timeout)
-        except (WorkerError, psutil.TimeoutExpired) as error:
-            problem = getattr(error, "what", None) or "the worker did not end by itself"
+            if self._connection.popen is not None and self._connection.status(timeout) is None:
+                problem = "the worker did not end by itself"
+        except WorkerHung:
+            problem = f"the worker did not close within {timeout:g} s"
+        except WorkerError as error:
+            problem = error.what
         self.kill()
         return problem
 
     def kill(self) -> None:
-        """End the worker and all its children at once."""
-        self._kill_tree()
-        # execnet would wait for goodbyes; the process is gone, so only its threads are reaped.
-        with contextlib.suppress(Exception):
-            self._group.terminate(timeout=0.5)
-
-    def _kill_tree(self) -> None:
-        if self._process is None:
+        """End the worker and all that it started at once; from any thread, again and again."""
+        if self._ended:
             return
-        tree = [self._process]
-        with contextlib.suppress(psutil.Error):
-            tree += self._process.children(recursive=True)
-        for process in tree:
+        self._know_family()
+        self._connection.cut()
+        for process in self._family:
             with contextlib.suppress(psutil.Error):
                 process.kill()
+        reaper.reap(self._mark)
+        self._connection.close()
+        self._ended = True
+
+    def _know_family(self) -> None:
+        """Note the worker's descendants, which may have thrown their mark away."""
+        popen = self._connection.popen
+        if popen is not None:
+            with contextlib.suppress(psutil.Error):
+                self._family.update(psutil.Process(popen.pid).children(recursive=True))

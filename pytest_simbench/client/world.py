@@ -65,7 +65,6 @@ class World:
         stopwatch: Stopwatch | None = None,
         on_phase: Callable[[str], None] = lambda name: None,
         trace_period: float | None = None,
-        load_timeout: float = 120.0,
         parity: bool = True,
     ) -> None:
         self.process = process
@@ -79,9 +78,7 @@ class World:
         if process.launch.compile_timeout:
             self._compile()
         with self.phase("load"), self.stopwatch.measuring("load"):
-            answer = process.request(
-                "load", timeout=load_timeout, scene=scene.to_wire(), parity=parity
-            )
+            answer = process.request("load", scene=scene.to_wire(), parity=parity)
         self.excused: list[str] = answer["excused"]
         self._take(answer)
         self._enter("task")  # between the phases that the task names
@@ -96,9 +93,8 @@ class World:
         process, deadline, began = self.process, self.process.deadline, time.monotonic()
         process.deadline = None
         with self.phase("compiling"), self.stopwatch.measuring("compile"):
-            process.request(
-                "compile", timeout=process.launch.compile_timeout, scene=self.scene.to_wire()
-            )
+            limits = process.launch.compile_timeout, process.launch.stall_timeout
+            process.request("compile", timeout=max(limits), scene=self.scene.to_wire())
         if deadline is not None:
             process.deadline = deadline + time.monotonic() - began
 

@@ -84,7 +84,6 @@ class Experiment:
             "play": play,
             "before": before,
             "delay": controller_delay(perturbations),
-            "load_timeout": max(120.0, self.handle.case.stall_timeout),
         }
         with (handle or self.handle).episode(scene, **options) as world:
             outcome = self.task.perform(world, self.seed, lambda done, total: None)

@@ -90,13 +90,14 @@ def _other_mode(
     other = "headless" if case.mode == "gui" else "gui"
     if other not in modes:
         return f"{case.simulator} has no window"
-    environment = dict(case.environment)
+    from pytest_simbench.client.errors import DisplayError
+
     if other == "gui":
         try:
-            environment |= this.displays.environment()
-        except pytest.skip.Exception as reason:
+            this.displays.environment()
+        except DisplayError as reason:
             return str(reason)
-    return handle(replace(case, mode=other, environment=environment))
+    return handle(replace(case, mode=other, display=this.displays if other == "gui" else None))
 
 
 def _experiment(case: Case, handle: SimulatorHandle, task: Task) -> Experiment:

@@ -8,9 +8,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from typing import Protocol as Interface
 
 from pytest_simbench.client.process import Launch
 from pytest_simbench.session.protocol import PROTOCOLS, Protocol
+
+
+class Display(Interface):
+    """What opens a display for windows, and knows what became of it; `display.Displays` is one."""
+
+    def environment(self) -> dict[str, str]:
+        """Variables that a worker with a window needs.
+
+        Raises:
+            DisplayError: there is no display to be had.
+        """
+
+    def problem(self, environment: Mapping[str, str]) -> str:
+        """Why the display of this environment is no longer there, or nothing."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +38,8 @@ class Case:
         adapter: `module:Class` of the simulator's adapter.
         changes: single settings changed by the user, by name.
         python, spec: interpreter or execnet specification of the worker.
-        environment: of the worker, DISPLAY for instance.
+        environment: of the worker.
+        display: adds to the environment what a window needs, for each worker anew.
         protocol: how repetitions are run.
         timeout: of a repetition from launch [s]; None for the task's own.
         stall_timeout: longest silence of a worker [s].
@@ -48,6 +64,7 @@ class Case:
     python: str | None = None
     spec: str | None = None
     environment: Mapping[str, str] = field(default_factory=dict)
+    display: Display | None = None
     protocol: Protocol = PROTOCOLS["fast"]
     timeout: float | None = None
     stall_timeout: float = 60.0
@@ -72,7 +89,11 @@ class Case:
         return re.sub(r"[^A-Za-z0-9_.=-]+", "_", name).strip("_")
 
     def launch(self, name: str) -> Launch:
-        """How to start a worker of this case; its log is `logs/NAME.log` in the run folder."""
+        """How to start a worker of this case; its log is `logs/NAME.log` in the run folder.
+
+        Raises:
+            DisplayError: there is no display for its window.
+        """
         log = self.folder / "logs" / f"{name}.log"
         try:
             log.parent.mkdir(parents=True, exist_ok=True)
@@ -83,7 +104,10 @@ class Case:
             adapter=self.adapter,
             python=self.python,
             spec=self.spec,
-            environment=self.environment,
+            environment={
+                **self.environment,
+                **(self.display.environment() if self.display else {}),
+            },
             log=log,
             start_timeout=max(self.stall_timeout, 1.0),
             stall_timeout=self.stall_timeout,

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import count
 from typing import Any
 
-from pytest_simbench.client.errors import Where, WorkerError
+from pytest_simbench.client.errors import DisplayError, DisplayLost, Where, WorkerError
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.tape import TapedWorld
 from pytest_simbench.client.world import World
 from pytest_simbench.scene import Scene
 from pytest_simbench.session.case import Case
 from pytest_simbench.session.example import replay_command, write_example
+
+EPISODE_TIMEOUT = 3600.0
+"""Wall time of an episode [s], unless `--sim-timeout` gives another; silence ends it sooner."""
 
 _numbers = count(1)
 """Of the workers that handles of this process started: their logs have names of their own."""
@@ -82,10 +86,14 @@ class SimulatorHandle:
         if self._process is None or not self._process.alive:
             # The process id keeps the workers of pytest-xdist apart, which share a run folder.
             name = f"{case.short_name}-{case.simulator}-{os.getpid()}-{next(_numbers)}"
-            self._process = WorkerProcess(case.launch(name), Where(case.simulator, case.mode))
+            where = Where(case.simulator, case.mode)
+            try:
+                self._process = WorkerProcess(case.launch(name), where)
+            except DisplayError as error:
+                raise DisplayLost(str(error), where) from None
+        self._process.deadline = time.monotonic() + (case.timeout or EPISODE_TIMEOUT)
         self.constructed = self._process.request(
             "construct",
-            timeout=case.stall_timeout,
             adapter=case.adapter,
             profile=case.profile,
             changes=dict(case.changes),

@@ -12,6 +12,7 @@ from pytest_simbench.client.errors import Unavailable, WorkerError, WorldParityE
 from pytest_simbench.measure.record import Record
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.session.case import Case
+from pytest_simbench.session.interrupts import Interrupts
 from pytest_simbench.session.repetition import Repetition
 from pytest_simbench.session.workers import IdleWorkers
 from pytest_simbench.tasks.base import Task
@@ -70,12 +71,25 @@ class Repeater:
         return ResultSet(records, (task.smoke() if self.case.protocol.smallest else task).metrics)
 
     def _one(self, task: Task, number: int) -> Record:
+        with Interrupts() as interrupts:
+            record, error = self._kept(task, number, interrupts)
+        if error is not None and (
+            isinstance(error, WorldParityError) or not isinstance(error, WorkerError)
+        ):
+            raise error
+        return record
+
+    def _kept(
+        self, task: Task, number: int, interrupts: Interrupts
+    ) -> tuple[Record, BaseException | None]:
+        """Run one repetition and keep its record."""
         progress = self.progress
         repetition = Repetition(
             self.case,
             task,
             number,
             idle=self._idle,
+            interrupts=interrupts,
             on_phase=progress.phase,
             on_count=lambda done, total: progress.count(done, total, "cubes"),
         )
@@ -87,25 +101,24 @@ class Repeater:
         self._active.discard(repetition)
         if isinstance(error, Unavailable):  # nothing was simulated: there is nothing to record
             raise error
-        if self._stopping.is_set() and record.status == "failed":
-            record = replace(record, status="interrupted")
         self.keep(record)
         progress.end_repetition(record.status, record.seconds["total"])
-        if error is not None and (
-            isinstance(error, WorldParityError) or not isinstance(error, WorkerError)
-        ):
-            raise error
-        return record
+        return record, error
 
     def _side_by_side(self, task: Task, numbers: list[int]) -> list[Record]:
-        with ThreadPoolExecutor(self.jobs, thread_name_prefix="simbench") as pool:
+        with (
+            Interrupts() as interrupts,
+            ThreadPoolExecutor(self.jobs, thread_name_prefix="simbench") as pool,
+        ):
             pending: set[Future[Record]] = {pool.submit(self._one, task, k) for k in numbers}
             done: list[Record] = []
             try:
                 while pending:
                     finished, pending = wait(pending, timeout=0.5, return_when=FIRST_COMPLETED)
                     done += [future.result() for future in finished]
+                interrupts.hold()
             except BaseException:
+                interrupts.hold()
                 self._stopping.set()
                 for future in pending:
                     future.cancel()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import asdict
@@ -14,15 +15,23 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench import __version__
-from pytest_simbench.client.errors import Where, WorkerError
+from pytest_simbench.client.errors import (
+    DisplayError,
+    DisplayLost,
+    Interrupted,
+    Where,
+    WorkerError,
+)
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.stopwatch import Stopwatch
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.measure.record import Failure, Record
 from pytest_simbench.measure.resources import ResourceSampler
 from pytest_simbench.session.case import Case
+from pytest_simbench.session.interrupts import Interrupts
 from pytest_simbench.session.workers import IdleWorkers
 from pytest_simbench.tasks.base import Jitter, Outcome, Task
+from pytest_simbench.worker.text import LONGEST, named, readable, told
 
 TRACE_PERIOD = 0.02
 """Sampling of `--sim-trace` [s]: 50 Hz."""
@@ -38,6 +47,8 @@ class Repetition:
         task: what to do.
         number: of the repetition, from 1.
         idle: where workers come from and go to, if the case reuses them.
+        interrupts: held from the moment that the task has ended or failed, so that the record
+            is made; the caller ends the block when it has kept it.
         on_phase, on_count: progress, see `tasks.base`.
     """
 
@@ -48,6 +59,7 @@ class Repetition:
         number: int,
         *,
         idle: IdleWorkers | None = None,
+        interrupts: Interrupts | None = None,
         on_phase: Callable[[str], None] = lambda name: None,
         on_count: Callable[[int, int], None] = lambda done, total: None,
     ) -> None:
@@ -61,7 +73,8 @@ class Repetition:
         self._reused = False
         self._on_phase = on_phase
         self._on_count = on_count
-        self._killed = False
+        self._interrupts = interrupts or Interrupts()
+        self._killed = threading.Event()
         self._process: WorkerProcess | None = None
         self._sampler: ResourceSampler | None = None
         self._world: World | None = None
@@ -70,34 +83,47 @@ class Repetition:
         self._closing: str | None = None
 
     def kill(self) -> None:
-        """End the worker at once; `run` then returns the record of a failure."""
-        self._killed = True  # before the look at the process: it may just be starting
+        """End the worker at once; `run` then returns the record of an interrupted repetition."""
+        self._killed.set()  # before the look at the process: it may just be starting
         if self._process is not None:
-            self._process.kill()
+            self._process.interrupt()
 
     def run(self) -> tuple[Record, BaseException | None]:
         """Carry it out; the record, and what ended it early if anything did."""
-        error: BaseException | None = None
-        outcome = Outcome()
-        try:
-            outcome = self._perform()
-        except BaseException as raised:
-            error = raised
-        finally:
-            resources = self._finish(error)
-        self._write_trace(failed=error is not None)
+        found, error = self._ended(self._perform)
+        outcome = found if error is None else Outcome()
+        resources = self._finish(error)
+        problem = self._write_trace(failed=error is not None)
+        if problem:
+            outcome.details["trace"] = problem
         return self._record(outcome, error, resources), error
 
     def probe(self) -> tuple[Record, BaseException | None]:
         """Start and end the simulator alone: the record's settings and versions are what counts."""
-        error: BaseException | None = None
-        try:
-            self._construct()
-        except BaseException as raised:
-            error = raised
-        finally:
-            self._finish(error)
+        _, error = self._ended(self._construct)
+        self._finish(error)
         return self._record(Outcome(), error, {}), error
+
+    def _ended(self, do: Callable[[], Any]) -> tuple[Any, BaseException | None]:
+        """What `do` returned, or what it raised; nothing interrupts from here on."""
+        result, error = None, None
+        try:
+            result = do()
+            self._interrupts.hold()
+        except BaseException as raised:
+            self._interrupts.hold()
+            error = raised
+        return result, self._because_of_display(error)
+
+    def _because_of_display(self, error: BaseException | None) -> BaseException | None:
+        """The error, unless the display of the window has ended: then that is the cause."""
+        if self._process is None or self.case.display is None:
+            return error
+        lost = self.case.display.problem(self._process.launch.environment)
+        if not lost or not isinstance(error, WorkerError | None):
+            return error
+        what = f"{lost}; {error.what}" if error else lost
+        return DisplayLost(what, self.where, error.log_tail if error else "")
 
     def _perform(self) -> Outcome:
         case, process = self.case, self._construct()
@@ -119,18 +145,14 @@ class Repetition:
         deadline = time.monotonic() + (case.timeout or self.task.study_timeout)
         self._enter("launch")
         with self.stopwatch.measuring("launch"):
-            process = self._process = self._worker()
-            if self._killed:
-                process.kill()
-            process.deadline = deadline
+            process = self._worker(deadline)
             self._sample(process)
             if case.protocol.before:
                 self._enter("before")
-                time.sleep(case.protocol.before)
+                self._killed.wait(case.protocol.before)
                 self._enter("launch")
             self._constructed = process.request(
                 "construct",
-                timeout=process.launch.start_timeout,
                 adapter=case.adapter,
                 profile=case.profile,
                 changes=dict(case.changes),
@@ -139,14 +161,24 @@ class Repetition:
             )
         return process
 
-    def _worker(self) -> WorkerProcess:
+    def _worker(self, deadline: float) -> WorkerProcess:
         process = self._idle.take() if self._idle is not None else None
-        if process is None:
+        if process is not None:
+            self._reused = True
+            process.where = self.where
+            process.deadline = deadline
+            self._made(process)
+            return process
+        try:
             launch = self.case.launch(f"{self.case.short_name}-{self.number}")
-            return WorkerProcess(launch, self.where)
-        process.where = self.where
-        self._reused = True
-        return process
+        except DisplayError as error:
+            raise DisplayLost(str(error), self.where) from None
+        return WorkerProcess(launch, self.where, deadline=deadline, made=self._made)
+
+    def _made(self, process: WorkerProcess) -> None:
+        self._process = process
+        if self._killed.is_set():
+            process.interrupt()
 
     def _sample(self, process: WorkerProcess) -> None:
         limit = self.case.memory_limit
@@ -166,8 +198,6 @@ class Repetition:
     def _finish(self, error: BaseException | None) -> dict[str, Any]:
         """End sampling and worker; resource use for the record."""
         use: dict[str, Any] = {}
-        if self._process is not None and error is not None and not self._stats:
-            self._stats = {}
         if self._sampler is not None:
             use = self._sampler.stop(self._stats.get("peak_rss_mb")).to_wire()
         if self._process is not None:
@@ -233,23 +263,31 @@ class Repetition:
             else ""
         )
 
-    def _write_trace(self, *, failed: bool) -> None:
-        """Joint and body states over time, as arrays of a .npz file in the run folder."""
+    def _write_trace(self, *, failed: bool) -> str:
+        """Joint and body states over time, as arrays of a .npz file in the run folder.
+
+        Returns:
+            why it could not be written; the repetition counts all the same.
+        """
         world, case = self._world, self.case
         if world is None or not world.trace or (case.trace == "retain-on-failure" and not failed):
-            return
+            return ""
         motion = Motion.joined(world.trace)
         name = self._log_name().removeprefix("logs/").removesuffix(".log")
         folder = case.folder / "traces"
-        folder.mkdir(parents=True, exist_ok=True)
-        np.savez_compressed(
-            folder / f"{name}.npz",
-            time=motion.time,
-            joints=motion.joints,
-            bodies=motion.bodies,
-            joint_names=list(world.scene.robot.joint_names if world.scene.robot else ()),
-            body_names=[body.name for body in world.scene.free_bodies],
-        )
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            np.savez_compressed(
+                folder / f"{name}.npz",
+                time=motion.time,
+                joints=motion.joints,
+                bodies=motion.bodies,
+                joint_names=list(world.scene.robot.joint_names if world.scene.robot else ()),
+                body_names=[body.name for body in world.scene.free_bodies],
+            )
+        except OSError as error:
+            return f"the trace could not be written: {named(error)}"
+        return ""
 
 
 def _scaled(jitter: float) -> Jitter:
@@ -258,15 +296,18 @@ def _scaled(jitter: float) -> Jitter:
 
 
 def _status(error: BaseException | None) -> Any:
+    """`interrupted` is what somebody ended from outside, and only that: it may be run again."""
     if error is None:
         return "ok"
-    return "failed" if isinstance(error, Exception) else "interrupted"
+    outside = isinstance(error, Interrupted) or not isinstance(error, Exception)
+    return "interrupted" if outside else "failed"
 
 
 def _failure(error: BaseException, where: Where) -> Failure:
     if isinstance(error, WorkerError):
-        return Failure(type(error).__name__, error.what, error.phase, error.log_tail)
-    return Failure(type(error).__name__, str(error), where.phase)
+        message = readable(error.what, 2 * LONGEST)  # shortened where it arose
+        return Failure(type(error).__name__, message, error.phase, error.log_tail)
+    return Failure(readable(type(error).__name__), told(error), where.phase)
 
 
 def _parameters(task: Task) -> dict[str, Any]:

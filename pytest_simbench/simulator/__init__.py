@@ -9,6 +9,7 @@ from pytest_simbench.simulator.errors import (
     ParityError,
     SettingsError,
     SimulatorError,
+    StateError,
     UnavailableError,
 )
 from pytest_simbench.simulator.info import Capability, Deviation, SimulatorInfo
@@ -31,6 +32,7 @@ __all__ = [
     "Simulator",
     "SimulatorError",
     "SimulatorInfo",
+    "StateError",
     "UnavailableError",
     "lazy_import",
     "one_value",

@@ -23,6 +23,10 @@ class DivergedError(SimulatorError):
     """The state holds a value that is not a finite number."""
 
 
+class StateError(SimulatorError):
+    """An adapter returned what is no state of the scene: its shape, type or order is wrong."""
+
+
 class NotSupportedError(SimulatorError):
     """The adapter was asked for something that its engine does not have."""
 

@@ -138,7 +138,7 @@ class Subject:
         process = self.launch(gui=gui) if alone else self.shared()
         try:
             self.construct(process, changes, gui)
-            yield World(process, scene, load_timeout=TIMEOUT)
+            yield World(process, scene)
         except WorkerError:
             process.kill()
             raise

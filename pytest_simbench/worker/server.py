@@ -2,8 +2,8 @@
 
 Imports nothing but the rooms `scene` and `simulator`, numpy and the standard library, so that it
 runs in an interpreter that holds nothing but the engine. Each request is a dict
-`{"op": name, ...}`; the answer is `{"ok": result}` or `{"error": {type, message, traceback}}`, and
-in between `{"alive": simulated time}` may come any number of times.
+`{"op": name, ...}`; the answer is `{"ok": result}` or `{"error": {type, message}}`, and in between
+`{"alive": simulated time}` may come any number of times.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from contextlib import suppress
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-
 from pytest_simbench import __version__
 from pytest_simbench.scene import Scene, Trajectory
-from pytest_simbench.simulator import ParityError, Simulator, SimulatorError, SimulatorInfo
+from pytest_simbench.simulator import Simulator, SimulatorError, SimulatorInfo
 from pytest_simbench.simulator.parity import check, expected_quantities
 from pytest_simbench.simulator.settings import changed
+from pytest_simbench.worker.state import check_following, check_log, check_start, checked_state
 from pytest_simbench.worker.stepping import Stepper
+from pytest_simbench.worker.text import LONGEST_LOGGED, named, readable, told
 from pytest_simbench.worker.wire import pack, unpack
 
 
@@ -57,6 +57,7 @@ class Server:
         self.send = send
         self.simulator: Simulator | None = None
         self.stepper: Stepper | None = None
+        self.scene = Scene("empty")
         self.saved: dict[str, Any] = {}
 
     def answer(self, request: dict[str, Any]) -> None:
@@ -65,16 +66,19 @@ class Server:
             operation = getattr(self, f"do_{request.pop('op')}")
             self.send({"ok": pack(operation(**unpack(request)))})
         except SimulatorError as error:
-            self._send_error(type(error).__name__, str(error))
+            self._send_error(error, _typed(error), told(error))
         except MemoryError as error:
-            self._send_error("MemoryError", str(error) or "out of memory")
-        except Exception as error:
-            self._send_error("EngineError", f"{type(error).__name__}: {error}")
+            self._send_error(error, "MemoryError", told(error) or "out of memory")
+        except SystemExit as error:
+            self._send_error(error, "SystemExit", f"the adapter called {_exit_call(error)}")
+        except BaseException as error:  # whatever an adapter raises, it is an answer
+            self._send_error(error, "EngineError", named(error))
 
-    def _send_error(self, name: str, message: str) -> None:
-        trace = traceback.format_exc()
-        print(trace, file=sys.stderr, flush=True)
-        self.send({"error": {"type": name, "message": message, "traceback": trace}})
+    def _send_error(self, error: BaseException, name: str, message: str) -> None:
+        with suppress(Exception):  # a full disk, an exception that cannot be printed
+            trace = "".join(traceback.format_exception(error))
+            print(readable(trace, LONGEST_LOGGED), file=sys.stderr, flush=True)
+        self.send({"error": {"type": name, "message": message}})
 
     def do_hello(self) -> dict[str, Any]:
         return {
@@ -114,9 +118,10 @@ class Server:
         simulator = self._constructed()
         world = Scene.from_wire(scene)
         simulator.load(world)
-        self.stepper = Stepper(simulator, lambda at: self.send({"alive": at}))
+        self.scene = world
+        self.stepper = Stepper(simulator, lambda at: self.send({"alive": float(at)}))
         self.stepper.real_time = self.real_time
-        _check_at_start(simulator)
+        check_start(simulator, world)
         excused: list[str] = []
         if parity:
             expected = expected_quantities(world, simulator.settings)
@@ -130,22 +135,21 @@ class Server:
         return self._constructed().read_back()
 
     def do_state(self) -> dict[str, Any]:
-        simulator = self._constructed()
-        return {
-            "time": simulator.time,
-            "joints": simulator.joint_state(),
-            "bodies": simulator.body_state(),
-        }
+        return checked_state(self._constructed(), self.scene)
 
     def do_follow(
         self, tick: float, position: Any, velocity: Any, effort: Any, log_period: float | None
     ) -> dict[str, Any]:
         trajectory = Trajectory(tick, position, velocity, effort)
-        log = self._loaded().follow(trajectory, log_period)
-        return {"log": log, **self.do_state()}
+        answer = self._moved(self._loaded().follow(trajectory, log_period))
+        check_following(self._constructed(), self.scene, answer["joints"], position[-1])
+        return answer
 
     def do_wait(self, duration: float, log_period: float | None) -> dict[str, Any]:
-        log = self._loaded().wait(duration, log_period)
+        return self._moved(self._loaded().wait(duration, log_period))
+
+    def _moved(self, log: dict[str, Any]) -> dict[str, Any]:
+        check_log(self._constructed(), self.scene, log)
         return {"log": log, **self.do_state()}
 
     def do_save(self, name: str) -> None:
@@ -183,6 +187,19 @@ class Server:
         return self.stepper
 
 
+def _typed(error: SimulatorError) -> str:
+    """Its type, by the name that the client knows: that of the class an adapter derived it from."""
+    known = (kind for kind in type(error).__mro__ if kind.__module__ == SimulatorError.__module__)
+    return next(known).__name__
+
+
+def _exit_call(error: SystemExit) -> str:
+    """What was called, and the status that it means: a text means 1, nothing means 0."""
+    if error.code is None or isinstance(error.code, int):
+        return f"sys.exit({error.code or 0})"
+    return f"sys.exit({told(error)!r}), status 1"
+
+
 def _import_engine(info: SimulatorInfo) -> None:
     for module in info.modules:
         try:
@@ -194,25 +211,11 @@ def _import_engine(info: SimulatorInfo) -> None:
             ) from error
 
 
-def _check_at_start(simulator: Simulator) -> None:
-    """A world must start at time 0 and at rest, also in a worker that served others before."""
-    speeds = [simulator.joint_state()[1], simulator.body_state()[:, 7:]]
-    fastest = max((float(np.abs(values).max()) for values in speeds if values.size), default=0.0)
-    if abs(simulator.time) > 1e-9 or not fastest < 1e-6:
-        raise ParityError(
-            f"{simulator.info.name} starts a world at t = {simulator.time:g} s with speeds up to "
-            f"{fastest:.3g} (m/s, rad/s); it must start at 0 and at rest"
-        )
-
-
 def serve(receive: Callable[[], Any], send: Callable[[Any], None]) -> None:
-    """Answer requests until the client asks to close; `receive` raises EOFError when it is gone."""
+    """Answer requests until the client asks to close."""
     server = Server(send)
     while True:
-        try:
-            request = receive()
-        except EOFError:
-            return
+        request = receive()
         closing = request.get("op") == "close"
         server.answer(request)
         if closing:

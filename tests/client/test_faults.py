@@ -9,14 +9,13 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import psutil
 import pytest
 
 from pytest_simbench.measure.record import Record
 from pytest_simbench.session.case import Case
 from pytest_simbench.session.repeat import Repeater
 from pytest_simbench.session.repetition import Repetition
-from tests.conftest import ADAPTERS
+from tests.conftest import ADAPTERS, workers
 from tests.tiny import Falling
 
 
@@ -41,15 +40,6 @@ def faulty(case: Case, fault: str) -> Case:
     """The case on the same engine with a fault."""
     engine = case.adapter.rpartition(":")[2]
     return replace(case, adapter=f"tests.client.faulty:{engine}_{fault}")
-
-
-def workers() -> set[psutil.Process]:
-    """Living workers of this process."""
-    return {
-        child
-        for child in psutil.Process().children()
-        if child.status() != psutil.STATUS_ZOMBIE and "python" in child.name()
-    }
 
 
 @pytest.fixture(params=["mujoco", "pybullet"])

@@ -6,7 +6,6 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 
-import psutil
 import pytest
 
 from pytest_simbench.client.errors import Where
@@ -18,6 +17,7 @@ from pytest_simbench.session.repetition import Repetition
 from pytest_simbench.session.workers import IdleWorkers
 from pytest_simbench.tasks.base import Jitter
 from tests.client.faulty import COMPILE_SECONDS
+from tests.conftest import workers
 from tests.tiny import Falling
 
 
@@ -97,17 +97,17 @@ def test_a_world_that_does_not_start_anew_is_refused(case: Case, idle: IdleWorke
 
 def test_the_dead_are_not_kept(case: Case, idle: IdleWorkers) -> None:
     run(costly(case), idle)
-    for child in psutil.Process().children():
-        child.kill()
-        child.wait()
+    for worker in workers():
+        worker.kill()
+        worker.wait()
     record = run(costly(case), idle, 2)
     assert (record.status, record.reused_worker) == ("ok", False)
 
 
 def test_closing_ends_them(case: Case) -> None:
     idle = IdleWorkers()
-    before = set(psutil.Process().children())
+    before = workers()
     run(costly(case), idle)
-    assert set(psutil.Process().children()) - before
+    assert workers() - before
     idle.close()
-    assert not set(psutil.Process().children()) - before
+    assert not workers() - before

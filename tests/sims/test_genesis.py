@@ -58,7 +58,7 @@ def load(worker: WorkerProcess, scene: Scene, profile: str = "tuned", **changes:
         gui=False,
         real_time=False,
     )
-    return World(worker, scene, load_timeout=120.0)
+    return World(worker, scene)
 
 
 @pytest.mark.parametrize("task", [Stacking(), Throwing()], ids=lambda task: task.name)

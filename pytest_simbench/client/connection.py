@@ -1,0 +1,192 @@
+"""execnet's channel to a worker, without its waits: whatever the other side does, none is for ever.
+
+execnet starts, sends and says goodbye without a time-out: a worker that is stopped, or that holds
+its interpreter's lock, blocks the caller in the pipe as soon as the pipe is full. Here each of
+these runs in a thread of its own, and its caller waits for one thing only, the inbox, for as long
+as it likes. Ending the process breaks the pipes and so frees the threads.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import shlex
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import execnet
+from execnet.gateway_base import ThreadExecModel
+
+RemoteError = execnet.RemoteError
+"""An exception out of the module that runs there, as text."""
+
+OPENED = object()
+"""The first message of a connection that could be opened."""
+
+_END = object()
+
+MOST_WAITING = 16
+"""Messages that may wait to be read. A worker answers one request at a time: more is a flood."""
+
+GOODBYE_TIMEOUT = 0.5
+"""For execnet's threads to notice that the process is gone [s]; what is left is left to itself."""
+
+
+class _Threads(ThreadExecModel):
+    """execnet's threads, with a process started our way."""
+
+    def __init__(self, popen: Callable[..., Any]) -> None:
+        self._popen = popen
+
+    @property
+    def subprocess(self) -> Any:
+        return SimpleNamespace(PIPE=subprocess.PIPE, Popen=self._popen)
+
+
+class Connection:
+    """To one worker. Each method returns at once, or after its time-out.
+
+    Args:
+        spec: execnet specification, or None to start `python` on this machine.
+        python: interpreter, if there is no specification; None for this one.
+        environment: variables of the process, beside this one's.
+        log: file for what the process says before it can see to that itself; None for our stderr.
+
+    Attributes:
+        popen: the process on this machine (of ssh, for another host); None before it is started,
+            and for a socket.
+        heard: `time.monotonic()` of the last sign of life.
+    """
+
+    def __init__(
+        self, spec: str | None, python: str | None, environment: Mapping[str, str], log: Path | None
+    ) -> None:
+        self.popen: subprocess.Popen[bytes] | None = None
+        self.heard = time.monotonic()
+        self._environment = environment
+        self._log = log
+        self._inbox: SimpleQueue[Any] = SimpleQueue()
+        self._channel: Any = None
+        self._cut = False
+        self._simulated: float | None = None
+        self._spec = execnet.XSpec(spec or "popen//execmodel=main_thread_only")
+        if not spec:  # not in the text, where a // in a path would end it
+            self._spec.python = shlex.quote(python or sys.executable)
+        threads: Any = _Threads(self._start)  # a name or a model, though declared as a name
+        self._group = execnet.Group(execmodel=threads)
+        atexit.unregister(self._group._cleanup_atexit)  # it may block, and keeps the group for ever
+
+    def open(self, module: ModuleType, configuration: dict[str, Any]) -> None:
+        """Begin to start the process and to run a module there; `receive` gives OPENED then."""
+
+        def work() -> None:
+            try:
+                gateway = self._group.makegateway(self._spec)
+                channel = gateway.remote_exec(module)
+                channel.setcallback(self._arrived, endmarker=_END)
+                channel.send(configuration)
+                self._channel = channel
+                self._inbox.put(OPENED)
+            except BaseException as error:
+                self._inbox.put(error)
+
+        threading.Thread(target=work, name="simbench-launch", daemon=True).start()
+
+    def _start(self, command: list[str], **pipes: Any) -> subprocess.Popen[bytes]:
+        """Called by execnet, in the thread of `open`."""
+        with contextlib.ExitStack() as stack:
+            if self._log is not None:
+                with contextlib.suppress(OSError):  # a full disk must not stop the worker
+                    pipes["stderr"] = stack.enter_context(self._log.open("ab"))
+            # A session of its own: Ctrl-C is for pytest, which decides what becomes of workers.
+            self.popen = subprocess.Popen(
+                command, env={**os.environ, **self._environment}, start_new_session=True, **pipes
+            )
+        if self._cut:  # meanwhile
+            self.popen.kill()
+        return self.popen
+
+    def _arrived(self, message: Any) -> None:
+        """Called by execnet's thread with each message."""
+        if isinstance(message, dict) and "alive" in message:
+            if message["alive"] != self._simulated:  # time that stands still is no sign of life
+                self._simulated, self.heard = message["alive"], time.monotonic()
+        elif message is _END or self._inbox.qsize() < MOST_WAITING:
+            self.heard = time.monotonic()
+            self._inbox.put(message)
+
+    def send(self, message: Any) -> None:
+        """Begin to send plain data; if that fails, `receive` says so."""
+
+        def work() -> None:
+            try:
+                self._channel.send(message)
+            except OSError:
+                self._inbox.put(_END)
+            except BaseException as error:
+                self._inbox.put(error)
+
+        threading.Thread(target=work, name="simbench-send", daemon=True).start()
+
+    @property
+    def unread(self) -> bool:
+        """Whether a message waits."""
+        return not self._inbox.empty()
+
+    def receive(self, timeout: float) -> Any:
+        """The next message.
+
+        Raises:
+            TimeoutError: none came within `timeout` [s].
+            EOFError: the connection is broken.
+            Exception: what went wrong while starting or sending, or an exception out of the module
+                there, as execnet's RemoteError.
+        """
+        try:
+            message = self._inbox.get(timeout=timeout)
+        except Empty:
+            raise TimeoutError from None
+        if message is _END:
+            self._inbox.put(_END)
+            if self._channel is not None:
+                with contextlib.suppress(OSError):  # the reason follows the end mark
+                    self._channel.waitclose(GOODBYE_TIMEOUT)
+            raise EOFError
+        if isinstance(message, BaseException):
+            raise message
+        return message
+
+    def status(self, timeout: float) -> int | None:
+        """Exit status of the process; None if it still runs after `timeout` [s]."""
+        try:
+            return None if self.popen is None else self.popen.wait(timeout)
+        except subprocess.TimeoutExpired:
+            return None
+
+    def cut(self) -> None:
+        """End the process, also one that is just being started; whoever receives is told."""
+        self._cut = True
+        if self.popen is not None:
+            with contextlib.suppress(OSError):
+                self.popen.kill()
+        self._inbox.put(_END)
+
+    def close(self) -> None:
+        """Let execnet tidy up, once the process is gone."""
+
+        def work() -> None:
+            with contextlib.suppress(Exception):
+                self._group.terminate(timeout=GOODBYE_TIMEOUT)
+
+        self.status(GOODBYE_TIMEOUT)
+        thread = threading.Thread(target=work, name="simbench-close", daemon=True)
+        thread.start()
+        thread.join(4 * GOODBYE_TIMEOUT)

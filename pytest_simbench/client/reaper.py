@@ -1,0 +1,115 @@
+"""No process outlives its purpose: what a run starts carries a mark, and the marked are ended.
+
+The mark is an environment variable. Children inherit it, so an engine's own children carry it too,
+whatever session or parent they gave themselves. `reap` ends all who carry a mark. Run as a script,
+this file waits until the process that started it is gone, however it went (SIGKILL as well), and
+ends all that it left behind; a program cannot do that for itself.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import select
+import signal
+import subprocess
+import sys
+import threading
+import time
+import uuid
+from itertools import count
+
+import psutil
+
+VARIABLE = "PYTEST_SIMBENCH_WORKER"
+"""The mark's name. Its value: one for the pytest process, a dot, and a number."""
+
+REAP_TIMEOUT = 5.0
+"""Wall time in which the marked must be gone [s]: the kernel ends them within milliseconds, unless
+they hang in a driver, and then nobody can end them."""
+
+PARENT_PERIOD = 1.0
+"""Wall time between two looks whether the parent still lives [s]; usually its pipe tells first."""
+
+
+class _Run:
+    """The mark of this process, and the script that waits for its end."""
+
+    def __init__(self) -> None:
+        self.pid = os.getpid()
+        self.mark = uuid.uuid4().hex
+        self.numbers = count(1)
+        self._script: subprocess.Popen[bytes] | None = None
+        atexit.register(self._dismiss)
+
+    def watch(self) -> None:
+        """Have the script run; it is started again if somebody ended it."""
+        if self._script is None or self._script.poll() is not None:
+            self._script = subprocess.Popen(
+                # -P: the names of the modules beside this file must not hide others.
+                [sys.executable, "-P", __file__, self.mark],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+            )
+
+    def _dismiss(self) -> None:
+        if self._script is None or self.pid != os.getpid():
+            return
+        assert self._script.stdin is not None
+        with contextlib.suppress(OSError, subprocess.TimeoutExpired):
+            self._script.stdin.close()
+            self._script.wait(2 * REAP_TIMEOUT)
+
+
+_run: _Run | None = None
+_lock = threading.Lock()
+
+
+def new_mark() -> str:
+    """A mark for one more process; what carries it ends with this process at the latest."""
+    global _run
+    with _lock:
+        if _run is None or _run.pid != os.getpid():  # after a fork the child is a run of its own
+            _run = _Run()
+        _run.watch()
+        return f"{_run.mark}.{next(_run.numbers)}"
+
+
+def marked(mark: str) -> list[psutil.Process]:
+    """Living processes that carry this mark, or one derived from it with a dot."""
+    found = []
+    for process in psutil.process_iter():
+        with contextlib.suppress(psutil.Error, OSError):
+            value = process.environ().get(VARIABLE, "")
+            if value == mark or value.startswith(f"{mark}."):
+                found.append(process)
+    return found
+
+
+def reap(mark: str) -> None:
+    """End all processes that carry the mark, also those that they start meanwhile."""
+    until = time.monotonic() + REAP_TIMEOUT
+    while (found := marked(mark)) and time.monotonic() < until:
+        for process in found:
+            with contextlib.suppress(psutil.Error):
+                process.kill()
+        time.sleep(0.01)
+
+
+def main(mark: str) -> None:
+    """Wait for the end of the parent, then reap."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):  # meant for the parent
+        signal.signal(number, signal.SIG_IGN)
+    parent = os.getppid()
+    while os.getppid() == parent:
+        readable, _, _ = select.select([0], [], [], PARENT_PERIOD)
+        if readable and not os.read(0, 1):
+            break
+    reap(mark)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,161 @@
+"""Is what an adapter returns the state of this scene: right shapes, numbers, units, order?
+
+Looked at when a world is loaded, where everything is where the scene puts it, and after each
+motion; never in the stepping loop. Whatever is wrong is an error of the adapter and ends the
+repetition: what was expected, and what came.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.simulator import ParityError, Simulator, StateError
+
+POSITION_TOLERANCE = 1e-3
+"""Between scene and engine at the start [m], [rad]: single precision at 10 m is 1e-6."""
+
+ROTATION_TOLERANCE = 1e-4
+"""Of the quaternions' inner product from 1: 1.6 degrees."""
+
+NORM_TOLERANCE = 1e-3
+"""Of a quaternion's length from 1."""
+
+EXCHANGED = 0.1
+"""A joint this far from its set point [rad] may have been taken for another one."""
+
+ALIKE = 0.02
+"""Joints that changed places stand this near to each other's set points [rad]."""
+
+
+def checked_state(simulator: Simulator, scene: Scene) -> dict[str, Any]:
+    """Time, joints and bodies, for an answer.
+
+    Raises:
+        StateError: a wrong type, shape or kind of number, or a quaternion that is no rotation.
+    """
+    name, time = simulator.info.name, simulator.time
+    if isinstance(time, bool) or not isinstance(time, int | float | np.floating):
+        raise StateError(f"{name}: the time must be a float, not {time!r:.80}")
+    shapes = _shapes(scene)
+    joints = _checked(f"{name}: joint_state()", simulator.joint_state(), shapes["joints"])
+    bodies = _checked(f"{name}: body_state()", simulator.body_state(), shapes["bodies"])
+    norms = np.linalg.norm(bodies[:, 3:7], axis=1)
+    for body, row, norm in zip(scene.free_bodies, bodies, norms, strict=True):
+        if not abs(norm - 1.0) <= NORM_TOLERANCE:
+            raise StateError(
+                f"{name}: the quaternion of {body.name!r} must have length 1, but "
+                f"{_text(row[3:7])} has {norm:.4g}"
+            )
+    return {"time": float(time), "joints": joints, "bodies": bodies}
+
+
+def check_start(simulator: Simulator, scene: Scene) -> None:
+    """A loaded world: at time 0, at rest, every joint and body where the scene has it.
+
+    Raises:
+        StateError: as `checked_state`; or the rows are in another order than the scene's.
+        ParityError: not at time 0 or not at rest, as in a worker that served others before.
+    """
+    name, state = simulator.info.name, checked_state(simulator, scene)
+    joints, bodies = state["joints"], state["bodies"]
+    for what, values in (("joints", joints), ("bodies", bodies)):
+        if not np.isfinite(values).all():
+            raise StateError(f"{name}: the state of the {what} is not finite after loading")
+    speeds = [joints[1], bodies[:, 7:]]
+    fastest = max((float(np.abs(values).max()) for values in speeds if values.size), default=0.0)
+    if abs(state["time"]) > 1e-9 or not fastest < 1e-6:
+        raise ParityError(
+            f"{name} starts a world at t = {state['time']:g} s with speeds up to "
+            f"{fastest:.3g} (m/s, rad/s); it must start at 0 and at rest"
+        )
+    if scene.robot is not None:
+        names = [joint.name for joint in scene.robot.joints]
+        start = scene.robot.column("initial_position")
+        _check_places(f"{name}: joint_state()", names, start[:, None], joints[0][:, None])
+    names = [body.name for body in scene.free_bodies]
+    poses = np.array([body.pose.as_array() for body in scene.free_bodies]).reshape(-1, 7)
+    _check_places(f"{name}: body_state()", names, poses[:, :3], bodies[:, :3])
+    alike = np.abs(np.sum(poses[:, 3:] * bodies[:, 3:7], axis=1))
+    for k in np.flatnonzero(alike < 1.0 - ROTATION_TOLERANCE):
+        raise StateError(
+            f"{name}: body {names[k]!r} starts with quaternion {_text(bodies[k, 3:7])}, where the "
+            f"scene has {_text(poses[k, 3:])} (w, x, y, z)"
+        )
+
+
+def check_following(simulator: Simulator, scene: Scene, joints: FloatArray, goal: Any) -> None:
+    """After a motion: no joint stands at the set point of another, that one at the first's.
+
+    What joints do late or badly is the engine's, but they do not change places. At the start some
+    positions are alike (a straight arm), so an exchange of these shows only here.
+
+    Raises:
+        StateError: they changed places.
+    """
+    if scene.robot is None:
+        return
+    reached, asked = joints[0], np.asarray(goal, dtype=float)
+    away = np.flatnonzero(np.abs(reached - asked) > EXCHANGED)
+    if len(away) < 2 or not np.allclose(
+        np.sort(reached[away]), np.sort(asked[away]), rtol=0.0, atol=ALIKE
+    ):
+        return
+    names = ", ".join(scene.robot.joints[k].name for k in away)
+    raise StateError(
+        f"{simulator.info.name}: the joints {names} stand at each other's set points, "
+        f"{_text(reached[away])} where {_text(asked[away])} was commanded: their order is not that "
+        "of scene.robot.joints"
+    )
+
+
+def check_log(simulator: Simulator, scene: Scene, log: dict[str, Any]) -> None:
+    """The samples of a motion, stacked.
+
+    Raises:
+        StateError: a wrong type, shape or kind of number.
+    """
+    if log:
+        shapes = _shapes(scene)
+        samples = len(log["time"])
+        for what in ("joints", "bodies"):
+            title = f"{simulator.info.name}: the logged {what}"
+            _checked(title, log[what], (samples, *shapes[what]))
+
+
+def _shapes(scene: Scene) -> dict[str, tuple[int, ...]]:
+    count = len(scene.robot.joints) if scene.robot is not None else 0
+    return {"joints": (2, count), "bodies": (len(scene.free_bodies), 13)}
+
+
+def _checked(title: str, values: Any, shape: tuple[int, ...]) -> FloatArray:
+    """The array, if it is one of float64 of this shape."""
+    if isinstance(values, np.ndarray):
+        came = f"{values.dtype} {values.shape}"
+        if values.dtype == np.float64 and values.shape == shape:
+            return values
+    else:
+        came = f"a {type(values).__name__}"
+    raise StateError(f"{title} must be an array of float64 {shape}, not {came}")
+
+
+def _check_places(title: str, names: Sequence[str], asked: FloatArray, came: FloatArray) -> None:
+    """Every row where the scene has it; else the message says whose place it stands at."""
+    for k, row in enumerate(came):
+        if np.abs(row - asked[k]).max() <= POSITION_TOLERANCE:
+            continue
+        place = f"row {k}, {names[k]!r},"
+        at = np.flatnonzero(np.abs(asked - row).max(axis=1) <= POSITION_TOLERANCE)
+        hint = (
+            f"; that is the place of {names[at[0]]!r}, so the order is another" if len(at) else ""
+        )
+        raise StateError(
+            f"{title} {place} starts at {_text(row)}, where the scene has {_text(asked[k])}{hint}"
+        )
+
+
+def _text(values: Any) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in np.asarray(values, dtype=float)) + ")"

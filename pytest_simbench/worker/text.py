@@ -1,0 +1,31 @@
+"""Texts of exceptions, made fit to travel and to be kept, whatever they hold."""
+
+from __future__ import annotations
+
+LONGEST = 2000
+"""Characters of a message that are kept; the log holds more."""
+
+LONGEST_LOGGED = 100_000
+"""Characters of a message, or of a traceback, in the log."""
+
+
+def readable(text: str, longest: int = LONGEST) -> str:
+    """The text as plain Unicode, and how much of it was cut off."""
+    cut = len(text) - longest
+    if cut > 0:
+        text = f"{text[:longest]} ... ({cut} more characters)"
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def told(error: BaseException, longest: int = LONGEST) -> str:
+    """The message of an exception, or what keeps it from having one."""
+    try:
+        return readable(str(error), longest)
+    except Exception as another:
+        return f"(its message cannot be read: {type(another).__name__})"
+
+
+def named(error: BaseException) -> str:
+    """Type and message of an exception."""
+    name, message = readable(type(error).__name__), told(error)
+    return f"{name}: {message}" if message else name
