@@ -22,9 +22,7 @@ def pytest_cmdline_main() -> Generator[None, Any, Any]:
     try:
         return (yield)
     except pytest.UsageError as error:
-        error.args = tuple(
-            for_terminal(arg) if isinstance(arg, str) else arg for arg in error.args
-        )
+        error.args = tuple(for_terminal(arg) if isinstance(arg, str) else arg for arg in error.args)
         raise
 
 

@@ -22,7 +22,11 @@ DPI = 120
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito's palette: told apart by colour-blind readers too (jfly.uni-koeln.de/color)."""
 
-PLAIN_TEXT: Any = {"text.usetex": False, "text.parse_math": False, "axes.formatter.use_mathtext": False}
+PLAIN_TEXT: Any = {
+    "text.usetex": False,
+    "text.parse_math": False,
+    "axes.formatter.use_mathtext": False,
+}
 """No label is a formula or LaTeX, whatever `matplotlibrc` says."""
 
 
