@@ -24,6 +24,7 @@ from pytest_simbench.scene import Scene, Trajectory
 from pytest_simbench.simulator import ParityError, Simulator, SimulatorError, SimulatorInfo
 from pytest_simbench.simulator.parity import check, expected_quantities
 from pytest_simbench.simulator.settings import changed
+from pytest_simbench.simulator.urdf_check import check_names
 from pytest_simbench.worker.stepping import Stepper
 from pytest_simbench.worker.wire import pack, unpack
 
@@ -113,6 +114,7 @@ class Server:
     def do_load(self, scene: dict[str, Any], parity: bool) -> dict[str, Any]:
         simulator = self._constructed()
         world = Scene.from_wire(scene)
+        check_names(world)
         simulator.load(world)
         self.stepper = Stepper(simulator, lambda at: self.send({"alive": at}))
         self.stepper.real_time = self.real_time
