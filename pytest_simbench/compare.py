@@ -19,6 +19,7 @@ from pytest_simbench.measure.baseline import (
 from pytest_simbench.measure.limits import Limit, LimitError, parse_limits
 from pytest_simbench.measure.metrics import Metric, UnknownMetric
 from pytest_simbench.measure.record import Record
+from pytest_simbench.text import for_terminal
 
 
 class Comparison:
@@ -54,7 +55,7 @@ class Comparison:
             parts.append("nothing was compared: no repetition was recorded")
         else:
             parts.append(render_terminal(self._report, width, bool(self.limits)))
-        return "\n".join(parts)
+        return for_terminal("\n".join(parts))
 
     def markdown(self) -> str:
         """For the page of a CI job."""

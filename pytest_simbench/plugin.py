@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench import options
+from pytest_simbench import harmless, options
 
 if TYPE_CHECKING:
     from pytest_simbench.compare import Comparison
@@ -30,8 +30,9 @@ MARKS = (
 )
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
+def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
     options.add_options(parser)
+    pluginmanager.register(harmless, "simbench-harmless")
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -16,6 +16,7 @@ from pytest_simbench.selection import number_mark
 from pytest_simbench.session.case import Case
 from pytest_simbench.session.repeat import Repeater
 from pytest_simbench.session.sequential import Plan, SequentialResultSet
+from pytest_simbench.text import in_one_line
 from pytest_simbench.worker_clock import worker_clock
 
 if TYPE_CHECKING:
@@ -92,8 +93,9 @@ def _properties(result: ResultSet) -> Iterator[tuple[str, float]]:
     """For JUnit: the mean of each metric and cost and the ends of its 95 % interval."""
     yield "repetitions", len(result.ok) + len(result.failures)
     yield "failures", len(result.failures)
-    for name in result.known:
-        found = result.interval(name)
+    for known in result.known:
+        found = result.interval(known)
+        name = in_one_line(known)
         if found.n:
             yield name, found.mean
             if isfinite(found.half_width):

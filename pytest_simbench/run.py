@@ -13,6 +13,7 @@ import pytest
 
 from pytest_simbench import options
 from pytest_simbench.display import Displays
+from pytest_simbench.text import for_terminal
 
 if TYPE_CHECKING:
     from pytest_simbench.measure.metrics import Metric
@@ -196,7 +197,7 @@ class Run:
         with suppress(OSError):
             problems += write_report(self.folder, summaries, records)
         problems.append(append_summary("\n".join([comparison, markdown.render_run(summaries)])))
-        for line in filter(None, [*problems, *self._unsaved()]):
+        for line in filter(None, [*map(for_terminal, problems), *self._unsaved()]):
             reporter.write_line(line)
 
     def _shared(self) -> bool:

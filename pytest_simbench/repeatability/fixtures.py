@@ -14,6 +14,7 @@ import pytest
 
 from pytest_simbench import options as session_options
 from pytest_simbench.plugin import run
+from pytest_simbench.text import for_terminal
 
 if TYPE_CHECKING:
     from pytest_simbench.repeatability.episode import Experiment
@@ -207,10 +208,10 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     try:
         found = tables(read(folder), agreements(folder))
     except ValueError as error:
-        terminalreporter.write_line(str(error))
+        terminalreporter.write_line(for_terminal(str(error)))
         return
     terminalreporter.write_sep("=", "repeatability")
     terminalreporter.write_line(render_terminal(found, terminalreporter._tw.fullwidth))
-    terminalreporter.write_line(f"\nresults on repeatability: {folder / NAME}")
+    terminalreporter.write_line(for_terminal(f"\nresults on repeatability: {folder / NAME}"))
     with suppress(OSError):
         (folder / MARKDOWN_NAME).write_text(render_markdown(found), encoding="utf-8")

@@ -11,8 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
-from pytest_simbench.scene import Pose, Robot, Scene
-from pytest_simbench.scene.scene import SceneError
+from pytest_simbench.scene import Pose, Robot, Scene, SceneError
 
 if TYPE_CHECKING:
     from hypothesis.strategies import SearchStrategy

@@ -207,11 +207,11 @@ def _kept_example(attack: Attack, smallest: Perturbations) -> str:
     tape = attack.tapes.get(smallest)
     if tape is None:  # it crashed: its episode wrote its own file
         return ""
-    case = experiment.handle.case
+    case, versions = experiment.handle.case, experiment.handle.constructed.get("versions")
     name = f"smallest-{experiment.task.name}-{case.simulator}-{case.mode}"
     scene = perturbed_scene(experiment.scene(), smallest)
     try:
-        return replay_command(write_example(case, name, scene, tape))
+        return replay_command(write_example(case, name, scene, tape, versions), case, scene)
     except OSError:
         return ""
 

@@ -9,7 +9,8 @@ from pytest_simbench.repeatability.motions import GROWTH_TIMES
 from pytest_simbench.repeatability.replay_result import Again
 from pytest_simbench.repeatability.store import Line
 from pytest_simbench.report.grid import Column, fill, render
-from pytest_simbench.report.markdown import escape, table
+from pytest_simbench.report.markdown import table
+from pytest_simbench.text import for_markdown, for_terminal, in_one_line
 
 Table = tuple[str, str, list[Column]]
 """Title, how to read it, columns."""
@@ -53,18 +54,19 @@ def render_terminal(found: Sequence[Table], width: int) -> str:
     """Plain lines of at most `width` columns."""
     parts = []
     for title, note, columns in found:
+        title = in_one_line(title)
         head = [title, "-" * len(title), *([fill(note, width)] if note else [])]
         parts.append("\n".join([*head, "", render(columns, width)]))
-    return "\n\n".join(parts)
+    return for_terminal("\n\n".join(parts))
 
 
 def render_markdown(found: Sequence[Table]) -> str:
     """The same as GitHub Markdown."""
     parts = ["# Repeatability"]
     for title, note, columns in found:
-        parts.append(f"## {escape(title)}")
+        parts.append(f"## {for_markdown(title)}")
         if note:
-            parts.append(escape(note) + ".")
+            parts.append(for_markdown(f"{note}."))
         parts.append(table(columns))
     return "\n\n".join(parts) + "\n"
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from pytest_simbench.report.grid import Column, render
 from pytest_simbench.simulator.info import Capability, SimulatorInfo
+from pytest_simbench.text import for_markdown
 
 MARKS: tuple[tuple[str, Capability], ...] = (
     ("window", Capability.WINDOW),
@@ -50,7 +51,9 @@ def capability_table(infos: Sequence[SimulatorInfo], width: int) -> str:
 def capability_markdown(infos: Sequence[SimulatorInfo]) -> str:
     """The table for a page of documentation."""
     table = rows(infos)
-    lines = [list(table), ["---"] * len(table), *map(list, zip(*table.values(), strict=True))]
+    texts = [list(table), *map(list, zip(*table.values(), strict=True))]
+    lines = [[for_markdown(cell, cell=True) for cell in line] for line in texts]
+    lines.insert(1, ["---"] * len(table))
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pytest_simbench.measure.gate import Change, GateReport
 from pytest_simbench.report import markdown
 from pytest_simbench.report.grid import Column, fill, render
+from pytest_simbench.text import for_markdown, for_terminal
 
 ALWAYS = ("rtf", "cpu_cost", "ram")
 """Costs that are shown although they may not have changed, as the study's metrics are."""
@@ -87,7 +88,7 @@ def render_terminal(report: GateReport, width: int, limited: bool) -> str:
         "\n".join(fill(f"FAILED {sentence}", width, "  ") for sentence in report.failures),
         PASSED if limited and not report.failures else "",
     ]
-    return "\n\n".join(part for part in parts if part)
+    return for_terminal("\n\n".join(part for part in parts if part))
 
 
 def _listed(title: str, items: Iterable[str], width: int) -> str:
@@ -99,7 +100,7 @@ def render_markdown(report: GateReport, baseline: str, limited: bool) -> str:
     """The same for the page of a CI job; ends with a newline."""
     table = columns(report)
     parts = [
-        f"## Compared with {markdown.escape(baseline)}",
+        f"## {for_markdown(f'Compared with {baseline}')}",
         _bullets(f"{DIFFERENT}: {sentence}" for sentence in report.differences),
         _bullets(f"FAILED {sentence}" for sentence in report.failures),
         f"Passed: {PASSED}." if limited and not report.failures else "",
@@ -110,4 +111,4 @@ def render_markdown(report: GateReport, baseline: str, limited: bool) -> str:
 
 
 def _bullets(items: Iterable[str]) -> str:
-    return "\n".join(f"- {markdown.escape(item)}" for item in items)
+    return "\n".join(f"- {for_markdown(item)}" for item in items)

@@ -6,7 +6,9 @@ matplotlib is an optional extra and is imported only when a picture is drawn.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +16,18 @@ from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.report.answer import short_labels
 from pytest_simbench.report.pooling import Spread
 from pytest_simbench.report.summary import Row, TaskSummary
+from pytest_simbench.text import for_figure, for_file
 
 DPI = 120
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito's palette: told apart by colour-blind readers too (jfly.uni-koeln.de/color)."""
+
+PLAIN_TEXT: Any = {
+    "text.usetex": False,
+    "text.parse_math": False,
+    "axes.formatter.use_mathtext": False,
+}
+"""No label is a formula or LaTeX, whatever `matplotlibrc` says."""
 
 
 class FiguresUnavailable(RuntimeError):
@@ -32,12 +42,21 @@ def write_figures(folder: Path, summaries: Sequence[TaskSummary]) -> list[Path]:
         OSError: the folder cannot be written to.
     """
     try:
-        from matplotlib.figure import Figure
+        from matplotlib import rc_context
     except ImportError as error:
         raise FiguresUnavailable(
             "no pictures: matplotlib is missing; pip install 'pytest-simbench[figures]'"
         ) from error
-    paths = []
+    with rc_context(PLAIN_TEXT), warnings.catch_warnings():
+        # Characters that the font lacks are drawn as boxes, long labels leave less room.
+        warnings.simplefilter("ignore", UserWarning)
+        return _draw(folder, summaries)
+
+
+def _draw(folder: Path, summaries: Sequence[TaskSummary]) -> list[Path]:
+    from matplotlib.figure import Figure
+
+    paths: list[Path] = []
     for summary in summaries:
         rows = [row for row in summary.rows if row.finished]
         if not rows:
@@ -53,13 +72,19 @@ def write_figures(folder: Path, summaries: Sequence[TaskSummary]) -> list[Path]:
             )
             axes = figure.subplots(1, panels, sharey=True, squeeze=False)[0]
             draw(axes, summary, rows)
-            axes[0].set_yticks(range(len(rows)), short_labels(rows))
+            axes[0].set_yticks(range(len(rows)), map(for_figure, short_labels(rows)))
             axes[0].set_ylim(len(rows) - 0.5, -0.5)
             figure.suptitle(_title(summary, rows, name), fontsize="medium")
-            path = folder / f"{summary.task}_{name}.png"
+            path = _path(folder, f"{for_file(summary.task)}_{name}", paths)
             figure.savefig(path, dpi=DPI)
             paths.append(path)
     return paths
+
+
+def _path(folder: Path, name: str, taken: Sequence[Path]) -> Path:
+    """A file of that name; tasks whose names differ in odd characters alone get numbers."""
+    names = (folder / f"{name}{f'_{number}' if number > 1 else ''}.png" for number in count(1))
+    return next(path for path in names if path not in taken)
 
 
 def _title(summary: TaskSummary, rows: Sequence[Row], name: str) -> str:
@@ -73,7 +98,8 @@ def _title(summary: TaskSummary, rows: Sequence[Row], name: str) -> str:
         for values in ({row.mode for row in rows}, {row.profile for row in rows})
         if len(values) == 1
     ]
-    return f"{summary.task} ({', '.join([*shared, summary.protocol])}): {what}"
+    setting = for_figure(", ".join([*shared, summary.protocol]))
+    return f"{for_figure(summary.task)} ({setting}): {what}"
 
 
 def _metrics(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -> None:
@@ -144,4 +170,4 @@ def _resources(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -
 
 def _heading(metric: Metric) -> str:
     unit = "%" if metric.bounded else metric.unit
-    return f"{metric.title}, {unit}" if unit else metric.title
+    return for_figure(f"{metric.title}, {unit}" if unit else metric.title)

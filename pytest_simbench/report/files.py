@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from pytest_simbench.measure.metrics import COSTS
 from pytest_simbench.measure.record import Record
 from pytest_simbench.report import markdown
 from pytest_simbench.report.figures import FiguresUnavailable, write_figures
 from pytest_simbench.report.summary import PHASES, TaskSummary
+from pytest_simbench.text import for_csv
 
 MARKDOWN_NAME = "report.md"
 CSV_NAME = "report.csv"
@@ -54,8 +55,8 @@ def write_csv(path: Path, records: Sequence[Record]) -> None:
     """
     metrics = list(dict.fromkeys(name for record in records for name in record.metrics))
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(
+        writer = CellWriter(file)
+        writer.row(
             [
                 *IDENTITY,
                 *(f"error.{name}" for name in ("type", "phase", "message")),
@@ -71,4 +72,15 @@ def write_csv(path: Path, records: Sequence[Record]) -> None:
             cells += [record.metrics.get(name) for name in metrics]
             cells += [record.cost(cost.name) for cost in COSTS]
             cells += [record.seconds.get(name) for name in PHASES]
-            writer.writerow(cells)
+            writer.row(cells)
+
+
+class CellWriter:
+    """Writes lines of a CSV file in which no text is a formula."""
+
+    def __init__(self, file: TextIO) -> None:
+        self._writer = csv.writer(file)
+
+    def row(self, cells: Iterable[Any]) -> None:
+        """One line; numbers stay numbers."""
+        self._writer.writerow([for_csv(cell) for cell in cells])

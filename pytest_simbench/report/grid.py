@@ -13,6 +13,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from pytest_simbench.text import for_terminal, in_one_line
+
 GAP = 2
 """Blank columns between two columns of a table."""
 
@@ -22,7 +24,7 @@ PLAIN = Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
 
 @dataclass(frozen=True)
 class Column:
-    """A heading and a cell for each row; a cell is one or more lines.
+    """A heading and a cell for each row; a cell is one or more lines of printable characters.
 
     Attributes:
         group: columns of one group stay together where a table must be cut.
@@ -34,6 +36,11 @@ class Column:
     group: str = ""
     left: bool = False
     wrap: bool = False
+
+    def __post_init__(self) -> None:
+        cells = [[in_one_line(line) for line in cell] for cell in self.cells]
+        object.__setattr__(self, "heading", in_one_line(self.heading))
+        object.__setattr__(self, "cells", cells)
 
     def joined(self) -> Column:
         """The same with each cell in a single line."""
@@ -81,7 +88,7 @@ def render(columns: Sequence[Column], width: int) -> str:
 
 def fill(text: str, width: int, indent: str = "") -> str:
     """`text` wrapped to the width; every line but the first is indented."""
-    lines = Text(text).wrap(_console(width), max(20, width - len(indent)))
+    lines = Text(for_terminal(text)).wrap(_console(width), max(20, width - len(indent)))
     return f"\n{indent}".join(line.plain.rstrip() for line in lines)
 
 

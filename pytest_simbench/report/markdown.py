@@ -8,6 +8,7 @@ from pytest_simbench.report import columns
 from pytest_simbench.report.answer import sentences
 from pytest_simbench.report.grid import Column
 from pytest_simbench.report.summary import TaskSummary
+from pytest_simbench.text import for_markdown
 
 
 def render_run(summaries: Sequence[TaskSummary], pictures: Sequence[str] = ()) -> str:
@@ -20,10 +21,10 @@ def render_run(summaries: Sequence[TaskSummary], pictures: Sequence[str] = ()) -
     if not summaries:
         return "No repetition was recorded.\n"
     parts = [render_task(summary) for summary in summaries]
-    parts.append(f"How to read it: {escape(columns.LEGEND)}")
+    parts.append(f"How to read it: {for_markdown(columns.LEGEND)}")
     deviations = columns.deviations(summaries)
     if deviations:
-        lines = [f"- {escape(name)}: {escape(text)}" for name, text in deviations]
+        lines = [f"- {for_markdown(f'{name}: {text}')}" for name, text in deviations]
         parts.append("\n".join(["## Declared deviations from the scene", "", *lines]))
     if pictures:
         parts.append("\n".join(["## Pictures", "", *(f"![{name}]({name})" for name in pictures)]))
@@ -32,16 +33,17 @@ def render_run(summaries: Sequence[TaskSummary], pictures: Sequence[str] = ()) -
 
 def render_task(summary: TaskSummary, level: int = 2) -> str:
     """One task under a heading of that level."""
-    title = f"{'#' * level} {columns.title(summary)}"
-    parts = [title, "\n".join(f"- {escape(text)}" for text in sentences(summary))]
+    title = f"{'#' * level} {for_markdown(columns.title(summary))}"
+    parts = [title, "\n".join(f"- {for_markdown(text)}" for text in sentences(summary))]
     parts.append(table(columns.study(summary)))
     tables = [*columns.details(summary), (columns.BY_PHASE, columns.by_phase(summary))]
     for name, found in tables:
         if found:
-            parts.append(f"{'#' * (level + 1)} {name[0].upper()}{name[1:]}\n\n{table(found)}")
+            heading = for_markdown(name[0].upper() + name[1:])
+            parts.append(f"{'#' * (level + 1)} {heading}\n\n{table(found)}")
     notes = columns.notes(summary)
     if notes:
-        parts.append("\n".join(f"- note: {escape(text)}" for text in notes))
+        parts.append("\n".join(f"- {for_markdown(f'note: {text}')}" for text in notes))
     return "\n\n".join(part for part in parts if part)
 
 
@@ -49,18 +51,11 @@ def table(found: Sequence[Column]) -> str:
     """One table with a line for each row."""
     single = [column.joined() for column in found]
     lines = [
-        [escape(column.heading) for column in single],
+        [for_markdown(column.heading, cell=True) for column in single],
         [":--" if column.left else "--:" for column in single],
         *(
-            [escape(" ".join(cell)) for cell in row]
+            [for_markdown(" ".join(cell), cell=True) for cell in row]
             for row in zip(*(column.cells for column in single), strict=True)
         ),
     ]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-def escape(text: str) -> str:
-    """`text` so that Markdown shows it as it is, in a table's cell too."""
-    for char in "\\|*_<>`":
-        text = text.replace(char, f"\\{char}")
-    return " ".join(text.split())

@@ -11,6 +11,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from pytest_simbench.text import in_one_line
+
 REDRAW_SECONDS = 0.1
 """A terminal line is redrawn at most this often: faster than the eye follows costs only CPU."""
 
@@ -91,7 +93,7 @@ class Progress:
     def start_test(self, test_id: str, repetitions: int) -> None:
         """A test begins that will run so many repetitions."""
         with self._lock:
-            self._test = _Test(test_id, repetitions)
+            self._test = _Test(in_one_line(test_id), repetitions)
             self._last = self._clock() if not self._is_tty else float("-inf")
             self._update(force=self._is_tty)
 
@@ -109,7 +111,7 @@ class Progress:
         with self._lock:
             current = self._current()
             if current is not None:
-                current.phase = name
+                current.phase = in_one_line(name)
                 self._update()
 
     def count(self, done: int, total: int, noun: str = "") -> None:
@@ -117,7 +119,7 @@ class Progress:
         with self._lock:
             current = self._current()
             if current is not None:
-                current.done, current.total, current.noun = done, total, noun
+                current.done, current.total, current.noun = done, total, in_one_line(noun)
                 self._update()
 
     def end_repetition(self, status: str, seconds: float) -> None:
@@ -132,7 +134,7 @@ class Progress:
             if self._is_tty:
                 self._update(force=len(test.seconds) == test.repetitions)
             else:
-                self._log(test, current, f"{status} after {seconds:.1f} s")
+                self._log(test, current, f"{in_one_line(status)} after {seconds:.1f} s")
 
     def end_test(self) -> None:
         """The test is over: its line goes away."""

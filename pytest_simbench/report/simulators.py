@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
+from pytest_simbench.text import for_terminal
+
 if TYPE_CHECKING:
     from pytest_simbench.selection import Selection
     from pytest_simbench.simulator.info import SimulatorInfo
@@ -41,6 +43,10 @@ def _size(info: SimulatorInfo) -> str:
 
 def list_simulators(selection: Selection) -> Iterator[str]:
     """Lines: the table of capabilities, then a paragraph for each registered simulator."""
+    return map(for_terminal, _lines(selection))
+
+
+def _lines(selection: Selection) -> Iterator[str]:
     from pytest_simbench.report.capabilities import capability_table
     from pytest_simbench.simulator.registry import adapter, registered
 

@@ -9,6 +9,7 @@ from pytest_simbench.report import columns
 from pytest_simbench.report.answer import sentences
 from pytest_simbench.report.grid import fill, render
 from pytest_simbench.report.summary import TaskSummary
+from pytest_simbench.text import for_terminal, in_one_line
 
 NARROWEST = 40
 """Tables are laid out for at least so many columns; in fewer, lines run over."""
@@ -37,16 +38,16 @@ def render_run(
         parts.append("\n".join(["declared deviations from the scene", *lines]))
     if folder is not None:
         parts.append(f"records, logs and report: {folder}")
-    return "\n\n".join(parts)
+    return for_terminal("\n\n".join(parts))
 
 
 def render_task(summary: TaskSummary, width: int = 80) -> str:
     """One task: title, answer, table, failures, further metrics, where the time went."""
-    title = columns.title(summary)
+    title = in_one_line(columns.title(summary))
     answer = [fill(sentence, width, "  ") for sentence in sentences(summary)]
     parts = ["\n".join([title, "=" * len(title), *answer])]
     parts.append(render(columns.study(summary), width))
     for name, found in columns.details(summary):
-        parts.append(f"{summary.task}, {name}\n{render(found, width)}")
+        parts.append(in_one_line(f"{summary.task}, {name}") + f"\n{render(found, width)}")
     notes = [fill(f"note: {text}", width, "  ") for text in columns.notes(summary)]
     return "\n\n".join([*parts, "\n".join(notes)] if notes else parts)

@@ -7,6 +7,7 @@ import pinocchio as pin
 
 from pytest_simbench.scene import FloatArray, Pose, Robot
 from pytest_simbench.simulator import DescriptionError
+from pytest_simbench.simulator.urdf_check import check_robot
 
 
 class RobotModel:
@@ -23,6 +24,7 @@ class RobotModel:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
+        check_robot(robot)
         try:
             self.pin = pin.buildModelFromUrdf(robot.urdf, mimic=False)
         except TypeError:

@@ -1,9 +1,10 @@
 """The declarative world: bodies, robot, gravity, friction, gains; frozen, in SI units."""
 
 from pytest_simbench.scene.bodies import Box, penetration
+from pytest_simbench.scene.checks import SceneError
 from pytest_simbench.scene.pose import FloatArray, Pose, Quaternion, Vector3, rotation_matrix
 from pytest_simbench.scene.robot import Gripper, Joint, Robot
-from pytest_simbench.scene.scene import STANDARD_GRAVITY, Scene, SceneError
+from pytest_simbench.scene.scene import STANDARD_GRAVITY, Scene
 from pytest_simbench.scene.trajectory import Trajectory
 
 __all__ = [

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.scene.checks import check_name, check_number, check_numbers, check_pose
 from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
 
 Colour = tuple[float, float, float, float]
@@ -26,6 +27,9 @@ class Box:
         friction: Coulomb coefficient mu of its surface, sliding. Every surface of a scene has the
             same one, so that the engines' different rules for combining two do not matter.
         colour: red, green, blue, alpha in 0..1.
+
+    Raises:
+        SceneError: a box that cannot exist; the message names box and value.
     """
 
     name: str
@@ -34,6 +38,14 @@ class Box:
     mass: float = 0.0
     friction: float = 1.0
     colour: Colour = WOOD
+
+    def __post_init__(self) -> None:
+        check_name(self.name, "a body")
+        check_numbers(self.size, 3, f"the size [m] of {self.name!r}", 0.0, above=True)
+        check_pose(self.pose, repr(self.name))
+        check_number(self.mass, f"the mass [kg] of {self.name!r}", 0.0)
+        check_number(self.friction, f"the friction of {self.name!r}", 0.0)
+        check_numbers(self.colour, 4, f"the colour of {self.name!r}", 0.0)
 
     @property
     def fixed(self) -> bool:

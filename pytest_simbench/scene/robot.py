@@ -8,6 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.scene.checks import (
+    STIFFEST,
+    SceneError,
+    check_name,
+    check_number,
+    check_pose,
+)
 from pytest_simbench.scene.pose import FloatArray, Pose
 
 
@@ -30,6 +37,13 @@ class Joint:
     effort_limit: float
     armature: float
     initial_position: float
+
+    def __post_init__(self) -> None:
+        check_name(self.name, "a joint")
+        for quantity in ("stiffness", "damping", "effort_limit", "armature"):
+            what = f"the {quantity} of joint {self.name!r}"
+            check_number(getattr(self, quantity), what, 0.0, STIFFEST)
+        check_number(self.initial_position, f"the initial position of joint {self.name!r}")
 
     def to_wire(self) -> dict[str, Any]:
         return dict(self.__dict__)
@@ -54,6 +68,13 @@ class Gripper:
     opened: float
     closed: float
     squeeze: float
+
+    def __post_init__(self) -> None:
+        for name in self.joints:
+            check_name(name, "a joint of the gripper")
+        for quantity in ("opened", "closed"):
+            check_number(getattr(self, quantity), f"the gripper's position {quantity!r} [m]")
+        check_number(self.squeeze, "the gripper's squeeze [N]", 0.0)
 
     def to_wire(self) -> dict[str, Any]:
         return {**self.__dict__, "joints": list(self.joints)}
@@ -88,6 +109,25 @@ class Robot:
     tool_frame: str
     base: Pose = field(default_factory=Pose)
     friction: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_name(self.name, "a robot")
+        check_name(self.tool_frame, f"the tool frame of {self.name!r}")
+        for path in (self.urdf, self.srdf, *self.packages, *self.packages.values()):
+            if not isinstance(path, str) or "\0" in path:
+                raise SceneError(f"robot {self.name!r} is described by {path!r}, which is no path")
+        check_pose(self.base, f"the base of {self.name!r}")
+        check_number(self.friction, f"the friction of {self.name!r}", 0.0)
+        names = self.joint_names
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise SceneError(f"robot {self.name!r} has several drives for {', '.join(twice)}")
+        unknown = [name for name in self.gripper.joints if name not in names]
+        if unknown:
+            raise SceneError(
+                f"the gripper of {self.name!r} has the joints {', '.join(unknown)}, which have no "
+                f"drives; choose from {', '.join(names)}"
+            )
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -7,6 +7,13 @@ from itertools import combinations
 from typing import Any
 
 from pytest_simbench.scene.bodies import Box, penetration
+from pytest_simbench.scene.checks import (
+    RESERVED,
+    SceneError,
+    check_name,
+    check_number,
+    check_numbers,
+)
 from pytest_simbench.scene.pose import Pose, Vector3
 from pytest_simbench.scene.robot import Robot
 
@@ -15,10 +22,6 @@ STANDARD_GRAVITY: Vector3 = (0.0, 0.0, -9.80665)
 
 OVERLAP_TOLERANCE = 1e-4
 """Boxes may overlap this deep at the start [m]: resting contacts are given to rounding."""
-
-
-class SceneError(ValueError):
-    """A scene that cannot exist: two bodies of one name, bodies inside each other."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,8 @@ class Scene:
         ground_friction: Coulomb coefficient of the ground plane.
 
     Raises:
-        SceneError: when two bodies share a name or overlap.
+        SceneError: two bodies share a name or overlap, one has the name of what is in every
+            scene, or a number is none.
     """
 
     name: str
@@ -43,7 +47,16 @@ class Scene:
     ground_friction: float = 1.0
 
     def __post_init__(self) -> None:
+        check_name(self.name, "a scene")
+        check_numbers(self.gravity, 3, f"the gravity [m/s^2] of scene {self.name!r}")
+        check_number(self.ground_friction, f"the ground's friction in scene {self.name!r}", 0.0)
         names = [body.name for body in self.bodies]
+        for name in names:
+            if name.lower() in RESERVED:
+                raise SceneError(
+                    f"scene {self.name!r}: a body is named {name!r}, as something in every scene "
+                    "is; give it another name"
+                )
         for name in names:
             if names.count(name) > 1:
                 raise SceneError(

@@ -108,8 +108,8 @@ class SimulatorHandle:
         test = os.environ.get("PYTEST_CURRENT_TEST", case.short_name).rpartition(" ")[0]
         name = f"{test.rpartition('::')[2] or 'episode'}-{case.simulator}-{case.mode}"
         with suppress(OSError):  # a full disk must not hide the failure itself
-            path = write_example(case, name, scene, tape)
-            error.add_note(f"replay this episode: {replay_command(path)}")
+            path = write_example(case, name, scene, tape, self.constructed.get("versions"))
+            error.add_note(f"replay this episode: {replay_command(path, case, scene)}")
 
     def close(self) -> None:
         """End the worker, if there is one; also from another thread than the one that uses it."""

@@ -10,6 +10,7 @@ as visual shapes too.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ import numpy as np
 
 from pytest_simbench.scene import FloatArray, Pose, Robot, Vector3
 from pytest_simbench.simulator.errors import DescriptionError
+from pytest_simbench.simulator.urdf_check import ROOT, Description
 
 
 @dataclass(frozen=True)
@@ -79,30 +81,50 @@ class PreparedRobot:
         limits: lower and upper position of each joint [rad or m], (2,).
 
     Raises:
-        DescriptionError: the file cannot be read, or lacks a driven joint.
+        DescriptionError: the file cannot be read or used (see `urdf_check`), or does not fit the
+            robot's drives.
     """
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        xml = _parse(robot.urdf)
-        raw = {e.attrib["name"]: self._read_link(e) for e in xml.findall("link")}
-        joints = xml.findall("joint")
-        children = {_child(j): j for j in joints}
-        roots = [name for name in raw if name not in children]
-        if len(roots) != 1:
-            raise DescriptionError(f"{robot.urdf} has {len(roots)} root links, not one")
-        self.root = "base"
+        self._description = Description(robot.urdf, robot.packages)
+        raw = {name: self._read_link(e) for name, e in self._description.links.items()}
+        joints, root = self._description.joints, self._description.root
+        self.root = ROOT
         self.links: dict[str, Link] = {self.root: Link(self.root)}
         self.joints: list[MovingJoint] = []
         self.limits: dict[str, FloatArray] = {}
-        self.links[self.root].absorb(raw[roots[0]], robot.base)
-        self._descend(roots[0], self.root, robot.base, joints, raw)
+        self.links[self.root].absorb(raw[root], robot.base)
+        self._descend(root, self.root, robot.base, joints, raw)
+        self._check_drives(raw)
+
+    def _check_drives(self, raw: Mapping[str, Link]) -> None:
+        """The drives and the tool are those of the file, and what is moved has a mass."""
+        robot = self.robot
         missing = set(robot.joint_names) ^ {joint.name for joint in self.joints}
         if missing:
             raise DescriptionError(
                 f"{robot.urdf} and the drives of {robot.name} disagree about joints "
                 f"{', '.join(sorted(missing))}"
             )
+        if robot.tool_frame not in raw:
+            raise DescriptionError(
+                f"the tool frame {robot.tool_frame!r} of {robot.name} is no link of {robot.urdf}; "
+                f"choose from {', '.join(raw)}"
+            )
+        for joint in self.joints:
+            if not self.links[joint.child].mass > 0:
+                raise DescriptionError(
+                    f"{robot.urdf}: link {joint.child!r} is moved by joint {joint.name!r} and has "
+                    "no mass; give it an <inertial>"
+                )
+        for drive in robot.joints:
+            lower, upper = self.limits[drive.name]
+            if not lower <= drive.initial_position <= upper:
+                raise DescriptionError(
+                    f"joint {drive.name!r} of {robot.name} starts at {drive.initial_position:g}, "
+                    f"and {robot.urdf} lets it go from {lower:g} to {upper:g}"
+                )
 
     @property
     def moving_links(self) -> list[Link]:
@@ -120,12 +142,7 @@ class PreparedRobot:
                 self.links[into].absorb(raw[child], origin)
                 self._descend(child, into, origin, joints, raw)
                 continue
-            kind, limit = joint.attrib["type"], joint.find("limit")
-            if kind not in ("revolute", "prismatic") or limit is None:
-                raise DescriptionError(
-                    f"{self.robot.urdf}: joint {joint.attrib['name']} must be revolute or "
-                    f"prismatic with limits, not {kind}"
-                )
+            kind, limit = joint.attrib["type"], _required(joint, "limit")
             axis = joint.find("axis")
             self.joints.append(
                 MovingJoint(
@@ -166,25 +183,9 @@ class PreparedRobot:
             if box is not None:
                 link.shapes.append(Shape(_origin(collision), size=_vector(box.attrib["size"])))
             elif mesh is not None:
-                path = self._resolve(mesh.attrib["filename"])
+                path = self._description.mesh(mesh.attrib["filename"])
                 link.shapes.append(Shape(_origin(collision), mesh=path))
-            else:
-                raise DescriptionError(
-                    f"{self.robot.urdf}: a collision shape of {link.name} is neither box nor mesh"
-                )
         return link
-
-    def _resolve(self, filename: str) -> str:
-        """Absolute path of a mesh file."""
-        path = Path(self.robot.urdf).parent / filename
-        if filename.startswith("package://"):
-            package, _, rest = filename.removeprefix("package://").partition("/")
-            if package not in self.robot.packages:
-                raise DescriptionError(f"{self.robot.urdf} refers to unknown package {package!r}")
-            path = Path(self.robot.packages[package]) / rest
-        if not path.is_file():
-            raise DescriptionError(f"{self.robot.urdf} refers to {path}, which does not exist")
-        return str(path)
 
     def to_urdf(self) -> str:
         """The reduced robot as URDF text."""
@@ -223,17 +224,6 @@ class PreparedRobot:
         return path
 
 
-def _parse(path: str) -> ET.Element:
-    try:
-        return ET.parse(path).getroot()
-    except OSError as error:
-        raise DescriptionError(
-            f"cannot read the robot description {path}: {error.strerror}"
-        ) from None
-    except ET.ParseError as error:
-        raise DescriptionError(f"the robot description {path} is not valid XML: {error}") from None
-
-
 def _about(inertia: FloatArray, mass: float, offset: FloatArray) -> FloatArray:
     """Inertia about a point `offset` away from the centre of mass (Steiner)."""
     steiner = mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
@@ -250,8 +240,7 @@ def _child(joint: ET.Element) -> str:
 
 def _required(element: ET.Element, tag: str) -> ET.Element:
     found = element.find(tag)
-    if found is None:
-        raise DescriptionError(f"<{element.tag} name={element.attrib.get('name')!r}> lacks <{tag}>")
+    assert found is not None  # the file was checked
     return found
 
 

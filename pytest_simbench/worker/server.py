@@ -22,6 +22,7 @@ from pytest_simbench.scene import Scene, Trajectory
 from pytest_simbench.simulator import Simulator, SimulatorError, SimulatorInfo
 from pytest_simbench.simulator.parity import check, expected_quantities
 from pytest_simbench.simulator.settings import changed
+from pytest_simbench.simulator.urdf_check import check_names
 from pytest_simbench.worker.state import check_following, check_log, check_start, checked_state
 from pytest_simbench.worker.stepping import Stepper
 from pytest_simbench.worker.text import LONGEST_LOGGED, named, readable, told
@@ -117,6 +118,7 @@ class Server:
     def do_load(self, scene: dict[str, Any], parity: bool) -> dict[str, Any]:
         simulator = self._constructed()
         world = Scene.from_wire(scene)
+        check_names(world)
         simulator.load(world)
         self.scene = world
         self.stepper = Stepper(simulator, lambda at: self.send({"alive": float(at)}))

@@ -61,7 +61,7 @@ def test_markdown_escapes_and_lists_failures_before_the_table() -> None:
     report = compared(made(0.5, 0.0), "placed:5%,landing_error:1")
     text = render_markdown(report, "a_b", True)
     assert text.startswith("## Compared with a\\_b\n")
-    assert text.index("- FAILED test\\_stacking[mujoco-headless]: placed fell") < text.index(
+    assert text.index("- FAILED test\\_stacking\\[mujoco-headless\\]: placed fell") < text.index(
         "| :--"
     )
     assert "- not compared: landing\\_error was not measured in both runs" in text

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 from collections.abc import Iterator
@@ -11,11 +10,11 @@ from pathlib import Path
 import pytest
 from hypothesis.errors import UnsatisfiedAssumption
 
-from pytest_simbench.client.errors import EngineFailed, WorkerExited
+from pytest_simbench.client.errors import WorkerExited
 from pytest_simbench.repeatability.__main__ import main
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.session.case import Case
-from pytest_simbench.session.example import ExampleError, read_example
+from pytest_simbench.session.example import read_example
 from pytest_simbench.session.handle import SimulatorHandle
 from pytest_simbench.tasks.base import cube
 
@@ -104,9 +103,9 @@ def test_a_crash_is_replayed_up_to_it(handle: SimulatorHandle, tmp_path: Path) -
         world.wait(0.2)
     assert "replay this episode" in caught.value.__notes__[0]
     (path,) = (tmp_path / "examples").iterdir()
-    _, scene, tape = read_example(path, tmp_path)
-    assert scene == SCENE
-    assert [operation.duration for operation in tape] == [0.1, 0.2]
+    example = read_example(path, tmp_path)
+    assert example.scene == SCENE
+    assert [operation.duration for operation in example.tape] == [0.1, 0.2]
     with handle.episode(SCENE) as world:
         world.wait(0.1)
 
@@ -118,40 +117,10 @@ def test_the_last_failure_stays(handle: SimulatorHandle, tmp_path: Path) -> None
         with pytest.raises(AssertionError), handle.episode(scene):
             raise AssertionError
     (path,) = (tmp_path / "examples").iterdir()
-    assert read_example(path, tmp_path)[1].body("a").pose.position[2] == 0.3
+    assert read_example(path, tmp_path).scene.body("a").pose.position[2] == 0.3
 
 
 def test_giving_an_example_up_is_no_failure(handle: SimulatorHandle, tmp_path: Path) -> None:
     with pytest.raises(UnsatisfiedAssumption), handle.episode(SCENE):
         raise UnsatisfiedAssumption
     assert not (tmp_path / "examples").exists()
-
-
-@pytest.mark.parametrize("text", ["", "{}", "[1]", '{"case": {"x": 1}, "scene": 1, "tape": []}'])
-def test_a_file_that_holds_no_episode(
-    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "x.json"
-    path.write_text(text)
-    with pytest.raises(ExampleError, match="holds no episode"):
-        read_example(path, tmp_path)
-    assert main([str(path)]) == 2
-    assert capsys.readouterr().err == f"{path} holds no episode of pytest-simbench\n"
-
-
-def test_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([str(tmp_path / "none.json")]) == 2
-    assert "No such file" in capsys.readouterr().err
-
-
-def test_replaying_what_the_engine_refuses(
-    handle: SimulatorHandle, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(EngineFailed), handle.episode(SCENE) as world:
-        world.restore("never saved")
-    (path,) = (tmp_path / "examples").iterdir()
-    data = json.loads(path.read_text())
-    data["case"]["adapter"] = "tests.nowhere:Nothing"
-    path.write_text(json.dumps(data))
-    assert main([str(path)]) == 1
-    assert "tests.nowhere" in capsys.readouterr().err

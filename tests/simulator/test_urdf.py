@@ -62,8 +62,8 @@ def test_malformed_file_is_one_sentence(tmp_path: Path) -> None:
 
 def test_a_drive_for_a_joint_that_is_not_there() -> None:
     robot = panda()
-    joints = (*robot.joints[:-1], replace(robot.joints[-1], name="tail"))
-    with pytest.raises(DescriptionError, match="disagree about joints panda_finger_joint2, tail"):
+    joints = (replace(robot.joints[0], name="tail"), *robot.joints[1:])
+    with pytest.raises(DescriptionError, match="disagree about joints panda_joint1, tail"):
         PreparedRobot(replace(robot, joints=joints))
 
 

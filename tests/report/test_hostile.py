@@ -1,0 +1,170 @@
+"""Records of a stranger: whatever their texts hold, every writer shows texts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from pytest_simbench.measure.gate import run_gate
+from pytest_simbench.measure.metrics import Metric
+from pytest_simbench.measure.record import Failure, Record
+from pytest_simbench.repeatability.store import Line
+from pytest_simbench.repeatability.tables import render_markdown, render_terminal
+from pytest_simbench.repeatability.tables import tables as repeatability_tables
+from pytest_simbench.report import changes, markdown, tables
+from pytest_simbench.report.capabilities import capability_markdown, capability_table
+from pytest_simbench.report.files import write_csv, write_report
+from pytest_simbench.report.github import VARIABLE, append_summary
+from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.progress import Progress
+from pytest_simbench.report.summary import summarise
+from pytest_simbench.simulator.registry import adapter
+from tests.hostile import (
+    HOSTILE,
+    assert_harmless_csv,
+    assert_harmless_markdown,
+    assert_harmless_terminal,
+)
+
+from .samples import record
+
+texts = pytest.mark.parametrize("text", HOSTILE, ids=lambda text: ascii(text)[:20])
+ALL = "".join(HOSTILE)
+
+
+def records(text: str) -> list[Record]:
+    """Two rows, one of them failing, with `text` wherever a record has one."""
+    found = []
+    for number in range(1, 7):
+        own = record(repetition=number, seed=number)
+        found.append(
+            replace(
+                own,
+                test=f"t.py::{text}",
+                task=text,
+                simulator=text,
+                mode=text,
+                profile=text,
+                protocol=text,
+                metrics={text: number / 10},
+                deviations=(text,),
+                details={"log": text, "untested": text},
+                settings={text: text},
+                versions={text: f"{text}{number}"},
+                host={text: text},
+                contended=True,
+                status="failed" if number > 3 else "ok",
+                error=Failure(text, text, text, text) if number > 3 else None,
+            )
+        )
+        found.append(replace(found[-1], simulator="other", metrics={text: 1.0 + number}))
+    return found
+
+
+def declared(text: str) -> dict[str, list[Metric]]:
+    return {text: [Metric(text, text, text, study=True, doc=text)]}
+
+
+@texts
+def test_the_terminal(text: str) -> None:
+    found = with_wins(summarise(records(text), declared(text), {text: {text: 0.5}}), records(text))
+    for width in (60, 200):
+        shown = tables.render_run(found, width, Path(text.replace("\0", "")))
+        assert_harmless_terminal(shown)
+        assert len(shown) < 100_000
+
+
+@texts
+def test_the_report_in_markdown(text: str) -> None:
+    found = with_wins(summarise(records(text), declared(text)), records(text))
+    assert_harmless_markdown(markdown.render_run(found))
+    assert_harmless_terminal(markdown.render_run(found))
+
+
+@texts
+def test_the_csv(text: str, tmp_path: Path) -> None:
+    write_csv(tmp_path / "a.csv", records(text))
+    content = (tmp_path / "a.csv").read_text(encoding="utf-8")
+    assert_harmless_csv(content)
+    assert_harmless_terminal(content)
+
+
+@pytest.mark.parametrize("text", [ALL, "../../evil", "/tmp/evil", ".."])
+def test_pictures_stay_in_their_folder(text: str, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
+    import matplotlib as mpl
+
+    folder = tmp_path / "deep" / "run"
+    folder.mkdir(parents=True)
+    all_ = [*records(text), *(replace(r, task=f"{text} ") for r in records(text))]
+    with mpl.rc_context({"text.parse_math": True}):
+        write_report(folder, summarise(all_, declared(text)), all_)
+    files = {path for path in tmp_path.rglob("*") if path.is_file()}
+    assert {path.parent for path in files} == {folder}
+    assert sum(path.suffix == ".png" for path in files) == 6
+    report = (folder / "report.md").read_text(encoding="utf-8")
+    assert_harmless_markdown(report.partition("## Pictures")[0])
+
+
+def test_a_formula_in_a_label_is_no_formula(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
+    (tmp_path / "run").mkdir()
+    found = records(r"$\nonsense{$")
+    assert write_report(tmp_path / "run", summarise(found, declared(r"$\nonsense{$")), found) == []
+
+
+@texts
+def test_the_comparison_with_a_baseline(text: str) -> None:
+    now = [replace(r, versions={text: "2"}, settings={text: 1}) for r in records(text)]
+    report = run_gate(records(text), now, (), declared(text))
+    assert_harmless_terminal(changes.render_terminal(report, 100, True))
+    shown = changes.render_markdown(report, text, True)
+    assert_harmless_markdown(shown)
+
+
+@texts
+def test_the_tables_of_repeatability(text: str) -> None:
+    again = {
+        "way": text, "identical": False, "first": 1.0, "body": text, "growth": {"1": 1.0},
+        "largest": 1.0, "changed": [text], "left_at": None, "skipped": "", "failure": "",
+        "claimed": True,
+    }  # fmt: skip
+    lines = [
+        Line("replay", text, text, text, text, text, 1, {}, {}, {"claims": True, "again": [again]}),
+        Line("search", text, text, text, text, text, 1, {}, {}, {"sentence": text}),
+    ]
+    found = repeatability_tables(lines, [])
+    assert_harmless_terminal(render_terminal(found, 100))
+    assert_harmless_markdown(render_markdown(found))
+
+
+@texts
+def test_the_table_of_simulators(text: str) -> None:
+    info = replace(adapter("mujoco").info, name=text, title=text, licence=text, engine=text)
+    assert_harmless_terminal(capability_table([info], 100))
+    assert_harmless_markdown(capability_markdown([info]))
+
+
+@texts
+@pytest.mark.parametrize("is_tty", [True, False])
+def test_the_progress_line(text: str, is_tty: bool) -> None:
+    written: list[str] = []
+    progress = Progress(written.append, is_tty=is_tty, width=100, clock=lambda: float(len(written)))
+    progress.start_test(text, 2)
+    progress.repetition(1, 1)
+    progress.phase(text)
+    progress.count(1, 2, text)
+    progress.end_repetition(text, 1.0)
+    assert_harmless_terminal(progress.line())
+    progress.end_test()
+    for part in written:
+        assert_harmless_terminal(part.replace("\r", ""))
+
+
+def test_the_page_of_a_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "summary"))
+    found = summarise(records(ALL), declared(ALL))
+    assert append_summary(markdown.render_run(found)) == ""
+    assert_harmless_markdown((tmp_path / "summary").read_text(encoding="utf-8"))
