@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench import options
-from pytest_simbench.plugin import run, selection
+from pytest_simbench import arguments, options
+from pytest_simbench.plugin import is_conftest, run, selection
 
 if TYPE_CHECKING:
     from pytest_simbench.client.world import World
@@ -21,6 +23,66 @@ if TYPE_CHECKING:
     from pytest_simbench.session.case import Case
     from pytest_simbench.session.handle import SimulatorHandle
     from pytest_simbench.tasks.base import Task
+
+
+SHARED = (
+    "output_path",
+    "repeat",
+    "resources",
+    "sim",
+    "simulator",
+    "threshold",
+    "replay",
+    "perturb",
+)
+"""Names that other plugins use too (pytest-playwright has an `output_path`)."""
+
+OWN = ("sim_case", "sim_name", "sim_mode", "sim_settings", "simbench_case", "simbench_handle")
+
+
+def beside(plugins: pytest.PytestPluginManager) -> ModuleType:
+    """A plugin with all fixtures but those whose name another plugin has.
+
+    A conftest's fixture hides ours where it holds, as always. Ours can be had under any name by
+    an import in a conftest: `from pytest_simbench.fixtures import repeat as sim_repeat`.
+    """
+    from pytest_simbench.repeatability import fixtures as repeatability
+
+    found = {**vars(repeatability), **globals()}
+    module = ModuleType("pytest_simbench.fixtures_here", __doc__)
+    others = [plugin for plugin in plugins.get_plugins() if not is_conftest(plugin)]
+    for name in (*OWN, *SHARED):
+        if name in OWN or not any(_is_fixture(getattr(other, name, None)) for other in others):
+            setattr(module, name, found[name])
+    rounds = benchmark_rounds if has_benchmark(plugins) else no_rounds
+    vars(module).update(
+        simbench_rounds=rounds, pytest_terminal_summary=repeatability.pytest_terminal_summary
+    )
+    return module
+
+
+def _is_fixture(thing: object) -> bool:
+    return type(thing).__name__ == "FixtureFunctionDefinition" or hasattr(
+        thing,
+        "_pytestfixturefunction",  # pytest before 8.4
+    )
+
+
+def has_benchmark(plugins: pytest.PytestPluginManager) -> bool:
+    """Whether pytest-benchmark is at work (it is not under `-p no:benchmark`)."""
+    module = sys.modules.get("pytest_benchmark.plugin")
+    return module is not None and plugins.is_registered(module)
+
+
+@pytest.fixture
+def benchmark_rounds(benchmark: Any) -> Any:
+    """What takes the repetitions as rounds: pytest-benchmark's fixture."""
+    return benchmark
+
+
+@pytest.fixture
+def no_rounds() -> None:
+    """Nothing takes the repetitions as rounds."""
 
 
 @pytest.fixture(scope="session")
@@ -81,11 +143,11 @@ def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: A
         costly_start=info.costly_start,
         compile_timeout=info.compile_timeout,
         fresh=options.value(config, "sim_fresh"),
-        protocol=PROTOCOLS[options.value(config, "protocol")],
+        protocol=PROTOCOLS[options.value(config, "sim_protocol")],
         stall_timeout=options.value(config, "sim_stall_timeout"),
         memory_limit=options.value(config, "sim_memory_limit"),
         seed=options.value(config, "sim_seed"),
-        jitter=options.value(config, "jitter"),
+        jitter=options.value(config, "sim_jitter"),
         trace=options.value(config, "sim_trace"),
         **more,
     )
@@ -110,25 +172,32 @@ def simbench_case(
     from pytest_simbench.selection import number_mark
 
     given = options.value(request.config, "sim_timeout")
+    profile = selection(request.config).profile
     return _case(
         request.config,
         sim_case,
         request.node.nodeid,
-        settings=sim_settings,
+        settings=arguments.checked_settings(sim_settings, sim_case[0], profile),
         timeout=given if given is not None else number_mark(request.node, "sim_timeout"),
     )
 
 
 @pytest.fixture
 def repeat(
-    request: pytest.FixtureRequest, simbench_case: Case, benchmark: Any
+    request: pytest.FixtureRequest, simbench_case: Case, simbench_rounds: Any
 ) -> Iterator[Callable[[Task], ResultSet]]:
-    """Runs a task `--reps` times: `result = repeat(Stacking())`."""
+    """Runs a task `--reps` times: `result = repeat(Stacking())`; each task once in a test."""
     from pytest_simbench.repeating import Repeating
 
     repeating = Repeating(request.node, simbench_case, run(request.config))
-    yield repeating
-    repeating.finish(benchmark)
+    done: set[str] = set()
+
+    def perform(task: Task) -> ResultSet:
+        arguments.once(arguments.checked_task(task, "repeat"), done)
+        return repeating(task)
+
+    yield perform
+    repeating.finish(simbench_rounds)
 
 
 @pytest.fixture
@@ -140,19 +209,29 @@ def threshold(request: pytest.FixtureRequest) -> Callable[[str, float], float]:
         found = problem(request.config, request.session.items)
         if found:
             pytest.fail(found, pytrace=False)
-    given = options.assignments(request.config, "sim_threshold")
-    return lambda metric, default: float(given.get(metric, default))
+    given = options.value(request.config, "sim_threshold")
+
+    def choose(metric: str, default: float) -> float:
+        return float(given.get(metric, arguments.checked_threshold(metric, default)))
+
+    return choose
 
 
 @pytest.fixture(scope="session")
-def simulator(
-    request: pytest.FixtureRequest, sim_case: tuple[str, str]
-) -> Iterator[SimulatorHandle]:
+def simulator(simbench_handle: SimulatorHandle) -> SimulatorHandle:
     """Handle of the simulator: `with simulator.episode(scene) as world`.
 
     One for the whole session, so that every example of Hypothesis may use it; the `sim_settings`
     of a test do not reach it.
     """
+    return simbench_handle
+
+
+@pytest.fixture(scope="session")
+def simbench_handle(
+    request: pytest.FixtureRequest, sim_case: tuple[str, str]
+) -> Iterator[SimulatorHandle]:
+    """The session's handle, whatever is named `simulator` here."""
     from pytest_simbench.session.handle import SimulatorHandle
 
     timeout = options.value(request.config, "sim_timeout")

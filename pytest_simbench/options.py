@@ -2,192 +2,225 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
 
+from pytest_simbench.values import (
+    Assignments,
+    Auto,
+    BadValue,
+    Choice,
+    File,
+    Files,
+    Flag,
+    Kind,
+    Limits,
+    Number,
+    Repetitions,
+    Word,
+    Words,
+)
 
-@dataclass(frozen=True)
-class Option:
-    """One option; its ini twin has the same name with underscores.
-
-    Attributes:
-        flag: as typed.
-        default: when neither option nor ini says anything.
-        help: one sentence.
-        kind: `text`, `int`, `float`, `flag`, or `list` (repeatable, comma separated).
-        metavar: placeholder of the value in the help.
-        choices: valid values, if they are few.
-    """
-
-    flag: str
-    default: Any
-    help: str
-    kind: str = "text"
-    metavar: str | None = None
-    choices: tuple[str, ...] = ()
-
-    @property
-    def name(self) -> str:
-        return self.flag.lstrip("-").replace("-", "_")
-
-
-OPTIONS = (
-    Option("--sim", [], "simulators to run: names, or all (default: every installed one)",
-           "list", "NAME"),
-    Option("--gui", False, "run in the simulators' own windows", "flag"),
-    Option("--headless", False, "run without windows (default; with --gui: both)", "flag"),
-    Option("--reps", None, "repetitions per test (default: the protocol's, 20), or auto: until "
-           "each asserted claim is decided, at most 160; auto:LIMIT", "text", "N"),
-    Option("--protocol", "fast", "fast, as fast as possible; paper, as the study; smoke, smallest",
-           "text", "NAME", ("fast", "paper", "smoke")),
-    Option("--jitter", 1.0, "scale of the start jitter; 1 is 1 mm and 1 degree, 0 is none",
-           "float", "SCALE"),
-    Option("--sim-seed", 2022, "seed of the first repetition; the next ones follow", "int", "SEED"),
-    Option("--sim-timeout", None, "time-out of a repetition in seconds (default: the study's)",
-           "float", "SECONDS"),
-    Option("--sim-stall-timeout", 60.0, "longest silence of a worker in seconds", "float",
-           "SECONDS"),
-    Option("--sim-profile", "tuned", "settings profile, default or tuned", "text", "NAME"),
-    Option("--sim-set", [], "change one setting: mujoco.timestep=0.001", "list",
-           "SIM.SETTING=VALUE"),
-    Option("--sim-python", [], "interpreter of a simulator's worker: genesis=PATH", "list",
-           "SIM=PATH"),
-    Option("--sim-spec", [], "execnet specification of a simulator's worker", "list", "SIM=SPEC"),
-    Option("--sim-fresh", False, "a new worker for each repetition even where starting is costly",
-           "flag"),
-    Option("--sim-jobs", 1, "repetitions in parallel workers (records are marked contended)",
-           "int", "N"),
-    Option("--sim-memory-limit", None, "memory a worker may use before it is killed", "float",
-           "MB"),
-    Option("--sim-output", None, "run folder (default: .simbench/TIME)", "text", "DIR"),
-    Option("--sim-trace", "off", "write joint and body motion at 50 Hz into the run folder",
-           "text", "WHEN", ("off", "on", "retain-on-failure")),
-    Option("--sim-threshold", [], "change a threshold of the suites: placed=0.9", "list",
-           "METRIC=VALUE"),
-    Option("--sim-baseline", None, "run to compare with: a run folder, its records.jsonl, or a "
-           "--benchmark-json file (default: the run that --benchmark-compare chooses)",
-           "text", "PATH"),
-    Option("--sim-compare-fail", None, "fail when a metric is significantly worse than in the "
-           "baseline, and by more than this: placed:5%,ram:10%,rtf:20%",
-           "text", "METRIC:LIMIT,..."),
-)  # fmt: skip
-"""Every option that is a setting; those of a single run are added apart and have no ini twin."""
+__all__ = ["OPTIONS", "Auto", "Option", "given", "number", "option", "value", "values"]
 
 AUTO_LIMIT = 160
 """Repetitions at which `--reps auto` gives up: with the looks before it 10, 20, 40, 80 and 160."""
 
+MOST_REPETITIONS = 100_000
+"""At a second each they take more than a day; a larger number is a slip of the hand."""
+
+LARGEST_SEED = 2**53 - MOST_REPETITIONS - 1
+"""The seed of every repetition is then a whole number that any reader of JSON keeps."""
+
+LONGEST = 1e6
+"""Of all time-outs [s]: eleven days."""
+
+SECONDS = Number(0.001, LONGEST)
+
 
 @dataclass(frozen=True)
-class Auto:
-    """`--reps auto`: repeat until the claims are decided, at most `limit` times."""
+class Option:
+    """One option and its ini twin, which has the same name with underscores.
 
-    limit: int = AUTO_LIMIT
+    Attributes:
+        flag: as typed; begins with `--sim-`.
+        kind: what its values may be.
+        help: one sentence.
+        default: when neither option nor ini says anything.
+        short: what it is called besides, where no other plugin and no conftest has that name.
+        metavar: placeholder of the value in the help.
+        ini: whether it has an ini twin; what concerns a single run has none.
+        arguments: for argparse, of an option that takes its values in its own way.
+    """
+
+    flag: str
+    kind: Kind
+    help: str
+    default: Any = None
+    short: str = ""
+    metavar: str | None = None
+    ini: bool = True
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """By which the code asks for its value; also the ini twin's name."""
+        return name_of(self.flag)
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """Everything that may be typed for it, the sure one first."""
+        return tuple(filter(None, (self.flag, self.short)))
 
 
-def add_options(parser: pytest.Parser) -> None:
-    """Register all options and ini twins."""
-    group = parser.getgroup("simbench", "comparison of robot simulators")
-    for option in OPTIONS:
-        arguments: dict[str, Any] = {"help": option.help, "default": None, "dest": option.name}
-        if option.kind == "flag":
-            arguments["action"] = "store_true"
-        else:
-            arguments["metavar"] = option.metavar
-            if option.kind == "list":
-                arguments["action"] = "append"
-        group.addoption(option.flag, **arguments)
-        parser.addini(option.name, option.help, default=None)
-    group.addoption(
-        "--sim-resume",
-        nargs="?",
-        const="",
-        metavar="RUN",
-        help="complete an interrupted run, without repeating what is recorded: its folder "
-        "(default: --sim-output, else the newest in .simbench)",
-    )
-    group.addoption(
-        "--sim-merge",
-        nargs="+",
-        metavar="RUN",
-        help="join runs with different seeds (--sim-seed), made on several machines for instance, "
-        "into one in --sim-output, and exit",
-    )
-    group.addoption(
-        "--sims", action="store_true", help="list the known simulators and exit", dest="sims_list"
-    )
-    group.addoption(
-        "--sim-install",
-        action="append",
-        metavar="NAME",
-        help="make the environment of a simulator that needs one of its own, and exit",
-    )
+def name_of(flag: str) -> str:
+    """The ini name of a flag: `sim_jobs` of `--sim-jobs`."""
+    return flag.lstrip("-").replace("-", "_")
+
+
+OPTIONS = (
+    Option("--sim-name", Words(), "simulators to run: names, or all (default: every installed one)",
+           [], "--sim", "NAME"),
+    Option("--sim-gui", Flag(), "run in the simulators' own windows", False, "--gui"),
+    Option("--sim-headless", Flag(), "run without windows (default; with --sim-gui: both)", False,
+           "--headless"),
+    Option("--sim-reps", Repetitions(MOST_REPETITIONS, AUTO_LIMIT), "repetitions per test, at most "
+           f"{MOST_REPETITIONS} (default: the protocol's, 20), or auto: until each asserted claim "
+           f"is decided, at most {AUTO_LIMIT}; auto:LIMIT", None, "--reps", "N"),
+    Option("--sim-protocol", Choice(("fast", "paper", "smoke")), "fast, as fast as possible; "
+           "paper, as the study; smoke, smallest", "fast", "--protocol", "NAME"),
+    Option("--sim-jitter", Number(0, 1000), "scale of the start jitter, at most 1000; 1 is 1 mm "
+           "and 1 degree, 0 is none", 1.0, "--jitter", "SCALE"),
+    Option("--sim-seed", Number(0, LARGEST_SEED, whole=True), "seed of the first repetition; the "
+           "next ones follow", 2022, metavar="SEED"),
+    Option("--sim-timeout", SECONDS, "time-out of a repetition in seconds (default: the study's)",
+           metavar="SECONDS"),
+    Option("--sim-stall-timeout", SECONDS, "longest silence of a worker in seconds", 60.0,
+           metavar="SECONDS"),
+    Option("--sim-profile", Word(), "settings profile, default or tuned", "tuned", metavar="NAME"),
+    Option("--sim-set", Assignments("SIM.SETTING=VALUE"), "change one setting: "
+           "mujoco.timestep=0.001", {}, metavar="SIM.SETTING=VALUE"),
+    Option("--sim-python", Assignments("SIM=PATH", commas=False), "interpreter of a simulator's "
+           "worker: genesis=PATH; repeat the option for another one", {}, metavar="SIM=PATH"),
+    Option("--sim-spec", Assignments("SIM=SPEC", commas=False), "execnet specification of a "
+           "simulator's worker; repeat the option for another one", {}, metavar="SIM=SPEC"),
+    Option("--sim-fresh", Flag(), "a new worker for each repetition even where starting is costly",
+           False),
+    Option("--sim-jobs", Number(1, 256, whole=True), "repetitions in parallel workers, at most 256 "
+           "(records are marked contended)", 1, metavar="N"),
+    Option("--sim-memory-limit", Number(1, 1e9), "memory a worker may use before it is killed",
+           metavar="MB"),
+    Option("--sim-output", File(), "run folder (default: .simbench/TIME)", metavar="DIR"),
+    Option("--sim-trace", Choice(("off", "on", "retain-on-failure")), "write joint and body motion "
+           "at 50 Hz into the run folder: off, on, retain-on-failure", "off", metavar="WHEN"),
+    Option("--sim-threshold", Assignments("METRIC=NUMBER", numbers=True), "change a threshold of "
+           "the suites: placed=0.9", {}, metavar="METRIC=VALUE"),
+    Option("--sim-baseline", File(), "run to compare with: a run folder, its records.jsonl, or a "
+           "--benchmark-json file (default: the run that --benchmark-compare chooses)",
+           metavar="PATH"),
+    Option("--sim-compare-fail", Limits(), "fail when a metric is significantly worse than in the "
+           "baseline, and by more than this: placed:5%,ram:10%,rtf:20%",
+           metavar="METRIC:LIMIT,..."),
+    Option("--sim-resume", File(), "complete an interrupted run, without repeating what is "
+           "recorded: its folder (default: --sim-output, else the newest in .simbench)",
+           metavar="RUN", ini=False, arguments={"nargs": "?", "const": True}),
+    Option("--sim-merge", Files(), "join runs with different seeds (--sim-seed), made on several "
+           "machines for instance, into one in --sim-output, and exit", metavar="RUN", ini=False,
+           arguments={"nargs": "+", "action": "store"}),
+    Option("--sim-list", Flag(), "list the known simulators and exit", False, "--sims", ini=False),
+    Option("--sim-install", Words(), "make the environment of a simulator that needs one of its "
+           "own, and exit", metavar="NAME", ini=False),
+)  # fmt: skip
+"""All options. Only their tests and the README know them besides this table."""
+
+_BY_NAME = {item.name: item for item in OPTIONS}
+
+OURS: pytest.StashKey[frozenset[str]] = pytest.StashKey()
+"""What is ours of the names on the command line (`--gui`) and in the ini file (`gui`)."""
+
+_VALUES: pytest.StashKey[Mapping[str, Any]] = pytest.StashKey()
+
+
+def option(name: str) -> Option:
+    """The option of that name."""
+    return _BY_NAME[name]
+
+
+def values(config: pytest.Config) -> Mapping[str, Any]:
+    """The values of all options, checked once: from the command line, else the ini file, else the
+    default.
+
+    Raises:
+        pytest.UsageError: a value that its option cannot take; one sentence.
+    """
+    if _VALUES not in config.stash:
+        config.stash[_VALUES] = {item.name: _value(config, item) for item in OPTIONS}
+    return config.stash[_VALUES]
 
 
 def value(config: pytest.Config, name: str) -> Any:
-    """The value of an option: from the command line, else its ini twin, else its default.
+    """The value of one option. All are checked, whichever is asked for first.
 
     Raises:
-        pytest.UsageError: a value of the wrong type or none of the choices.
+        pytest.UsageError: a value that its option cannot take; one sentence.
     """
-    option = next(option for option in OPTIONS if option.name == name)
-    given = config.getoption(name)
-    if given is None:
-        given = config.getini(name) or None
-    if given is None:
-        return option.default
-    if option.kind == "flag":
-        return given is True or str(given).lower() in ("1", "true", "on", "yes")
-    if option.kind == "list":
-        texts = given if isinstance(given, list) else str(given).split()
-        return [part.strip() for text in texts for part in text.split(",") if part.strip()]
-    if option.kind in ("int", "float"):
-        convert, noun = (int, "whole number") if option.kind == "int" else (float, "number")
-        try:
-            return convert(given)
-        except ValueError:
-            raise pytest.UsageError(f"{option.flag} takes a {noun}, not {given!r}") from None
-    if option.choices and given not in option.choices:
-        raise pytest.UsageError(f"{option.flag} {given}: choose from {', '.join(option.choices)}")
-    return given
+    return values(config)[name]
 
 
-def repetitions(config: pytest.Config) -> int | Auto | None:
-    """What `--reps` asks for; None when it is not given.
+def given(config: pytest.Config, name: str) -> bool:
+    """Whether an option is on the command line."""
+    return option(name).flag in _ours(config) and config.getoption(name) is not None
 
-    Raises:
-        pytest.UsageError: neither a number nor auto, or less than 1.
-    """
-    text = value(config, "reps")
-    if text is None:
-        return None
-    word, colon, limit = str(text).strip().partition(":")
-    auto = word == "auto"
-    if auto and not colon:
-        return Auto()
+
+def _ours(config: pytest.Config) -> frozenset[str]:
+    return config.stash.get(OURS, frozenset())
+
+
+def _value(config: pytest.Config, item: Option) -> Any:
+    name = item.short if item.short in _ours(config) else item.flag
+    raw = config.getoption(item.name) if given(config, item.name) else None
+    if raw is True:  # a flag, or an option that may stand without a value
+        return True
+    if raw is None:
+        name, raw = _ini(config, item)
+    if raw is None:
+        return item.default
+    texts = list(map(str, raw)) if isinstance(raw, list) else [str(raw)]
     try:
-        number = int(limit if auto else text)
-    except ValueError:
-        raise pytest.UsageError(
-            f"--reps takes a whole number, auto or auto:LIMIT, not {text!r}"
-        ) from None
-    if number < 1:
-        raise pytest.UsageError(f"--reps {text}: give at least 1")
-    return Auto(number) if auto else number
+        return item.kind.read(texts)
+    except BadValue as error:
+        raise pytest.UsageError(error.sentence(name)) from None
 
 
-def assignments(config: pytest.Config, name: str) -> dict[str, str]:
-    """A list option of `key=value` texts as a dict.
+def _ini(config: pytest.Config, item: Option) -> tuple[str, Any]:
+    """Name and value of the ini twin that is set, if one is."""
+    for name in map(name_of, item.flags if item.ini else ()):
+        if name in _ours(config):
+            try:
+                raw = config.getini(name)
+            except (TypeError, ValueError) as error:  # not a text, or quotes that do not match
+                raise pytest.UsageError(f"the ini option {name}: {error}") from None
+            if raw is not None:
+                return f"the ini option {name}", raw
+    return "", None
+
+
+def number(name: str, value: Any) -> Any:
+    """A number from a mark, within the bounds of the option `name`.
 
     Raises:
-        pytest.UsageError: a text without `=`.
+        BadValue: it is none.
     """
-    option = next(option for option in OPTIONS if option.name == name)
-    result = {}
-    for text in value(config, name):
-        key, equals, right = text.partition("=")
-        if not (equals and key and right):
-            raise pytest.UsageError(f"{option.flag} {text}: write it as {option.metavar}")
-        result[key.strip()] = right.strip()
-    return result
+    kind = option(name).kind
+    if isinstance(kind, Repetitions):
+        kind = Number(1, kind.most, whole=True)
+    assert isinstance(kind, Number)
+    return kind.check(value)
+
+
+def mentioned(config: pytest.Config, names: Sequence[str]) -> bool:
+    """Whether one of these options is on the command line or in the ini file."""
+    return any(given(config, name) or _ini(config, option(name))[1] is not None for name in names)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Generator
+from collections.abc import Collection, Generator
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench import harmless, options
+from pytest_simbench import harmless, options, spellings
 
 if TYPE_CHECKING:
     from pytest_simbench.compare import Comparison
@@ -19,6 +20,8 @@ RUN = pytest.StashKey["Run"]()
 SELECTION = pytest.StashKey["Selection"]()
 COMPARISON: pytest.StashKey[Comparison] = pytest.StashKey()
 SAVED = pytest.StashKey[list[dict[str, Any]]]()
+PROBLEMS = pytest.StashKey[list[str]]()
+"""What is wrong with marks, found while tests are made of them; told when all are."""
 
 MARKS = (
     "only_sim(*names): run only on these simulators",
@@ -30,9 +33,36 @@ MARKS = (
 )
 
 
+NAMING = ("sim_name", "sim_profile", "sim_set", "sim_python", "sim_spec")
+"""Options whose values name simulators: they are held against the adapters, which takes imports."""
+
+
 def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
-    options.add_options(parser)
+    """Only where a conftest has loaded us (`pytest_plugins`), which is later than the next hook."""
     pluginmanager.register(harmless, "simbench-harmless")
+    config = pluginmanager.get_plugin("pytestconfig")
+    if config is not None and any(map(is_conftest, pluginmanager.get_plugins())):
+        spellings.register(parser, config)
+
+
+def is_conftest(plugin: object) -> bool:
+    """Whether a plugin is a conftest.py."""
+    return os.path.basename(getattr(plugin, "__file__", None) or "") == "conftest.py"
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_load_initial_conftests(
+    early_config: pytest.Config, parser: pytest.Parser, args: list[str]
+) -> Generator[None, Any, Any]:
+    """Register the options when all plugins and conftests have taken the names they want."""
+    ours = spellings.without_ours(args)
+    if ours != args:
+        known = early_config.known_args_namespace
+        known.file_or_dir = parser.parse_known_args(ours).file_or_dir
+    try:
+        return (yield)
+    finally:  # also where a conftest does not import: --help goes on then
+        spellings.register(parser, early_config)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -40,20 +70,21 @@ def pytest_configure(config: pytest.Config) -> None:
         config.addinivalue_line("markers", mark)
     from pytest_simbench import fixtures
 
-    config.pluginmanager.register(fixtures, "simbench-fixtures")
-    from pytest_simbench.repeatability import fixtures as repeatability
-
-    config.pluginmanager.register(repeatability, "simbench-repeatability")
-    if any(config.getoption(option.name) is not None for option in options.OPTIONS):
-        selection(config)  # complain of bad input before anything is collected
+    config.pluginmanager.register(fixtures.beside(config.pluginmanager), "simbench-fixtures")
+    if config.getoption("help") or config.getoption("version"):
+        return
+    options.values(config)  # complain of bad input before anything is collected
+    if options.mentioned(config, NAMING) or any(
+        options.given(config, option.name) for option in options.OPTIONS
+    ):
+        selection(config)
 
 
 def selection(config: pytest.Config) -> Selection:
     """What the user asked for, checked once."""
     if SELECTION not in config.stash:
-        from pytest_simbench.selection import check_numbers, select
+        from pytest_simbench.selection import select
 
-        check_numbers(config)
         config.stash[SELECTION] = select(config)
     return config.stash[SELECTION]
 
@@ -77,7 +108,7 @@ def pytest_benchmark_compare_machine_info(config: pytest.Config, compared_benchm
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Complain of a bad baseline or limit, or of no run to resume, before anything runs."""
     config = session.config
-    if config.getoption("sim_resume") is not None:
+    if options.given(config, "sim_resume"):
         run(config)
     asked = options.value(config, "sim_compare_fail") or options.value(config, "sim_baseline")
     if hasattr(config, "workerinput") or not (asked or SAVED in config.stash):
@@ -90,17 +121,18 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 
 def pytest_cmdline_main(config: pytest.Config) -> int | None:
-    if config.getoption("sim_install"):
-        return _install(config.getoption("sim_install"))
-    if config.getoption("sim_merge"):
+    if options.given(config, "sim_install"):
+        return _install(options.value(config, "sim_install"))
+    if options.given(config, "sim_merge"):
+        options.values(config)
         from pytest_simbench.merge import merge_runs
 
         return merge_runs(config)
-    if not config.getoption("sims_list"):
+    if not options.given(config, "sim_list"):
         return None
     from pytest_simbench.report.simulators import list_simulators
 
-    for line in list_simulators(selection(config)):
+    for line in [*list_simulators(selection(config)), *spellings.foreign(config)]:
         print(line)
     return 0
 
@@ -111,7 +143,7 @@ def _install(names: list[str]) -> int:
     from pytest_simbench.simulator.registry import adapter
 
     try:
-        for name in [part for text in names for part in text.split(",")]:
+        for name in names:
             environment = Environment.of(adapter(name).info)
             if environment.problem:
                 environment.create()
@@ -124,29 +156,54 @@ def _install(names: list[str]) -> int:
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "sim_case" not in metafunc.fixturenames:
         return
-    from pytest_simbench.selection import number_mark, parameters
+    from pytest_simbench.selection import NOTHING, number_mark, parameters
 
-    node = metafunc.definition
-    for name in ("reps", "sim_timeout"):
-        number_mark(node, name)
-    chosen = parameters(metafunc, selection(metafunc.config))
+    node, config = metafunc.definition, metafunc.config
+    try:
+        for name in ("reps", "sim_timeout"):
+            number_mark(node, name)
+        chosen = parameters(metafunc, selection(config))
+    except pytest.UsageError as error:
+        if hasattr(config, "workerinput"):  # the end of an xdist worker would be an internal error
+            raise
+        config.stash.setdefault(PROBLEMS, []).append(str(error))
+        chosen = [NOTHING]
     metafunc.parametrize("sim_case", chosen, indirect=True, scope="session")
 
 
 @pytest.hookimpl(tryfirst=True)  # before -k and -m leave out tests
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    if config.getoption("sim_threshold") and not hasattr(config, "workerinput"):
+    problems = config.stash.get(PROBLEMS, [])
+    if options.given(config, "sim_threshold") and not hasattr(config, "workerinput"):
         from pytest_simbench.thresholds import problem
 
-        found = problem(config, items)
-        if found:
-            raise pytest.UsageError(found)
-    for item in items:
-        if "repeat" in getattr(item, "fixturenames", ()):
-            from pytest_simbench.worker_clock import worker_clock
+        problems += filter(None, [problem(config, items)])
+    if problems:
+        raise pytest.UsageError("\n".join(dict.fromkeys(problems)))
+    timed = [item for item in items if "simbench_rounds" in _fixtures(item)]
+    if timed:
+        _time_by_workers(config, timed)
 
-            group = item.name.partition("[")[0]
-            item.add_marker(pytest.mark.benchmark(timer=worker_clock, group=group))
+
+def _time_by_workers(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Have pytest-benchmark, where it is at work, take the workers' seconds as its time."""
+    from pytest_simbench.fixtures import has_benchmark
+    from pytest_simbench.worker_clock import worker_clock
+
+    for item in items if has_benchmark(config.pluginmanager) else ():
+        group = item.name.partition("[")[0]
+        item.add_marker(pytest.mark.benchmark(timer=worker_clock, group=group))
+
+
+def pytest_report_collectionfinish(config: pytest.Config, items: list[pytest.Item]) -> list[str]:
+    """Which of our options go by another name here, where there are tests of simulators."""
+    ours = any("sim_case" in _fixtures(item) for item in items)
+    return spellings.foreign(config) if ours else []
+
+
+def _fixtures(item: pytest.Item) -> Collection[str]:
+    found: Collection[str] = getattr(item, "fixturenames", ())
+    return found
 
 
 @pytest.hookimpl(optionalhook=True)

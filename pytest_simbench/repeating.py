@@ -45,7 +45,7 @@ class Repeating:
     def __call__(self, task: Task) -> ResultSet:
         """Run a task's repetitions, as many as options and marks say."""
         self.this.declare(task.smoke() if self.case.protocol.smallest else task)
-        wanted = options.repetitions(self.node.config)
+        wanted = options.value(self.node.config, "sim_reps")
         metrics = (task.smoke() if self.case.protocol.smallest else task).metrics
         found = self.this.resume(self.node.nodeid, task.name)
         if isinstance(wanted, options.Auto):
@@ -82,10 +82,10 @@ class Repeating:
         return [found[k] for k in sorted(found)]
 
     def finish(self, benchmark: Any) -> None:
-        """Tell pytest-benchmark and JUnit; called when the test has ended."""
+        """Tell pytest-benchmark, where there is one, and JUnit; called when the test has ended."""
         for result in self.results:
             self.node.user_properties.extend(_properties(result))
-        if self.results:
+        if self.results and benchmark is not None:
             _benchmark(benchmark, self.results[0])
 
 

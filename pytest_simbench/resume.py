@@ -27,9 +27,10 @@ def folder_to_resume(config: pytest.Config) -> Path | None:
     Raises:
         pytest.UsageError: there is no such run, or none at all.
     """
-    given = config.getoption("sim_resume")
+    given = options.value(config, "sim_resume")
     if given is None:
         return None
+    given = "" if given is True else given  # without a value
     output = options.value(config, "sim_output")
     if given and output and given != output:
         raise pytest.UsageError(

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from math import inf
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from pytest_simbench import options
+from pytest_simbench.interpreters import checked_specification, interpreter_path
+from pytest_simbench.values import BadValue, shown
 
 if TYPE_CHECKING:
     from pytest_simbench.client.environments import Environment
+    from pytest_simbench.simulator.info import SimulatorInfo
 
 MODES = ("headless", "gui")
 
@@ -40,32 +42,50 @@ class Selection:
     def missing(self, name: str) -> str | None:
         """Why a simulator cannot run here, with what mends it; None when it can."""
         from pytest_simbench.client.environments import missing
-        from pytest_simbench.simulator.registry import adapter
+        from pytest_simbench.simulator.registry import problem
 
-        if name in self.pythons or name in self.specs:
-            return None
-        return missing(adapter(name).info)
+        found = problem(name) or self._settings_problem(name)
+        if found or name in self.pythons or name in self.specs:
+            return found
+        return missing(_info(name))
+
+    def _settings_problem(self, name: str) -> str | None:
+        from pytest_simbench.simulator.errors import SettingsError
+        from pytest_simbench.simulator.registry import adapter
+        from pytest_simbench.simulator.settings import changed, profile
+
+        try:
+            settings = profile(adapter(name).profiles, self.profile, name)
+            changed(settings, self.changes.get(name, {}), name)
+        except SettingsError as error:
+            return str(error)
+        return None
 
     def environment(self, name: str) -> Environment:
         """The place of a simulator's own environment."""
         from pytest_simbench.client.environments import Environment
-        from pytest_simbench.simulator.registry import adapter
 
-        return Environment.of(adapter(name).info)
+        return Environment.of(_info(name))
 
     def python(self, name: str) -> str | None:
         """Interpreter of a simulator's workers; None for this one."""
         from pytest_simbench.client.environments import interpreter
-        from pytest_simbench.simulator.registry import adapter
 
-        return self.pythons.get(name) or interpreter(adapter(name).info)
+        return self.pythons.get(name) or interpreter(_info(name))
+
+
+def _info(name: str) -> SimulatorInfo:
+    from pytest_simbench.simulator.registry import adapter
+
+    return adapter(name).info
 
 
 def select(config: pytest.Config) -> Selection:
     """The checked selection.
 
     Raises:
-        pytest.UsageError: unknown simulator, setting, profile, or a malformed value.
+        pytest.UsageError: an unknown or broken simulator, an unknown setting or profile, an
+            interpreter or specification that cannot be one; one sentence.
     """
     from pytest_simbench.simulator.errors import SimulatorError
 
@@ -76,72 +96,81 @@ def select(config: pytest.Config) -> Selection:
 
 
 def _select(config: pytest.Config) -> Selection:
-    from pytest_simbench.simulator.registry import adapter, check_names, registered
-    from pytest_simbench.simulator.settings import changed, profile
+    from pytest_simbench.simulator.registry import adapter, check_names, known
 
-    asked = options.value(config, "sim")
+    _check_profile(options.value(config, "sim_profile"))
+    asked = options.value(config, "sim_name")
     names = [name for name in asked if name != "all"]
-    check_names(names)
-    pythons = options.assignments(config, "sim_python")
-    specs = options.assignments(config, "sim_spec")
-    check_names([*pythons, *specs])
-    profile_name = options.value(config, "sim_profile")
     changes: dict[str, dict[str, str]] = {}
-    for key, text in options.assignments(config, "sim_set").items():
-        name, dot, setting = key.partition(".")
-        if not dot:
-            raise pytest.UsageError(f"--sim-set {key}={text}: write it as SIM.SETTING=VALUE")
-        check_names([name])
+    for key, text in options.value(config, "sim_set").items():
+        name, _, setting = key.partition(".")
+        if not setting:
+            raise pytest.UsageError(f"--sim-set={key}={text}: write it as SIM.SETTING=VALUE")
         changes.setdefault(name, {})[setting] = text
-    everything = tuple(registered()) if not names or "all" in asked else tuple(dict.fromkeys(names))
-    for name in {*everything, *changes}:
-        changed(profile(adapter(name).profiles, profile_name, name), changes.get(name, {}), name)
+    pythons = {
+        name: interpreter_path(path, f"--sim-python={name}={shown(path)}", config)
+        for name, path in options.value(config, "sim_python").items()
+    }
+    specs = {
+        name: checked_specification(text, f"--sim-spec={name}={shown(text)}")
+        for name, text in options.value(config, "sim_spec").items()
+    }
+    named = [*names, *changes, *pythons, *specs]
+    check_names(named)
+    for name in named:
+        adapter(name)  # complains of a broken one
+    for name in pythons.keys() & specs.keys():
+        raise pytest.UsageError(
+            f"{name} has both --sim-python and --sim-spec; a specification names its own "
+            "interpreter (python=...), so give one of them"
+        )
     selection = Selection(
-        everything, frozenset(names), _modes(config), profile_name, changes, pythons, specs
+        tuple(known() if not names or "all" in asked else dict.fromkeys(names)),
+        frozenset(names),
+        _modes(config),
+        options.value(config, "sim_profile"),
+        changes,
+        pythons,
+        specs,
     )
+    for name in changes:
+        problem = selection._settings_problem(name)
+        if problem:
+            raise pytest.UsageError(problem)
     for name in names:
         reason = selection.missing(name)
         if reason:
             raise pytest.UsageError(reason)
-    if not asked:
-        here = tuple(name for name in everything if not selection.missing(name))
-        selection = Selection(
-            here, frozenset(), selection.modes, profile_name, changes, pythons, specs
+    if asked:
+        return selection
+    return replace(
+        selection, simulators=tuple(n for n in selection.simulators if not selection.missing(n))
+    )
+
+
+def _check_profile(name: str) -> None:
+    from pytest_simbench.simulator.registry import adapter, registered
+
+    valid = dict.fromkeys(found for sim in registered() for found in adapter(sim).profiles)
+    if name not in valid:
+        raise pytest.UsageError(
+            f"no simulator has a settings profile {name!r}; choose from {', '.join(valid)}"
         )
-    return selection
 
 
 def _modes(config: pytest.Config) -> tuple[str, ...]:
-    gui, headless = options.value(config, "gui"), options.value(config, "headless")
+    gui, headless = options.value(config, "sim_gui"), options.value(config, "sim_headless")
     if gui:
         return MODES if headless else ("gui",)
     return ("headless",)
 
 
-def check_numbers(config: pytest.Config) -> None:
-    """Check the plain numbers.
-
-    Raises:
-        pytest.UsageError: zero repetitions, a negative time-out and the like.
-    """
-    options.repetitions(config)
-    for name, least in (
-        ("sim_jobs", 1), ("jitter", 0), ("sim_seed", 0), ("sim_timeout", 1e-3),
-        ("sim_stall_timeout", 1e-3), ("sim_memory_limit", 1),
-    ):  # fmt: skip
-        number = options.value(config, name)
-        if number is not None and not number >= least:
-            flag = "--" + name.replace("_", "-")
-            raise pytest.UsageError(f"{flag} {number}: give at least {least:g}")
-    for name in ("protocol", "sim_trace"):
-        options.value(config, name)
-    for metric, text in options.assignments(config, "sim_threshold").items():
-        try:
-            float(text)
-        except ValueError:
-            raise pytest.UsageError(
-                f"--sim-threshold {metric}={text}: the value must be a number"
-            ) from None
+NOTHING = pytest.param(
+    ("none", "headless"),
+    id="none",
+    marks=[pytest.mark.skip(reason="no selected simulator fits the only_sim mark")],
+)
+"""The parameter of a test that runs on no simulator."""
 
 
 def parameters(metafunc: pytest.Metafunc, selection: Selection) -> list[Any]:
@@ -157,10 +186,7 @@ def parameters(metafunc: pytest.Metafunc, selection: Selection) -> list[Any]:
         for mode in selection.modes:
             marks = _marks(node, name, mode, selection)
             result.append(pytest.param((name, mode), id=f"{name}-{mode}", marks=marks))
-    if not result:
-        skip = pytest.mark.skip(reason="no selected simulator fits the only_sim mark")
-        result.append(pytest.param(("none", "headless"), id="none", marks=[skip]))
-    return result
+    return result or [NOTHING]
 
 
 def _wanted(node: Any, name: str) -> bool:
@@ -172,13 +198,15 @@ def _wanted(node: Any, name: str) -> bool:
 
 def _marks(node: Any, name: str, mode: str, selection: Selection) -> list[pytest.MarkDecorator]:
     from pytest_simbench.simulator.info import Capability
-    from pytest_simbench.simulator.registry import adapter
+    from pytest_simbench.simulator.registry import problem
 
     marks = []
     reason = selection.missing(name)
     if reason:
         marks.append(pytest.mark.skip(reason=reason))
-    info = adapter(name).info
+    if problem(name):
+        return marks  # nothing else is known of it
+    info = _info(name)
     if mode not in info.modes:
         marks.append(pytest.mark.skip(reason=f"{name} has no window"))
     for mark in node.iter_markers("skip_sim"):
@@ -233,24 +261,20 @@ def _check_keywords(mark: pytest.Mark, node: Any) -> None:
 
 
 def number_mark(node: Any, name: str) -> Any:
-    """The positive number in a mark such as `reps(5)`, or None without the mark.
+    """The number in a mark such as `reps(5)`, or None without the mark.
 
     Raises:
-        pytest.UsageError: no argument, or not a positive number.
+        pytest.UsageError: no argument, or no number that the option could have.
     """
     mark = node.get_closest_marker(name)
     if mark is None:
         return None
     _check_keywords(mark, node)
     if len(mark.args) > 1:
-        raise pytest.UsageError(f"{node.nodeid}: {name}{mark.args!r}: give one number")
-    number = mark.args[0] if mark.args else None
-    whole = name == "reps"
-    if (
-        isinstance(number, bool)
-        or not isinstance(number, int if whole else int | float)
-        or not 0 < number < inf
-    ):
-        noun = "positive whole number" if whole else "positive number"
-        raise pytest.UsageError(f"{node.nodeid}: {name}({number!r}): give a {noun}")
-    return number
+        raise pytest.UsageError(f"{node.nodeid}: {name}{shown(mark.args)}: give one number")
+    try:
+        return options.number(f"sim_{name.removeprefix('sim_')}", *(mark.args or [None]))
+    except BadValue as error:
+        raise pytest.UsageError(
+            f"{node.nodeid}: {name}({shown(repr(error.text))}): {error.advice}"
+        ) from None

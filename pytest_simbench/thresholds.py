@@ -18,10 +18,10 @@ def problem(config: pytest.Config, items: Iterable[pytest.Item]) -> str:
     have metrics of their own. The ini file, which holds for tests that were not collected this
     time too, is not checked.
     """
-    if not config.getoption("sim_threshold"):
+    if not options.given(config, "sim_threshold"):
         return ""
     asking = [item for item in items if "threshold" in getattr(item, "fixturenames", ())]
-    given = options.assignments(config, "sim_threshold")
+    given = options.value(config, "sim_threshold")
     unknown = given.keys() - {text for item in asking for text in _texts(item)}
     if not unknown:
         return ""
@@ -32,7 +32,7 @@ def problem(config: pytest.Config, items: Iterable[pytest.Item]) -> str:
     tasks = (Stacking(), Throwing())
     known = {m.name for m in (*COSTS, FAILURES, *(m for task in tasks for m in task.metrics))}
     for name in sorted(unknown - known):
-        return f"--sim-threshold {name}={given[name]}: {UnknownMetric(name, known)}"
+        return f"--sim-threshold={name}={given[name]:g}: {UnknownMetric(name, known)}"
     return ""
 
 

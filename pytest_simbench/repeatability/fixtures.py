@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from pytest_simbench import options as session_options
+from pytest_simbench.arguments import checked_task
 from pytest_simbench.plugin import run
 from pytest_simbench.text import for_terminal
 
@@ -42,6 +43,7 @@ def replay(request: pytest.FixtureRequest, simbench_case: Case) -> Callable[[Tas
     from pytest_simbench.simulator.registry import adapter
 
     def replay_task(task: Task, **options: Any) -> Replay:
+        checked_task(task, "replay")
         case = simbench_case
         info = adapter(case.simulator).info
         with _Handles() as handle:
@@ -184,8 +186,14 @@ def perturb(
     All examples run in the session's worker (one of the test's own where it has `sim_settings`).
     """
     with _Handles() as handles:
-        handle = handles(simbench_case) if sim_settings else request.getfixturevalue("simulator")
-        yield lambda task: Perturber(simbench_case, _experiment(simbench_case, handle, task))
+        own = handles(simbench_case) if sim_settings else None
+        handle = own or request.getfixturevalue("simbench_handle")
+
+        def perturb_task(task: Task) -> Perturber:
+            checked_task(task, "perturb")
+            return Perturber(simbench_case, _experiment(simbench_case, handle, task))
+
+        yield perturb_task
 
 
 @pytest.hookimpl(trylast=True)

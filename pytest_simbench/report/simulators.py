@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from pytest_simbench.text import for_terminal
@@ -28,7 +28,7 @@ def _here(selection: Selection, name: str) -> str:
     own = selection.python(name) is not None
     try:
         found = selection.environment(name).version() if own else version(info.distribution)
-    except PackageNotFoundError:
+    except Exception:  # not there, or metadata that nobody can read
         found = None
     place = f"in its own environment, {selection.environment(name).folder}" if own else "installed"
     untested = "" if found == info.tested_version else ", UNTESTED"
@@ -42,17 +42,23 @@ def _size(info: SimulatorInfo) -> str:
 
 
 def list_simulators(selection: Selection) -> Iterator[str]:
-    """Lines: the table of capabilities, then a paragraph for each registered simulator."""
+    """Lines: the table of capabilities, then a paragraph for each registered simulator, also for
+    those whose adapter is broken."""
     return map(for_terminal, _lines(selection))
 
 
 def _lines(selection: Selection) -> Iterator[str]:
     from pytest_simbench.report.capabilities import capability_table
-    from pytest_simbench.simulator.registry import adapter, registered
+    from pytest_simbench.simulator.registry import adapter, known, problem, registered, registry
 
     yield capability_table([adapter(name).info for name in registered()], _width())
     yield ""
-    for name in registered():
+    for name in known():
+        broken = problem(name)
+        if broken:
+            yield f"{name}: BROKEN: {broken}"
+            yield ""
+            continue
         cls = adapter(name)
         info = cls.info
         missing = selection.missing(name)
@@ -65,3 +71,5 @@ def _lines(selection: Selection) -> Iterator[str]:
             what = f"{deviation.quantity}: " if deviation.quantity else ""
             yield f"    deviates: {what}{deviation.reason}"
         yield ""
+    for sentence in registry().unreadable:
+        yield f"BROKEN: {sentence}"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import math
+import reprlib
 import types
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,6 +13,10 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 from pytest_simbench.simulator.errors import SettingsError
 
 S = TypeVar("S", bound="Settings")
+
+SHORTEST_STEP, LONGEST_STEP = 1e-6, 0.1
+"""Bounds of an integration step [s]: a run of more steps would not end in a day, and a cube falls
+its own height in one of less."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +56,7 @@ def changed(settings: S, changes: Mapping[str, Any], simulator: str) -> S:
     for name in changes:
         if name not in hints:
             raise SettingsError(
-                f"{simulator} has no setting {name!r}; choose from "
+                f"{simulator} has no setting {reprlib.repr(name)}; choose from "
                 + ", ".join(f"{key}={getattr(settings, key)}" for key in hints)
             )
     values = {
@@ -58,37 +64,61 @@ def changed(settings: S, changes: Mapping[str, Any], simulator: str) -> S:
         for name, value in changes.items()
     }
     result = dataclasses.replace(settings, **values)
-    if not result.timestep > 0:
-        raise SettingsError(f"{simulator}.timestep must be positive, not {result.timestep}")
+    if not SHORTEST_STEP <= result.timestep <= LONGEST_STEP:
+        raise SettingsError(
+            f"{simulator}.timestep={result.timestep:g}: give a number of seconds from "
+            f"{SHORTEST_STEP:g} to {LONGEST_STEP:g}"
+        )
     return result
 
 
 def _converted(value: Any, hint: Any, where: str) -> Any:
     """`value`, perhaps a text from the command line, as the annotated type `hint`."""
     origin = get_origin(hint)
+    text = value if isinstance(value, str) and len(value) < 40 else reprlib.repr(value)
     if origin is Literal:
         choices = get_args(hint)
         for choice in choices:
-            if value == choice or str(value) == str(choice):
+            if str(value) == str(choice):
                 return choice
-        raise SettingsError(f"{where}={value}: choose from {', '.join(map(str, choices))}")
+        raise SettingsError(f"{where}={text}: choose from {', '.join(map(str, choices))}")
     if origin in (Union, types.UnionType):
         options = [option for option in get_args(hint) if option is not type(None)]
         if value is None or value == "none":
             return None
         return _converted(value, options[0], where)
     if origin is tuple:
-        parts = value.split("/") if isinstance(value, str) else list(value)
+        parts = value.split("/") if isinstance(value, str) else value
         kinds = get_args(hint)
-        if len(parts) != len(kinds):
-            raise SettingsError(f"{where}={value}: give {len(kinds)} numbers, separated by '/'")
+        if not isinstance(parts, list | tuple) or len(parts) != len(kinds):
+            raise SettingsError(f"{where}={text}: give {len(kinds)} numbers, separated by '/'")
         return tuple(_converted(p, k, where) for p, k in zip(parts, kinds, strict=True))
-    if hint is bool and isinstance(value, str):
-        texts = {"1": True, "true": True, "on": True, "0": False, "false": False, "off": False}
-        if value.lower() not in texts:
-            raise SettingsError(f"{where}={value}: give true or false")
-        return texts[value.lower()]
-    try:
-        return hint(value)
-    except (TypeError, ValueError):
-        raise SettingsError(f"{where}={value!r} is not a valid {hint.__name__}") from None
+    found = _of_type(value, hint)
+    if found is None:
+        raise SettingsError(f"{where}={text}: {_ADVICE.get(hint, f'give a {hint.__name__}')}")
+    return found
+
+
+_TRUTH = {"1": True, "true": True, "on": True, "0": False, "false": False, "off": False}
+
+_ADVICE = {bool: "give true or false", int: "give a whole number", float: "give a finite number"}
+
+
+def _of_type(value: Any, hint: type) -> Any:
+    """`value`, a text or of the type itself, as `hint`; None where nothing would be the same."""
+    if hint is bool:
+        return _TRUTH.get(value.lower()) if isinstance(value, str) else _same(value, bool)
+    if hint in (int, float):
+        if isinstance(value, bool) or not hasattr(value, "__float__") | isinstance(value, str):
+            return None
+        try:
+            number = hint(value)
+            same = isinstance(value, str) or number == value
+        except (TypeError, ValueError, OverflowError):
+            return None
+        return number if same and math.isfinite(number) else None
+    return _same(value, hint)
+
+
+def _same(value: Any, hint: type) -> Any:
+    return value if isinstance(value, hint) else None
