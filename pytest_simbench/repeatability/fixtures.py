@@ -102,7 +102,7 @@ def _other_mode(
 def _experiment(case: Case, handle: SimulatorHandle, task: Task) -> Experiment:
     from pytest_simbench.repeatability.episode import Experiment, scaled_jitter
 
-    chosen = task.smoke() if case.protocol.smallest else task
+    chosen = case.protocol.version_of(task)
     return Experiment(handle, chosen, case.seed, scaled_jitter(case.jitter))
 
 
@@ -142,7 +142,7 @@ class Perturber:
 
     @property
     def task(self) -> Task:
-        """The task that is run: its smallest version under `--protocol smoke`."""
+        """The task that is run: the version that `--protocol` asks for."""
         return self.experiment.task
 
     def search(self, bounds: Mapping[str, float] | None = None, **options: Any) -> Finding:

@@ -35,7 +35,7 @@ class Repetition:
 
     Args:
         case: simulator, settings and limits.
-        task: what to do.
+        task: what to do, as it is: `Protocol.version_of` has been asked before.
         number: of the repetition, from 1.
         idle: where workers come from and go to, if the case reuses them.
         on_phase, on_count: progress, see `tasks.base`.
@@ -52,7 +52,7 @@ class Repetition:
         on_count: Callable[[int, int], None] = lambda done, total: None,
     ) -> None:
         self.case = case
-        self.task = task.smoke() if case.protocol.smallest else task
+        self.task = task
         self.number = number
         self.seed = case.seed + number - 1
         self.where = Where(case.simulator, case.mode, number, self.seed)

@@ -84,6 +84,12 @@ class Task(ABC):
         """The smallest version of the task that still exercises every part of it."""
         return self
 
+    def study(self) -> Task:
+        """The task by the reference study's own rules, where they differ from ours; docs/study.md
+        lists each difference. Its size stays as asked for. Every rule is a parameter, so that
+        the record says which one held."""
+        return self
+
     @abstractmethod
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         """The scene of a repetition; the same seed gives the same scene on every simulator."""
