@@ -111,12 +111,9 @@ def _label(case: Case) -> str:
 
 
 def _keep(case: Case, kind: str, experiment: Experiment, result: Mapping[str, Any]) -> None:
-    from dataclasses import asdict
-
     from pytest_simbench.repeatability.store import Line, append
 
     constructed = experiment.handle.constructed
-    task = {f"task.{k}": v for k, v in asdict(experiment.task).items()}  # type: ignore[call-overload]
     line = Line(
         kind,
         case.test,
@@ -125,7 +122,7 @@ def _keep(case: Case, kind: str, experiment: Experiment, result: Mapping[str, An
         case.profile,
         experiment.task.name,
         case.seed,
-        {**constructed.get("settings", {}), **task},
+        {**constructed.get("settings", {}), **experiment.task.parameters()},
         constructed.get("versions", {}),
         result,
     )

@@ -6,7 +6,6 @@ import os
 import platform
 import time
 from collections.abc import Callable
-from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -213,7 +212,7 @@ class Repetition:
             stepping=stepping,
             timeline={} if self._world is None else self._world.timeline,
             resources=resources,
-            settings={**self._constructed.get("settings", {}), **_parameters(self.task)},
+            settings={**self._constructed.get("settings", {}), **self.task.parameters()},
             versions={
                 "pytest-simbench": __version__,
                 **({"python": self._process.python_version} if self._process else {}),
@@ -267,10 +266,6 @@ def _failure(error: BaseException, where: Where) -> Failure:
     if isinstance(error, WorkerError):
         return Failure(type(error).__name__, error.what, error.phase, error.log_tail)
     return Failure(type(error).__name__, str(error), where.phase)
-
-
-def _parameters(task: Task) -> dict[str, Any]:
-    return {f"task.{key}": value for key, value in asdict(task).items()}  # type: ignore[call-overload]
 
 
 @cache
