@@ -94,7 +94,7 @@ class Manipulator:
         self.fingers = self.gripper.opened
         self.held: str | None = None
         self._released: tuple[str, ...] = ()
-        self._origin: Pose | None = None
+        self._origin = Pose()
         self._grip = Pose()
         self._released_at = world.time
 
@@ -178,17 +178,15 @@ class Manipulator:
 
     def recover(self) -> str | None:
         """After a failure: put a held cube back where it came from, and open the hand."""
+        if self.held is None:
+            return None  # and the hand is open
         problem = None
-        if self.held is not None and self._origin is not None:
-            if self._in_hand():
-                above = self._origin.translated(z=PUT_BACK_HEIGHT)
-                problem = self._attempt("put back", lambda: self.place(above))
-            if self.held is not None:
-                self._open()
-            return problem or self.try_retreat()
-        if self.fingers != self.gripper.opened:
+        if self._in_hand():
+            above = self._origin.translated(z=PUT_BACK_HEIGHT)
+            problem = self._attempt("put back", lambda: self.place(above))
+        if self.held is not None:
             self._open()
-        return None
+        return problem or self.try_retreat()
 
     def _attempt(self, what: str, motion: Callable[[], None]) -> str | None:
         try:

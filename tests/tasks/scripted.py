@@ -31,8 +31,8 @@ HALF = CUBE_SIZE / 2
 """Where a finger stands that presses on a cube [m]."""
 
 Effect = Callable[["ScriptedProcess"], None]
-Named = str | Callable[["ScriptedProcess"], str]
-"""A cube: its name, or who it is when the time comes (cubes are taken in an order by seed)."""
+Cube = Callable[["ScriptedProcess"], str]
+"""Which cube it is, when the time comes: cubes are taken in an order by seed."""
 
 
 @dataclass(frozen=True)
@@ -63,10 +63,12 @@ class ScriptedProcess:
 
     Attributes:
         asked: every operation so far.
-        counts: what the task reported as progress.
+        counts, marks: what the task reported as progress, the moments that it marked [s].
         released: cubes that the hand let go, in order, and the pose that each had then.
         held: name of the cube in the hand, or None.
-        time, position, poses, velocities: simulated time [s], of all joints, of all cubes.
+        time: simulated [s].
+        commanded, position: of all joints, as told and as they are.
+        poses, velocities: of all cubes.
     """
 
     pid = None
@@ -85,6 +87,7 @@ class ScriptedProcess:
         self.time = 0.0
         self.held: str | None = None
         self.counts: list[tuple[int, int]] = []
+        self.marks: dict[str, float] = {}
         self._phase, self._phase_began = "", 0.0
         self._samples: list[tuple[float, FloatArray, FloatArray]] = []
 
@@ -108,6 +111,7 @@ class ScriptedProcess:
         robot = self.scene.robot
         self.model = None if robot is None else RobotModel(robot)
         self.position = np.zeros(0) if robot is None else robot.column("initial_position")
+        self.commanded = self.position
         self.poses = {body.name: body.pose for body in self.scene.free_bodies}
         self.velocities = {name: np.zeros(6) for name in self.poses}
         return {"excused": [], **self.do_state()}
@@ -120,7 +124,7 @@ class ScriptedProcess:
 
     def do_wait(self, duration: float, log_period: float | None) -> dict[str, Any]:
         self._note("wait", duration, {"duration": duration})
-        rows = np.repeat(self.position[None], 2, axis=0)
+        rows = np.repeat(self.commanded[None], 2, axis=0)
         return self._advance(duration, np.array([0.0, duration]), rows, log_period)
 
     def do_follow(
@@ -190,12 +194,12 @@ class ScriptedProcess:
 
     def _command(self, position: FloatArray) -> None:
         """The joints are there at once, and the cube in the hand with them."""
-        self.position = position
+        self.position = self.commanded = position
         pressing = position[-1] < HALF - 1e-4
         if pressing and self.held is None:
             self._grasp()
         elif self.held is not None:
-            self.poses[self.held] = self.tool() * self._grip
+            self.poses[self.held] = self.tool() * self.grip
             if not pressing:
                 self.let_go()
         if self.held is not None:
@@ -205,7 +209,7 @@ class ScriptedProcess:
         tool = self.tool()
         for name, pose in self.poses.items():
             if np.linalg.norm(np.subtract(pose.position, tool.position)) < REACH:
-                self.held, self._grip = name, tool.inverse() * pose
+                self.held, self.grip = name, tool.inverse() * pose
                 return
 
     def let_go(self) -> None:
@@ -238,6 +242,18 @@ class ScriptedProcess:
         return np.array(rows).reshape(-1, 13)
 
 
+class ScriptedWorld(World):
+    """A world that also knows the simulated time of each moment that the task marked."""
+
+    def __init__(self, process: ScriptedProcess, scene: Scene) -> None:
+        super().__init__(process, scene)  # type: ignore[arg-type]
+        self.scripted = process
+
+    def mark(self, moment: str) -> None:
+        super().mark(moment)
+        self.scripted.marks[moment] = self.time
+
+
 def perform(
     task: Task,
     *script: Mishap,
@@ -248,18 +264,28 @@ def perform(
     """A task's score in the world of the script, every mishap of which must have happened."""
     process = process or ScriptedProcess()
     process.pending += script
-    world = World(process, task.scene(seed, jitter or Jitter()))  # type: ignore[arg-type]
+    world = ScriptedWorld(process, task.scene(seed, jitter or Jitter()))
     outcome = task.perform(world, seed, lambda *count: process.counts.append(count))
     assert not process.pending, f"never happened: {process.pending}"
     return outcome, process
 
 
-def stacked(number: int) -> Named:
+def stacked(number: int) -> Cube:
     """The cube that was let go as the `number`th, from 1."""
     return lambda process: process.released[number - 1][0]
 
 
-def move(cube: Named, *, tilt: float = 0.0, **offset: float) -> Effect:
+def untouched(number: int) -> Cube:
+    """The `number`th cube, from 1, of those that the hand never let go."""
+
+    def name(process: ScriptedProcess) -> str:
+        let_go = {name for name, _ in process.released}
+        return [name for name in process.poses if name not in let_go][number - 1]
+
+    return name
+
+
+def move(cube: str | Cube, *, tilt: float = 0.0, **offset: float) -> Effect:
     """A cube is suddenly elsewhere: by x, y, z [m], tilted by `tilt` [rad] about x."""
 
     def effect(process: ScriptedProcess) -> None:
@@ -273,11 +299,20 @@ def move(cube: Named, *, tilt: float = 0.0, **offset: float) -> Effect:
     return effect
 
 
-def put(cube: Named, pose: Pose) -> Effect:
+def put(cube: str | Cube, pose: Pose) -> Effect:
     """A cube is suddenly at `pose`."""
 
     def effect(process: ScriptedProcess) -> None:
         process.poses[cube if isinstance(cube, str) else cube(process)] = pose
+
+    return effect
+
+
+def slip(**offset: float) -> Effect:
+    """The cube in the hand is suddenly elsewhere in it: by x, y, z in the tool's frame [m]."""
+
+    def effect(process: ScriptedProcess) -> None:
+        process.grip = process.grip.translated(**offset)
 
     return effect
 
