@@ -12,6 +12,11 @@ from pytest_simbench.simulator.errors import SettingsError
 
 S = TypeVar("S", bound="Settings")
 
+LARGEST_TIMESTEP = 1 / 60
+"""[s]. At the 3 m/s that the arm reaches, a cube of 5 cm then moves by its own width in a step, and
+with longer steps one may pass through another unseen. No engine here has a longer default
+(Omniverse PhysX has this one), and no motion or wait of a task is shorter."""
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -44,7 +49,8 @@ def changed(settings: S, changes: Mapping[str, Any], simulator: str) -> S:
     """The settings with single values changed; texts are converted to each field's type.
 
     Raises:
-        SettingsError: an unknown name, or a value its field cannot take; lists the valid ones.
+        SettingsError: an unknown name, a value its field cannot take, or a time step too coarse for
+            the tasks; lists the valid ones.
     """
     hints = get_type_hints(type(settings))
     for name in changes:
@@ -58,8 +64,11 @@ def changed(settings: S, changes: Mapping[str, Any], simulator: str) -> S:
         for name, value in changes.items()
     }
     result = dataclasses.replace(settings, **values)
-    if not result.timestep > 0:
-        raise SettingsError(f"{simulator}.timestep must be positive, not {result.timestep}")
+    if not 0 < result.timestep <= LARGEST_TIMESTEP:
+        raise SettingsError(
+            f"{simulator}.timestep must be above 0 and at most {LARGEST_TIMESTEP:.4g} s, in which "
+            f"a thrown cube moves by its own width, not {result.timestep:g}"
+        )
     return result
 
 

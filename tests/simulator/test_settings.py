@@ -33,7 +33,7 @@ def test_texts_become_values(name: str, text: Any, value: Any) -> None:
         ({"cone": "round"}, "mujoco.cone=round: choose from pyramidal, elliptic"),
         ({"solref": "1"}, "mujoco.solref=1: give 2 numbers, separated by '/'"),
         ({"timestep": "fast"}, "mujoco.timestep='fast' is not a valid float"),
-        ({"timestep": -1}, "mujoco.timestep must be positive, not -1.0"),
+        ({"timestep": -1}, "mujoco.timestep must be above 0 and at most 0.01667 s, .*, not -1"),
     ],
 )
 def test_bad_changes(changes: dict[str, Any], message: str) -> None:

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.client.errors import Where
+from pytest_simbench.client.errors import Where, WorkerError
 from pytest_simbench.client.world import World
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.scene import FloatArray, Pose, Scene
@@ -322,10 +322,10 @@ def drop(process: ScriptedProcess) -> None:
     process.let_go()
 
 
-def fail(error: Exception) -> Effect:
+def fail(error: type[BaseException], what: str = "as the script says") -> Effect:
     """The worker fails: what its request raises."""
 
     def effect(process: ScriptedProcess) -> None:
-        raise error
+        raise error(what, process.where) if issubclass(error, WorkerError) else error(what)
 
     return effect

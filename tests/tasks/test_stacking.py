@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pytest_simbench.client.errors import Diverged, RepetitionTimeout, Where
+from pytest_simbench.client.errors import Diverged, RepetitionTimeout
 from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.robot.panda import READY
 from pytest_simbench.scene import Box, Pose
@@ -101,7 +101,7 @@ def test_every_score_of_a_world_with_one_of_everything() -> None:
 def test_placed_is_counted_half_a_second_after_the_release_and_the_end_at_the_end(
     phase: str, after: float, placed: float, at_end: float
 ) -> None:
-    found = score(ONE, Mishap(phase, after, move(stacked(1), x=0.2, z=-0.025)))
+    found = score(ONE, Mishap(phase, after, move(stacked(1), x=0.2)))
     assert (found["placed"], found["placed_strict"]) == (placed, placed)
     assert (found["at_end"], found["at_end_strict"], found["towers"]) == (at_end,) * 3
 
@@ -252,16 +252,10 @@ def test_what_could_not_be_done_on_the_way_is_noted() -> None:
     assert outcome.metrics["placed"] == 1.0
 
 
-@pytest.mark.parametrize(
-    "error",
-    [
-        RepetitionTimeout("the repetition took longer than 900 s", Where("x", "headless")),
-        Diverged("the state is not finite", Where("x", "headless")),
-    ],
-)
+@pytest.mark.parametrize("error", [RepetitionTimeout, Diverged])
 @pytest.mark.parametrize("phase", ["settle start", "pick cube 2 of 2", "settle"])
-def test_a_world_that_fails_has_no_score(error: Exception, phase: str) -> None:
-    with pytest.raises(type(error)):
+def test_a_world_that_fails_has_no_score(error: type[Exception], phase: str) -> None:
+    with pytest.raises(error):
         perform(Stacking(towers=1, levels=2), Mishap(phase, 0.1, fail(error)))
 
 
@@ -381,7 +375,7 @@ def test_the_study_makes_one_attempt_for_each_place() -> None:
 def test_the_study_counts_after_the_retreat_and_half_a_second(
     phase: str, after: float, placed: float
 ) -> None:
-    fall = Mishap(phase, after, move(stacked(1), x=0.2, z=-0.025))
+    fall = Mishap(phase, after, move(stacked(1), x=0.2))
     assert score(ONE.study(), fall)["placed"] == placed
 
 
