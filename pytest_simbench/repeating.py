@@ -44,9 +44,10 @@ class Repeating:
 
     def __call__(self, task: Task) -> ResultSet:
         """Run a task's repetitions, as many as options and marks say."""
-        self.this.declare(task.smoke() if self.case.protocol.smallest else task)
+        task = self.case.protocol.version_of(task)
+        self.this.declare(task)
         wanted = options.value(self.node.config, "sim_reps")
-        metrics = (task.smoke() if self.case.protocol.smallest else task).metrics
+        metrics = task.metrics
         found = self.this.resume(self.node.nodeid, task.name)
         if isinstance(wanted, options.Auto):
             plan = Plan.up_to(wanted.limit)

@@ -81,7 +81,7 @@ class WorldParityError(WorkerError):
 
 
 class Diverged(WorkerError):
-    """The engine's state is not finite."""
+    """The engine's state is not finite or cannot be: cubes outside the room, inside each other."""
 
 
 class Unavailable(WorkerError):

@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_simbench.client.errors import Diverged
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.stopwatch import Stopwatch
 from pytest_simbench.scene import FloatArray, Pose, Scene, Trajectory
+from pytest_simbench.scene.plausibility import implausible
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,9 @@ class Motion:
 
 class World:
     """The scene as it is now, and the means to move it on.
+
+    Loading, moving and restoring raise `Diverged` where the cubes end up in a state that cannot
+    be, see `scene.plausibility`.
 
     Attributes:
         scene: what was loaded.
@@ -87,6 +92,12 @@ class World:
         self.time = float(answer["time"])
         self.joints: FloatArray = answer["joints"]
         self.bodies: FloatArray = answer["bodies"]
+        wrong = implausible(self.scene, self.bodies)
+        if wrong is not None:
+            raise Diverged(
+                f"{wrong}, at t = {self.time:.3f} s; a smaller timestep may help",
+                self.process.where,
+            )
 
     def _compile(self) -> None:
         """Have the engine compile; the repetition's time-out stands still meanwhile."""

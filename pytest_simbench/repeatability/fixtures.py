@@ -106,7 +106,7 @@ def _other_mode(
 def _experiment(case: Case, handle: SimulatorHandle, task: Task) -> Experiment:
     from pytest_simbench.repeatability.episode import Experiment, scaled_jitter
 
-    chosen = task.smoke() if case.protocol.smallest else task
+    chosen = case.protocol.version_of(task)
     return Experiment(handle, chosen, case.seed, scaled_jitter(case.jitter))
 
 
@@ -115,12 +115,9 @@ def _label(case: Case) -> str:
 
 
 def _keep(case: Case, kind: str, experiment: Experiment, result: Mapping[str, Any]) -> None:
-    from dataclasses import asdict
-
     from pytest_simbench.repeatability.store import Line, append
 
     constructed = experiment.handle.constructed
-    task = {f"task.{k}": v for k, v in asdict(experiment.task).items()}  # type: ignore[call-overload]
     line = Line(
         kind,
         case.test,
@@ -129,7 +126,7 @@ def _keep(case: Case, kind: str, experiment: Experiment, result: Mapping[str, An
         case.profile,
         experiment.task.name,
         case.seed,
-        {**constructed.get("settings", {}), **task},
+        {**constructed.get("settings", {}), **experiment.task.parameters()},
         constructed.get("versions", {}),
         result,
     )
@@ -146,7 +143,7 @@ class Perturber:
 
     @property
     def task(self) -> Task:
-        """The task that is run: its smallest version under `--protocol smoke`."""
+        """The task that is run: the version that `--protocol` asks for."""
         return self.experiment.task
 
     def search(self, bounds: Mapping[str, float] | None = None, **options: Any) -> Finding:

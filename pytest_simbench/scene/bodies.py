@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.scene.checks import check_name, check_number, check_numbers, check_pose
+from pytest_simbench.scene.overlap import overlaps
 from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
 
 Colour = tuple[float, float, float, float]
@@ -82,19 +83,10 @@ class Box:
 
 
 def penetration(a: Box, b: Box) -> float:
-    """How deep two boxes overlap [m]; 0 or less when they are apart or touch.
-
-    The separating-axis test: two convex boxes are apart when one of 15 axes (3 face normals each
-    and the 9 products of their edges) separates their projections.
-    """
-    ra, rb = a.pose.rotation(), b.pose.rotation()
-    offset = np.asarray(b.pose.position) - np.asarray(a.pose.position)
+    """How deep two boxes overlap [m]; 0 or less when they are apart or touch."""
+    offset = np.subtract(b.pose.position, a.pose.position)
     half_a, half_b = np.asarray(a.size) / 2, np.asarray(b.size) / 2
     if np.linalg.norm(offset) > np.linalg.norm(half_a) + np.linalg.norm(half_b):
         return 0.0
-    crosses = np.cross(ra.T[:, None, :], rb.T[None, :, :]).reshape(9, 3)
-    axes = np.vstack([ra.T, rb.T, crosses])
-    lengths = np.linalg.norm(axes, axis=1)
-    axes = axes[lengths > 1e-9] / lengths[lengths > 1e-9, None]
-    reach = np.abs(axes @ ra) @ half_a + np.abs(axes @ rb) @ half_b
-    return float((reach - np.abs(axes @ offset)).min())
+    turn_a, turn_b = a.pose.rotation(), b.pose.rotation()
+    return float(overlaps(offset[None], turn_a[None], half_a[None], turn_b[None], half_b[None])[0])

@@ -20,6 +20,9 @@ from pytest_simbench.scene.robot import Robot
 STANDARD_GRAVITY: Vector3 = (0.0, 0.0, -9.80665)
 """Standard acceleration of free fall [m/s^2] (ISO 80000-3)."""
 
+ROOM: Vector3 = (5.0, 5.0, 10.0)
+"""[m]. The arm throws at 3 m/s from at most 1.4 m up: that flies 2 m and slides or rolls 1 m."""
+
 OVERLAP_TOLERANCE = 1e-4
 """Boxes may overlap this deep at the start [m]: resting contacts are given to rounding."""
 
@@ -34,10 +37,12 @@ class Scene:
         robot: the arm, or None for a scene of boxes alone.
         gravity: [m/s^2].
         ground_friction: Coulomb coefficient of the ground plane.
+        room: how far it goes from the origin to each side in x and in y, and up [m]. A free body
+            that leaves it has diverged (`plausibility`); `math.inf` for a side without a wall.
 
     Raises:
         SceneError: two bodies share a name or overlap, one has the name of what is in every
-            scene, or a number is none.
+            scene, a free one is outside the room, or a number is none.
     """
 
     name: str
@@ -45,6 +50,7 @@ class Scene:
     robot: Robot | None = None
     gravity: Vector3 = field(default=STANDARD_GRAVITY)
     ground_friction: float = 1.0
+    room: Vector3 = field(default=ROOM)
 
     def __post_init__(self) -> None:
         check_name(self.name, "a scene")
@@ -61,6 +67,13 @@ class Scene:
             if names.count(name) > 1:
                 raise SceneError(
                     f"scene {self.name!r}: {names.count(name)} bodies are named {name!r}"
+                )
+        for body in self.free_bodies:
+            at = zip(map(abs, body.pose.position[:2]), self.room[:2], strict=True)
+            if any(value > wall for value, wall in at) or body.pose.position[2] > self.room[2]:
+                raise SceneError(
+                    f"scene {self.name!r}: {body.name!r} is outside the room {self.room} [m]; move "
+                    "it, or give the scene a larger `room`"
                 )
         for a, b in combinations(self.bodies, 2):
             if a.fixed and b.fixed:
@@ -110,6 +123,7 @@ class Scene:
             "robot": None if self.robot is None else self.robot.to_wire(),
             "gravity": list(self.gravity),
             "ground_friction": self.ground_friction,
+            "room": list(self.room),
         }
 
     @classmethod
@@ -120,4 +134,5 @@ class Scene:
             robot=None if data["robot"] is None else Robot.from_wire(data["robot"]),
             gravity=tuple(data["gravity"]),
             ground_friction=data["ground_friction"],
+            room=tuple(data.get("room", ROOM)),  # examples written before there was one
         )

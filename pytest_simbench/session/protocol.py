@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pytest_simbench.tasks.base import Task
 
 
 @dataclass(frozen=True)
@@ -15,6 +19,7 @@ class Protocol:
         before: how long the idle worker is recorded before its simulator starts [s].
         repetitions: default of `--reps`.
         smallest: run the smallest version of each task.
+        study: run each task by the reference study's own rules.
         doc: one sentence for the help.
     """
 
@@ -23,7 +28,15 @@ class Protocol:
     before: float = 0.0
     repetitions: int = 20
     smallest: bool = False
+    study: bool = False
     doc: str = ""
+
+    def version_of(self, task: Task) -> Task:
+        """What is run when a test asks for `task`. Resolved once, where the test's task arrives;
+        everything behind that gets the version itself."""
+        if self.smallest:
+            return task.smoke()
+        return task.study() if self.study else task
 
 
 PROTOCOLS = {
@@ -34,7 +47,9 @@ PROTOCOLS = {
             "paper",
             real_time=True,
             before=5.0,
-            doc="as the reference study: real time, recorded from 5 s before to 60 s after",
+            study=True,
+            doc="as the reference study: its rules, real time, recorded from 5 s before to 60 s "
+            "after",
         ),
         Protocol(
             "smoke", repetitions=1, smallest=True, doc="the smallest run that exercises every part"

@@ -68,7 +68,7 @@ class Repeater:
         finally:
             self._idle.close()
             self.progress.end_test()
-        return ResultSet(records, (task.smoke() if self.case.protocol.smallest else task).metrics)
+        return ResultSet(records, task.metrics)
 
     def _one(self, task: Task, number: int) -> Record:
         with Interrupts() as interrupts:

@@ -7,7 +7,6 @@ import platform
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -44,7 +43,7 @@ class Repetition:
 
     Args:
         case: simulator, settings and limits.
-        task: what to do.
+        task: what to do, as it is: `Protocol.version_of` has been asked before.
         number: of the repetition, from 1.
         idle: where workers come from and go to, if the case reuses them.
         interrupts: held from the moment that the task has ended or failed, so that the record
@@ -64,7 +63,7 @@ class Repetition:
         on_count: Callable[[int, int], None] = lambda done, total: None,
     ) -> None:
         self.case = case
-        self.task = task.smoke() if case.protocol.smallest else task
+        self.task = task
         self.number = number
         self.seed = case.seed + number - 1
         self.where = Where(case.simulator, case.mode, number, self.seed)
@@ -243,7 +242,7 @@ class Repetition:
             stepping=stepping,
             timeline={} if self._world is None else self._world.timeline,
             resources=resources,
-            settings={**self._constructed.get("settings", {}), **_parameters(self.task)},
+            settings={**self._constructed.get("settings", {}), **self.task.parameters()},
             versions={
                 "pytest-simbench": __version__,
                 **({"python": self._process.python_version} if self._process else {}),
@@ -308,10 +307,6 @@ def _failure(error: BaseException, where: Where) -> Failure:
         message = readable(error.what, 2 * LONGEST)  # shortened where it arose
         return Failure(type(error).__name__, message, error.phase, error.log_tail)
     return Failure(readable(type(error).__name__), told(error), where.phase)
-
-
-def _parameters(task: Task) -> dict[str, Any]:
-    return {f"task.{key}": value for key, value in asdict(task).items()}  # type: ignore[call-overload]
 
 
 @cache

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -84,6 +84,16 @@ class Task(ABC):
         """The smallest version of the task that still exercises every part of it."""
         return self
 
+    def study(self) -> Task:
+        """The task by the reference study's own rules, where they differ from ours; docs/study.md
+        lists each difference. Its size stays as asked for. Every rule is a parameter, so that
+        the record says which one held."""
+        return self
+
+    def parameters(self) -> dict[str, Any]:
+        """Every parameter under its name in records: `task.levels`, `task.speeds.carry`."""
+        return dict(_flat("task", asdict(self)))  # type: ignore[call-overload]
+
     @abstractmethod
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         """The scene of a repetition; the same seed gives the same scene on every simulator."""
@@ -95,6 +105,14 @@ class Task(ABC):
         Enter a phase (`world.phase`) for every stage, and measure what is planning
         with `world.stopwatch.measuring("plan")`.
         """
+
+
+def _flat(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _flat(f"{name}.{key}", item)
+    else:
+        yield name, value
 
 
 def cube(name: str, pose: Pose, colour: tuple[float, float, float, float]) -> Box:

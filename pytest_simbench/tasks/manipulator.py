@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -14,6 +15,7 @@ from pytest_simbench.robot.kinematics import inverse_kinematics, tool_over, top_
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.planning import MotionPlanner, Release
 from pytest_simbench.scene import FloatArray, Pose, Trajectory
+from pytest_simbench.tasks.base import CUBE_SIZE
 
 APPROACH = 0.10
 """Height above a grasp or a place from which the tool comes straight down [m] (study code)."""
@@ -27,10 +29,29 @@ RELEASE_TIME = 0.2
 IN_HAND = 0.04
 """A cube whose centre is farther than this from the tool centre point is not held [m]."""
 
-FREE_SPEED, CARRY_SPEED, CONTACT_SPEED = 1.0, 0.6, 0.3
-"""Shares of the joint velocity limits: empty hand, cube in hand, straight down."""
+PUT_BACK_HEIGHT = 0.005
+"""How far above where it came from a cube is let go that could not be placed [m]."""
 
 T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Speeds:
+    """Shares of the joint velocity limits at which the arm moves.
+
+    Attributes:
+        free: with an empty hand.
+        carry: with a cube in the hand.
+        contact: straight down to a cube, or with one to its place.
+    """
+
+    free: float = 1.0
+    carry: float = 0.6
+    contact: float = 0.3
+
+
+FULL_SPEED = Speeds(1.0, 1.0, 1.0)
+"""As the study moved (code: no velocity scaling)."""
 
 
 class LostCube(Exception):
@@ -43,6 +64,10 @@ class Manipulator:
     Motions start from the commanded set points, as a controller's do, and are planned against the
     cubes as the simulator has them now.
 
+    Args:
+        rng: of the repetition; drives everything random in planning.
+        speeds: of its motions.
+
     Attributes:
         world: the simulated world.
         arm: commanded arm joints, (arm,) [rad].
@@ -50,13 +75,16 @@ class Manipulator:
         held: name of the cube in the hand, or None.
     """
 
-    def __init__(self, world: World, rng: np.random.Generator) -> None:
+    def __init__(
+        self, world: World, rng: np.random.Generator, speeds: Speeds | None = None
+    ) -> None:
         robot = world.scene.robot
         if robot is None:
             raise ValueError(f"scene {world.scene.name!r} has no robot")
         self.world = world
         self.gripper = robot.gripper
         self.rng = rng
+        self.speeds = speeds or Speeds()
         with world.stopwatch.measuring("plan"):
             self.model = RobotModel(robot)
             self.planning = PlanningScene(self.model, world.scene)
@@ -66,7 +94,7 @@ class Manipulator:
         self.fingers = self.gripper.opened
         self.held: str | None = None
         self._released: tuple[str, ...] = ()
-        self._origin: Pose | None = None
+        self._origin = Pose()
         self._grip = Pose()
         self._released_at = world.time
 
@@ -81,13 +109,13 @@ class Manipulator:
         grasp, above = self._plan_choice(
             [tool_over(cube, pose.yaw) for pose in top_down_grasps(cube)], ignored=(name,)
         )
-        self.go_to(above, speed=FREE_SPEED)
-        self._linear(grasp, ignored=(name,), speed=CONTACT_SPEED)
+        self.go_to(above, speed=self.speeds.free)
+        self._linear(grasp, ignored=(name,), speed=self.speeds.contact)
         self._move_fingers(self.gripper.closed, GRASP_TIME)
         self.held, self._origin = name, cube
         tool = self.model.tool_pose(self.arm)
         self._grip = tool.inverse() * cube
-        self._linear(grasp.translated(z=APPROACH), ignored=(name,), speed=CARRY_SPEED)
+        self._linear(grasp.translated(z=APPROACH), ignored=(name,), speed=self.speeds.carry)
         self._check_held()
 
     def place(self, target: Pose) -> None:
@@ -103,9 +131,9 @@ class Manipulator:
         grips = [target * Pose.at(0, 0, 0, yaw=k * np.pi / 2) for k in range(-2, 2)]
         tools = [grip * self._grip.inverse() for grip in grips]
         down, above = self._plan_choice(tools)
-        self.go_to(above, speed=CARRY_SPEED)
+        self.go_to(above, speed=self.speeds.carry)
         self._check_held()
-        self._linear(down, speed=CONTACT_SPEED)
+        self._linear(down, speed=self.speeds.contact)
         self._open()
 
     def go_to(self, goal: FloatArray, *, speed: float) -> None:
@@ -141,26 +169,24 @@ class Manipulator:
         """
         above = self.model.tool_pose(self.arm).translated(z=APPROACH)
         return self._attempt(
-            "retreat", lambda: self._linear(above, ignored=self._released, speed=FREE_SPEED)
+            "retreat", lambda: self._linear(above, ignored=self._released, speed=self.speeds.free)
         )
 
     def try_go_home(self) -> str | None:
         """Back to the start position; a sentence when that is not possible."""
-        return self._attempt("go home", lambda: self.go_to(self.home, speed=FREE_SPEED))
+        return self._attempt("go home", lambda: self.go_to(self.home, speed=self.speeds.free))
 
     def recover(self) -> str | None:
         """After a failure: put a held cube back where it came from, and open the hand."""
+        if self.held is None:
+            return None  # and the hand is open
         problem = None
-        if self.held is not None and self._origin is not None:
-            if self._in_hand():
-                origin = self._origin
-                problem = self._attempt("put back", lambda: self.place(origin.translated(z=0.005)))
-            if self.held is not None:
-                self._open()
-            return problem or self.try_retreat()
-        if self.fingers != self.gripper.opened:
+        if self._in_hand():
+            above = self._origin.translated(z=PUT_BACK_HEIGHT)
+            problem = self._attempt("put back", lambda: self.place(above))
+        if self.held is not None:
             self._open()
-        return None
+        return problem or self.try_retreat()
 
     def _attempt(self, what: str, motion: Callable[[], None]) -> str | None:
         try:
@@ -238,7 +264,7 @@ class Manipulator:
         with self.world.stopwatch.measuring("plan"):
             self.planning.update(self.world.poses())
             opened = self.gripper.opened
-            self.planning.opening = opened if self.held is None else _held_opening()
+            self.planning.opening = opened if self.held is None else CUBE_SIZE / 2
             if self.held is not None and self.planning.held != self.held:
                 self.planning.attach(self.held, self._grip)
 
@@ -252,10 +278,3 @@ class Manipulator:
     def _check_held(self) -> None:
         if not self._in_hand():
             raise LostCube(f"{self.held} is not in the hand")
-
-
-def _held_opening() -> float:
-    """Finger position while a cube is held, half its width [m]."""
-    from pytest_simbench.tasks.base import CUBE_SIZE
-
-    return CUBE_SIZE / 2

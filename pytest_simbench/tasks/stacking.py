@@ -11,7 +11,7 @@ import numpy as np
 
 from pytest_simbench.client.world import World
 from pytest_simbench.measure.metrics import Metric
-from pytest_simbench.robot.panda import panda
+from pytest_simbench.robot.panda import FINGER_CLOSED, panda
 from pytest_simbench.robot.planning import PlanningError
 from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.tasks.base import (
@@ -24,7 +24,7 @@ from pytest_simbench.tasks.base import (
     cube,
     generators,
 )
-from pytest_simbench.tasks.manipulator import LostCube, Manipulator
+from pytest_simbench.tasks.manipulator import FULL_SPEED, LostCube, Manipulator, Speeds
 
 TABLE_TOP = 0.30
 """Height of the table top [m] (study code, Webots)."""
@@ -59,15 +59,20 @@ class Place:
 
 @dataclass(frozen=True)
 class Stacking(Task):
-    """Stack `towers` towers of `levels` cubes.
+    """Stack `towers` towers of `levels` cubes; `study()` does it by the study's rules.
 
     Attributes:
         towers: how many of the three.
         levels: cubes in each.
-        release_height: how far above its resting height a cube is let go [m]. The study dropped
-            from about 0.02, which measures bouncing rather than placing.
-        check_delay: from release to the count of *placed* [s] (study).
-        settle: from the end of the task to the count at the end [s] (study: 60).
+        spare_cubes: whether another cube is taken when a pick failed, as long as there are any; if
+            not, its place stays empty.
+        release_height: how far above its resting height a cube is let go [m].
+        check_delay: to the count of *placed*, from the release or the retreat [s].
+        count_after_retreat: whether the hand retreats before `check_delay` begins; if not, it
+            waits and retreats after the count.
+        finger_closed: position commanded to each finger to grasp [m].
+        speeds: of the arm.
+        settle: from the end of the task to the count at the end [s].
     """
 
     name: ClassVar[str] = "stacking"
@@ -75,8 +80,12 @@ class Stacking(Task):
 
     towers: int = 3
     levels: int = 5
+    spare_cubes: bool = True
     release_height: float = 0.005
     check_delay: float = 0.5
+    count_after_retreat: bool = False
+    finger_closed: float = FINGER_CLOSED
+    speeds: Speeds = field(default_factory=Speeds)
     settle: float = 60.0
 
     @property
@@ -87,9 +96,11 @@ class Stacking(Task):
     @property
     def metrics(self) -> tuple[Metric, ...]:
         n = self.cubes
+        counted = "the hand has retreated" if self.count_after_retreat else "release"
         return (
             Metric("placed", "placed", kind="share", of=n, study=True,
-                   doc="within 5 cm in x and y of the target, 0.5 s after release"),
+                   doc="within 5 cm in x and y of the target, "
+                       f"{self.check_delay:g} s after {counted}"),
             Metric("at_end", "at the end", kind="share", of=n, study=True,
                    doc=f"the same, {self.settle:g} s after the task ended"),
             Metric("placed_strict", "placed, strict", kind="share", of=n,
@@ -107,6 +118,21 @@ class Stacking(Task):
     def smoke(self) -> Stacking:
         return replace(self, towers=1, levels=2, settle=2.0)
 
+    def study(self) -> Stacking:
+        """As the study counted (its code): one attempt for each place; dropped from about 2 cm; the
+        hand opens, retreats, and 0.5 s later the cube is counted; fingers 0.020 m closed; full
+        speed; again counted 60 s after the end."""
+        return replace(
+            self,
+            spare_cubes=False,
+            release_height=0.02,
+            check_delay=0.5,
+            count_after_retreat=True,
+            finger_closed=0.02,
+            speeds=FULL_SPEED,
+            settle=60.0,
+        )
+
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         rng = generators(seed)[0]
         cubes = [
@@ -117,7 +143,9 @@ class Stacking(Task):
             )
             for number, (x, y) in enumerate(GRID, start=1)
         ]
-        return Scene("stacking", (TABLE, *cubes), panda())
+        robot = panda()
+        gripper = replace(robot.gripper, closed=self.finger_closed)
+        return Scene("stacking", (TABLE, *cubes), replace(robot, gripper=gripper))
 
     def places(self) -> list[Place]:
         """Targets in the order in which they are filled."""
@@ -133,12 +161,14 @@ class Stacking(Task):
             world.wait(0.2)
         start = world.poses()
         unused = [str(name) for name in order_rng.permutation(sorted(start))]
-        manipulator = Manipulator(world, planner_rng)
+        manipulator = Manipulator(world, planner_rng, self.speeds)
         picks = _Picks()
         world.mark("start")
         for place in self.places():
-            while unused and not self._stack(manipulator, unused.pop(0), place, picks):
-                pass
+            while unused:
+                done = self._stack(manipulator, unused.pop(0), place, picks)
+                if done or not self.spare_cubes:
+                    break
             count(len(picks.stacked), self.cubes)
         with world.phase("go home"):
             picks.note_motion(manipulator.try_go_home())
@@ -148,7 +178,7 @@ class Stacking(Task):
         return self._score(start, world.poses(), picks)
 
     def _stack(self, manipulator: Manipulator, name: str, place: Place, picks: _Picks) -> bool:
-        """Bring one cube to its place; False when it could not be done."""
+        """Bring one cube to its place and count it; False when it could not be done."""
         world = manipulator.world
         where = f"cube {len(picks.stacked) + 1} of {self.cubes}"
         try:
@@ -157,8 +187,6 @@ class Stacking(Task):
             picks.handled.add(name)
             with world.phase(f"place {where}"):
                 manipulator.place(place.pose.translated(z=self.release_height))
-            with world.phase(f"check {where}"):
-                world.wait(max(0.0, self.check_delay - manipulator.time_since_release()))
         except (PlanningError, LostCube) as error:
             picks.fail(name, place, error)
             with world.phase(f"recover from {where}"):
@@ -166,10 +194,20 @@ class Stacking(Task):
             if isinstance(error, LostCube):
                 picks.handled.add(name)
             return False
+        pause = self.check_delay - manipulator.time_since_release()
+        if self.count_after_retreat:
+            pause = self.check_delay
+            self._retreat(manipulator, where, picks)
+        with world.phase(f"check {where}"):
+            world.wait(max(0.0, pause))
         picks.stacked[name] = (place, world.pose(name))
-        with world.phase(f"retreat {where}"):
-            picks.note_motion(manipulator.try_retreat())
+        if not self.count_after_retreat:
+            self._retreat(manipulator, where, picks)
         return True
+
+    def _retreat(self, manipulator: Manipulator, where: str, picks: _Picks) -> None:
+        with manipulator.world.phase(f"retreat {where}"):
+            picks.note_motion(manipulator.try_retreat())
 
     def _score(self, start: Mapping[str, Pose], end: Mapping[str, Pose], picks: _Picks) -> Outcome:
         stacked, n = picks.stacked, self.cubes
@@ -233,7 +271,7 @@ class _Picks:
 
 
 def _placed(place: Place, pose: Pose) -> bool:
-    """As the study counts: height and order do not matter."""
+    """Within the study's distance, and as it measures: height and order do not matter."""
     x, y, _ = np.abs(np.subtract(pose.position, place.pose.position))
     return bool(x <= STUDY_TOLERANCE and y <= STUDY_TOLERANCE)
 

@@ -32,7 +32,7 @@ TEST = """
         (["--sim-set=mujoco.timestep=x"], "mujoco.timestep=x: give a finite number"),
         (
             ["--sim-set=mujoco.timestep=0"],
-            "mujoco.timestep=0: give a number of seconds from 1e-06 to 0.1",
+            "mujoco.timestep=0: give a number of seconds from 1e-06 to 0.01667",
         ),
         (["--sim-set=mujoco.cone=round"], "mujoco.cone=round: choose from pyramidal, elliptic"),
         (

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import pytest
 
 from pytest_simbench.session.case import Case
 from pytest_simbench.session.protocol import PROTOCOLS
 from pytest_simbench.session.repetition import Repetition
-from pytest_simbench.tasks import Stacking
 from tests.tiny import Falling
+
+
+@dataclass(frozen=True)
+class Versions(Falling):
+    """A task that says which version of it this is."""
+
+    version: str = "as asked for"
+
+    def smoke(self) -> Versions:
+        return replace(self, version="the smallest")
+
+    def study(self) -> Versions:
+        return replace(self, version="the study's")
 
 
 def test_paper_runs_in_real_time_and_records_before(case: Case) -> None:
@@ -37,9 +49,21 @@ def test_fast_does_not_wait(case: Case) -> None:
     assert record.timeline["end"] - record.timeline["start"] < 50.0
 
 
-def test_smoke_shrinks_the_task(case: Case) -> None:
-    repetition = Repetition(replace(case, protocol=PROTOCOLS["smoke"]), Stacking(), 1)
-    assert repetition.task == Stacking(towers=1, levels=2, settle=2.0)
+def test_each_protocol_has_its_version_of_a_task() -> None:
+    found = {name: each.version_of(Versions()) for name, each in PROTOCOLS.items()}
+    assert found == {
+        "fast": Versions(version="as asked for"),
+        "paper": Versions(version="the study's"),
+        "smoke": Versions(version="the smallest"),
+    }
+    tiny = Falling(duration=0.1)  # a task with one version only
+    assert all(each.version_of(tiny) == tiny for each in PROTOCOLS.values())
+
+
+def test_a_repetition_runs_the_task_that_it_is_given(case: Case) -> None:
+    """The version has been chosen before: asked twice, a version of a version would be run."""
+    for protocol in PROTOCOLS.values():
+        assert Repetition(replace(case, protocol=protocol), Versions(), 1).task == Versions()
 
 
 def test_a_record_says_what_it_was(case: Case) -> None:

@@ -33,7 +33,7 @@ def test_texts_become_values(name: str, text: Any, value: Any) -> None:
         ({"cone": "round"}, "mujoco.cone=round: choose from pyramidal, elliptic"),
         ({"solref": "1"}, "mujoco.solref=1: give 2 numbers, separated by '/'"),
         ({"timestep": "fast"}, "mujoco.timestep=fast: give a finite number"),
-        ({"timestep": -1}, "mujoco.timestep=-1: give a number of seconds from 1e-06 to 0.1"),
+        ({"timestep": -1}, "mujoco.timestep=-1: give a number of seconds from 1e-06 to 0.01667"),
         ({"timestep": 1e9}, "mujoco.timestep=1e[+]09: give a number of seconds"),
         ({"timestep": "inf"}, "mujoco.timestep=inf: give a finite number"),
         ({"timestep": float("nan")}, "mujoco.timestep=nan: give a finite number"),

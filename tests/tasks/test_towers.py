@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.tasks import Jitter, LeaningTowers
-from pytest_simbench.tasks.base import CUBE_SIZE
+from pytest_simbench.tasks.base import CUBE_MASS, CUBE_SIZE
+from tests.tasks.scripted import Mishap, move, perform
 
 
 @given(margin=st.floats(0.0, 0.024), levels=st.integers(2, 8))
@@ -33,3 +37,60 @@ def test_towers_stand_apart_and_are_counted() -> None:
 def test_smoke_is_one_tower_for_a_shorter_time() -> None:
     assert LeaningTowers().smoke() == LeaningTowers(margins=(0.008,), settle=1.5)
     assert LeaningTowers(settle=1.0).smoke().settle == 1.0
+
+
+def test_every_score_of_towers_of_which_one_stands_one_lost_a_cube_one_fell() -> None:
+    outcome, process = perform(
+        LeaningTowers(levels=3),
+        Mishap("settle", 1.0, move("cube_01", x=0.0099)),
+        Mishap("settle", 2.9, move("cube_06", z=-0.0101)),
+        *(Mishap("settle", 2.99, move(f"cube_0{k}", x=0.1)) for k in (7, 8, 9)),
+    )
+    assert outcome.metrics == pytest.approx({"standing": 5 / 9, "towers": 1 / 3})
+    assert outcome.details == {
+        "fallen": ["cube_06", "cube_07", "cube_08", "cube_09"],
+        "toppled": ["tower 2", "tower 3"],
+    }
+    assert process.counts == [(5, 9)]
+    assert [(a.phase, a.kind, a.duration) for a in process.asked] == [("settle", "wait", 3.0)]
+    assert process.marks == {"start": 0.0, "end": 3.0}
+
+
+@pytest.mark.parametrize(
+    ("offset", "standing"),
+    [
+        ({"x": -0.0099}, 1.0), ({"x": -0.0101}, 0.75),
+        ({"y": 0.0101}, 0.75), ({"z": -0.0101}, 0.75),
+        ({"x": 0.006, "y": 0.006, "z": 0.006}, 0.75), ({"x": 0.005, "y": 0.005, "z": 0.005}, 1.0),
+        ({"tilt": 0.5}, 1.0),
+    ],
+)  # fmt: skip
+def test_a_cube_stands_within_1_cm_of_its_start(offset: dict[str, float], standing: float) -> None:
+    task = LeaningTowers(margins=(0.01,))
+    outcome, _ = perform(task, Mishap("settle", 2.0, move("cube_03", **offset)))
+    assert outcome.metrics["standing"] == standing
+    assert outcome.metrics["towers"] == math.floor(standing)
+
+
+def test_the_towers_as_they_are_built() -> None:
+    task = LeaningTowers(margins=(0.005, 0.009), levels=2)
+    scene = task.scene(3, Jitter())
+    assert scene.name == "leaning towers"
+    assert scene.robot is None
+    assert np.array([body.pose.position for body in scene.bodies]) == pytest.approx(
+        np.array([[0.4, 0.0, 0.025], [0.42, 0.0, 0.075], [0.4, 0.3, 0.025], [0.416, 0.3, 0.075]])
+    )
+    assert {(body.size, body.mass) for body in scene.bodies} == {((CUBE_SIZE,) * 3, CUBE_MASS)}
+    colours = [body.colour for body in scene.bodies]
+    assert colours == [colours[0], colours[1]] * 2
+    assert colours[0] != colours[1]
+
+
+def test_it_says_what_it_measures() -> None:
+    assert LeaningTowers() == LeaningTowers((0.008, 0.010, 0.012), 4, 3.0)
+    assert (LeaningTowers.name, LeaningTowers.study_timeout) == ("leaning towers", 60.0)
+    assert LeaningTowers(settle=2.5).metrics == (
+        Metric("standing", "standing", kind="share", of=12,
+               doc="cubes within 1 cm of their start 2.5 s later"),
+        Metric("towers", "towers", kind="share", of=3, doc="towers all of whose cubes stand"),
+    )  # fmt: skip

@@ -1,0 +1,93 @@
+"""Which states a world can be in, whatever happened in it.
+
+A world whose cubes left the room, sank into the ground or stand inside each other has diverged,
+as one whose state is no number: it is a failure of the simulation and has no score. The limits
+are far beyond all that can happen to a cube; one that lies beside the table or was thrown three
+metres is where it may be.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_simbench.scene.overlap import overlaps, rotations
+from pytest_simbench.scene.pose import FloatArray, Vector3
+from pytest_simbench.scene.scene import Scene
+
+DEEPEST = 1 / 3
+"""Share of the thinner body's shortest edge to which two bodies, or a body and the ground, may
+overlap. The softest contacts here (SAPIEN's and Genesis' defaults) give way by 1 mm of 50."""
+
+FASTEST = 30.0
+"""No point of a body is faster [m/s]: ten times what the arm can throw, and twice a fall from the
+ceiling of the room."""
+
+
+def implausible(scene: Scene, bodies: FloatArray) -> str | None:
+    """Why these states of the free bodies cannot be, as a sentence; None when they can.
+
+    Looked at after every motion and wait, in the pytest process: a third of a millisecond for
+    21 cubes. What is only there for a moment, the depth of a hard impact, is not looked for.
+
+    Args:
+        scene: whose bodies they are.
+        bodies: rows of the free bodies, (n_free, 13), as `World.bodies`.
+    """
+    if not len(bodies):
+        return None
+    free = scene.free_bodies
+    if not np.isfinite(bodies).all():
+        row = int(np.argmin(np.isfinite(bodies).all(axis=1)))
+        return f"the state of {free[row].name!r} is not finite"
+    position = bodies[:, :3]
+    half = np.array([body.size for body in free]) / 2
+    for k in np.flatnonzero(~_inside(position, scene.room)):
+        at = ", ".join(f"{value:.3g}" for value in position[k])
+        x, y, height = scene.room
+        return (
+            f"{free[k].name!r} left the room: it is at ({at}) m, and the room of scene "
+            f"{scene.name!r} goes {x:g} m to each side in x, {y:g} m in y, and {height:g} m up"
+        )
+    radius = np.linalg.norm(half, axis=1)
+    speed = np.linalg.norm(bodies[:, 7:10], axis=1) + radius * np.linalg.norm(
+        bodies[:, 10:], axis=1
+    )
+    for k in np.flatnonzero(speed > FASTEST):
+        return f"{free[k].name!r} moves at {speed[k]:.3g} m/s, and nothing here can be so fast"
+    return _too_deep(scene, bodies)
+
+
+def _inside(position: FloatArray, room: Vector3) -> NDArray[np.bool_]:
+    """Whether each centre is within the walls and under the ceiling, (n,)."""
+    x, y, height = room
+    within: NDArray[np.bool_] = (np.abs(position[:, :2]) <= (x, y)).all(axis=1) & (
+        position[:, 2] <= height
+    )
+    return within
+
+
+def _too_deep(scene: Scene, bodies: FloatArray) -> str | None:
+    """The first body that is inside the ground or another body."""
+    names = [body.name for body in (*scene.free_bodies, *scene.fixed_bodies)]
+    fixed = [body.pose.as_array() for body in scene.fixed_bodies]
+    states = np.concatenate([bodies[:, :7], np.reshape(fixed, (-1, 7))])
+    half = np.array([b.size for b in (*scene.free_bodies, *scene.fixed_bodies)]) / 2
+    limit = 2 * half.min(axis=1) * DEEPEST
+    position, turn = states[:, :3], rotations(states[:, 3:])
+    depth = np.einsum("ni,ni->n", np.abs(turn[:, 2]), half) - position[:, 2]
+    for k in np.flatnonzero(depth[: len(bodies)] > limit[: len(bodies)]):
+        return f"{names[k]!r} is {1000 * depth[k]:.0f} mm deep in the ground"
+    pairs = [(a, b) for a, b in combinations(range(len(names)), 2) if a < len(bodies)]
+    if not pairs:
+        return None
+    a, b = np.array(pairs).T
+    offset, radius = position[b] - position[a], np.linalg.norm(half, axis=1)
+    near = np.linalg.norm(offset, axis=1) < radius[a] + radius[b]
+    a, b, offset = a[near], b[near], offset[near]
+    into = overlaps(offset, turn[a], half[a], turn[b], half[b])
+    for k in np.flatnonzero(into > np.minimum(limit[a], limit[b])):
+        return f"{names[a[k]]!r} and {names[b[k]]!r} overlap by {1000 * into[k]:.0f} mm"
+    return None

@@ -1,0 +1,129 @@
+"""What all tasks share: jitter, generators, parameters, the cube."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from pytest_simbench.scene import Box, Pose
+from pytest_simbench.tasks import Jitter, LeaningTowers, Stacking, Throwing
+from pytest_simbench.tasks.base import CUBE_MASS, CUBE_SIZE, STUDY_TOLERANCE, cube, generators
+from tests.tiny import Falling
+
+AXES = ("x", "y", "angle")
+
+
+def offsets(jitter: Jitter, count: int = 400) -> np.ndarray:
+    """What the jitter did to `count` poses: x and y [m], angle [rad], (count, 3)."""
+    rng = np.random.default_rng(7)
+    pose = Pose.at(0.3, -0.2, 0.4, yaw=0.2)
+    found = [jitter.disturbed(pose, rng) for _ in range(count)]
+    assert {new.position[2] for new in found} == {0.4}
+    assert all(new.tilt() < 1e-7 for new in found)
+    return np.array([[n.position[0] - 0.3, n.position[1] + 0.2, n.yaw - 0.2] for n in found])
+
+
+@pytest.mark.parametrize("number", range(3), ids=AXES)
+def test_jitter_is_uniform_to_both_sides(number: int) -> None:
+    amplitudes = (0.002, 0.002, 0.05)
+    column = offsets(Jitter(0.002, 0.05))[:, number] / amplitudes[number]
+    assert -1.0 <= column.min() < -0.95
+    assert 0.95 < column.max() <= 1.0
+    assert abs(column.mean()) < 0.1  # its standard deviation is 0.029
+    assert column.std() == pytest.approx(1 / np.sqrt(3), abs=0.05)
+
+
+def test_jitter_in_x_y_and_angle_are_independent() -> None:
+    found = np.corrcoef(offsets(Jitter(0.002, 0.05)).T)
+    for i, j in combinations(range(3), 2):
+        assert abs(found[i, j]) < 0.2  # its standard deviation is 0.05
+
+
+def test_the_jitter_of_the_study_cubes() -> None:
+    assert Jitter() == Jitter(distance=0.001, angle=np.deg2rad(1.0))
+    assert np.abs(offsets(Jitter())).max(axis=0) == pytest.approx([1e-3, 1e-3, np.pi / 180], 0.05)
+
+
+def test_each_amplitude_is_its_own_and_three_numbers_are_always_drawn() -> None:
+    moved, turned = offsets(Jitter(0.002, 0.0)), offsets(Jitter(0.0, 0.05))
+    assert np.abs(moved[:, 2]).max() < 1e-12
+    assert np.abs(turned[:, :2]).max() < 1e-12
+    both = offsets(Jitter(0.002, 0.05))
+    assert moved[:, :2] == pytest.approx(both[:, :2])  # the same draws
+    assert turned[:, 2] == pytest.approx(both[:, 2])
+
+
+def test_jitter_turns_a_tilted_body_about_the_vertical() -> None:
+    tilted = Pose((0.0, 0.0, 1.0), (np.cos(0.2), np.sin(0.2), 0.0, 0.0))
+    turned = Jitter(0.0, 0.5).disturbed(tilted, np.random.default_rng(1))
+    turn = Pose(quaternion=turned.quaternion) * Pose(quaternion=tilted.quaternion).inverse()
+    assert turn.quaternion[1:3] == pytest.approx([0.0, 0.0])
+    assert abs(turn.quaternion[3]) > 0.01
+
+
+@pytest.mark.parametrize("task", [Stacking(), Throwing()], ids=lambda task: task.name)
+def test_every_cube_of_every_seed_is_disturbed_by_itself(task: Stacking | Throwing) -> None:
+    jitter, none = Jitter(), Jitter(0.0, 0.0)
+    seen = set()
+    for seed in (1, 2):
+        pairs = zip(
+            task.scene(seed, jitter).free_bodies, task.scene(seed, none).free_bodies, strict=True
+        )
+        for body, nominal in pairs:
+            x, y, _ = np.subtract(body.pose.position, nominal.pose.position)
+            assert 0 < abs(x) <= 0.001
+            assert 0 < abs(y) <= 0.001
+            seen.add((round(x, 9), round(y, 9), round(body.pose.yaw - nominal.pose.yaw, 9)))
+    assert len(seen) == 2 * len(task.scene(1, none).free_bodies)
+
+
+def test_three_generators_by_seed() -> None:
+    first = [rng.random() for rng in generators(2022)]
+    assert first == [rng.random() for rng in generators(2022)]
+    assert len({*first, *(rng.random() for rng in generators(2023))}) == 6
+    # numpy's streams do not change with its version; published seeds stay what they were
+    assert first == pytest.approx(FIRST_DRAWS)
+
+
+FIRST_DRAWS = [0.4435521581217913, 0.021836641555814107, 0.6603664734664141]
+
+
+def test_a_cube() -> None:
+    pose, colour = Pose.at(1, 2, 3), (0.1, 0.2, 0.3, 1.0)
+    assert cube("it", pose, colour) == Box("it", (0.05,) * 3, pose, mass=0.1, colour=colour)
+    assert (CUBE_SIZE, CUBE_MASS, STUDY_TOLERANCE) == (0.05, 0.1, 0.05)
+
+
+@dataclass(frozen=True)
+class Inner:
+    low: float = 1.0
+    high: float = 2.0
+
+
+@dataclass(frozen=True)
+class Nested(Falling):
+    inner: Inner = field(default_factory=Inner)
+
+
+def test_parameters_are_flat_and_name_every_rule() -> None:
+    assert Nested().parameters() == {
+        "task.duration": 0.6, "task.inner.low": 1.0, "task.inner.high": 2.0
+    }  # fmt: skip
+    assert LeaningTowers().parameters()["task.margins"] == (0.008, 0.010, 0.012)
+    ours, study = Stacking().parameters(), Stacking().study().parameters()
+    assert {name: value for name, value in study.items() if value != ours[name]} == {
+        "task.spare_cubes": False,
+        "task.release_height": 0.02,
+        "task.count_after_retreat": True,
+        "task.finger_closed": 0.02,
+        "task.speeds.carry": 1.0,
+        "task.speeds.contact": 1.0,
+    }
+
+
+def test_a_task_of_one_version_is_its_own_smoke_and_study() -> None:
+    assert Falling(duration=0.3).smoke() == Falling(duration=0.3)
+    assert LeaningTowers().study() == LeaningTowers()

@@ -1,0 +1,299 @@
+"""The arm as the tasks use it: what is planned how fast, held or lost, and put back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pytest_simbench.robot.errors import PlanningError
+from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.robot.panda import READY
+from pytest_simbench.robot.planning import MotionPlanner
+from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.tasks import Jitter, Stacking
+from pytest_simbench.tasks.base import generators
+from pytest_simbench.tasks.manipulator import FULL_SPEED, LostCube, Manipulator, Speeds
+from tests.tasks.scripted import Mishap, ScriptedProcess, ScriptedWorld, drop, move, put, slip
+
+CUBE = "cube_11"
+"""In the middle of the grid, straight before the arm."""
+
+PLACE = Pose.at(0.5, 0.0, 0.33)
+
+
+class Arm:
+    """A manipulator in a world of the script."""
+
+    def __init__(self, *script: Mishap, speeds: Speeds | None = None, seed: int = 1) -> None:
+        self.process = ScriptedProcess(script)
+        self.process.where.phase = "it"
+        scene = Stacking().scene(seed, Jitter(0.0, 0.0))
+        self.world = ScriptedWorld(self.process, scene)
+        self.process.where.phase = "it"
+        self.manipulator = Manipulator(self.world, generators(seed)[2], speeds)
+
+    @property
+    def tools(self) -> list[Pose]:
+        """Where the tool was commanded to at the end of each motion."""
+        scene = self.world.scene
+        assert scene.robot is not None
+        model = RobotModel(scene.robot)
+        return [model.tool_pose(end[:7]) for end in self.ends]
+
+    @property
+    def ends(self) -> list[np.ndarray]:
+        """All joints as commanded at the end of each motion."""
+        return [a.arguments["position"][-1] for a in self.process.asked if a.kind == "follow"]
+
+    @property
+    def fingers(self) -> list[float]:
+        return [float(end[-1]) for end in self.ends]
+
+
+def positions(tools: list[Pose]) -> np.ndarray:
+    return np.array([tool.position for tool in tools])
+
+
+def test_picking_approaches_from_above_grasps_and_lifts() -> None:
+    arm = Arm()
+    arm.manipulator.pick(CUBE)
+    x, y, z = arm.process.scene.body(CUBE).pose.position
+    assert positions(arm.tools) == pytest.approx(
+        np.array([[x, y, z + 0.10], [x, y, z], [x, y, z], [x, y, z + 0.10]]), abs=1e-4
+    )
+    assert arm.fingers == [0.035, 0.035, 0.0, 0.0]
+    assert [round(asked.duration, 3) for asked in arm.process.asked][2] == 0.476
+    assert arm.manipulator.held == CUBE
+    assert arm.process.poses[CUBE].position == pytest.approx([x, y, z + 0.10], abs=1e-4)
+    down = [tool.rotation()[:, 2] for tool in arm.tools]
+    assert np.array(down) == pytest.approx(np.array([[0, 0, -1.0]] * 4), abs=1e-4)
+
+
+def test_placing_carries_lowers_and_opens() -> None:
+    arm = Arm()
+    arm.manipulator.pick(CUBE)
+    before = len(arm.process.asked)
+    arm.manipulator.place(PLACE)
+    assert positions(arm.tools[before:]) == pytest.approx(
+        np.array([[0.5, 0, 0.43], [0.5, 0, 0.33], [0.5, 0, 0.33]]), abs=1e-4
+    )
+    assert arm.fingers[before:] == [0.0, 0.0, 0.035]
+    assert round(arm.process.asked[-1].duration, 3) == 0.376  # 0.176 to open, 0.2 more
+    assert arm.manipulator.held is None
+    (name, pose), opened = arm.process.released[0], arm.process.asked[-1].began
+    assert (name, pose.position) == (CUBE, pytest.approx([0.5, 0.0, 0.33], abs=1e-5))
+    assert arm.manipulator.time_since_release() == pytest.approx(arm.world.time - opened)
+    assert arm.manipulator.try_retreat() is None
+    assert arm.tools[-1].position == pytest.approx([0.5, 0.0, 0.43], abs=1e-4)
+    assert arm.manipulator.try_go_home() is None
+    assert arm.process.asked[-1].arguments["position"][-1, :7] == pytest.approx(READY)
+
+
+def test_the_place_may_turn_by_quarters_only() -> None:
+    """The cube's own yaw to the place's, whichever side was grasped."""
+    for yaw in (0.0, 0.3, -0.7):
+        arm = Arm()
+        arm.process.poses[CUBE] = Pose.at(0.3, 0.0, 0.325, yaw=yaw)
+        arm.world.wait(0.1)
+        arm.manipulator.pick(CUBE)
+        arm.manipulator.place(PLACE)
+        turn = arm.process.poses[CUBE].yaw / (np.pi / 2)
+        assert turn - round(turn) == pytest.approx(0.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("speeds", [Speeds(0.9, 0.7, 0.5), None, FULL_SPEED])
+def test_each_motion_has_its_speed(speeds: Speeds | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[str, float]] = []
+    for name in ("move_to", "move_linear"):
+        plan = getattr(MotionPlanner, name)
+
+        def spy(self: Any, *args: Any, _name: str = name, _plan: Any = plan, **options: Any) -> Any:
+            asked.append((_name, options["speed"]))
+            return _plan(self, *args, **options)
+
+        monkeypatch.setattr(MotionPlanner, name, spy)
+    arm = Arm(speeds=speeds)
+    arm.manipulator.pick(CUBE)
+    arm.manipulator.place(PLACE)
+    arm.manipulator.try_retreat()
+    arm.manipulator.try_go_home()
+    free, carry, contact = {None: (1.0, 0.6, 0.3), FULL_SPEED: (1.0, 1.0, 1.0)}.get(
+        speeds, (0.9, 0.7, 0.5)
+    )
+    assert asked == [
+        *(("move_to", free), ("move_linear", contact), ("move_linear", carry)),
+        *(("move_to", carry), ("move_linear", contact)),
+        *(("move_linear", free), ("move_to", free)),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("offset", "lost"),
+    [({"z": 0.039}, False), ({"z": 0.041}, True), ({"x": -0.041}, True), ({"y": 0.041}, True)],
+)
+def test_a_cube_4_cm_from_the_tool_is_not_held(offset: dict[str, float], lost: bool) -> None:
+    arm = Arm(Mishap("it", 2.6, slip(**offset)))
+    if lost:
+        with pytest.raises(LostCube, match="cube_11 is not in the hand"):
+            arm.manipulator.pick(CUBE)
+    else:
+        arm.manipulator.pick(CUBE)
+    assert arm.manipulator.held == CUBE
+
+
+def test_a_slip_in_the_hand_is_not_corrected_for() -> None:
+    arm = Arm()
+    arm.manipulator.pick(CUBE)
+    arm.process.grip = arm.process.grip.translated(x=0.02)
+    arm.manipulator.place(PLACE)
+    off = np.subtract(arm.process.released[0][1].position, PLACE.position)
+    assert np.linalg.norm(off) == pytest.approx(0.02, abs=1e-5)
+
+
+def test_a_cube_lost_on_the_way_is_lost_before_it_would_be_placed() -> None:
+    arm = Arm()
+    arm.manipulator.pick(CUBE)
+    arm.process.pending.append(Mishap("carry", 0.3, drop))
+    arm.process.where.phase = "carry"
+    with pytest.raises(LostCube):
+        arm.manipulator.place(PLACE)
+    assert [asked.phase for asked in arm.process.asked].count("carry") == 1  # it is not lowered
+
+
+def test_it_looks_where_the_cube_is_now() -> None:
+    arm = Arm()
+    arm.process.poses[CUBE] = Pose.at(0.35, 0.05, 0.325, yaw=0.2)
+    arm.world.wait(0.1)
+    arm.manipulator.pick(CUBE)
+    assert arm.tools[2].position == pytest.approx([0.35, 0.05, 0.325], abs=1e-4)
+
+
+def test_of_equivalent_grasps_the_nearest_is_taken() -> None:
+    arm = Arm()
+    start = arm.manipulator.arm.copy()
+    arm.manipulator.pick(CUBE)
+    above = arm.process.asked[0].arguments["position"][-1, :7]
+    assert np.abs(above - start).max() < np.pi / 2
+
+
+def test_a_cube_beside_another_is_grasped_across() -> None:
+    """A neighbour 1 mm away leaves no room for a finger on two of the four sides."""
+    arm = Arm()
+    x, y, z = arm.process.scene.body(CUBE).pose.position
+    arm.process.poses["cube_01"] = Pose.at(x, y + 0.051, z)
+    arm.process.poses["cube_02"] = Pose.at(x, y - 0.051, z)
+    arm.world.wait(0.1)
+    arm.manipulator.pick(CUBE)
+    opening = arm.tools[1].rotation()[:, 1]
+    assert np.abs(opening) == pytest.approx([1.0, 0.0, 0.0], abs=1e-3)
+
+
+def test_what_cannot_be_grasped_says_why() -> None:
+    walled = Arm()
+    x, y, z = walled.process.scene.body(CUBE).pose.position
+    for k, (dx, dy) in enumerate(((0.051, 0), (-0.051, 0), (0, 0.051), (0, -0.051)), start=1):
+        walled.process.poses[f"cube_0{k}"] = Pose.at(x + dx, y + dy, z)
+    walled.world.wait(0.1)
+    with pytest.raises(PlanningError, match=r"in collision: panda_\w*finger\w* and cube_0\d"):
+        walled.manipulator.pick(CUBE)
+    assert walled.manipulator.held is None
+    far = Arm()
+    far.process.poses[CUBE] = Pose.at(-2.0, 0.0, 0.025)
+    far.world.wait(0.1)
+    with pytest.raises(PlanningError, match=r"unreachable: tool at \(-2\.000"):
+        far.manipulator.pick(CUBE)
+    assert far.manipulator.recover() is None
+    assert all(asked.kind == "wait" for asked in far.process.asked)  # nothing was moved
+
+
+def test_recovering_with_the_cube_in_hand_puts_it_back() -> None:
+    arm = Arm()
+    origin = arm.process.poses[CUBE]
+    arm.manipulator.pick(CUBE)
+    assert arm.manipulator.recover() is None
+    (name, pose) = arm.process.released[0]
+    offset = np.subtract(pose.position, origin.position)
+    assert (name, offset) == (CUBE, pytest.approx([0, 0, 0.005], abs=1e-5))
+    assert arm.process.poses[CUBE].position == pytest.approx(origin.position, abs=1e-5)
+    assert arm.manipulator.held is None
+    assert arm.tools[-1].position == pytest.approx([*pose.position[:2], pose.position[2] + 0.1])
+
+
+def test_recovering_without_the_cube_opens_the_hand_and_retreats() -> None:
+    arm = Arm(Mishap("it", 2.6, drop))
+    with pytest.raises(LostCube):
+        arm.manipulator.pick(CUBE)
+    before, at = len(arm.process.asked), arm.tools[-1]
+    assert arm.manipulator.recover() is None
+    assert arm.manipulator.held is None
+    assert arm.fingers[before:] == [0.035, 0.035]
+    assert positions(arm.tools[before:])[:, 2] == pytest.approx(
+        [at.position[2], at.position[2] + 0.1], abs=1e-4
+    )
+
+
+def test_a_cube_that_cannot_be_put_back_is_let_go_where_it_is() -> None:
+    arm = Arm()
+    origin = arm.process.poses[CUBE]
+    arm.manipulator.pick(CUBE)
+    arm.process.poses["cube_01"] = origin.translated(z=0.001)
+    arm.world.wait(0.1)
+    problem = arm.manipulator.recover()
+    assert problem is not None
+    assert problem.startswith("could not put back: in collision: ")
+    assert arm.manipulator.held is None
+    (_, pose) = arm.process.released[0]
+    assert pose.position[2] == pytest.approx(origin.position[2] + 0.1, abs=1e-4)
+
+
+def test_after_a_failure_the_next_cube_can_be_taken() -> None:
+    arm = Arm(Mishap("it", 2.6, drop))
+    with pytest.raises(LostCube):
+        arm.manipulator.pick(CUBE)
+    arm.manipulator.recover()
+    arm.manipulator.pick("cube_04")
+    arm.manipulator.place(PLACE)
+    assert arm.process.poses["cube_04"].position == pytest.approx([0.5, 0, 0.325], abs=1e-5)
+
+
+def test_a_retreat_may_touch_the_cube_it_let_go_but_nothing_else() -> None:
+    arm = Arm()
+    arm.manipulator.pick(CUBE)
+    arm.manipulator.place(PLACE)
+    move(CUBE, tilt=0.3)(arm.process)  # it leans against the fingers
+    arm.world.wait(0.1)
+    assert arm.manipulator.try_retreat() is None
+    other = Arm()
+    other.manipulator.pick(CUBE)
+    other.manipulator.place(PLACE)
+    put("cube_01", Pose.at(0.5, 0.0, 0.52))(other.process)
+    other.world.wait(0.1)
+    problem = other.manipulator.try_retreat()
+    assert problem is not None
+    assert problem.startswith("could not retreat: straight line blocked: ")
+    assert "cube_01" in problem
+
+
+def test_a_motion_starts_from_the_commands_not_from_where_the_arm_sags() -> None:
+    arm = Arm()
+    arm.manipulator.pick(CUBE)
+    for before, after in zip(arm.process.asked, arm.process.asked[1:], strict=False):
+        ends, starts = before.arguments["position"][-1], after.arguments["position"][0]
+        assert starts == pytest.approx(ends, abs=1e-9)
+
+
+def test_planning_is_measured_as_planning() -> None:
+    arm = Arm()
+    built = arm.world.stopwatch.seconds["plan"]
+    assert built > 0
+    arm.manipulator.pick(CUBE)
+    assert arm.world.stopwatch.seconds["plan"] > built
+
+
+def test_a_scene_without_a_robot_has_no_manipulator() -> None:
+    scene = Scene("bare", (Box("it", (0.1, 0.1, 0.1), Pose.at(0, 0, 0.05), mass=0.1),))
+    world = ScriptedWorld(ScriptedProcess(), scene)
+    with pytest.raises(ValueError, match="scene 'bare' has no robot"):
+        Manipulator(world, np.random.default_rng(1))

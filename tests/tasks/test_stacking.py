@@ -1,0 +1,453 @@
+"""Scores of stacking, in worlds whose right score is known: neither nothing nor everything."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pytest_simbench.client.errors import Diverged, RepetitionTimeout
+from pytest_simbench.measure.metrics import Metric
+from pytest_simbench.robot.panda import READY
+from pytest_simbench.scene import Box, Pose
+from pytest_simbench.tasks import Jitter, Stacking, stacking
+from pytest_simbench.tasks.base import generators
+from pytest_simbench.tasks.manipulator import Manipulator, Speeds
+from pytest_simbench.tasks.stacking import GRID, TABLE, TOWERS, Place, _placed, _strict
+from tests.tasks.scripted import (
+    Asked,
+    Mishap,
+    ScriptedProcess,
+    drop,
+    fail,
+    move,
+    perform,
+    put,
+    stacked,
+    untouched,
+)
+
+ONE = Stacking(towers=1, levels=1)
+SCORES = (
+    *("placed", "at_end", "placed_strict", "at_end_strict"),
+    *("towers", "untouched_moved", "failed_picks"),
+)
+PLACE = Place(0, 1, Pose.at(0.5, 0.0, 0.375))
+
+
+def score(task: Stacking, *script: Mishap, **options: Any) -> dict[str, float | None]:
+    return perform(task, *script, **options)[0].metrics
+
+
+def in_phase(process: ScriptedProcess, phase: str) -> list[Asked]:
+    return [asked for asked in process.asked if asked.phase == phase]
+
+
+# What each score counts
+
+
+def test_every_score_of_a_world_with_one_of_everything() -> None:
+    """No two scores are the same, so none can stand for another."""
+    outcome, process = perform(
+        Stacking(towers=2, levels=3),
+        Mishap("pick cube 2 of 6", 2.6, drop),  # lost while it is lifted
+        Mishap("check cube 4 of 6", 0.05, move(stacked(5), x=0.012)),  # in its place, not strictly
+        Mishap("check cube 6 of 6", 0.05, move(stacked(7), y=0.06, z=-0.1)),  # fallen at once
+        Mishap("settle", 30.0, move(stacked(6), x=0.1, z=-0.025)),  # fallen later
+        Mishap("settle", 59.9, move(untouched(1), x=-0.008, y=-0.008)),  # knocked by 11 mm
+        Mishap("settle", 59.9, move(untouched(2), x=-0.009)),
+    )
+    assert outcome.metrics == {
+        "placed": 5 / 6,
+        "at_end": 4 / 6,
+        "placed_strict": 4 / 6,
+        "at_end_strict": 3 / 6,
+        "towers": 1 / 2,
+        "untouched_moved": 1.0,
+        "failed_picks": 1.0,
+    }
+    order = [name for name, _ in process.released]
+    lost = order.pop(1)
+    picks = outcome.details["picks"]
+    assert [(pick["cube"], pick["tower"], pick["level"]) for pick in picks] == [
+        *((order[0], 0, 0), (order[1], 0, 1), (order[2], 0, 2)),
+        *((order[3], 1, 0), (order[4], 1, 1), (order[5], 1, 2)),
+    ]
+    assert picks[3]["placed_error"] == pytest.approx([0.012, 0, 0, 0], abs=1e-5)
+    assert picks[3]["end_error"] == picks[3]["placed_error"]
+    assert picks[4]["placed_error"] == pytest.approx([0, 0, 0, 0], abs=1e-5)
+    assert picks[4]["end_error"] == pytest.approx([0.1, 0, -0.025, 0], abs=1e-5)
+    assert picks[5]["placed_error"] == pytest.approx([0, 0.06, -0.1, 0], abs=1e-5)
+    assert outcome.details["failed_picks"] == [
+        {"cube": lost, "tower": 0, "level": 1, "reason": f"{lost} is not in the hand"}
+    ]
+    knocked = untouched(1)(process)
+    assert outcome.details["untouched_moved"] == pytest.approx({knocked: 0.008 * math.sqrt(2)})
+    assert outcome.details["notes"] == []
+    assert process.counts == [(number, 6) for number in range(1, 7)]
+
+
+@pytest.mark.parametrize(
+    ("phase", "after", "placed", "at_end"),
+    [
+        ("check cube 1 of 1", 0.12, 0.0, 0.0),  # 0.496 s after the release
+        ("retreat cube 1 of 1", 0.004, 1.0, 0.0),
+        ("go home", 0.1, 1.0, 0.0),
+        ("settle", 59.99, 1.0, 0.0),
+    ],
+)
+def test_placed_is_counted_half_a_second_after_the_release_and_the_end_at_the_end(
+    phase: str, after: float, placed: float, at_end: float
+) -> None:
+    found = score(ONE, Mishap(phase, after, move(stacked(1), x=0.2)))
+    assert (found["placed"], found["placed_strict"]) == (placed, placed)
+    assert (found["at_end"], found["at_end_strict"], found["towers"]) == (at_end,) * 3
+
+
+def test_a_cube_that_comes_back_is_counted_where_it_was_and_where_it_is() -> None:
+    found = score(
+        ONE,
+        Mishap("check cube 1 of 1", 0.1, move(stacked(1), x=0.2)),
+        Mishap("settle", 1.0, move(stacked(1), x=-0.2)),
+    )
+    assert [found[name] for name in SCORES[:5]] == [0.0, 1.0, 0.0, 1.0, 1.0]
+
+
+def test_the_shares_are_of_all_places_also_of_those_never_filled() -> None:
+    """With 19 of 21 cubes out of reach, two are stacked and two places stay empty."""
+    away = [
+        Mishap("settle start", 0.1, put(f"cube_{k:02d}", Pose.at(-2.0, 0.15 * k, 0.025)))
+        for k in range(1, 20)
+    ]
+    outcome, process = perform(Stacking(towers=2, levels=2), *away)
+    assert [outcome.metrics[name] for name in SCORES] == [0.5, 0.5, 0.5, 0.5, 0.5, 0.0, 19.0]
+    assert {pick["cube"] for pick in outcome.details["picks"]} == {"cube_20", "cube_21"}
+    failed = outcome.details["failed_picks"]
+    assert {pick["cube"] for pick in failed} == {f"cube_{k:02d}" for k in range(1, 20)}
+    assert all(pick["reason"].startswith("unreachable: tool at (-2.000") for pick in failed)
+    assert process.counts[-1] == (2, 4)
+
+
+def test_a_tower_is_complete_with_all_of_its_cubes_strictly_in_place() -> None:
+    for number, by, complete in ((1, 0.009, 1.0), (1, 0.011, 0.5), (4, -0.011, 0.5)):
+        task, off = Stacking(towers=2, levels=2), move(stacked(number), x=by)
+        found = score(task, Mishap("settle", 1.0, off))
+        assert (found["towers"], found["at_end"]) == (complete, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("pose", "placed", "strict"),
+    [
+        (PLACE.pose, True, True),
+        (PLACE.pose.translated(x=0.0099, y=-0.0099, z=0.0099), True, True),
+        *((PLACE.pose.translated(**{axis: 0.0101}), True, False) for axis in "xyz"),
+        *((PLACE.pose.translated(**{axis: -0.0101}), True, False) for axis in "xyz"),
+        (PLACE.pose.translated(x=0.0499, y=-0.0499), True, False),
+        *((PLACE.pose.translated(**{axis: 0.0501}), False, False) for axis in "xy"),
+        *((PLACE.pose.translated(**{axis: -0.0501}), False, False) for axis in "xy"),
+        (PLACE.pose.translated(z=-0.3), True, False),
+        *((PLACE.pose * Pose(quaternion=q), True, s) for q, s in (
+            ((math.cos(math.radians(2.45)), math.sin(math.radians(2.45)), 0.0, 0.0), True),
+            ((math.cos(math.radians(2.55)), math.sin(math.radians(2.55)), 0.0, 0.0), False),
+            ((math.cos(math.radians(2.55)), 0.0, -math.sin(math.radians(2.55)), 0.0), False),
+            ((math.cos(math.radians(45)), math.sin(math.radians(45)), 0.0, 0.0), True),
+            ((math.cos(math.radians(20)), 0.0, 0.0, math.sin(math.radians(20))), True),
+        )),
+    ],
+)  # fmt: skip
+def test_in_its_place_and_strictly_so(pose: Pose, placed: bool, strict: bool) -> None:
+    """5 cm in x and in y; 1 cm in x, y and z and 5 degrees, whatever face it lies on."""
+    assert (_placed(PLACE, pose), _strict(PLACE, pose)) == (placed, strict)
+
+
+def test_the_bounds_of_a_place_belong_to_it() -> None:
+    origin = Place(0, 0, Pose())
+    assert _placed(origin, Pose.at(0.05, -0.05, 0.0))
+    assert _strict(origin, Pose.at(0.01, -0.01, 0.01))
+
+
+@pytest.mark.parametrize(
+    ("offset", "moved"),
+    [
+        ({"x": 0.0099}, 0.0), ({"x": -0.0101}, 1.0), ({"y": 0.0101}, 1.0), ({"z": 0.0101}, 1.0),
+        ({"x": 0.006, "y": 0.006, "z": 0.006}, 1.0), ({"x": 0.005, "y": 0.005, "z": 0.005}, 0.0),
+    ],
+)  # fmt: skip
+def test_untouched_cubes_moved_by_more_than_1_cm(offset: dict[str, float], moved: float) -> None:
+    outcome, _ = perform(ONE, Mishap("settle", 1.0, move("cube_01", **offset)))
+    assert outcome.metrics["untouched_moved"] == moved
+    assert outcome.metrics["placed"] == outcome.metrics["at_end"] == 1.0
+    assert set(outcome.details["untouched_moved"]) == ({"cube_01"} if moved else set())
+
+
+def test_untouched_is_measured_from_when_the_cubes_had_settled() -> None:
+    early = Mishap("settle start", 0.19, move("cube_01", x=-0.02))
+    assert score(ONE, early)["untouched_moved"] == 0.0
+    assert score(ONE, early, Mishap("go home", 0.0, move("cube_02", y=0.02))) == {
+        **score(ONE), "untouched_moved": 1.0
+    }  # fmt: skip
+
+
+def test_a_cube_that_was_handled_is_not_untouched() -> None:
+    """Lost while lifted, lost on the way, put in its place: wherever they end, a hand was there."""
+    outcome, process = perform(
+        Stacking(towers=1, levels=1),
+        Mishap("pick cube 1 of 1", 2.5, drop),
+        Mishap("recover from cube 1 of 1", 0.0, move(stacked(1), x=-0.02)),
+        Mishap("settle", 1.0, move(stacked(2), z=0.02)),
+    )
+    assert len(process.released) == 2
+    assert [outcome.metrics[name] for name in ("untouched_moved", "failed_picks")] == [0.0, 1.0]
+    on_the_way, process = perform(ONE, Mishap("place cube 1 of 1", 0.7, drop))
+    assert [on_the_way.metrics[name] for name in ("untouched_moved", "failed_picks")] == [0.0, 1.0]
+    lost = process.released[0][0]
+    assert on_the_way.details["failed_picks"][0]["reason"] == f"{lost} is not in the hand"
+    assert on_the_way.metrics["placed"] == 1.0  # by the next cube
+
+
+def test_a_cube_out_of_reach_stays_untouched() -> None:
+    """Nobody handled it, so it counts when it moves."""
+    first = perform(ONE)[1].released[0][0]
+    outcome, _ = perform(
+        ONE,
+        Mishap("settle start", 0.1, put(first, Pose.at(-2.0, 0.0, 0.025))),
+        Mishap("settle", 1.0, move(first, x=0.02)),
+    )
+    assert [pick["cube"] for pick in outcome.details["failed_picks"]] == [first]
+    assert outcome.details["untouched_moved"] == pytest.approx({first: 0.02})
+
+
+def test_a_cube_that_cannot_be_placed_is_put_back() -> None:
+    """Its place is blocked: it goes back where it came from, and the next cube is taken."""
+    blocked = put("cube_21", Pose.at(0.5, -0.2, 0.326))
+    first = perform(ONE)[1].released[0][0]
+    assert first != "cube_21"
+    outcome, process = perform(
+        ONE,
+        Mishap("pick cube 1 of 1", 2.6, blocked),
+        Mishap("recover from cube 1 of 1", 0.1, put("cube_21", Pose.at(0.8, 0.3, 0.325))),
+    )
+    assert process.released[0][0] == first
+    (failed,) = outcome.details["failed_picks"]
+    assert (failed["cube"], failed["tower"], failed["level"]) == (first, 0, 0)
+    assert failed["reason"].startswith("in collision: ")
+    assert outcome.metrics["failed_picks"] == 1.0
+    assert outcome.metrics["placed"] == 1.0
+    assert outcome.metrics["untouched_moved"] == 1.0  # the one that blocked
+    origin = ONE.scene(1, Jitter()).body(first).pose
+    let_go, back = process.released[0][1], process.poses[first]
+    assert np.subtract(let_go.position, origin.position) == pytest.approx([0, 0, 0.005], abs=1e-5)
+    assert np.subtract(back.position, origin.position) == pytest.approx([0, 0, 0], abs=1e-5)
+
+
+def test_what_could_not_be_done_on_the_way_is_noted() -> None:
+    """Something hangs over the hand: no retreat, no way home; the score is the cubes'."""
+    above = put("cube_01", Pose.at(0.5, -0.2, 0.52))
+    outcome, _ = perform(ONE, Mishap("check cube 1 of 1", 0.1, above), seed=1)
+    assert [note.split(":")[0] for note in outcome.details["notes"]] == [
+        "could not retreat", "could not go home",
+    ]  # fmt: skip
+    assert outcome.metrics["placed"] == 1.0
+
+
+@pytest.mark.parametrize("error", [RepetitionTimeout, Diverged])
+@pytest.mark.parametrize("phase", ["settle start", "pick cube 2 of 2", "settle"])
+def test_a_world_that_fails_has_no_score(error: type[Exception], phase: str) -> None:
+    with pytest.raises(error):
+        perform(Stacking(towers=1, levels=2), Mishap(phase, 0.1, fail(error)))
+
+
+# What is done
+
+
+def test_the_course_of_one_cube() -> None:
+    _, process = perform(ONE)
+    assert list(dict.fromkeys(asked.phase for asked in process.asked)) == [
+        *("settle start", "pick cube 1 of 1", "place cube 1 of 1", "check cube 1 of 1"),
+        *("retreat cube 1 of 1", "go home", "settle"),
+    ]
+    (start,), (check,), (end,) = (
+        in_phase(process, phase) for phase in ("settle start", "check cube 1 of 1", "settle")
+    )
+    assert (start.kind, start.duration) == ("wait", 0.2)
+    assert (end.kind, end.duration) == ("wait", 60.0)
+    opening = in_phase(process, "place cube 1 of 1")[-1]
+    assert check.began + check.duration == pytest.approx(opening.began + 0.5)
+    home = in_phase(process, "go home")[-1]
+    assert home.arguments["position"][-1, :7] == pytest.approx(READY)
+    assert process.position[-2:] == pytest.approx([0.035, 0.035])
+    assert process.marks == pytest.approx({"start": 0.2, "end": end.began})
+
+
+def test_a_longer_delay_of_the_count_is_waited_for() -> None:
+    _, process = perform(Stacking(towers=1, levels=1, check_delay=2.0))
+    (check,) = in_phase(process, "check cube 1 of 1")
+    opening = in_phase(process, "place cube 1 of 1")[-1]
+    assert check.began + check.duration == pytest.approx(opening.began + 2.0)
+    _, process = perform(Stacking(towers=1, levels=1, check_delay=0.1))
+    assert [asked.duration for asked in in_phase(process, "check cube 1 of 1")] == [0.0]
+
+
+@pytest.mark.parametrize("height", [0.005, 0.02])
+def test_cubes_are_let_go_at_the_release_height_over_their_places(height: float) -> None:
+    task = Stacking(towers=2, levels=2, release_height=height)
+    _, process = perform(task)
+    assert Stacking().release_height == 0.005
+    for place, (_, pose) in zip(task.places(), process.released, strict=True):
+        offset = np.subtract(pose.position, place.pose.position)
+        assert offset == pytest.approx([0.0, 0.0, height], abs=1e-5)
+
+
+def test_the_order_of_the_cubes_is_by_seed() -> None:
+    def order(seed: int) -> list[str]:
+        return [name for name, _ in perform(ONE, seed=seed)[1].released]
+
+    assert order(3) == order(3)
+    assert len({order(seed)[0] for seed in range(20)}) >= 8  # of 21; 13 to be expected
+
+
+def test_the_published_seeds_have_their_order() -> None:
+    """By name, not by where the simulator lists them: records of other days stay comparable."""
+    _, process = perform(Stacking(), seed=2022)
+    names = sorted(body.name for body in Stacking().scene(2022, Jitter()).free_bodies)
+    expected = generators(2022)[1].permutation(names)
+    assert [name for name, _ in process.released] == list(expected[:15])
+    assert [name for name, _ in process.released][:3] == FIRST_OF_2022
+
+
+def test_the_planner_has_a_generator_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[dict[str, Any]] = []
+
+    class Spy(Manipulator):
+        def __init__(self, world: Any, rng: np.random.Generator, speeds: Speeds) -> None:
+            seen.append(rng.bit_generator.state)
+            super().__init__(world, rng, speeds)
+
+    monkeypatch.setattr(stacking, "Manipulator", Spy)
+    perform(ONE, seed=5)
+    assert seen == [generators(5)[2].bit_generator.state]
+
+
+# The study's rules
+
+
+def test_the_studys_rules() -> None:
+    assert Stacking().study() == Stacking(
+        spare_cubes=False,
+        release_height=0.02,
+        check_delay=0.5,
+        count_after_retreat=True,
+        finger_closed=0.020,
+        speeds=Speeds(1.0, 1.0, 1.0),
+        settle=60.0,
+    )
+    assert Stacking(towers=1, levels=2, settle=1.0).study().cubes == 2
+    assert Stacking() == Stacking(
+        3, 5, True, 0.005, 0.5, False, 0.0, Speeds(1.0, 0.6, 0.3), 60.0
+    )  # fmt: skip
+    assert Stacking().smoke() == Stacking(towers=1, levels=2, settle=2.0)
+
+
+def test_the_study_makes_one_attempt_for_each_place() -> None:
+    """A failed pick leaves its place empty and goes on with the next place."""
+    lost = Mishap("pick cube 2 of 4", 1.5, drop)
+    ours, _ = perform(Stacking(towers=2, levels=2), Mishap("pick cube 2 of 4", 2.6, drop))
+    assert ours.metrics["placed"] == 1.0
+    outcome, process = perform(Stacking(towers=2, levels=2).study(), lost)
+    assert outcome.metrics["failed_picks"] == 1.0
+    assert [outcome.metrics[n] for n in SCORES[:4]] == [0.75, 0.75, 0.75, 0.75]
+    assert outcome.metrics["towers"] == 0.5
+    places = [(pick["tower"], pick["level"]) for pick in outcome.details["picks"]]
+    assert places == [(0, 0), (1, 0), (1, 1)]
+    assert process.counts == [(1, 4), (1, 4), (2, 4), (3, 4)]
+
+
+@pytest.mark.parametrize(
+    ("phase", "after", "placed"),
+    [
+        ("retreat cube 1 of 1", 0.3, 0.0),
+        ("check cube 1 of 1", 0.49, 0.0),
+        ("go home", 0.0, 1.0),
+    ],
+)
+def test_the_study_counts_after_the_retreat_and_half_a_second(
+    phase: str, after: float, placed: float
+) -> None:
+    fall = Mishap(phase, after, move(stacked(1), x=0.2))
+    assert score(ONE.study(), fall)["placed"] == placed
+
+
+def test_the_course_of_one_cube_by_the_studys_rules() -> None:
+    outcome, process = perform(ONE.study())
+    assert outcome.metrics["placed"] == 1.0
+    assert list(dict.fromkeys(asked.phase for asked in process.asked))[2:5] == [
+        *("place cube 1 of 1", "retreat cube 1 of 1", "check cube 1 of 1"),
+    ]
+    (check,) = in_phase(process, "check cube 1 of 1")
+    assert (check.kind, check.duration) == ("wait", 0.5)
+    grasp = in_phase(process, "pick cube 1 of 1")[2]
+    assert grasp.arguments["position"][-1, -2:] == pytest.approx([0.020, 0.020])
+    (_, pose) = process.released[0]
+    assert pose.position[2] == pytest.approx(0.325 + 0.02, abs=1e-5)
+
+
+# What it is
+
+
+def test_the_scene_is_the_studys() -> None:
+    assert tuple((x, y) for x in (0.2, 0.3, 0.4) for y in STUDY_Y) == GRID
+    assert TOWERS == ((0.5, -0.2), (0.5, 0.0), (0.5, 0.2))
+    assert Box("table", (0.914, 0.914, 0.30), Pose.at(0.6, 0.0, 0.15)) == TABLE
+    scene = Stacking().scene(0, Jitter(0.0, 0.0))
+    assert scene.name == "stacking"
+    assert scene.bodies[0] == TABLE
+    assert [body.name for body in scene.free_bodies] == [f"cube_{k:02d}" for k in range(1, 22)]
+    assert [body.pose for body in scene.free_bodies] == [Pose.at(x, y, 0.325) for x, y in GRID]
+    colours = [body.colour for body in scene.free_bodies]
+    assert colours[0] != colours[1]
+    assert colours == [colours[0], colours[1]] * 10 + [colours[0]]
+    assert scene.robot is not None
+    assert scene.robot.base == Pose()
+    assert (scene.robot.gripper.opened, scene.robot.gripper.closed) == (0.035, 0.0)
+
+
+def test_the_places_in_their_order() -> None:
+    assert Stacking(towers=2, levels=3).places() == [
+        Place(tower, level, Pose.at(0.5, y, z))
+        for tower, y in ((0, -0.2), (1, 0.0))
+        for level, z in ((0, 0.325), (1, pytest.approx(0.375)), (2, pytest.approx(0.425)))
+    ]
+    assert len(Stacking().places()) == Stacking().cubes == 15
+
+
+@pytest.mark.parametrize(
+    ("task", "settle", "counted"),
+    [
+        (Stacking(settle=7.0), "7 s", "0.5 s after release"),
+        (Stacking(check_delay=0.7), "60 s", "0.7 s after release"),
+        (Stacking().study(), "60 s", "0.5 s after the hand has retreated"),
+    ],
+)
+def test_it_says_what_it_measures(task: Stacking, settle: str, counted: str) -> None:
+    assert (task.name, task.study_timeout) == ("stacking", 900.0)
+    end, share = f"the same, {settle} after the task ended", {"kind": "share", "of": 15}
+    assert task.metrics == (
+        Metric("placed", "placed", **share, study=True,
+               doc=f"within 5 cm in x and y of the target, {counted}"),
+        Metric("at_end", "at the end", **share, study=True, doc=end),
+        Metric("placed_strict", "placed, strict", **share,
+               doc="within 1 cm in x, y and z of the target and tilted by less than 5 degrees"),
+        Metric("at_end_strict", "at the end, strict", **share, doc=end),
+        Metric("towers", "towers complete", kind="share", of=3,
+               doc="towers all of whose cubes are strictly in place at the end"),
+        Metric("untouched_moved", "untouched moved", unit="cubes", better="lower",
+               doc="cubes nobody handled that are more than 1 cm away from their start"),
+        Metric("failed_picks", "failed picks", unit="picks", better="lower",
+               doc="cubes that could not be reached, planned for, or held"),
+    )  # fmt: skip
+
+
+STUDY_Y = (-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3)
+FIRST_OF_2022 = ["cube_02", "cube_06", "cube_09"]
