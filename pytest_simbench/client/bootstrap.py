@@ -14,6 +14,7 @@ import queue
 import signal
 import sys
 import tempfile
+import time
 from importlib.machinery import ModuleSpec
 from typing import Any
 
@@ -22,6 +23,9 @@ PR_SET_CHILD_SUBREAPER = 36
 
 GONE = object()
 """In place of a request: the client is gone."""
+
+GRACE = 2.0
+"""For the client's reaper to end this process [s]: it finds our children through us."""
 
 
 class PackageFinder:
@@ -85,6 +89,7 @@ def requests_of(channel: Any) -> "queue.SimpleQueue[Any]":
 
     def take(request: Any) -> None:  # in execnet's thread
         if request is GONE:
+            time.sleep(GRACE)
             os._exit(1)
         requests.put(request)
 

@@ -327,4 +327,4 @@ class WorkerProcess:
         popen = self._connection.popen
         if popen is not None:
             with contextlib.suppress(psutil.Error):
-                self._family.update(psutil.Process(popen.pid).children(recursive=True))
+                self._family |= reaper.descendants([psutil.Process(popen.pid)])

@@ -18,6 +18,7 @@ import sys
 import threading
 import time
 import uuid
+from collections.abc import Iterable
 from itertools import count
 
 import psutil
@@ -89,11 +90,20 @@ def marked(mark: str) -> list[psutil.Process]:
     return found
 
 
+def descendants(processes: Iterable[psutil.Process]) -> set[psutil.Process]:
+    """All children of children; some may have thrown their mark away."""
+    found: set[psutil.Process] = set()
+    for process in processes:
+        with contextlib.suppress(psutil.Error):
+            found.update(process.children(recursive=True))
+    return found
+
+
 def reap(mark: str) -> None:
-    """End all processes that carry the mark, also those that they start meanwhile."""
+    """End all processes that carry the mark, their descendants, and what they start meanwhile."""
     until = time.monotonic() + REAP_TIMEOUT
     while (found := marked(mark)) and time.monotonic() < until:
-        for process in found:
+        for process in [*found, *descendants(found)]:
             with contextlib.suppress(psutil.Error):
                 process.kill()
         time.sleep(0.01)

@@ -17,6 +17,9 @@ import psutil
 MB = 1e6
 """Bytes of one MB here and in the records, as the worker counts its own peak."""
 
+STOP_TIMEOUT = 5.0
+"""Wall seconds that a look which is under way may still take; then its sample is left out."""
+
 LISTING_INTERVAL = 1.0
 """Wall seconds between two looks for new children: listing reads every process of the machine."""
 
@@ -206,7 +209,7 @@ class ResourceSampler:
         """
         self._stop.set()
         if self._thread is not threading.current_thread():
-            self._thread.join()
+            self._thread.join(STOP_TIMEOUT)
         samples = tuple(self._samples)
         peaks = [sample.rss_mb for sample in samples]
         if peak_mb is not None:

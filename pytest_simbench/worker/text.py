@@ -11,10 +11,9 @@ LONGEST_LOGGED = 100_000
 
 def readable(text: str, longest: int = LONGEST) -> str:
     """The text as plain Unicode, and how much of it was cut off."""
+    text = text.encode("utf-8", "backslashreplace").decode("utf-8")
     cut = len(text) - longest
-    if cut > 0:
-        text = f"{text[:longest]} ... ({cut} more characters)"
-    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+    return text if cut <= 0 else f"{text[:longest]} ... ({cut} more characters)"
 
 
 def told(error: BaseException, longest: int = LONGEST) -> str:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import dataclass, replace
 
 import pytest
 
+from pytest_simbench.display import Displays
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.session.case import Case
 from pytest_simbench.session.repetition import Repetition
@@ -67,12 +69,10 @@ def test_unreachable_cubes_are_counted_and_the_task_goes_on(case: Case) -> None:
 
 @pytest.mark.parametrize("name", able_to(Capability.WINDOW))
 def test_with_a_window_the_outcome_is_the_same(case: Case, name: str) -> None:
-    display = pytest.importorskip("pyvirtualdisplay.display")
-    headless = case_of(case, name)
-    with display.Display(visible=False, size=(1280, 960), manage_global_env=False) as virtual:
-        environment = {**headless.environment, "DISPLAY": f":{virtual.display}"}
-        gui = replace(headless, mode="gui", environment=environment)
-        throw = Throwing(settle=1.0)
+    headless, throw = case_of(case, name), Throwing(settle=1.0)
+    displays = Displays()
+    with closing(displays):
+        gui = replace(headless, mode="gui", display=displays)
         with_window, error = Repetition(gui, throw, 1).run()
     assert error is None
     without, _ = Repetition(headless, throw, 1).run()

@@ -1,0 +1,224 @@
+"""Faults for chaos.py: the real adapters, each with a fault that waits for its moment.
+
+Imported in workers as `chaos_faults:ENGINE`. The fault's name stands in the environment as CHAOS,
+the simulated time of its moment [s] as CHAOS_AT.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+import os
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.simulator import Simulator
+
+ADAPTERS = {
+    "mujoco": "mujoco:MuJoCo",
+    "pybullet": "pybullet:PyBullet",
+    "sapien": "sapien:SAPIEN",
+    "dart": "dart:DART",
+}
+
+SLEEPER = [sys.executable, "-c", "import time; time.sleep(600)"]
+
+
+def stop() -> None:
+    os.kill(os.getpid(), signal.SIGSTOP)
+
+
+def keep_the_interpreter() -> None:
+    """No other thread of this process runs any more."""
+    ctypes.PyDLL(None).sleep(600)
+
+
+def pipes() -> list[int]:
+    """execnet's descriptors."""
+    found = []
+    for name in os.listdir("/proc/self/fd"):
+        try:
+            if int(name) > 2 and os.readlink(f"/proc/self/fd/{name}").startswith("pipe:"):
+                found.append(int(name))
+        except OSError:
+            continue
+    return found
+
+
+def write_to_pipes(data: bytes) -> None:
+    for descriptor in pipes():
+        try:
+            os.write(descriptor, data)
+        except OSError:  # that which is read from
+            continue
+    time.sleep(600)
+
+
+def close_pipes() -> None:
+    for descriptor in pipes():
+        os.close(descriptor)
+    time.sleep(600)
+
+
+def eat() -> None:
+    """Memory up to the limit, at 100 MB a moment."""
+    hoard = []
+    while True:
+        hoard.append(np.ones(12_500_000))
+        time.sleep(0.02)
+
+
+def eat_at_once() -> None:
+    soft = 2 * 2**40
+    resource.setrlimit(resource.RLIMIT_AS, (soft, resource.getrlimit(resource.RLIMIT_AS)[1]))
+    np.ones(2**42)
+
+
+def recurse() -> None:
+    recurse()
+
+
+def raised(error: BaseException) -> Callable[[], None]:
+    def fault() -> None:
+        raise error
+
+    return fault
+
+
+def daemon() -> None:
+    """A process with another parent and another session."""
+    script = "import os\nif os.fork(): os._exit(0)\nos.setsid()\nif os.fork(): os._exit(0)\n"
+    subprocess.run([sys.executable, "-c", f"{script}import time; time.sleep(600)"], check=True)
+
+
+def without_disk() -> None:
+    """Every line of the log is one too many."""
+    full = os.open("/dev/full", os.O_WRONLY)
+    for descriptor in (1, 2):
+        os.dup2(full, descriptor)
+    print("lost", flush=True)
+    print("lost", file=sys.stderr, flush=True)
+
+
+def without_folder() -> None:
+    folder = tempfile.mkdtemp()
+    os.chdir(folder)
+    os.rmdir(folder)
+
+
+def signalled(number: int) -> Callable[[], None]:
+    return lambda: os.kill(os.getpid(), number)
+
+
+STEPPING: dict[str, Callable[[], None]] = {
+    "SIGSEGV": lambda: ctypes.string_at(0) and None,
+    "SIGABRT": os.abort,
+    "SIGKILL": signalled(signal.SIGKILL),
+    "SIGBUS": signalled(signal.SIGBUS),
+    "SIGTERM of the worker": signalled(signal.SIGTERM),
+    "SIGSTOP while stepping": stop,
+    "hang, interpreter kept": keep_the_interpreter,
+    "hang, interpreter free": lambda: time.sleep(600),
+    "garbage on stdout": lambda: os.write(1, os.urandom(100_000)) and None,
+    "garbage among the messages": lambda: write_to_pipes(b"c" + bytes(8)),
+    "half a message": lambda: write_to_pipes(b"\4\0\0\0\1\0\0\3\350half"),
+    "connection closed": close_pipes,
+    "sys.exit": lambda: sys.exit(4),
+    "os._exit": lambda: os._exit(5),
+    "exception while stepping": raised(ValueError("the engine is unhappy")),
+    "base exception": raised(KeyboardInterrupt("from inside")),
+    "huge message": raised(ValueError("y" * 5_000_000)),
+    "surrogate message": raised(ValueError("bad \ud800 text")),
+    "endless recursion": recurse,
+    "memory up to the limit": eat,
+    "memory refused": eat_at_once,
+    "child left behind": lambda: subprocess.Popen(SLEEPER) and None,
+    "daemon left behind": daemon,
+    "full disk for the log": without_disk,
+    "log deleted": lambda: os.unlink(os.readlink("/proc/self/fd/1")),
+    "folder deleted": without_folder,
+    "log flooded": lambda: [os.write(2, b"x" * 1_000_000) for _ in range(100)] and None,
+}
+"""At the moment, once."""
+
+LATER: dict[str, Callable[[], None]] = {
+    "SIGSTOP between requests": stop,
+    "interpreter kept between requests": keep_the_interpreter,
+}
+"""From a thread, just after the world was loaded."""
+
+STATES: dict[str, Callable[[FloatArray], Any]] = {
+    "state not a number": lambda b: b * np.nan,
+    "wrong shape": lambda b: b[:, :7],
+    "wrong type of number": lambda b: b.astype(np.float32),
+    "bodies in another order": lambda b: b[::-1].copy(),
+}
+"""What becomes of the bodies' state; the first one from the moment on."""
+
+
+class Chaos(Simulator):
+    """Comes before the real adapter in the order of methods."""
+
+    fault = os.environ.get("CHAOS", "")
+    at = float(os.environ.get("CHAOS_AT", 0.0))
+    happened = False
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        if self.fault == "exception while starting":
+            raise ValueError("no licence")
+        super().__init__(*arguments, **options)
+        if self.fault == "SIGSTOP while starting":
+            stop()
+
+    def load(self, scene: Scene) -> None:
+        if self.fault == "SIGSTOP while loading":
+            stop()
+        if self.fault == "exception while loading":
+            raise ValueError("no such shape")
+        super().load(scene)  # type: ignore[safe-super]
+
+    def read_back(self) -> dict[str, Any]:
+        if self.fault == "exception while reading back":
+            raise ValueError("cannot tell")
+        if self.fault in LATER:  # this is about the last thing before the answer
+            threading.Timer(0.5, LATER[self.fault]).start()
+        return super().read_back()  # type: ignore[safe-super]
+
+    def step(self) -> None:
+        super().step()  # type: ignore[safe-super]
+        if self.fault == "slow":
+            time.sleep(0.2)
+        if not self.happened and self.time >= self.at:
+            self.happened = True
+            STEPPING.get(self.fault, lambda: None)()
+
+    def body_state(self) -> FloatArray:
+        state = super().body_state()  # type: ignore[safe-super]
+        if self.fault == "state not a number" and self.time < self.at:
+            return state
+        return STATES.get(self.fault, lambda b: b)(state)  # type: ignore[no-any-return]
+
+    def close(self) -> None:
+        if self.fault == "exception while closing":
+            raise ValueError("already closed")
+        if self.fault == "SIGSTOP while closing":
+            stop()
+        super().close()
+
+
+def __getattr__(name: str) -> type[Simulator]:
+    if name not in ADAPTERS:
+        raise AttributeError(name)
+    module, _, adapter = ADAPTERS[name].partition(":")
+    real = getattr(importlib.import_module(f"pytest_simbench.sims.{module}"), adapter)
+    return type(adapter, (Chaos, real), {})

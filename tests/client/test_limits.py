@@ -1,0 +1,265 @@
+"""No wait for a worker is without a limit, and Ctrl-C works in each of them."""
+
+from __future__ import annotations
+
+import _thread
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from pytest_simbench.client.process import WorkerProcess
+from pytest_simbench.client.world import World
+from pytest_simbench.measure.record import Record
+from pytest_simbench.session.case import Case
+from pytest_simbench.session.handle import SimulatorHandle
+from pytest_simbench.session.interrupts import Interrupts
+from pytest_simbench.session.repeat import Repeater
+from pytest_simbench.session.repetition import Repetition
+from pytest_simbench.tasks.base import Count, Jitter, Outcome
+from tests.client.test_faults import Silent
+from tests.conftest import workers
+from tests.tiny import Falling
+
+STALL, DEADLINE = 2.0, 5.0
+"""Limits of these tests [s]."""
+
+SLACK = 4.0
+"""Wall time that noticing, killing and recording may take on a busy machine [s]."""
+
+
+@dataclass(frozen=True)
+class Sending(Falling):
+    """Sends more than any pipe holds, after a moment in which the worker can freeze."""
+
+    name: ClassVar[str] = "sending"
+
+    def perform(self, world: World, seed: int, count: Count) -> Outcome:
+        time.sleep(0.6)
+        with world.phase("send"):
+            world.process.request("read_back", ballast=np.zeros(4_000_000))
+        return Outcome()
+
+
+def unruly(case: Case, name: str, **changes: object) -> Case:
+    options = {"stall_timeout": STALL, "timeout": 60.0, **changes}
+    return replace(case, adapter=f"tests.client.unruly:{name}", **options)  # type: ignore[arg-type]
+
+
+@contextmanager
+def at_most(seconds: float) -> Iterator[None]:
+    began = time.monotonic()
+    yield
+    assert time.monotonic() - began < seconds + SLACK
+    assert not workers()
+
+
+def failure(case: Case, task: Falling | None = None) -> tuple[str, str, str]:
+    record, _ = Repetition(case, task or Falling(), 1).run()
+    assert record.status == "failed"
+    assert record.error is not None
+    return record.error.type, record.error.phase, record.error.message
+
+
+@pytest.mark.parametrize("fault", ["StopsBetweenRequests", "HoldsTheInterpreter"])
+def test_sending_to_a_worker_that_does_not_read(case: Case, fault: str) -> None:
+    with at_most(1.5 + STALL):
+        kind, phase, message = failure(unruly(case, fault), Sending())
+    assert (kind, phase) == ("WorkerHung", "send")
+    assert "for 2 s" in message
+    assert "--sim-stall-timeout" in message
+
+
+def test_sending_has_the_repetition_s_time_out_too(case: Case) -> None:
+    case = unruly(case, "StopsBetweenRequests", stall_timeout=60.0, timeout=DEADLINE)
+    with at_most(DEADLINE):
+        kind, phase, message = failure(case, Sending())
+    assert (kind, phase) == ("RepetitionTimeout", "send")
+    assert "--sim-timeout" in message
+
+
+@pytest.mark.parametrize(
+    ("fault", "phase"),
+    [("StopsBeingMade", "launch"), ("StopsLoading", "load"), ("StandsStill", "fall")],
+)
+def test_silence_in_each_phase_is_the_stall_limit(case: Case, fault: str, phase: str) -> None:
+    with at_most(1.5 + STALL):
+        assert failure(unruly(case, fault), Falling(1e6))[:2] == ("WorkerHung", phase)
+
+
+def test_signs_of_life_do_not_put_off_the_repetition_s_time_out(case: Case) -> None:
+    with at_most(DEADLINE):
+        kind, phase, _ = failure(unruly(case, "Chatters", timeout=DEADLINE))
+    assert (kind, phase) == ("RepetitionTimeout", "fall")
+
+
+@pytest.mark.parametrize(
+    ("fault", "kind"),
+    [("HalfAnswer", "WorkerHung"), ("HangsUp", "WorkerExited"), ("Garbage", "WorkerExited")],
+)
+def test_a_connection_that_is_none(case: Case, fault: str, kind: str) -> None:
+    with at_most(1.5 + STALL):
+        found, phase, _ = failure(unruly(case, fault))
+    assert (found, phase) == (kind, "fall")
+
+
+def test_a_worker_that_does_not_close(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    record, _ = Repetition(unruly(case, "StopsClosing"), Falling(), 1).run()
+    assert record.status == "ok"
+    assert record.details["closing"] == "the worker did not close within 10 s"
+
+
+def test_a_log_does_not_fill_the_disk(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    from pytest_simbench.client import logs
+
+    assert failure(unruly(case, "FloodsTheLog", stall_timeout=3.0))[0] == "WorkerHung"
+    (log,) = (case.folder / "logs").iterdir()
+    assert log.stat().st_size < logs.LARGEST
+
+
+@pytest.mark.parametrize("limit", [20.0, 60.0])
+def test_the_limits_are_those_given(case: Case, limit: float) -> None:
+    """Unscaled, on the worker's own clock: the numbers that the process is told."""
+    launch = replace(case, stall_timeout=limit).launch("limits")
+    assert (launch.start_timeout, launch.stall_timeout) == (limit, limit)
+    made: list[WorkerProcess] = []
+    repetition = Repetition(replace(case, timeout=limit), Falling(), 1)
+    keep = repetition._made
+    repetition._made = lambda process: (keep(process), made.append(process))  # type: ignore
+    before = time.monotonic()
+    deadlines = []
+    repetition._on_phase = lambda name: deadlines.extend(p.deadline for p in made)
+    repetition.run()
+    assert deadlines
+    assert all(before + limit <= at <= before + limit + 1.0 for at in deadlines if at)
+
+
+def interrupt_after(seconds: float, times: int = 1, apart: float = 0.0) -> threading.Thread:
+    """Ctrl-C, as the kernel would deliver it to this process."""
+
+    def work() -> None:
+        time.sleep(seconds)
+        for _ in range(times):
+            _thread.interrupt_main()
+            time.sleep(apart)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    return thread
+
+
+def kept(case: Case, task: Falling, jobs: int = 1, last: int = 1) -> tuple[list[Record], bool]:
+    """Records of a run, and whether Ctrl-C got out of it."""
+    records: list[Record] = []
+    try:
+        Repeater(case, jobs, Silent(), records.append).run(task, range(1, last + 1))  # type: ignore[arg-type]
+    except KeyboardInterrupt:
+        return records, True
+    return records, False
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize(
+    ("fault", "task"),
+    [
+        ("StopsBetweenRequests", Sending()),
+        ("HoldsTheInterpreter", Sending()),
+        ("StopsLoading", Falling()),
+        ("StandsStill", Falling(1e6)),
+    ],
+)
+def test_interrupt(case: Case, fault: str, task: Falling, jobs: int) -> None:
+    case = unruly(case, fault, stall_timeout=60.0)
+    thread = interrupt_after(4.0)
+    with at_most(4.0):
+        records, raised = kept(case, task, jobs, last=jobs)
+    thread.join()
+    assert raised
+    assert [record.status for record in records] == ["interrupted"] * jobs
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_interrupt_while_starting(case: Case, tmp_path: object, jobs: int) -> None:
+    folder = case.folder
+    never = folder / "python"
+    never.write_text("#!/bin/sh\nsleep 600\n")
+    never.chmod(0o755)
+    case = replace(case, python=str(never), stall_timeout=60.0)
+    thread = interrupt_after(1.0)
+    with at_most(1.0):
+        records, raised = kept(case, Falling(), jobs, last=jobs)
+    thread.join()
+    assert raised
+    assert [(r.status, r.error.phase) for r in records if r.error] == [
+        ("interrupted", "launch")
+    ] * jobs
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.002, 0.02, 0.1])
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_two_interrupts_lose_no_record(case: Case, jobs: int, apart: float) -> None:
+    thread = interrupt_after(2.0, times=5, apart=apart)
+    records, raised = [], False
+    try:
+        records, raised = kept(case, Falling(1e6), jobs, last=jobs)
+        thread.join()
+    except KeyboardInterrupt:  # one of the later ones, when the records were kept
+        raised = True
+    thread.join()
+    assert raised
+    assert [record.status for record in records] == ["interrupted"] * jobs
+
+
+def test_an_interrupt_while_the_record_is_kept(case: Case) -> None:
+    records: list[Record] = []
+
+    def keep(record: Record) -> None:
+        _thread.interrupt_main()
+        time.sleep(0.05)
+        records.append(record)
+
+    with pytest.raises(KeyboardInterrupt):
+        Repeater(case, 1, Silent(), keep).run(Falling(), [1, 2])  # type: ignore[arg-type]
+    assert [record.status for record in records] == ["ok"]
+
+
+def test_a_time_out_is_a_failure_also_while_the_run_is_interrupted(case: Case) -> None:
+    """It happened first; what Ctrl-C ended is only what it ended."""
+    records: list[Record] = []
+    case = replace(case, timeout=3.0)
+    repeater = Repeater(case, 2, Silent(), records.append)  # type: ignore[arg-type]
+
+    def stop(keep: Callable[[Record], None]) -> Callable[[Record], None]:
+        def first(record: Record) -> None:
+            repeater._stopping.set()
+            keep(record)
+
+        return first
+
+    repeater.keep = stop(records.append)
+    repeater.run(Falling(1e6), [1])
+    assert [(r.status, r.error and r.error.type) for r in records] == [
+        ("failed", "RepetitionTimeout")
+    ]
+
+
+def test_an_episode_has_the_time_out_that_was_given(case: Case) -> None:
+    handle = SimulatorHandle(unruly(case, "Chatters", timeout=3.0, stall_timeout=60.0))
+    scene = Falling().scene(1, Jitter())
+    with at_most(5.0):
+        with pytest.raises(Exception, match="--sim-timeout"), handle.episode(scene) as world:
+            world.wait(1.0)
+        handle.close()
+
+
+def test_signals_reach_their_handler_when_the_block_ends() -> None:
+    with pytest.raises(KeyboardInterrupt), Interrupts() as interrupts:  # noqa: PT012
+        interrupts.hold()
+        _thread.interrupt_main()
+        reached = True
+    assert reached

@@ -1,0 +1,158 @@
+"""Nothing that a run starts outlives it, however the run ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import psutil
+import pytest
+
+from pytest_simbench.client import reaper
+from pytest_simbench.session.case import Case
+from pytest_simbench.session.repetition import Repetition
+from tests.client.test_limits import unruly
+from tests.conftest import workers
+from tests.tiny import Falling
+
+
+def gone(pids: list[int], seconds: float = 10.0) -> bool:
+    """Whether none of them lives, at last."""
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        if not [pid for pid in pids if lives(pid)]:
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def lives(pid: int) -> bool:
+    try:
+        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
+
+
+@pytest.mark.parametrize(("fault", "status"), [("Parent", "ok"), ("ParentThatDies", "failed")])
+def test_children_of_an_engine(case: Case, tmp_path: Path, fault: str, status: str) -> None:
+    ids = tmp_path / "ids"
+    case = unruly(case, fault, environment={"UNRULY": str(ids)}, stall_timeout=20.0)
+    record, _ = Repetition(case, Falling(), 1).run()
+    assert record.status == status
+    pids = [int(line) for line in ids.read_text().split()]
+    assert len(pids) == 3
+    if fault == "ParentThatDies":  # its session and its mark are gone, and so is its parent
+        assert gone(pids[:2])
+        for pid in filter(lives, pids[2:]):
+            os.kill(pid, signal.SIGKILL)
+    assert gone(pids)
+
+
+SCRIPT = """
+import sys, time
+from dataclasses import replace
+from pathlib import Path
+from pytest_simbench.session.case import Case
+from pytest_simbench.session.repetition import Repetition
+from tests.conftest import ADAPTERS
+from tests.tiny import Falling
+folder = Path(sys.argv[1])
+case = Case("t::t", "mujoco", "headless", "tuned", sys.argv[2], folder, stall_timeout=300.0,
+            environment={"UNRULY": str(folder / "ids")})
+Repetition(case, Falling(1e6), 1).run()
+"""
+
+
+def started(folder: Path, adapter: str) -> tuple[subprocess.Popen[bytes], list[psutil.Process]]:
+    """A program that runs a repetition without end, and the processes that it has."""
+    program = subprocess.Popen(
+        [sys.executable, "-c", SCRIPT, str(folder), adapter], start_new_session=True
+    )
+    me = psutil.Process(program.pid)
+    for _ in range(300):
+        log = list((folder / "logs").glob("*.log")) if (folder / "logs").is_dir() else []
+        if log and len(me.children()) >= 2:
+            break
+        time.sleep(0.1)
+    time.sleep(2.0)  # the worker is stepping, or stuck, by now
+    return program, me.children(recursive=True)
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize(
+    "adapter",
+    ["pytest_simbench.sims.mujoco:MuJoCo", "tests.client.faulty:MuJoCo_Hung",
+     "tests.client.faulty:MuJoCo_Stopped", "tests.client.unruly:Parent"],
+)  # fmt: skip
+def test_a_killed_run_leaves_nothing(tmp_path: Path, adapter: str, number: int) -> None:
+    program, family = started(tmp_path, adapter)
+    assert len(family) >= 2  # worker and reaper
+    os.killpg(program.pid, number)
+    assert program.wait(10) == -number
+    assert gone([process.pid for process in family])
+    if (tmp_path / "ids").exists():
+        pids = [int(line) for line in (tmp_path / "ids").read_text().split()]
+        assert len(pids) == 3
+        assert gone(pids)
+
+
+def test_a_run_that_ends_well_leaves_nothing(tmp_path: Path) -> None:
+    script = SCRIPT.replace("1e6", "0.1")
+    command = [sys.executable, "-c", script, str(tmp_path), "pytest_simbench.sims.mujoco:MuJoCo"]
+    program = subprocess.Popen(command)
+    family: set[psutil.Process] = set()
+    while program.poll() is None:
+        try:
+            family.update(psutil.Process(program.pid).children(recursive=True))
+        except psutil.NoSuchProcess:
+            break
+        time.sleep(0.02)
+    assert program.wait() == 0
+    assert family
+    assert gone([process.pid for process in family], 2.0)
+
+
+def test_a_reaper_that_was_ended_is_started_again() -> None:
+    reaper.new_mark()
+    first = reaper._run and reaper._run._script
+    assert first is not None
+    first.kill()
+    first.wait()
+    reaper.new_mark()
+    second = reaper._run and reaper._run._script
+    assert second is not None
+    assert second.poll() is None
+
+
+def test_reaping_ends_those_of_the_mark_alone() -> None:
+    def start(mark: str) -> subprocess.Popen[bytes]:
+        return subprocess.Popen(["sleep", "600"], env={**os.environ, reaper.VARIABLE: mark})
+
+    one, another = reaper.new_mark(), reaper.new_mark()
+    mine, derived, others, longer = map(start, (one, f"{one}.1", another, f"{one}1"))
+    try:
+        reaper.reap(one)
+        assert (mine.wait(1), derived.wait(1)) == (-9, -9)
+        assert (others.poll(), longer.poll()) == (None, None)
+    finally:
+        for process in (others, longer):
+            process.kill()
+            process.wait()
+    assert not workers()
+
+
+def forked(do: Callable[[], bool]) -> int:
+    pid = os.fork()
+    if pid == 0:
+        os._exit(0 if do() else 1)
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+
+
+def test_a_forked_process_has_a_mark_of_its_own() -> None:
+    mine = reaper.new_mark().partition(".")[0]
+    assert forked(lambda: reaper.new_mark().partition(".")[0] != mine) == 0

@@ -1,0 +1,230 @@
+"""More adapters that misbehave on purpose, on a real engine: in time, in words, in what they start.
+
+Loaded by workers as `tests.client.unruly:NAME`.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+from pytest_simbench.sims.mujoco import MuJoCo
+
+from pytest_simbench.scene import Scene
+from pytest_simbench.simulator import ParityError, UnavailableError
+from pytest_simbench.worker.server import Server
+
+FAULT_TIME = 0.3
+"""Simulated time at which the fault happens [s]."""
+
+
+class _AtTime(MuJoCo):
+    """Does `fault` once, in the middle of the motion."""
+
+    done = False
+
+    def step(self) -> None:
+        super().step()
+        if self.time >= FAULT_TIME and not self.done:
+            self.done = True
+            self.fault()
+
+    def fault(self) -> None:
+        raise NotImplementedError
+
+
+def hold_the_interpreter(seconds: float) -> None:
+    """No other thread of this process runs meanwhile, that which reads messages included."""
+    ctypes.PyDLL(None).usleep(ctypes.c_uint(int(seconds * 1e6)))
+
+
+class StopsBetweenRequests(MuJoCo):
+    """Answers `load`, and a moment later stops, so that nobody reads the next request."""
+
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGSTOP)).start()
+
+
+class HoldsTheInterpreter(MuJoCo):
+    """Answers `load`; then a thread of its own lets no other run."""
+
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        threading.Timer(0.3, hold_the_interpreter, (600.0,)).start()
+
+
+class StopsLoading(MuJoCo):
+    def load(self, scene: Scene) -> None:
+        os.kill(os.getpid(), signal.SIGSTOP)
+
+
+class StopsBeingMade(MuJoCo):
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        os.kill(os.getpid(), signal.SIGSTOP)
+
+
+class StopsClosing(MuJoCo):
+    def close(self) -> None:
+        os.kill(os.getpid(), signal.SIGSTOP)
+
+
+class StandsStill(MuJoCo):
+    """Steps for ever, and does not get on."""
+
+    def step(self) -> None:
+        if self.time < FAULT_TIME:
+            super().step()
+
+
+class Chatters(MuJoCo):
+    """Says that it is alive as often as it can, each time a little later."""
+
+    def step(self) -> None:
+        super().step()
+        server = next(o for o in gc.get_objects() if isinstance(o, Server))
+        for k in range(10**9):
+            server.send({"alive": self.time + k})
+
+
+class FloodsTheLog(_AtTime):
+    def fault(self) -> None:
+        line = b"x" * 99 + b"\n"
+        for _ in range(100):
+            os.write(2, line * 10_000)
+        time.sleep(600.0)
+
+
+def _connections() -> list[int]:
+    """execnet's descriptors: the pipes other than stdin, stdout and stderr."""
+    found = []
+    for name in os.listdir("/proc/self/fd"):
+        try:
+            target = os.readlink(f"/proc/self/fd/{name}")
+        except OSError:
+            continue
+        if int(name) > 2 and target.startswith("pipe:"):
+            found.append(int(name))
+    return found
+
+
+class HangsUp(_AtTime):
+    """Closes its connection and lives on."""
+
+    def fault(self) -> None:
+        for descriptor in _connections():
+            os.close(descriptor)
+        time.sleep(600.0)
+
+
+class HalfAnswer(_AtTime):
+    """Begins a message of 1000 bytes and sends ten."""
+
+    def fault(self) -> None:
+        for descriptor in _connections():
+            try:
+                os.write(descriptor, b"\4\0\0\0\1\0\0\3\350" + b"0123456789")
+            except OSError:  # the other direction
+                continue
+        time.sleep(600.0)
+
+
+class Garbage(_AtTime):
+    """Writes a message of no known kind where the messages go."""
+
+    def fault(self) -> None:
+        for descriptor in _connections():
+            try:
+                os.write(descriptor, b"c" + bytes(8))
+            except OSError:
+                continue
+        time.sleep(600.0)
+
+
+class Unprintable(Exception):
+    def __str__(self) -> str:
+        raise RuntimeError("no text")
+
+    __repr__ = __str__
+
+
+class Rude(BaseException):
+    """An exception that no `except Exception` sees."""
+
+
+class Derived(UnavailableError):
+    """An adapter's own kind of one of ours."""
+
+
+RAISED: dict[str, Any] = {
+    "surrogate": lambda: ValueError("bad \ud800 text"),
+    "huge": lambda: ValueError("y" * 5_000_000),
+    "no_text": Unprintable,
+    "no_string": lambda: ValueError(b"bytes", {1: 2}, None),
+    "interrupt": lambda: KeyboardInterrupt("from inside"),
+    "generator": lambda: GeneratorExit("done"),
+    "rude": lambda: Rude("hm"),
+    "exit": lambda: SystemExit(3),
+    "exit_text": lambda: SystemExit("tired"),
+    "parity": lambda: ParityError("\udfff" * 3000),
+    "derived": lambda: Derived("no driver"),
+}
+
+
+class Raises(_AtTime):
+    """Raises one of `RAISED`, named in the environment."""
+
+    def fault(self) -> None:
+        raise RAISED[os.environ["UNRULY"]]()
+
+
+class ExitsLoading(MuJoCo):
+    def load(self, scene: Scene) -> None:
+        sys.exit(5)
+
+
+class ExitsAtOnce(_AtTime):
+    def fault(self) -> None:
+        os._exit(7)
+
+
+class Aborts(_AtTime):
+    def fault(self) -> None:
+        os.abort()
+
+
+class Parent(MuJoCo):
+    """Starts processes that want to stay: a child, one with another session and parent, and one
+    that has thrown its environment away as well. Their ids are in the file of `UNRULY`."""
+
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        sleep = "import os,time; print(os.getpid(), flush=True); time.sleep(600)"
+        daemon = (
+            "import os,sys\nif os.fork(): os._exit(0)\nos.setsid()\nif os.fork(): os._exit(0)\n"
+        )
+        with open(os.environ["UNRULY"], "ab") as ids:
+            subprocess.Popen([sys.executable, "-c", sleep], stdout=ids)
+            for environment in (None, {}):
+                subprocess.run(
+                    [sys.executable, "-c", daemon + sleep],
+                    stdout=ids,
+                    env=environment,
+                    check=True,
+                )
+        while Path(os.environ["UNRULY"]).read_text().count("\n") < 3:
+            time.sleep(0.01)
+
+
+class ParentThatDies(Parent):
+    def step(self) -> None:
+        os.kill(os.getpid(), signal.SIGKILL)
