@@ -22,6 +22,7 @@ from pytest_simbench.client.world import Motion
 from pytest_simbench.repeatability.episode import Episode
 from pytest_simbench.repeatability.motions import gaps
 from pytest_simbench.scene import FloatArray
+from pytest_simbench.simulator.files import read_arrays, read_json
 
 LIMITS = (0.001, 0.01)
 """Distances of interest [m]."""
@@ -31,6 +32,9 @@ SAME_COMMAND = 1e-3
 what an inverse kinematics solver leaves."""
 
 FOLDER = "motions"
+
+LARGEST = 256 * 2**20
+"""Of a file, packed and unpacked [bytes]; a whole stacking has 7 MB."""
 
 
 @dataclass(frozen=True)
@@ -99,15 +103,55 @@ class Sample:
 
     @classmethod
     def load(cls, path: Path) -> Sample:
-        """Read it back."""
-        with np.load(path) as data:
-            facts = json.loads(str(data["facts"]))
-            cuts = np.cumsum(data["lengths"])[:-1]
-            parts = (np.split(data[name], cuts) for name in ("time", "joints", "bodies"))
-            motions = [Motion(*part) for part in zip(*parts, strict=True)]
-            commands = [None if np.isnan(row).all() else row for row in data["commands"]]
-            durations = [float(value) for value in data["durations"]]
+        """Read it back.
+
+        Raises:
+            ValueError: something else is in the file, which the message names.
+        """
+        data = read_arrays(path, LARGEST)
+        try:
+            facts = _checked(data)
+        except (ValueError, KeyError, TypeError) as error:
+            raise ValueError(f"{path} holds no motion of pytest-simbench: {error}") from None
+        cuts = np.cumsum(data["lengths"])[:-1]
+        parts = (np.split(data[name], cuts) for name in ("time", "joints", "bodies"))
+        motions = [Motion(*part) for part in zip(*parts, strict=True)]
+        commands = [None if np.isnan(row).all() else row for row in data["commands"]]
+        durations = [float(value) for value in data["durations"]]
         return cls(**facts, motions=motions, commands=commands, durations=durations)
+
+
+def _checked(data: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """The facts of a file whose arrays are what `Sample.save` writes.
+
+    Raises:
+        ValueError, KeyError, TypeError: they are not.
+    """
+    facts = read_json(str(data["facts"]))
+    label, task, seed, bodies, counts = (
+        facts[key] for key in ("label", "task", "seed", "bodies", "counts")
+    )
+    time, lengths, durations = data["time"], data["lengths"], data["durations"]
+    fine = (
+        set(facts) == {"label", "task", "seed", "bodies", "counts"}
+        and all(isinstance(text, str) for text in (label, task, *bodies, *counts))
+        and all(isinstance(value, int | float | None) for value in counts.values())
+        and isinstance(seed, int)
+        and all(data[name].dtype.kind == "f" for name in ("time", "joints", "bodies", "commands"))
+        and (lengths.ndim, lengths.dtype.kind, durations.dtype.kind) == (1, "i", "f")
+        and len(lengths) > 0
+        and int(lengths.min()) > 0
+        and time.shape == (int(lengths.sum()),)
+        and data["bodies"].shape == (len(time), len(bodies), 13)
+        and data["joints"].shape[:2] == (len(time), 2)
+        and data["commands"].ndim == 2
+        and durations.shape == (len(data["commands"]),)
+        and all(np.isfinite(data[name]).all() for name in ("time", "bodies", "durations"))
+        and bool((np.diff(time) >= 0).all())
+    )
+    if not fine:
+        raise ValueError("its arrays do not fit each other")
+    return dict(facts)
 
 
 def _command(operation: Operation) -> FloatArray | None:

@@ -9,8 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pytest_simbench.simulator.files import read_file, read_json
+
 NAME = "repeatability.jsonl"
 SCHEMA = 1
+
+LARGEST = 256 * 2**20
+"""Of the file [bytes]; a line has about 1 kB."""
 
 
 @dataclass(frozen=True)
@@ -71,14 +76,51 @@ def read(folder: Path) -> list[Line]:
     if not path.is_file():
         return []
     lines = []
-    for number, text in enumerate(path.read_text("ascii").splitlines(), start=1):
+    for number, text in enumerate(read_file(path, LARGEST).splitlines(), start=1):
         try:
-            data = json.loads(text)
+            data = read_json(text)
             schema = data.pop("schema")
             line = Line(**data)
+            fine = _is_line(line)
         except (ValueError, KeyError, TypeError, AttributeError):
-            raise ValueError(f"{path}, line {number}: not a result on repeatability") from None
+            fine = False
+        if not fine:
+            raise ValueError(f"{path}, line {number}: not a result on repeatability")
         if schema != SCHEMA:
-            raise ValueError(f"{path}, line {number}: schema {schema}, this reads {SCHEMA}")
+            raise ValueError(f"{path}, line {number}: schema {schema!r:.20}, this reads {SCHEMA}")
         lines.append(line)
     return sorted(lines, key=lambda line: (line.kind, line.task, line.test))
+
+
+def _is_line(line: Line) -> bool:
+    """Whether its parts are what the tables read.
+
+    Raises:
+        KeyError, TypeError, AttributeError: they are not.
+    """
+    texts = (line.test, line.simulator, line.mode, line.profile, line.task)
+    if not (all(isinstance(text, str) for text in texts) and isinstance(line.seed, int)):
+        return False
+    if line.kind != "replay":
+        sentence = line.result["sentence"]
+        return line.kind in ("search", "stability", "sensitivity") and isinstance(sentence, str)
+    return isinstance(line.result["claims"], bool) and all(
+        _is_again(again) for again in line.result["again"]
+    )
+
+
+def _is_again(data: Mapping[str, Any]) -> bool:
+    if not isinstance(data["changed"], list):
+        return False
+    texts = [data["way"], data["skipped"], data["failure"], *data["changed"]]
+    if data["first"] is not None:
+        texts.append(data["body"])
+        numbers = [data["first"], data["largest"], *data["growth"].values()]
+        if not all(isinstance(number, int | float | None) for number in numbers):
+            return False
+        [float(time) for time in data["growth"]]
+        if None in numbers[:2]:
+            return False
+    return all(isinstance(text, str) for text in texts) and isinstance(
+        data["left_at"], int | float | None
+    )

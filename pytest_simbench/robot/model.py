@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from pytest_simbench.scene import FloatArray, Pose, Robot
 from pytest_simbench.simulator import DescriptionError
-from pytest_simbench.simulator.urdf_check import check_robot
+from pytest_simbench.simulator.robot_check import check_robot
 
 
 class RobotModel:

@@ -220,13 +220,10 @@ def _operation(told: Any, joints: int) -> Operation:
         isinstance(number, int | float) and not isinstance(number, bool) and 0 < number <= longest,
         f"an operation {kind!r} has the {length} {number!r}; it takes up to {longest:g} s",
     )
-    operation = Operation(
-        kind,
-        {
-            key: _rows(key, value, joints) if key in ARRAYS else value
-            for key, value in arguments.items()
-        },
-        in_one_line(phase, 200),
+    for name in ARRAYS if kind == "follow" else ():
+        _check_rows(name, arguments[name], joints)
+    operation = Operation.from_wire(
+        {"kind": kind, "arguments": arguments, "phase": in_one_line(phase)}
     )
     if kind == "follow":
         lengths = {len(operation.arguments[name]) for name in ARRAYS}
@@ -235,7 +232,7 @@ def _operation(told: Any, joints: int) -> Operation:
     return operation
 
 
-def _rows(name: str, value: Any, joints: int) -> Any:
+def _check_rows(name: str, value: Any, joints: int) -> None:
     """An array of a motion, (n, joints); JSON holds finite numbers only."""
     try:
         rows = np.array(value)
@@ -245,7 +242,6 @@ def _rows(name: str, value: Any, joints: int) -> Any:
         rows.ndim == 2 and rows.dtype.kind in "fi" and len(rows) > 0 and rows.shape[1] == joints,
         f"the {name} of a motion is no array of {joints} joints",
     )
-    return rows.astype(float)
 
 
 def replay_command(path: Path, case: Case, scene: Scene) -> str:

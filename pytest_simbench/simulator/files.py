@@ -1,16 +1,20 @@
 """Files that somebody else may have made: read whole or not at all, never more than expected.
 
-Used in workers too: standard library only.
+Used in workers too: standard library and numpy only.
 """
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import os
 import stat
+import zipfile
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 KINDS = {
     stat.S_IFDIR: "a folder",
@@ -61,6 +65,28 @@ def _check(status: os.stat_result, path: str | Path, largest: int, what: str) ->
 
 def _too_large(path: str | Path, largest: int, what: str) -> str:
     return f"cannot read {what} {path}: it is larger than {largest / 2**20:g} MB"
+
+
+def read_arrays(path: str | Path, largest: int) -> dict[str, np.ndarray]:
+    """The arrays in a .npz file, of `largest` bytes together; never objects, which are code.
+
+    Raises:
+        FileError: no such file, too large, also when unpacked, or something else in it.
+    """
+    data = io.BytesIO(read_file(path, largest))
+    try:
+        with zipfile.ZipFile(data) as archive:
+            if sum(item.file_size for item in archive.infolist()) > largest:
+                raise FileError(_too_large(path, largest, "the arrays in"))
+        with np.load(data, allow_pickle=False) as arrays:
+            found = {name: arrays[name] for name in arrays.files}
+    except FileError:
+        raise
+    except Exception as error:  # zipfile, zlib and numpy have many for what is none
+        raise FileError(f"{path} holds no arrays: {error}") from None
+    if not all(isinstance(array, np.ndarray) for array in found.values()):
+        raise FileError(f"{path} holds something else than arrays")
+    return found
 
 
 def read_json(text: str | bytes) -> Any:

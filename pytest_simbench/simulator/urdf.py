@@ -19,7 +19,10 @@ import numpy as np
 
 from pytest_simbench.scene import FloatArray, Pose, Robot, Vector3
 from pytest_simbench.simulator.errors import DescriptionError
-from pytest_simbench.simulator.urdf_check import ROOT, Description
+from pytest_simbench.simulator.urdf_check import Description
+
+ROOT = "base"
+"""Link of a reduced robot that is fixed in the world."""
 
 
 @dataclass(frozen=True)

@@ -10,25 +10,18 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import NoReturn
-from xml.parsers import expat
 
 import numpy as np
 
-from pytest_simbench.scene import Robot, Scene
 from pytest_simbench.scene.checks import LARGEST, UNIT_TOLERANCE, SceneError, check_name
 from pytest_simbench.simulator.errors import DescriptionError
-from pytest_simbench.simulator.files import FileError, read_file
+from pytest_simbench.simulator.files import FileError
 from pytest_simbench.simulator.mesh_check import check_mesh, mesh_path
+from pytest_simbench.simulator.xml_file import read_xml
 
-LARGEST_FILE = 16 * 2**20
-"""Of a URDF or SRDF file [bytes]; the largest in example-robot-data have 0.3 MB."""
-
-MOST_ELEMENTS, MOST_LINKS = 100_000, 300
-
-ROOT = "base"
-"""Link of a reduced robot that is fixed in the world."""
+MOST_LINKS = 300
 
 MOVING, FIXED = ("revolute", "prismatic"), "fixed"
 REFUSED = {
@@ -297,86 +290,6 @@ class Description:
                 "on nothing; a robot is one tree"
             )
         return roots[0]
-
-
-def check_robot(robot: Robot) -> None:
-    """Check all files of a robot, and that they fit its drives.
-
-    Raises:
-        DescriptionError: what is wrong, where, and what to do.
-    """
-    from pytest_simbench.simulator.urdf import PreparedRobot
-
-    PreparedRobot(robot)
-    srdf = read_xml(robot.srdf, "the list of link pairs")
-    if srdf.tag != "robot":
-        raise DescriptionError(f"{robot.srdf} is no SRDF: it holds <{srdf.tag}>, not <robot>")
-
-
-def check_names(scene: Scene) -> None:
-    """Raise `SceneError` for a body that has the name of one of the robot's links.
-
-    Engines keep both under their names, in one list.
-    """
-    if scene.robot is None:
-        return
-    xml = read_xml(scene.robot.urdf, "the robot description")
-    links = {ROOT, *(link.get("name") for link in xml.findall("link"))}
-    for body in scene.bodies:
-        if body.name in links:
-            raise SceneError(
-                f"scene {scene.name!r}: a body is named {body.name!r}, as a link of the robot "
-                f"{scene.robot.name!r} is; give it another name"
-            )
-
-
-def read_xml(path: str, what: str, lines: dict[ET.Element, int] | None = None) -> ET.Element:
-    """The root element of an XML file without a document type, which could define entities.
-
-    Args:
-        path: of the file.
-        what: the file is, for messages.
-        lines: takes the line of each element.
-
-    Raises:
-        DescriptionError: no file, too large, or no such XML.
-    """
-    try:
-        data = read_file(path, LARGEST_FILE, what)
-    except FileError as error:
-        raise DescriptionError(str(error)) from None
-    builder, parser = ET.TreeBuilder(), expat.ParserCreate()
-    count = 0
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal count
-        count += 1
-        if count > MOST_ELEMENTS:
-            raise DescriptionError(f"{path} has more than {MOST_ELEMENTS} elements")
-        element = builder.start(tag, attributes)
-        if lines is not None:
-            lines[element] = parser.CurrentLineNumber
-
-    def refuse(*_: object) -> None:
-        raise DescriptionError(
-            f"{path}, line {parser.CurrentLineNumber}: {what} has a document type (<!DOCTYPE>), "
-            "which may define entities; leave it out"
-        )
-
-    handlers: dict[str, Callable[..., object]] = {
-        "StartElementHandler": start,
-        "EndElementHandler": builder.end,
-        "CharacterDataHandler": builder.data,
-        "StartDoctypeDeclHandler": refuse,
-        "EntityDeclHandler": refuse,
-    }
-    for name, handler in handlers.items():
-        setattr(parser, name, handler)
-    try:
-        parser.Parse(data, True)
-    except (expat.ExpatError, ValueError, LookupError) as error:
-        raise DescriptionError(f"{what} {path} is not valid XML: {error}") from None
-    return builder.close()
 
 
 def _plain_float(text: str) -> float:

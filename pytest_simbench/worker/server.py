@@ -21,8 +21,8 @@ from pytest_simbench import __version__
 from pytest_simbench.scene import Scene, Trajectory
 from pytest_simbench.simulator import Simulator, SimulatorError, SimulatorInfo
 from pytest_simbench.simulator.parity import check, expected_quantities
+from pytest_simbench.simulator.robot_check import check_names
 from pytest_simbench.simulator.settings import changed
-from pytest_simbench.simulator.urdf_check import check_names
 from pytest_simbench.worker.state import check_following, check_log, check_start, checked_state
 from pytest_simbench.worker.stepping import Stepper
 from pytest_simbench.worker.text import LONGEST_LOGGED, named, readable, told

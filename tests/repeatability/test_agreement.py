@@ -101,3 +101,35 @@ def test_engines_with_the_same_law_agree_until_things_collide(
     assert centimetre is not None
     assert 0.1 < centimetre.time < 1.6
     assert agreement(samples[0], samples[0]).partings == {0.001: None, 0.01: None}
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"facts": np.array("[]")},
+        {"facts": np.array("nonsense")},
+        {"facts": np.array("[" * 9999)},
+        {"facts": np.array('{"label": "a", "task": "t", "seed": "x", "bodies": [], "counts": {}}')},
+        {"time": np.zeros(2)},
+        {"time": np.array([0.0, 0.4, 0.3, 0.2, 0.1])},
+        {"time": np.full(5, np.nan)},
+        {"lengths": np.array([5, 0])},
+        {"lengths": np.array([-1, 6])},
+        {"lengths": np.array([2.5, 2.5])},
+        {"bodies": np.zeros((5, 2, 7))},
+        {"bodies": np.full((5, 2, 13), np.inf)},
+        {"joints": np.zeros(5)},
+        {"commands": np.array(["x"])},
+        {"durations": np.zeros(3)},
+        {"durations": None},
+    ],
+    ids=str,
+)
+def test_a_file_with_something_else_in_it(tmp_path: Path, wrong: dict[str, object]) -> None:
+    path = tmp_path / "a.npz"
+    sample("a", TIMES, [0.2] * 4).save(path)
+    with np.load(path) as data:
+        arrays = {**data, **wrong}
+    np.savez(path, **{k: v for k, v in arrays.items() if v is not None})  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=f"{path} holds no motion of pytest-simbench"):
+        Sample.load(path)

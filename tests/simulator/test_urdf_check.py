@@ -20,7 +20,7 @@ from pytest_simbench.session.case import Case
 from pytest_simbench.session.handle import SimulatorHandle
 from pytest_simbench.simulator import DescriptionError, PreparedRobot
 from pytest_simbench.simulator.mesh_check import LARGEST_MESH, TRIANGLE
-from pytest_simbench.simulator.urdf_check import check_names, check_robot
+from pytest_simbench.simulator.robot_check import check_names, check_robot
 from tests.hostile import assert_harmless_terminal
 
 SOUND = """<robot name="arm">

@@ -1,0 +1,176 @@
+"""What cannot be is refused in a sentence where it is made, and where it arrives from elsewhere."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pytest_simbench.robot.panda import panda
+from pytest_simbench.scene import Box, Gripper, Joint, Pose, Robot, Scene, SceneError
+from tests.hostile import HOSTILE, assert_harmless_terminal
+
+BOX = Box("a", (0.1, 0.1, 0.1), Pose.at(0, 0, 0.5), mass=1.0)
+SCENE = Scene("s", (BOX,), panda())
+NAN, INF = math.nan, math.inf
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            {"size": (0.1, 0.1, -0.1)},
+            "the size \\[m\\] of 'a' is -0.1; it must be a number above 0",
+        ),
+        ({"size": (0.1, 0.1, 0)}, "the size .* above 0"),
+        ({"size": (0.1, 0.1)}, "the size .* must be 3 numbers"),
+        ({"size": "0.1"}, "must be 3 numbers"),
+        ({"size": (NAN, 1, 1)}, "the size .* is nan"),
+        ({"size": (1e7, 1, 1)}, "the size .* to 1e\\+06"),
+        ({"mass": -1.0}, "the mass \\[kg\\] of 'a' is -1.0"),
+        ({"mass": NAN}, "the mass .* is nan"),
+        ({"mass": INF}, "the mass .* is inf"),
+        ({"mass": "1"}, "the mass .* is '1'"),
+        ({"mass": True}, "the mass .* is True"),
+        ({"mass": None}, "the mass .* is None"),
+        ({"mass": 10**400}, "the mass .* it must be"),
+        ({"friction": -0.1}, "the friction of 'a' is -0.1"),
+        ({"friction": NAN}, "the friction of 'a' is nan"),
+        ({"colour": (0, 0, 0)}, "the colour of 'a' .* must be 4 numbers"),
+        ({"colour": (0, 0, 0, NAN)}, "the colour of 'a' is nan"),
+        ({"pose": Pose((NAN, 0, 0))}, "the position of 'a' is nan"),
+        ({"pose": Pose((0, INF, 0))}, "the position of 'a' is inf"),
+        ({"pose": Pose(quaternion=(0, 0, 0, 0))}, "quaternion of 'a' has the length 0; it must be"),
+        ({"pose": Pose(quaternion=(2, 0, 0, 0))}, "quaternion of 'a' has the length 2"),
+        ({"pose": Pose(quaternion=(NAN, 0, 0, 0))}, "the quaternion of 'a' is nan"),
+        ({"pose": Pose((0, 0))}, "the position of 'a' .* must be 3 numbers"),  # type: ignore[arg-type]
+        ({"name": ""}, "a body has the name ''; give it a text"),
+        ({"name": " "}, "a body has the name ' '; give it a text"),
+        ({"name": 3}, "a body has the name 3"),
+        ({"name": "a/b"}, "a body has the name 'a/b'; a name has up to 100 printable"),
+        ({"name": "a\0"}, r"a body has the name 'a\\x00'"),
+        ({"name": "a\nb"}, r"a body has the name 'a\\nb'"),
+        ({"name": ".."}, "a body has the name '..'"),
+        ({"name": " a"}, "a body has the name ' a'"),
+        ({"name": "x" * 101}, "a body has the name"),
+        ({"name": "<a>"}, "none of / "),
+    ],
+    ids=lambda value: str(value)[:40],
+)
+def test_a_box_that_cannot_be(change: dict[str, Any], said: str) -> None:
+    with pytest.raises(SceneError, match=said) as caught:
+        replace(BOX, **change)
+    assert_harmless_terminal(str(caught.value))
+
+
+@pytest.mark.parametrize("name", ["ground", "world", "Ground", "WORLD"])
+def test_the_names_of_what_is_in_every_scene(name: str) -> None:
+    with pytest.raises(SceneError, match=f"a body is named '{name}', as something in every scene"):
+        Scene("s", (replace(BOX, name=name),))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"name": "a/b"}, "a scene has the name 'a/b'"),
+        ({"gravity": (0, 0)}, "the gravity .* must be 3 numbers"),
+        ({"gravity": (0, 0, NAN)}, "the gravity .* is nan"),
+        ({"ground_friction": -1}, "the ground's friction .* is -1"),
+    ],
+)
+def test_a_scene_that_cannot_be(change: dict[str, Any], said: str) -> None:
+    with pytest.raises(SceneError, match=said):
+        replace(SCENE, **change)
+
+
+JOINT = Joint("j", 1.0, 1.0, 1.0, 0.1, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"name": "a\x1b"}, r"a joint has the name 'a\\x1b'"),
+        ({"stiffness": -1.0}, "the stiffness of joint 'j' is -1.0"),
+        ({"damping": NAN}, "the damping of joint 'j' is nan"),
+        ({"effort_limit": INF}, "the effort_limit of joint 'j' is inf"),
+        ({"armature": "x"}, "the armature of joint 'j' is 'x'"),
+        ({"initial_position": NAN}, "the initial position of joint 'j' is nan"),
+    ],
+)
+def test_a_joint_that_cannot_be(change: dict[str, Any], said: str) -> None:
+    with pytest.raises(SceneError, match=said):
+        replace(JOINT, **change)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"name": ""}, "a robot has the name ''"),
+        ({"urdf": None}, "robot 'panda' is described by None, which is no path"),
+        ({"urdf": "a\0"}, "which is no path"),
+        ({"packages": {"a": 3}}, "is described by 3, which is no path"),
+        ({"tool_frame": "a/b"}, "the tool frame of 'panda' has the name 'a/b'"),
+        ({"friction": NAN}, "the friction of 'panda' is nan"),
+        ({"base": Pose((NAN, 0, 0))}, "the position of the base of 'panda' is nan"),
+        ({"joints": (JOINT, JOINT)}, "robot 'panda' has several drives for j"),
+        ({"gripper": Gripper(("x",), 0.1, 0.0, 1.0)}, "the gripper .* the joints x, which have no"),
+    ],
+)
+def test_a_robot_that_cannot_be(change: dict[str, Any], said: str) -> None:
+    with pytest.raises(SceneError, match=said):
+        replace(panda(), **change)
+
+
+@pytest.mark.parametrize("quantity", ["opened", "closed", "squeeze"])
+def test_a_gripper_that_cannot_be(quantity: str) -> None:
+    with pytest.raises(SceneError, match="the gripper's"):
+        replace(panda().gripper, **{quantity: NAN})
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    size = tuple(np.array([0.1, 0.2, 0.3]))
+    assert replace(BOX, size=size, mass=np.float32(1), friction=np.int64(1)).size == size
+
+
+@given(st.sampled_from(HOSTILE) | st.text())
+def test_a_name_that_is_taken_is_printable(name: str) -> None:
+    try:
+        box = replace(BOX, name=name)
+    except SceneError as error:
+        assert_harmless_terminal(str(error))
+    else:
+        assert box.name.isprintable()
+        assert "/" not in box.name
+
+
+def numbers_of(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Places of all numbers in plain data."""
+    if isinstance(data, dict):
+        return [p for key, value in data.items() for p in numbers_of(value, (*path, key))]
+    if isinstance(data, list):
+        return [p for k, value in enumerate(data) for p in numbers_of(value, (*path, k))]
+    return [path] if isinstance(data, float | int) else []
+
+
+WIRE = SCENE.to_wire()
+
+
+@pytest.mark.parametrize("place", numbers_of(WIRE), ids=str)
+@pytest.mark.parametrize("value", [NAN, INF, -INF, "1", None, True, [1.0]], ids=str)
+def test_no_number_that_arrives_is_none(place: tuple[Any, ...], value: Any) -> None:
+    data = inside = json.loads(json.dumps(WIRE))
+    for key in place[:-1]:
+        inside = inside[key]
+    inside[place[-1]] = value
+    with pytest.raises(SceneError):
+        Scene.from_wire(data)
+
+
+def test_a_robot_travels_unchanged() -> None:
+    assert Robot.from_wire(json.loads(json.dumps(panda().to_wire()))) == panda()
