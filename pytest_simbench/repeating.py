@@ -44,7 +44,7 @@ class Repeating:
     def __call__(self, task: Task) -> ResultSet:
         """Run a task's repetitions, as many as options and marks say."""
         self.this.declare(task.smoke() if self.case.protocol.smallest else task)
-        wanted = options.value(self.node.config, "sim_reps")
+        wanted = options.repetitions(self.node.config)
         metrics = (task.smoke() if self.case.protocol.smallest else task).metrics
         found = self.this.resume(self.node.nodeid, task.name)
         if isinstance(wanted, options.Auto):
