@@ -81,7 +81,7 @@ def prepare(config: pytest.Config, saved: list[dict[str, Any]]) -> Comparison | 
     """
     text = options.value(config, "sim_compare_fail")
     try:
-        baseline = _baseline(config, saved, needed=options.given(config, "sim_compare_fail"))
+        baseline = _baseline(config, saved, needed=config.getoption("sim_compare_fail") is not None)
         if baseline is None:
             return None
         return Comparison(baseline, _limits(text, baseline) if text is not None else ())

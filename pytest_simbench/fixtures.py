@@ -75,8 +75,18 @@ def has_benchmark(plugins: pytest.PytestPluginManager) -> bool:
 
 
 @pytest.fixture
-def benchmark_rounds(benchmark: Any) -> Any:
-    """What takes the repetitions as rounds: pytest-benchmark's fixture."""
+def benchmark_rounds(request: pytest.FixtureRequest, benchmark: Any) -> Any:
+    """What takes the repetitions as rounds: pytest-benchmark's fixture.
+
+    A test that is run again (pytest-rerunfailures) replaces the rounds of its first attempt, which
+    would else be in the saved file a second time. A conftest's own `benchmark` takes no rounds.
+    """
+    from pytest_benchmark.fixture import BenchmarkFixture
+
+    if not isinstance(benchmark, BenchmarkFixture):
+        return None
+    saved = getattr(getattr(request.config, "_benchmarksession", None), "benchmarks", [])
+    saved[:] = [rounds for rounds in saved if rounds.fullname != benchmark.fullname]
     return benchmark
 
 

@@ -24,7 +24,7 @@ def merge_runs(config: pytest.Config) -> int:
     """
     runs: dict[str, list[Record]] = {}
     folders: dict[str, Path] = {}
-    for name in options.value(config, "sim_merge"):
+    for name in config.getoption("sim_merge"):
         path = Path(config.invocation_params.dir, name)
         if name in runs:
             raise pytest.UsageError(f"--sim-merge {name}: the run is given twice")

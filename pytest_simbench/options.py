@@ -10,7 +10,6 @@ import pytest
 
 from pytest_simbench.values import (
     Assignments,
-    Auto,
     BadValue,
     Choice,
     File,
@@ -23,8 +22,7 @@ from pytest_simbench.values import (
     Word,
     Words,
 )
-
-__all__ = ["OPTIONS", "Auto", "Option", "given", "number", "option", "value", "values"]
+from pytest_simbench.values import Auto as Auto
 
 AUTO_LIMIT = 160
 """Repetitions at which `--reps auto` gives up: with the looks before it 10, 20, 40, 80 and 160."""
@@ -201,11 +199,17 @@ def _ini(config: pytest.Config, item: Option) -> tuple[str, Any]:
         if name in _ours(config):
             try:
                 raw = config.getini(name)
-            except (TypeError, ValueError) as error:  # not a text, or quotes that do not match
+            except (TypeError, ValueError, pytest.UsageError) as error:  # not a text, or quotes that do not match
                 raise pytest.UsageError(f"the ini option {name}: {error}") from None
             if raw is not None:
                 return f"the ini option {name}", raw
     return "", None
+
+
+def repetitions(config: pytest.Config) -> int | Auto | None:
+    """What `--reps` asks for; None when it is not given."""
+    found: int | Auto | None = value(config, "sim_reps")
+    return found
 
 
 def number(name: str, value: Any) -> Any:

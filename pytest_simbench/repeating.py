@@ -46,7 +46,7 @@ class Repeating:
         """Run a task's repetitions, as many as options and marks say."""
         task = self.case.protocol.version_of(task)
         self.this.declare(task)
-        wanted = options.value(self.node.config, "sim_reps")
+        wanted = options.repetitions(self.node.config)
         metrics = task.metrics
         found = self.this.resume(self.node.nodeid, task.name)
         if isinstance(wanted, options.Auto):

@@ -27,10 +27,10 @@ def folder_to_resume(config: pytest.Config) -> Path | None:
     Raises:
         pytest.UsageError: there is no such run, or none at all.
     """
-    given = options.value(config, "sim_resume")
+    given = config.getoption("sim_resume")
     if given is None:
         return None
-    given = "" if given is True else given  # without a value
+    given = "" if given is True else given  # the option without a value
     output = options.value(config, "sim_output")
     if given and output and given != output:
         raise pytest.UsageError(

@@ -44,7 +44,7 @@ class Run:
         self._references: dict[str, dict[str, float]] = {}
         self._problems: list[str] = []
         self.resumed: Resumed | None = None
-        if options.given(config, "sim_resume"):
+        if config.getoption("sim_resume") is not None:
             from pytest_simbench.resume import Resumed
 
             self.resumed = Resumed(self.folder)
@@ -53,7 +53,7 @@ class Run:
         shared = getattr(self.config, "workerinput", {}).get("simbench_folder")
         if shared:
             return Path(shared)
-        if options.given(self.config, "sim_resume"):
+        if self.config.getoption("sim_resume") is not None:
             from pytest_simbench.resume import folder_to_resume
 
             folder = folder_to_resume(self.config)

@@ -29,7 +29,8 @@ def register(parser: pytest.Parser, config: pytest.Config) -> None:
                 ours.add(flag)
         for name in map(name_of, item.flags if item.ini else ()):
             if _is_free_ini(config, name):
-                parser.addini(name, item.help, type=item.kind.ini, default=None)
+                text = item.help if name == item.name else f"the same as {item.name}"
+                parser.addini(name, text, type=item.kind.ini, default=None)
                 ours.add(name)
     config.stash[OURS] = frozenset(ours)
 

@@ -1,0 +1,204 @@
+"""Is the plugin at peace with others? It is installed, not from its sources, beside each of them.
+
+    python tests/matrix.py              the newest pytest with all the others: what CI runs
+    python tests/matrix.py --all        pytest 8 and 9, with and without each of them
+    python tests/matrix.py --folder F   keep the environments in F, to run again in seconds
+
+Makes each environment with venv and pip (with uv, where it is on the PATH), and runs there what a
+user types first. Ends with exit status 1 when one of the commands does not do what it should.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent.parent
+
+PLUGINS = ("xdist", "rerunfailures", "randomly", "timeout", "asyncio", "playwright", "seleniumbase")
+"""pytest-NAME each, but for the last. Playwright and SeleniumBase do not go together: both want
+`--headed`."""
+
+WANT_OUR_NAMES = {"seleniumbase": {"--gui", "--headless", "--protocol"}}
+"""Of our short names, those that a plugin has for itself."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """An environment.
+
+    Attributes:
+        pytest: its major version.
+        plugins: of `PLUGINS`.
+    """
+
+    pytest: int
+    plugins: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        return "-".join((f"pytest{self.pytest}", *self.plugins))
+
+    @property
+    def requirements(self) -> list[str]:
+        packages = [p if p == "seleniumbase" else f"pytest-{p}" for p in self.plugins]
+        # Its older releases pin no pytest, and pip would dig them out.
+        packages = [p.replace("seleniumbase", "seleniumbase>=4.40") for p in packages]
+        return [f"pytest>={self.pytest},<{self.pytest + 1}", *packages]
+
+
+ALL = tuple(p for p in PLUGINS if p != "seleniumbase")
+QUICK = (Place(9, ALL), Place(9, ("seleniumbase",)))
+EVERY = tuple(
+    Place(pytest, plugins)
+    for pytest in (8, 9)
+    for plugins in ((), *((plugin,) for plugin in PLUGINS), ALL)
+)
+
+
+def make(place: Place, wheel: Path, folder: Path) -> Path:
+    """The environment's interpreter; what is there already is brought up to date."""
+    python = folder / place.name / "bin" / "python"
+    wanted = [*place.requirements, f"{wheel}[mujoco]"]
+    uv = shutil.which("uv")
+    if not python.exists():
+        command = [uv, "venv", "-q"] if uv else [sys.executable, "-m", "venv"]
+        subprocess.run([*command, str(folder / place.name)], check=True)
+    pip = [uv, "pip", "install", "-q", "--python", str(python)] if uv else [
+        str(python), "-m", "pip", "install", "-q"]  # fmt: skip
+    subprocess.run([*pip, *wanted], check=True)
+    again = "--reinstall-package=pytest-simbench" if uv else "--force-reinstall"
+    subprocess.run([*pip, again, "--no-deps", str(wheel)], check=True)
+    return python
+
+
+OWN_TEST = """
+def test_own(tmp_path):
+    assert tmp_path.is_dir()
+"""
+
+WITH_OPTIONS = """
+def pytest_addoption(parser):
+    parser.addoption("--gui", action="store_true", help="the project's own")
+    parser.addoption("--reps", help="the project's own")
+    parser.addini("jitter", "the project's own", type="bool", default=False)
+"""
+
+RERUN = """
+import pytest
+
+attempts = []
+
+@pytest.mark.flaky(reruns=1)
+def test_again(repeat):
+    from pytest_simbench.tasks import Throwing
+    repeat(Throwing())
+    attempts.append(1)
+    assert len(attempts) == 2
+"""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A command and what must come of it.
+
+    Attributes:
+        arguments: of pytest.
+        shows: regular expressions, each of which the output must match.
+        files: of the project that it runs in.
+        status: the exit status.
+        variables: of the environment.
+    """
+
+    arguments: tuple[str, ...]
+    shows: tuple[str, ...] = ()
+    files: tuple[tuple[str, str], ...] = (("test_own.py", OWN_TEST),)
+    status: int = 0
+
+
+def steps(place: Place) -> Iterator[Step]:
+    """What is run in an environment."""
+    others = set().union(*(WANT_OUR_NAMES.get(plugin, set()) for plugin in place.plugins))
+    free = {"--gui", "--headless", "--protocol", "--reps", "--sim", "--jitter", "--sims"} - others
+    shorts = tuple(rf"(?m)^  {flag}\b.*\n?.* the same as --sim-" for flag in free)
+    own = [rf"(?m)^  {flag}[ =]" for flag in ("--sim-gui", "--sim-reps", "--sim-compare-fail")]
+    yield Step(("--help",), ("placed:5%,ram:10%,rtf:20%", *own, *shorts))
+    yield Step(("--sims",), (r"mujoco: MuJoCo", *(f"{f} belongs to another" for f in others)))
+    yield Step(("--markers",), ("only_sim",))
+    yield Step(("--fixtures",), ("simulator", *(("output_path",))))
+    yield Step((), ("1 passed",))
+    yield Step(("-p", "no:benchmark", "--strict-markers"), ("1 passed",))
+    suites = ("test_throwing.py", "test_stacking.py")
+    smallest = ("--sim=mujoco", "--sim-protocol=smoke", "--sim-output=out")
+    files = tuple((name, (HERE / "suites" / name).read_text("utf-8")) for name in suites)
+    yield Step((*suites, *smallest), ("2 passed", "simulator comparison"), files)
+    yield Step(
+        (suites[0], *smallest, "-p", "no:benchmark", "--strict-markers"), ("1 passed",), files
+    )
+    taken = (("test_own.py", OWN_TEST), ("conftest.py", WITH_OPTIONS))
+    if "--gui" not in others:  # two others that want one name are no matter of ours
+        yield Step(("--help",), ("the project's own", *own), taken)
+        yield Step(("--gui", "--reps", "x"), ("1 passed",), taken)
+    if "xdist" in place.plugins:
+        yield Step((*suites, *smallest, "-n2"), ("2 passed", "simulator comparison"), files)
+    if {"rerunfailures", "seleniumbase"} & set(place.plugins):
+        yield Step(("test_again.py", *smallest), ("1 passed, 1 rerun", r"benchmark 'test_again': 1 tests"),
+                   (("test_again.py", RERUN),))  # fmt: skip
+
+
+def check(python: Path, step: Step) -> str:
+    """Run a command in a project of its own; what is wrong with it, or nothing."""
+    with tempfile.TemporaryDirectory() as folder:
+        for name, text in step.files:
+            Path(folder, name).write_text(text, "utf-8")
+        variables = {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST", "PYTHON"))}
+        result = subprocess.run(
+            [str(python), "-m", "pytest", *step.arguments], cwd=folder, env=variables,
+            capture_output=True, text=True, check=False, timeout=600,
+        )  # fmt: skip
+    text = result.stdout + result.stderr
+    wrong = [f"it shows no {pattern!r}" for pattern in step.shows if not re.search(pattern, text)]
+    if result.returncode != step.status:
+        wrong.append(f"exit status {result.returncode} instead of {step.status}")
+    if "Traceback (" in text or "INTERNALERROR" in text:
+        wrong.append("a traceback")
+    return "" if not wrong else f"{'; '.join(wrong)}\n{text[-3000:]}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])  # type: ignore[union-attr]
+    parser.add_argument("--all", action="store_true", help="every environment, not only the newest")
+    parser.add_argument("--folder", type=Path, help="keeps the environments")
+    parser.add_argument("--only", help="environments whose name contains this")
+    given = parser.parse_args(arguments)
+    failed = 0
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = (given.folder or Path(temporary)).absolute()
+        built = Path(temporary, "wheel")
+        subprocess.run(
+            [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", str(built), str(HERE)],
+            check=True,
+        )
+        for place in EVERY if given.all or given.only else QUICK:
+            if given.only and given.only not in place.name:
+                continue
+            python = make(place, next(built.glob("*.whl")), folder)
+            for step in steps(place):
+                problem = check(python, step)
+                failed += bool(problem)
+                command = " ".join(("pytest", *step.arguments))
+                print(f"{place.name}: {command}: {problem or 'ok'}", flush=True)
+    print(f"{failed} commands failed" if failed else "all commands did what they should")
+    return min(failed, 1)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,171 @@
+"""Adapters of other packages that are broken spoil no other, and are told by their reason."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+GOOD = """
+from dataclasses import replace
+from pytest_simbench.sims.mujoco import MuJoCo
+
+class Good(MuJoCo):
+    info = replace(MuJoCo.info, name="good", title="Good")
+
+class OnlyDefault(Good):
+    profiles = {"default": MuJoCo.profiles["default"]}
+
+class NoInfo(MuJoCo):
+    info = None
+
+class NoProfiles(MuJoCo):
+    profiles = None
+"""
+
+TEST = """
+from tests.tiny import Falling
+
+def test_falling(repeat):
+    repeat(Falling())
+"""
+
+
+@pytest.fixture
+def site(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder on sys.path with modules of a third party."""
+    folder = pytester.mkdir("site")
+    (folder / "good_adapter.py").write_text(GOOD)
+    (folder / "raises.py").write_text("raise ValueError('no\\nluck')")
+    (folder / "exits.py").write_text("import sys; sys.exit(3)")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder), os.environ["PYTHONPATH"]]))
+    pytester.makepyfile(TEST)
+    return folder
+
+
+def distribution(site: Path, name: str, entries: str | bytes, metadata: bool = True) -> Path:
+    folder = site / f"{name}-1.0.dist-info"
+    folder.mkdir()
+    if metadata:
+        (folder / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    text = entries if isinstance(entries, bytes) else entries.encode()
+    (folder / "entry_points.txt").write_bytes(b"[pytest_simbench.simulators]\n" + text + b"\n")
+    return folder
+
+
+BROKEN = {
+    "nosuch_module:Class": "does not import: ModuleNotFoundError: No module named 'nosuch_module'",
+    "good_adapter:Missing": "does not import: AttributeError: *Missing*",
+    "raises:Class": "does not import: ValueError: no luck",
+    "exits:Class": "does not import: SystemExit: 3",
+    "good_adapter:GOOD": "does not import: *",
+    "good_adapter:replace": "is no Simulator subclass",
+    "good_adapter:NoInfo": "has no SimulatorInfo in its attribute info",
+    "good_adapter:NoProfiles": "has no settings in its attribute profiles",
+    "!!": "does not import: *",
+}
+
+
+def test_broken_adapters_end_no_other(pytester: pytest.Pytester, site: Path) -> None:
+    """All kinds at once: each is told with its reason, and is an error only when it is named."""
+    names = {f"broken{number}": value for number, value in enumerate(BROKEN)}
+    entries = [f"{name} = {value}" for name, value in names.items()]
+    distribution(site, "broken-sims", "\n".join([*entries, "good = good_adapter:Good"]))
+    said = {
+        name: f"the adapter of {name} ({value}, of broken-sims 1.0) {BROKEN[value]}"
+        for name, value in names.items()
+    }
+    result = pytester.runpytest_subprocess("--sims")
+    assert result.ret == 0
+    result.stdout.fnmatch_lines([f"{name}: BROKEN: {text}" for name, text in said.items()])
+    result.stdout.fnmatch_lines(["good: Good (*", "mujoco: MuJoCo (*"])
+    result = pytester.runpytest_subprocess("--collect-only", "-q")
+    result.stdout.fnmatch_lines(["*::test_falling?good-headless?", "*?mujoco-headless?"])
+    assert "broken" not in result.stdout.str().replace("test_broken", "")
+    pytester.runpytest_subprocess("--sim=good", "--reps=1").assert_outcomes(passed=1)
+    for name, text in said.items():
+        result = pytester.runpytest_subprocess(f"--sim={name}")
+        assert result.ret == pytest.ExitCode.USAGE_ERROR
+        result.stderr.fnmatch_lines([f"ERROR: {text}"])
+        assert "Traceback" not in result.stderr.str() + result.stdout.str()
+
+
+def test_all_skips_a_broken_one_with_its_reason(pytester: pytest.Pytester, site: Path) -> None:
+    distribution(site, "broken-sims", "broken = nosuch:Class")
+    pytester.makepyfile(
+        TEST.replace("def ", "import pytest\n@pytest.mark.only_sim('broken')\ndef ")
+    )
+    result = pytester.runpytest_subprocess("--sim=all", "-rs")
+    result.assert_outcomes(skipped=1)
+    result.stdout.fnmatch_lines(
+        ["SKIPPED*the adapter of broken (nosuch:Class, of broken-sims 1.0)*"]
+    )
+
+
+def test_two_distributions_of_one_name(pytester: pytest.Pytester, site: Path) -> None:
+    distribution(site, "first-sims", "good = good_adapter:Good")
+    distribution(site, "second-sims", "good = nosuch:Other")
+    sentence = (
+        "good is registered by first-sims 1.0 (good_adapter:Good) and second-sims 1.0 "
+        "(nosuch:Other); uninstall or rename one of them"
+    )
+    for arguments in (["--sim=good"], ["--sim-set=good.timestep=0.001"], ["--sim-python=good=sh"]):
+        result = pytester.runpytest_subprocess(*arguments)
+        assert result.ret == pytest.ExitCode.USAGE_ERROR
+        assert sorted(result.stderr.str().split()) == sorted(f"ERROR: {sentence}".split())
+    result = pytester.runpytest_subprocess("--sims")
+    result.stdout.fnmatch_lines(["good: BROKEN: good is registered by *"])
+    pytester.runpytest_subprocess("--sim=mujoco", "--reps=1").assert_outcomes(passed=1)
+
+
+def test_one_of_ours_cannot_be_taken_over(pytester: pytest.Pytester, site: Path) -> None:
+    distribution(site, "second-sims", "mujoco = good_adapter:Good")
+    result = pytester.runpytest_subprocess("--sim=mujoco")
+    result.stderr.fnmatch_lines(["*mujoco is registered by second-sims 1.0 *pytest-simbench*"])
+    pytester.runpytest_subprocess("--sim=pybullet", "--reps=1").assert_outcomes(passed=1)
+
+
+def test_the_same_adapter_twice_is_no_clash(pytester: pytest.Pytester, site: Path) -> None:
+    distribution(site, "first-sims", "good = good_adapter:Good")
+    distribution(site, "second-sims", "good = good_adapter:Good")
+    pytester.runpytest_subprocess("--sim=good", "--reps=1").assert_outcomes(passed=1)
+
+
+@pytest.mark.parametrize(("entries", "metadata"), [("= x:Y", True), ("x = y", False)])
+def test_odd_metadata(pytester: pytest.Pytester, site: Path, entries: str, metadata: bool) -> None:
+    distribution(site, "malformed", entries, metadata)
+    result = pytester.runpytest_subprocess("--sims")
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(["*BROKEN: *malformed*"])
+    pytester.runpytest_subprocess("--sim=mujoco", "--reps=1").assert_outcomes(passed=1)
+
+
+@pytest.mark.parametrize("entries", ["a line that is none", b"\xff\xfe = x:Y"])
+def test_metadata_that_nobody_can_read(
+    pytester: pytest.Pytester, site: Path, entries: str | bytes
+) -> None:
+    """pytest itself does not survive it where it looks for plugins; our own registry does."""
+    distribution(site, "malformed", entries)
+    script = (
+        "from pytest_simbench.simulator.registry import registered, registry; "
+        "print(*registered()); print(*registry().unreadable)"
+    )
+    result = pytester.run(sys.executable, "-c", script)
+    result.stdout.fnmatch_lines(
+        ["*mujoco*", "the metadata of the distribution *malformed-1.0.dist-info cannot be read (*"]
+    )
+
+
+def test_a_profile_that_one_simulator_lacks(pytester: pytest.Pytester, site: Path) -> None:
+    distribution(site, "good-sims", "good = good_adapter:OnlyDefault")
+    result = pytester.runpytest_subprocess("--collect-only", "-q")
+    assert "mujoco-headless" in result.stdout.str()
+    assert "good-headless" not in result.stdout.str()
+    result = pytester.runpytest_subprocess("--sim=good")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["*good has no settings profile 'tuned'; choose from default"])
+    pytester.runpytest_subprocess(
+        "--sim=good", "--sim-profile=default", "--reps=1"
+    ).assert_outcomes(passed=1)

@@ -1,0 +1,179 @@
+"""The plugin beside others: options, ini names, marks and fixtures that somebody else has too."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from pytest_simbench.options import OPTIONS
+
+FLAGS = [flag for option in OPTIONS for flag in option.flags]
+INI = [flag.lstrip("-").replace("-", "_") for o in OPTIONS if o.ini for flag in o.flags]
+
+OWN = """
+def pytest_addoption(parser):
+    for flag in {flags!r}:
+        parser.addoption(flag, action="store_true", dest="own_" + flag, help="the project's own")
+    for name in {ini!r}:
+        parser.addini(name, "the project's own", type="bool", default=True)
+"""
+
+TEST = """
+FLAGS, INI = {flags!r}, {ini!r}
+
+def test_own(pytestconfig):
+    assert all(pytestconfig.getoption("own_" + flag) for flag in FLAGS)
+    assert all(pytestconfig.getini(name) is True for name in INI)
+"""
+
+FALLING = """
+from tests.tiny import Falling
+
+def test_falling(repeat):
+    assert len(repeat(Falling())) == 2
+"""
+
+
+def no_traceback(result: pytest.RunResult) -> None:
+    text = result.stdout.str() + result.stderr.str()
+    assert "Traceback (" not in text
+    assert "INTERNALERROR" not in text
+
+
+@pytest.mark.parametrize("place", ["conftest", "before", "after"])
+def test_any_of_our_names_may_be_somebody_else_s(pytester: pytest.Pytester, place: str) -> None:
+    """All at once, in a conftest, in a plugin loaded before ours and in one loaded after it."""
+    own = OWN.format(flags=FLAGS, ini=INI)
+    pytester.makepyfile(test_own=TEST.format(flags=FLAGS, ini=INI))
+    pytester.syspathinsert()
+    early = () if place != "before" else ("-p", "other")
+    pytester.makepyfile(**{"conftest" if place == "conftest" else "other": own})
+    if place == "after":
+        pytester.makeconftest("pytest_plugins = ['other']")
+    result = pytester.runpytest_subprocess(*early, *FLAGS)
+    result.assert_outcomes(passed=1)
+    no_traceback(result)
+    no_traceback(pytester.runpytest_subprocess(*early, "--help"))
+
+
+@pytest.mark.parametrize("option", [o for o in OPTIONS if o.short], ids=lambda o: o.short)
+def test_a_taken_short_name_leaves_the_long_one(pytester: pytest.Pytester, option: object) -> None:
+    flag, short = option.flag, option.short  # type: ignore[attr-defined]
+    pytester.makeconftest(OWN.format(flags=[short], ini=[short.lstrip("-")]))
+    pytester.makepyfile(FALLING)
+    long = {"--sim-name": ["--sim-name=mujoco"], "--sim-reps": [], "--sim-gui": [],
+            "--sim-protocol": ["--sim-protocol=fast"], "--sim-jitter": ["--sim-jitter=0"],
+            "--sim-headless": ["--sim-headless"], "--sim-list": []}[flag]  # fmt: skip
+    sim = ["--sim=mujoco"] if short != "--sim" else []
+    result = pytester.runpytest_subprocess(*sim, *long, "--sim-reps=2", short, "--sim-output=out")
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines([f"{short} belongs to another plugin or to a conftest*{flag}*"])
+    record = json.loads((pytester.path / "out" / "records.jsonl").read_text().splitlines()[0])
+    assert record["mode"] == "headless"  # their --gui is not ours
+    assert record["jitter"] == (0 if flag == "--sim-jitter" else 1)
+
+
+def test_values_of_ours_are_no_folders_with_conftests(pytester: pytest.Pytester) -> None:
+    """pytest looks for conftests before it knows our options: `out` in `--sim-output out`."""
+    tests = pytester.mkdir("tests")
+    (tests / "conftest.py").write_text("pytest_plugins = ['pytester']\n" + OWN.format(
+        flags=["--their"], ini=[]))  # fmt: skip
+    (tests / "test_it.py").write_text("def test_it(pytestconfig): assert pytestconfig.option\n")
+    pytester.makeini("[pytest]\ntestpaths = tests\n")
+    pytester.mkdir("out")
+    for arguments in (
+        ("--reps", "4"), ("--sim", "mujoco"), ("--sim-output", "out"),
+    ):  # fmt: skip
+        result = pytester.runpytest_subprocess(*arguments, "--their", "--collect-only")
+        result.stdout.fnmatch_lines(["*1 test collected*"])
+
+
+def test_a_flag_of_a_conftest_before_a_path(pytester: pytest.Pytester) -> None:
+    tests = pytester.mkdir("tests")
+    (tests / "conftest.py").write_text(OWN.format(flags=["--sim"], ini=[]))
+    (tests / "test_it.py").write_text(TEST.format(flags=["--sim"], ini=[]))
+    pytester.runpytest_subprocess("--sim", "tests").assert_outcomes(passed=1)
+
+
+def test_loaded_by_a_conftest(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    pytester.makeconftest(
+        "pytest_plugins = ['pytest_simbench.plugin']\n" + OWN.format(flags=["--gui"], ini=[])
+    )
+    pytester.makepyfile(FALLING)
+    result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=2", "--gui")
+    result.assert_outcomes(passed=1)
+
+
+def test_without_pytest_benchmark(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(FALLING)
+    result = pytester.runpytest_subprocess(
+        "--sim=mujoco", "--reps=2", "-p", "no:benchmark", "--strict-markers", "--sim-output=out"
+    )
+    result.assert_outcomes(passed=1)
+    no_traceback(result)
+    assert len((pytester.path / "out" / "records.jsonl").read_text().splitlines()) == 2
+
+
+def test_a_project_s_own_benchmark_fixture(pytester: pytest.Pytester) -> None:
+    pytester.makeconftest("import pytest\n@pytest.fixture\ndef benchmark():\n    return 'ours'\n")
+    pytester.makepyfile(FALLING)
+    result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=2", "-p", "no:benchmark")
+    result.assert_outcomes(passed=1)
+
+
+WITH_FIXTURES = "import pytest\n" + "".join(
+    f"@pytest.fixture\ndef {name}():\n    return 'own'\n\n"
+    for name in ("output_path", "repeat", "resources", "sim", "simulator", "threshold", "replay",
+                 "perturb")
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("place", ["conftest", "plugin"])
+def test_fixtures_of_our_names(pytester: pytest.Pytester, place: str) -> None:
+    """pytest-playwright has an `output_path`: every test of a browser would get ours."""
+    pytester.syspathinsert()
+    pytester.makepyfile(**{"conftest" if place == "conftest" else "other": WITH_FIXTURES})
+    pytester.makepyfile(
+        test_own="""
+        def test_own(output_path, repeat, resources, sim, simulator, threshold, replay, perturb):
+            assert {output_path, repeat, resources, sim, simulator, threshold} == {"own"}
+            assert {replay, perturb} == {"own"}
+        """
+    )
+    early = ("-p", "other") if place == "plugin" else ()
+    result = pytester.runpytest_subprocess(*early, "--strict-markers")
+    result.assert_outcomes(passed=1)
+    assert not (pytester.path / ".simbench").exists()
+
+
+def test_ours_under_another_name(pytester: pytest.Pytester) -> None:
+    pytester.makeconftest(
+        WITH_FIXTURES + "from pytest_simbench.fixtures import repeat as sim_repeat\n"
+    )
+    pytester.makepyfile(FALLING.replace("repeat", "sim_repeat"))
+    pytester.runpytest_subprocess("--sim=mujoco", "--reps=2").assert_outcomes(passed=1)
+
+
+def test_marks_of_our_names_on_tests_that_are_not_ours(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        """
+        import pytest
+        pytestmark = [pytest.mark.reps("x"), pytest.mark.needs(3), pytest.mark.only_sim("nosuch")]
+
+        def test_own():
+            pass
+        """
+    )
+    pytester.runpytest_subprocess("--strict-markers").assert_outcomes(passed=1)
+
+
+def test_an_unrelated_run_sees_nothing_of_us(pytester: pytest.Pytester) -> None:
+    pytester.makeconftest(OWN.format(flags=["--gui"], ini=["reps"]))
+    pytester.makepyfile("def test_it():\n    pass\n")
+    result = pytester.runpytest_subprocess("--gui")
+    result.assert_outcomes(passed=1)
+    assert "sim" not in result.stdout.str().replace("simbench", "").partition("collected")[2]
+    assert not Path(pytester.path, ".simbench").exists()
