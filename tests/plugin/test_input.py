@@ -27,7 +27,11 @@ TEST = """
         (["--sim-set=timestep=1"], "--sim-set timestep=1: write it as SIM.SETTING=VALUE"),
         (["--sim-set=mujoco.speed=1"], "mujoco has no setting 'speed'; choose from timestep=*"),
         (["--sim-set=mujoco.timestep=x"], "mujoco.timestep='x' is not a valid float"),
-        (["--sim-set=mujoco.timestep=0"], "mujoco.timestep must be positive, not 0.0"),
+        (["--sim-set=mujoco.timestep=0"], "mujoco.timestep must be above 0 and at most 0.01667 s*"),
+        (
+            ["--sim-set=mujoco.timestep=1e9"],
+            "mujoco.timestep must be *in which a thrown cube moves*",
+        ),
         (["--sim-set=mujoco.cone=round"], "mujoco.cone=round: choose from pyramidal, elliptic"),
         (["--sim-profile=best"], "*has no settings profile 'best'; choose from default, tuned"),
         (["--sim-python=mujoco"], "--sim-python mujoco: write it as SIM=PATH"),
