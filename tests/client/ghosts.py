@@ -8,6 +8,12 @@ AFTER = 0.5
 """Simulated time at which it begins [s]."""
 
 
+def without_contacts(simulator: MuJoCo) -> None:
+    import mujoco
+
+    simulator.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+
+
 class Ghost(MuJoCo):
     def step(self) -> None:
         super().step()
@@ -22,9 +28,7 @@ class Sinking(Ghost):
     """Nothing touches anything any more."""
 
     def haunt(self) -> None:
-        import mujoco
-
-        self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+        without_contacts(self)
 
 
 class Flying(Ghost):
@@ -35,8 +39,10 @@ class Flying(Ghost):
 
 
 class Merging(Ghost):
-    """One cube stands where another one stands."""
+    """One cube stands where another one stands, and nothing drives them apart."""
 
     def haunt(self) -> None:
+        without_contacts(self)
+        self.model.opt.gravity[:] = 0.0
         self.data.qpos[:3] = self.data.qpos[7:10]
         self.data.qvel[:] = 0.0
