@@ -29,8 +29,8 @@ ceiling of the room."""
 def implausible(scene: Scene, bodies: FloatArray) -> str | None:
     """Why these states of the free bodies cannot be, as a sentence; None when they can.
 
-    Looked at after every motion and wait, in the pytest process: a third of a millisecond for
-    21 cubes. What is only there for a moment, the depth of a hard impact, is not looked for.
+    Looked at after every motion and wait, in the pytest process: under a millisecond for 21
+    cubes. What is only there for a moment, the depth of a hard impact, is not looked for.
 
     Args:
         scene: whose bodies they are.

@@ -34,6 +34,10 @@ TEST = """
             ["--sim-set=mujoco.timestep=0"],
             "mujoco.timestep=0: give a number of seconds from 1e-06 to 0.01667",
         ),
+        (
+            ["--sim-set=mujoco.timestep=1e9"],
+            "mujoco.timestep=1e+09: give a number *in which a thrown cube moves*",
+        ),
         (["--sim-set=mujoco.cone=round"], "mujoco.cone=round: choose from pyramidal, elliptic"),
         (
             ["--sim-profile=best"],

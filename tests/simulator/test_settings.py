@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
 from pytest_simbench.sims.mujoco import MuJoCo, MuJoCoSettings
 
 from pytest_simbench.simulator import SettingsError
+from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.simulator.settings import changed, profile
 
 
@@ -53,6 +55,19 @@ def test_texts_become_values(name: str, text: Any, value: Any) -> None:
 def test_bad_changes(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(SettingsError, match=message):
         changed(MuJoCoSettings(), changes, "mujoco")
+
+
+@pytest.mark.parametrize("timestep", [1e9, 0.05, 0.0167, math.inf, math.nan, 0.0, -0.001])
+def test_a_time_step_too_coarse_for_the_tasks_is_refused(timestep: float) -> None:
+    """Two steps of 1e9 s once made a throw that hit."""
+    with pytest.raises(SettingsError, match="timestep must be above 0 and at most 0.01667 s"):
+        changed(MuJoCoSettings(), {"timestep": str(timestep)}, "mujoco")
+
+
+def test_every_profile_of_every_engine_has_a_time_step_that_is_fine_enough() -> None:
+    for name in registered():
+        for settings in adapter(name).profiles.values():
+            assert 0 < changed(settings, {}, name).timestep <= 1 / 60
 
 
 def test_unknown_profile() -> None:
