@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from pytest_simbench.measure.metrics import COSTS, Metric, UnknownMetric
+from pytest_simbench.measure.metrics import COSTS, Metric, UnknownMetric, significant
 
 FAILURES = Metric(
     "failures", "failed repetitions", better="lower", kind="yes_no", doc="1 for each that failed"
@@ -46,9 +46,9 @@ class Limit:
     def describe(self, metric: Metric, amount: float) -> str:
         """An amount in the limit's terms: `5 points`, `20 %`, `0.01 m`."""
         if metric.bounded:
-            return f"{100 * amount:.3g} points"
+            return f"{significant(100 * amount)} points"
         if self.percent:
-            return f"{100 * amount:.3g} %"
+            return f"{significant(100 * amount)} %"
         return metric.format(amount)
 
 

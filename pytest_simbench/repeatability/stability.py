@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pytest_simbench.measure.intervals import Interval, interval, wilson
+from pytest_simbench.measure.intervals import Interval, interval, proportion
+from pytest_simbench.measure.metrics import Metric, significant
 from pytest_simbench.repeatability.attack import Attack, Perturbations
 from pytest_simbench.repeatability.episode import Experiment
 from pytest_simbench.repeatability.motions import gaps
@@ -20,6 +21,8 @@ from pytest_simbench.repeatability.search import bounds_in_words
 
 SENSITIVITY_TIMES = (0.1, 1.0, 5.0, 20.0)
 """Simulated times at which sensitivity is told [s]."""
+
+KEPT = Metric("kept", "kept", kind="share", of=1, doc="what a perturbed run keeps of the outcome")
 
 
 @dataclass(frozen=True)
@@ -43,19 +46,19 @@ class Stability:
     @property
     def share(self) -> Interval:
         """Mean of what was kept."""
-        return interval(self.kept, bounded=True)
+        return interval(self.kept, KEPT)
 
     @property
     def same(self) -> Interval:
         """Share of the runs whose outcome was the same."""
-        return wilson(self.unchanged, len(self.kept))
+        return proportion(self.unchanged, len(self.kept))
 
     @property
     def sentence(self) -> str:
         """For the report."""
         share, n = self.share, len(self.kept)
         text = (
-            f"kept {100 * share.mean:.3g} % [{100 * share.low:.0f}, {100 * share.high:.0f}] within "
+            f"kept {significant(100 * share.mean)} % [{100 * share.low:.0f}, {100 * share.high:.0f}] within "
             f"{self.bounds}; the same outcome in {self.unchanged} of {n}"
         )
         return f"{text}; worst: {self.worst}" if self.worst else text
@@ -146,8 +149,8 @@ class Sensitivity:
     @property
     def sentence(self) -> str:
         """For the report."""
-        parts = [f"{r:.3g} at {t:g} s" for t, r in self.ratio.items() if r is not None]
-        return f"mm per mm after {self.perturbation}: {', '.join(parts)}; most {self.largest:.3g}"
+        parts = [f"{significant(r)} at {t:g} s" for t, r in self.ratio.items() if r is not None]
+        return f"mm per mm after {self.perturbation}: {', '.join(parts)}; most {significant(self.largest)}"
 
     def assert_below(self, most: float, until: float) -> None:
         """Raise AssertionError when the ratio exceeds `most` at one of the times up to `until`."""
