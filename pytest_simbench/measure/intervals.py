@@ -185,9 +185,7 @@ def varies(values: Sequence[float], metric: Metric) -> bool:
     return float(np.ptp(sample)) > max(metric.smallest_difference, rounding)
 
 
-def interval(
-    values: Sequence[float], metric: Metric, confidence: float = CONFIDENCE
-) -> Interval:
+def interval(values: Sequence[float], metric: Metric, confidence: float = CONFIDENCE) -> Interval:
     """Interval of the mean of a metric's values (n,), one for each repetition.
 
     Raises:

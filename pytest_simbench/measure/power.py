@@ -140,7 +140,10 @@ def main() -> None:
     from pytest_simbench.measure.limits import FAILURES
     from pytest_simbench.measure.verdicts import confidence
 
-    yes, share = Metric("hit", "hit", kind="yes_no"), Metric("placed", "placed", kind="share", of=15)
+    yes, share = (
+        Metric("hit", "hit", kind="yes_no"),
+        Metric("placed", "placed", kind="share", of=15),
+    )
     claims = [
         ("failures at most 15 %", 0.85, FAILURES),
         ("`hit` at least 80 %", 0.8, yes),

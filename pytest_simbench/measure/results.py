@@ -258,4 +258,3 @@ def _example(records: Sequence[Record]) -> str:
     message = first.error.message if first.error else ""
     place = f"repetition {first.repetition}, seed {first.seed}"
     return f" ({place}: {message})" if message else f" ({place})"
-

@@ -150,7 +150,8 @@ class Sensitivity:
     def sentence(self) -> str:
         """For the report."""
         parts = [f"{significant(r)} at {t:g} s" for t, r in self.ratio.items() if r is not None]
-        return f"mm per mm after {self.perturbation}: {', '.join(parts)}; most {significant(self.largest)}"
+        most = significant(self.largest)
+        return f"mm per mm after {self.perturbation}: {', '.join(parts)}; most {most}"
 
     def assert_below(self, most: float, until: float) -> None:
         """Raise AssertionError when the ratio exceeds `most` at one of the times up to `until`."""
