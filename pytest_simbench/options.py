@@ -66,6 +66,8 @@ OPTIONS = (
            "text", "WHEN", ("off", "on", "retain-on-failure")),
     Option("--sim-threshold", [], "change a threshold of the suites: placed=0.9", "list",
            "METRIC=VALUE"),
+    Option("--sim-strict", False, "claims that the repetitions do not decide fail, also those that "
+           "are not judged because there are too few", "flag"),
     Option("--sim-baseline", None, "run to compare with: a run folder, its records.jsonl, or a "
            "--benchmark-json file (default: the run that --benchmark-compare chooses)",
            "text", "PATH"),

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from math import isfinite
 
 from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval, proportion
-from pytest_simbench.measure.limits import FAILURES
+from pytest_simbench.measure.limits import FAILURES, check_threshold
 from pytest_simbench.measure.metrics import COSTS, Metric, UnknownMetric
 from pytest_simbench.measure.record import Record
 from pytest_simbench.measure.verdicts import (
@@ -154,7 +154,11 @@ class ResultSet:
         return judge(claim, interval())
 
     def assert_at_least(self, name: str, threshold: float) -> None:
-        """Fail when the true mean is below `threshold`; shares are in 0..1."""
+        """Fail when the true mean is below `threshold`; shares are in 0..1.
+
+        Raises:
+            LimitError: a threshold that the metric cannot reach; so do the other assertions.
+        """
         __tracebackhide__ = True
         self._assert(name, at_least(threshold))
 
@@ -180,8 +184,7 @@ class ResultSet:
     def assert_failures_at_most(self, share: float) -> None:
         """Fail when more than `share` (0..1) of all repetitions ever made would fail."""
         __tracebackhide__ = True
-        if not 0 <= share <= 1:
-            raise ValueError(f"a share of failures lies in 0..1, not {share:g}")
+        check_threshold(FAILURES, share)
         self._assert_recorded()
         found = self._decide(at_most(share), lambda: self._judged(FAILURES))
         sentence = f"{self._failed()} ({self._bounds(FAILURES, found.interval)})"
@@ -190,6 +193,8 @@ class ResultSet:
     def _assert(self, name: str, *claims: Claim) -> None:
         __tracebackhide__ = True
         metric = self.metric(name)
+        for claim in claims:
+            check_threshold(metric, claim.value)
         self._assert_recorded()
         if not self.ok:
             raise AssertionError(f"{name} cannot be judged: {self._failed()}")

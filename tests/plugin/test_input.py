@@ -31,6 +31,16 @@ TEST = """
         (["--sim-set=mujoco.cone=round"], "mujoco.cone=round: choose from pyramidal, elliptic"),
         (["--sim-profile=best"], "*has no settings profile 'best'; choose from default, tuned"),
         (["--sim-python=mujoco"], "--sim-python mujoco: write it as SIM=PATH"),
+        (
+            ["--sim-threshold=placed=90"],
+            "--sim-threshold placed=90: placed is a share, so its threshold lies between 0 and 1, "
+            "not at 90; did you mean 0.9?",
+        ),
+        (
+            ["--sim-threshold=hit=0"],
+            "--sim-threshold hit=0: hit is always at least 0, so that this threshold can never "
+            "fail",
+        ),
         (["--sim-threshold=placed=x"], "--sim-threshold placed=x: the value must be a number"),
         (
             ["--sim-threshold=plased=1"],
