@@ -44,11 +44,11 @@ def wins(
     """Every metric on which one side beats another.
 
     Each pair is tested at each metric that has a good direction, two-sided, paired by seed where
-    both sides ran the same seeds. Nothing is tested with fewer than `FEWEST` values on a side, nor a
-    side whose values do not vary by more than the metric's resolution: they are one value, many
-    times; and no smaller difference is won. Of the wins at most `alpha` are expected to be chance (Benjamini
-    and Hochberg's false-discovery rate), and where no side differs, a run without any win is had
-    with a probability of 1 - `alpha`.
+    both sides ran the same seeds. Nothing is tested with fewer than `FEWEST` values on a side, nor
+    with a side whose values vary by no more than the metric's resolution: they are one value, many
+    times; and no smaller difference is won. Of the wins at most `alpha` are expected to be chance
+    (Benjamini and Hochberg's false-discovery rate), and where no side differs, a run without any
+    win is had with a probability of 1 - `alpha`.
 
     Args:
         sides: records by side: simulator, mode, profile.
