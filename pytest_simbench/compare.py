@@ -124,6 +124,6 @@ def _limits(text: str, baseline: Baseline) -> tuple[Limit, ...]:
     from pytest_simbench.tasks import Stacking, Throwing
 
     metrics = {metric.name: metric for task in (Stacking(), Throwing()) for metric in task.metrics}
-    for name in baseline.metric_names:  # a task of another package: its direction is known later
-        metrics.setdefault(name, Metric(name, name))
+    for name in baseline.metric_names:  # a task of another package: its kind is known later
+        metrics.setdefault(name, Metric(name, name, better="lower"))
     return parse_limits(text, metrics.values())

@@ -116,6 +116,8 @@ OPTIONS = (
            "at 50 Hz into the run folder: off, on, retain-on-failure", "off", metavar="WHEN"),
     Option("--sim-threshold", Assignments("METRIC=NUMBER", numbers=True), "change a threshold of "
            "the suites: placed=0.9", {}, metavar="METRIC=VALUE"),
+    Option("--sim-strict", Flag(), "claims that the repetitions do not decide fail, also those "
+           "that are not judged because there are too few", False),
     Option("--sim-baseline", File(), "run to compare with: a run folder, its records.jsonl, or a "
            "--benchmark-json file (default: the run that --benchmark-compare chooses)",
            metavar="PATH"),

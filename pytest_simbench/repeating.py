@@ -58,6 +58,7 @@ class Repeating:
         else:
             number = wanted or number_mark(self.node, "reps") or self.case.protocol.repetitions
             result = ResultSet(self._up_to(int(number), task, found), metrics)
+        result.strict = options.value(self.node.config, "sim_strict")
         self.results.append(result)
         return result
 

@@ -1,4 +1,4 @@
-"""Is every metric of `--sim-threshold` one that a threshold can be of?"""
+"""Is every metric of `--sim-threshold` one that a threshold can be of, and can it fail?"""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pytest_simbench import options
 
 
 def problem(config: pytest.Config, items: Iterable[pytest.Item]) -> str:
-    """What is wrong with the names in `--sim-threshold`, once the tests are known; else nothing.
+    """What is wrong with `--sim-threshold`, once the tests are known; else nothing.
 
     Valid are the metrics of our own tasks, the costs, `failures`, and every name that stands in the
     code or the parameters of a collected test that asks for a `threshold`: tests of other packages
@@ -23,16 +23,21 @@ def problem(config: pytest.Config, items: Iterable[pytest.Item]) -> str:
     asking = [item for item in items if "threshold" in getattr(item, "fixturenames", ())]
     given = options.value(config, "sim_threshold")
     unknown = given.keys() - {text for item in asking for text in _texts(item)}
-    if not unknown:
-        return ""
-    from pytest_simbench.measure.limits import FAILURES
-    from pytest_simbench.measure.metrics import COSTS, UnknownMetric
+    from pytest_simbench.measure.limits import FAILURES, LimitError, check_gate
+    from pytest_simbench.measure.metrics import COSTS, Metric, UnknownMetric
+    from pytest_simbench.repeatability.stability import KEPT
     from pytest_simbench.tasks import Stacking, Throwing
 
     tasks = (Stacking(), Throwing())
-    known = {m.name for m in (*COSTS, FAILURES, *(m for task in tasks for m in task.metrics))}
-    for name in sorted(unknown - known):
+    all_metrics = (*COSTS, FAILURES, KEPT, *(m for task in tasks for m in task.metrics))
+    known = {metric.name: metric for metric in all_metrics}
+    for name in sorted(unknown - known.keys()):
         return f"--sim-threshold={name}={given[name]:g}: {UnknownMetric(name, known)}"
+    for name, value in given.items():
+        try:
+            check_gate(known.get(name, Metric(name, name, better=None)), value)
+        except LimitError as error:
+            return f"--sim-threshold={name}={value:g}: {error}"
     return ""
 
 

@@ -26,6 +26,7 @@ from pytest_simbench.simulator import (
     Capability,
     Deviation,
     PreparedRobot,
+    SeedsSeen,
     Settings,
     Simulator,
     SimulatorInfo,
@@ -105,6 +106,9 @@ class DART(Simulator):
     profiles: ClassVar[Mapping[str, Settings]] = {
         "default": DARTSettings(),
         "tuned": DARTSettings(detector="ode", solver="nsgs", tolerance=1e-4, position_gain=0.5),
+    }
+    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+        "tuned": (SeedsSeen("throwing", 100, 100), SeedsSeen("stacking", 100, 100)),
     }
     settings: DARTSettings
 

@@ -33,6 +33,7 @@ from pytest_simbench.simulator import (
     Capability,
     Deviation,
     PreparedRobot,
+    SeedsSeen,
     Settings,
     Simulator,
     SimulatorInfo,
@@ -84,6 +85,9 @@ class Genesis(Simulator):
             friction_cone="elliptic",
             box_box_detection=True,
         ),
+    }
+    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+        "tuned": (SeedsSeen("throwing", 100, 101),),
     }
     settings: GenesisSettings
     world: Any = None

@@ -29,6 +29,7 @@ from pytest_simbench.simulator import (
     Capability,
     Deviation,
     PreparedRobot,
+    SeedsSeen,
     Settings,
     Simulator,
     SimulatorInfo,
@@ -107,6 +108,9 @@ class MuJoCo(Simulator):
             solref=(0.002, 1.0),
             solimp=(0.99, 0.9999, 0.001),
         ),
+    }
+    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+        "tuned": (SeedsSeen("throwing", 1, 1), SeedsSeen("stacking", 1, 1)),
     }
     settings: MuJoCoSettings
 

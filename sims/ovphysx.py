@@ -33,6 +33,7 @@ from pytest_simbench.simulator import (
     Capability,
     Deviation,
     PreparedRobot,
+    SeedsSeen,
     Settings,
     Simulator,
     SimulatorInfo,
@@ -129,6 +130,9 @@ class OvPhysX(Simulator):
             angular_damping=0.0,
             sleeping=False,
         ),
+    }
+    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+        "tuned": (SeedsSeen("throwing", 100, 119),),
     }
     settings: OvPhysXSettings
 

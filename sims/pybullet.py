@@ -40,6 +40,7 @@ from pytest_simbench.simulator import (
     Capability,
     Deviation,
     PreparedRobot,
+    SeedsSeen,
     Settings,
     Simulator,
     SimulatorInfo,
@@ -136,6 +137,9 @@ class PyBullet(Simulator):
             friction_anchor=True,
             contact_erp=0.2,
         ),
+    }
+    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+        "tuned": (SeedsSeen("throwing", 2022, 2041), SeedsSeen("stacking", 2024, 2024)),
     }
     settings: PyBulletSettings
 

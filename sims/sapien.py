@@ -25,6 +25,7 @@ from pytest_simbench.simulator import (
     Capability,
     Deviation,
     PreparedRobot,
+    SeedsSeen,
     Settings,
     Simulator,
     SimulatorInfo,
@@ -119,6 +120,10 @@ class SAPIEN(Simulator):
             link_damping=0.0,
             joint_friction=0.0,
         ),
+    }
+    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+        # the candidate of 1 ms was dropped for its 15 of 20 on 2022 to 2041
+        "tuned": (SeedsSeen("throwing", 100, 149), SeedsSeen("throwing", 2022, 2041)),
     }
     settings: SAPIENSettings
 

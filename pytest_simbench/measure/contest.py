@@ -8,15 +8,13 @@ from itertools import combinations
 from typing import Any
 
 from pytest_simbench.measure.comparison import ALPHA, Comparison, compare_by_seed
+from pytest_simbench.measure.intervals import FEWEST, varies
 from pytest_simbench.measure.limits import FAILURES
 from pytest_simbench.measure.metrics import COSTS, Metric
 from pytest_simbench.measure.record import Record
 
 COMPARED_COSTS = ("rtf", "cpu_cost", "ram")
 """Of the costs those that belong to the simulator alone: the others hold planning and start-up."""
-
-FEWEST = 2
-"""Values on each side without which nothing is tested."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +44,11 @@ def wins(
     """Every metric on which one side beats another.
 
     Each pair is tested at each metric that has a good direction, two-sided, paired by seed where
-    both sides ran the same seeds. Of the wins at most `alpha` are expected to be chance (Benjamini
-    and Hochberg's false-discovery rate), and where no side differs, a run without any win is had
-    with a probability of 1 - `alpha`.
+    both sides ran the same seeds. Nothing is tested with fewer than `FEWEST` values on a side, nor
+    with a side whose values vary by no more than the metric's resolution: they are one value, many
+    times; and no smaller difference is won. Of the wins at most `alpha` are expected to be chance
+    (Benjamini and Hochberg's false-discovery rate), and where no side differs, a run without any
+    win is had with a probability of 1 - `alpha`.
 
     Args:
         sides: records by side: simulator, mode, profile.
@@ -66,18 +66,24 @@ def wins(
     found: list[tuple[Any, Any, Metric, Comparison]] = []
     for (a, b), metric in ((p, m) for p in combinations(sides, 2) for m in judged):
         first, second = values[a, metric.name], values[b, metric.name]
-        if comparable(a, b) and min(len(first), len(second)) >= FEWEST:
+        if comparable(a, b) and _testable(first, metric) and _testable(second, metric):
             found.append((a, b, metric, compare_by_seed(first, second)))
     if not found:
         return []
     corrected = false_discovery_control([c.p_value for *_, c in found])
     result = []
     for (a, b, metric, comparison), p in zip(found, corrected, strict=True):
-        if p <= alpha and comparison.difference:
+        if p <= alpha and abs(comparison.difference) > metric.smallest_difference:
             second_wins = (comparison.difference > 0) == (metric.better == "higher")
             winner, loser = (b, a) if second_wins else (a, b)
             result.append(Win(winner, loser, metric, comparison, float(p)))
     return result
+
+
+def _testable(values: Mapping[int, float], metric: Metric) -> bool:
+    if len(values) < FEWEST:
+        return False
+    return metric.smallest_difference == 0 or varies([*values.values()], metric)
 
 
 def _values(records: Sequence[Record], metric: Metric) -> dict[int, float]:

@@ -130,6 +130,7 @@ def run_gate(
     notes = [f"{test} is not in the baseline and is not compared" for test in after.keys() - before]
     notes += [f"{test} is in the baseline but did not run" for test in before.keys() - after]
     broken = [_broken(test, before[test], after[test]) for test in common]
+    broken += dict.fromkeys(_vain(after[test], limit) for test in common for limit in limits)
     changes = _corrected(
         _change(test, before[test], after[test], limit) for test in common for limit in limits
     )
@@ -181,6 +182,11 @@ def _by_test(
 
 def _name(test: str) -> str:
     return test.rpartition("::")[2]
+
+
+def _vain(result: ResultSet, limit: Limit) -> str:
+    """A sentence when the limit, of a metric known only now, cannot be exceeded."""
+    return limit.vain(result.metric(limit.metric)) if limit.metric in result.known else ""
 
 
 def _broken(test: str, old: ResultSet, new: ResultSet) -> str:

@@ -1,4 +1,7 @@
-"""What `--sim-compare-fail="placed:5%,ram:10%,rtf:20%"` says: how much worse is too much."""
+"""What `--sim-compare-fail="placed:5%,ram:10%,rtf:20%"` says: how much worse is too much.
+
+And whether a threshold of a claim makes sense: a gate that cannot fail is worse than none.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from pytest_simbench.measure.metrics import COSTS, Metric, UnknownMetric
+from pytest_simbench.measure.metrics import COSTS, Metric, UnknownMetric, significant
 
 FAILURES = Metric(
     "failures", "failed repetitions", better="lower", kind="yes_no", doc="1 for each that failed"
@@ -43,12 +46,23 @@ class Limit:
             return loss / abs(before)
         return math.copysign(math.inf, loss) if loss else 0.0
 
+    def vain(self, metric: Metric) -> str:
+        """Why no run could ever exceed it, in a sentence; empty when one could."""
+        text = f"{self.metric}:{significant(self.amount * (100 if self.percent else 1))}"
+        text += "%" if self.percent else ""
+        if metric.bounded and self.amount >= 1:
+            hint = "" if self.percent else f"; did you mean {text}%?"
+            return f"{text} can never be exceeded: {self.metric} lies between 0 and 100 %{hint}"
+        if self.percent and metric.better == "higher" and self.amount >= 1:
+            return f"{text} can never be exceeded: {self.metric} cannot fall by more than 100 %"
+        return ""
+
     def describe(self, metric: Metric, amount: float) -> str:
         """An amount in the limit's terms: `5 points`, `20 %`, `0.01 m`."""
         if metric.bounded:
-            return f"{100 * amount:.3g} points"
+            return f"{significant(100 * amount)} points"
         if self.percent:
-            return f"{100 * amount:.3g} %"
+            return f"{significant(100 * amount)} %"
         return metric.format(amount)
 
 
@@ -62,8 +76,8 @@ def parse_limits(text: str, metrics: Iterable[Metric]) -> tuple[Limit, ...]:
         metrics: of all tasks; the costs and `failures` are known besides.
 
     Raises:
-        LimitError: an item that is not of that form, is there twice, or names a metric of which
-            neither direction is better.
+        LimitError: an item that is not of that form, is there twice, names a metric of which
+            neither direction is better, or a limit that no run could exceed.
         UnknownMetric: no such metric; the message lists the valid names.
     """
     known = {metric.name: metric for metric in (*COSTS, FAILURES, *metrics)}
@@ -83,5 +97,44 @@ def parse_limits(text: str, metrics: Iterable[Metric]) -> tuple[Limit, ...]:
             )
         if name in found:
             raise LimitError(f"{name} has two limits; give it one")
-        found[name] = Limit(name, float(number) / (100 if percent else 1), bool(percent))
+        limit = Limit(name, float(number) / (100 if percent else 1), bool(percent))
+        if vain := limit.vain(known[name]):
+            raise LimitError(vain)
+        found[name] = limit
     return tuple(found.values())
+
+
+def check_threshold(metric: Metric, value: float) -> None:
+    """Whether claims about a metric can have that threshold.
+
+    Raises:
+        LimitError: it is no finite number, or lies outside what the metric can be.
+    """
+    if not math.isfinite(value):
+        raise LimitError(f"a threshold of {metric.name} is a finite number, not {value:g}")
+    if metric.bounded and not 0 <= value <= 1:
+        hint = f"; did you mean {significant(value / 100)}?" if 1 < value <= 100 else ""
+        raise LimitError(
+            f"{metric.name} is a share, so its threshold lies between 0 and 1, not at "
+            f"{significant(value)}{hint}"
+        )
+
+
+def check_gate(metric: Metric, value: float) -> None:
+    """Whether a threshold that a user sets leaves a claim that can fail.
+
+    Raises:
+        LimitError: it cannot, or `check_threshold` refuses it.
+    """
+    check_threshold(metric, value)
+    always = {"higher": value <= 0, "lower": metric.bounded and value >= 1, None: False}
+    if always[metric.better] and (metric.bounded or metric in COSTS):
+        relation = "at least" if metric.better == "higher" else "at most"
+        raise LimitError(
+            f"{metric.name} is always {relation} {significant(value)}, so that this threshold can "
+            "never fail"
+        )
+    if metric.better == "lower" and value < 0 and metric in COSTS:
+        raise LimitError(
+            f"{metric.name} is never below 0, so a threshold of {value:g} always fails"
+        )

@@ -2,13 +2,31 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from difflib import get_close_matches
+from functools import partial
 from typing import Any, Literal
 
 Better = Literal["higher", "lower"]
 Kind = Literal["share", "yes_no", "value"]
+
+
+RESOLUTIONS = {"m": 1e-3, "m/s": 5e-3, "s": 1e-3}
+"""Smallest differences that mean anything, by unit: a millimetre is what tables print and what the
+start is jittered by; the others are what it is at the release of a throw (2.75 m/s, steps of 1 ms).
+Less than that between repetitions is a deterministic engine's rounding, not a spread."""
+
+
+def significant(value: float, digits: int = 3, *, keep_zeros: bool = False) -> str:
+    """A number with so many significant digits and never a power of ten: 1.35, 0.8, 161, 1552."""
+    if value == 0 or not math.isfinite(value):
+        return f"{value:g}"
+    rounded = float(f"{value:.{digits - 1}e}")
+    whole = math.floor(math.log10(abs(rounded))) + 1  # digits before the point
+    text = f"{value:.{max(0, digits - whole)}f}"
+    return text if keep_zeros or "." not in text else text.rstrip("0").rstrip(".")
 
 
 class UnknownMetric(LookupError):
@@ -38,6 +56,8 @@ class Metric:
         of: how many things a share is of (15 cubes), else None.
         study: whether the reference study reports it too.
         doc: one sentence that says what is counted.
+        resolution: the smallest difference that means anything, in its unit; None: by unit, see
+            `RESOLUTIONS`, else 0.
 
     Raises:
         ValueError: a share without `of`.
@@ -51,6 +71,7 @@ class Metric:
     of: int | None = None
     study: bool = False
     doc: str = ""
+    resolution: float | None = None
 
     def __post_init__(self) -> None:
         if self.kind == "share" and not self.of:
@@ -61,6 +82,13 @@ class Metric:
         """Whether it lies in 0..1, so that a mean of it is a proportion."""
         return self.kind != "value"
 
+    @property
+    def smallest_difference(self) -> float:
+        """The smallest difference that means anything; 0 for proportions and counts."""
+        if self.resolution is not None:
+            return self.resolution
+        return RESOLUTIONS.get(self.unit, 0.0) if self.kind == "value" else 0.0
+
     def to_wire(self) -> dict[str, Any]:
         """Plain data: the arguments that make it again."""
         return {item.name: getattr(self, item.name) for item in fields(self)}
@@ -68,18 +96,21 @@ class Metric:
     def format(self, value: float, digits: int = 3) -> str:
         """The value as a reader sees it: proportions in percent, others with their unit."""
         if self.bounded:
-            return f"{100 * value:.4g} %"
-        return f"{value:.{digits}g} {self.unit}".rstrip()
+            return f"{significant(100 * value, 4)} %"
+        return f"{significant(value, digits)} {self.unit}".rstrip()
 
+
+_cost = partial(Metric, resolution=0.0)
 
 COSTS: tuple[Metric, ...] = (
-    Metric("rtf", "real-time factor", "", "higher", doc="simulated over wall seconds of stepping"),
-    Metric("cpu", "CPU", "% of a core", "lower", study=True, doc="mean of worker and children"),
-    Metric("ram", "RAM", "MB", "lower", study=True, doc="mean resident memory"),
-    Metric("ram_peak", "peak RAM", "MB", "lower", doc="largest resident memory"),
-    Metric("cpu_cost", "CPU s per simulated s", "", "lower", doc="CPU over simulated seconds"),
-    Metric("start", "task start", "s", "lower", study=True, doc="from launch to task start"),
-    Metric("end", "task end", "s", "lower", study=True, doc="from launch to task end"),
-    Metric("total", "wall time", "s", "lower", doc="the whole repetition"),
+    _cost("rtf", "real-time factor", doc="simulated over wall seconds of stepping"),
+    _cost("cpu", "CPU", "% of a core", "lower", study=True, doc="mean of worker and children"),
+    _cost("ram", "RAM", "MB", "lower", study=True, doc="mean resident memory"),
+    _cost("ram_peak", "peak RAM", "MB", "lower", doc="largest resident memory"),
+    _cost("cpu_cost", "CPU s per simulated s", "", "lower", doc="CPU over simulated seconds"),
+    _cost("start", "task start", "s", "lower", study=True, doc="from launch to task start"),
+    _cost("end", "task end", "s", "lower", study=True, doc="from launch to task end"),
+    _cost("total", "wall time", "s", "lower", doc="the whole repetition"),
 )
-"""What a repetition cost, whatever its task; read from the record, see `record.Record.cost`."""
+"""What a repetition cost, whatever its task; read from the record, see `record.Record.cost`. Costs
+always vary, so they have no resolution."""

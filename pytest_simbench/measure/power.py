@@ -1,10 +1,11 @@
-"""How many repetitions a claim or a comparison needs."""
+"""How many repetitions a claim or a comparison needs, and what a test lets pass."""
 
 from __future__ import annotations
 
 import math
 
-from pytest_simbench.measure.intervals import CONFIDENCE, Interval, wilson
+from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval, proportion
+from pytest_simbench.measure.metrics import Metric
 
 MOST = 10_000
 """Repetitions beyond which a claim is called out of reach: the truth is at its threshold."""
@@ -19,18 +20,20 @@ def further_repetitions(interval: Interval, threshold: float) -> int | None:
         0 when the interval does not hold the threshold; None when more than `MOST` would be needed,
         or when there is too little to tell (a single value).
     """
-    if threshold not in interval or interval.low == interval.high:
+    if threshold not in interval:
         return 0
     if interval.n == 0 or not math.isfinite(interval.half_width):
         return None
-    if interval.method == "wilson":
+    if interval.method == "exact":
         total = repetitions_for_proportion(interval.mean, threshold, interval.confidence)
     else:
         away = abs(interval.mean - threshold)
         reach = interval.mean - interval.low
         if interval.mean < threshold:
             reach = interval.high - interval.mean
-        total = math.ceil(interval.n * (reach / away) ** 2) if away * MOST > reach else None
+        # The interval of shares that are all 0 or all 1 shrinks with n, others with its root.
+        power = 1 if interval.method == "betting" and interval.mean in (0.0, 1.0) else 2
+        total = math.ceil(interval.n * (reach / away) ** power) if away * MOST > reach else None
     if total is None or total > MOST:
         return None
     return max(1, total - interval.n)
@@ -39,13 +42,13 @@ def further_repetitions(interval: Interval, threshold: float) -> int | None:
 def repetitions_for_proportion(
     rate: float, threshold: float, confidence: float = CONFIDENCE
 ) -> int | None:
-    """Fewest repetitions whose Wilson interval leaves the threshold when `rate` of them succeed.
+    """Fewest repetitions whose interval leaves the threshold when `rate` of them succeed.
 
-    For instance 35 to show at least 0.9 with every one a success. None when `MOST` do not suffice.
+    For instance 36 to show at least 0.9 with every one a success. None when `MOST` do not suffice.
     """
 
     def leaves(n: int) -> bool:
-        found = wilson(rate * n, n, confidence)
+        found = proportion(rate * n, n, confidence)
         return found.low >= threshold if rate > threshold else found.high < threshold
 
     if not leaves(MOST):
@@ -86,3 +89,84 @@ def repetitions_to_detect(
 
     quantiles = float(norm.ppf(1 - alpha) + norm.ppf(power))
     return max(2, math.ceil((1 if paired else 2) * (quantiles * std / difference) ** 2))
+
+
+def least_supported(threshold: float, metric: Metric, n: int, confidence: float) -> int | None:
+    """How many of `n` repetitions must be whole successes, the others whole losses, for "at least
+    `threshold`" of a proportion to be supported; None when `n` are too few."""
+    return next((k for k in range(n + 1) if _of(k, n, metric, confidence).low >= threshold), None)
+
+
+def passing_rate(
+    threshold: float, metric: Metric, n: int, chance: float, confidence: float
+) -> float:
+    """The true rate of successes at which "at least `threshold`" is not refuted by `n` repetitions
+    with a probability of `chance`.
+
+    Whole repetitions succeed or fail, which is the hardest case of a share. The rate at which "at
+    most t" passes is 1 less that of "at least 1 - t".
+
+    Args:
+        threshold: of the claim, 0..1.
+        metric: yes or no, or a share.
+        n: repetitions.
+        chance: 0.5, or 0.05 for the rate that a test all but always finds out.
+        confidence: of the interval by which the claim is judged, see `verdicts.confidence`.
+    """
+    from scipy.stats import beta
+
+    passing = next(k for k in range(n + 1) if _of(k, n, metric, confidence).high >= threshold)
+    # P(k or more of n) at rate p is the beta distribution's cdf at p.
+    return float(beta.ppf(chance, passing, n - passing + 1)) if passing else 0.0
+
+
+def alike_rate(threshold: float, metric: Metric, n: int, confidence: float) -> float:
+    """The mean share below which "at least `threshold`" is refuted by `n` repetitions that all
+    have that share: the easiest case, as `passing_rate` is the hardest."""
+    low, high = 0.0, threshold
+    while high - low > 1e-3:
+        middle = (low + high) / 2
+        refuted = interval([middle] * n, metric, confidence).high < threshold
+        low, high = (middle, high) if refuted else (low, middle)
+    return low
+
+
+def _of(successes: int, n: int, metric: Metric, confidence: float) -> Interval:
+    return interval([1.0] * successes + [0.0] * (n - successes), metric, confidence)
+
+
+def main() -> None:
+    """Print what the suites' claims let pass, for docs/gate.md."""
+    from pytest_simbench.measure.limits import FAILURES
+    from pytest_simbench.measure.verdicts import confidence
+
+    yes, share = (
+        Metric("hit", "hit", kind="yes_no"),
+        Metric("placed", "placed", kind="share", of=15),
+    )
+    claims = [
+        ("failures at most 15 %", 0.85, FAILURES),
+        ("`hit` at least 80 %", 0.8, yes),
+        ("`placed`, `at_end` at least 80 %", 0.8, share),
+        ("`moved` at least 20 %", 0.2, share),
+    ]
+    columns = ("claim", "repetitions", "supported by", "passes half of the time", "1 in 20 times")
+    print(f"| {' | '.join([*columns, 'fails if all repetitions are alike'])} |")
+    print("|:--|--:|--:|--:|--:|--:|")
+    for name, least, metric in claims:
+        for n in (5, 10, 20, 40, 80):
+            level = confidence(metric)
+            needed = least_supported(least, metric, n, level)
+            rates = [passing_rate(least, metric, n, chance, level) for chance in (0.5, 0.05)]
+            alike = f"below {100 * alike_rate(least, metric, n, level):.0f} %"
+            if metric is FAILURES:
+                rates = [1 - rate for rate in rates]
+            text = "none" if needed is None else f"{needed} of {n}"
+            if needed is not None and metric is FAILURES:
+                text = f"{n - needed} failures"
+            cells = [name, n, text, *(f"{100 * rate:.0f} %" for rate in rates)]
+            print(f"| {' | '.join(map(str, [*cells, alike if metric is share else '']))} |")
+
+
+if __name__ == "__main__":
+    main()

@@ -6,33 +6,47 @@ import warnings
 from collections.abc import Callable, Iterable, Sequence
 from math import isfinite
 
-from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval, wilson
+from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval, proportion
+from pytest_simbench.measure.limits import FAILURES, check_threshold
 from pytest_simbench.measure.metrics import COSTS, Metric, UnknownMetric
 from pytest_simbench.measure.record import Record
-from pytest_simbench.measure.verdicts import Claim, Judgement, Verdict, at_least, at_most, judge
+from pytest_simbench.measure.verdicts import (
+    ERROR,
+    Claim,
+    Judgement,
+    Verdict,
+    at_least,
+    at_most,
+    confidence,
+    judge,
+)
 
 
 class InconclusiveWarning(UserWarning):
-    """The repetitions decide a claim neither way; the message says how many more would."""
+    """The repetitions decide a claim neither way, or are too few to be judged; the message says how
+    many more are needed."""
 
 
 class ResultSet:
     """Records with the metrics of their task.
 
     A failed repetition is left out of every metric, as in the reference study, and counted by
-    itself. An assertion on a metric *fails* when the 95 % interval of its mean lies wholly on the
-    wrong side of the threshold, *passes* when it lies wholly on the right side, and else passes
-    with an `InconclusiveWarning`.
+    itself. An assertion on a metric *fails* when the interval of its mean, each of whose ends is
+    right in at least 95 of 100 runs, lies wholly on the wrong side of the threshold, *passes* when
+    it lies wholly on the right side, and else (also with fewer than 5 repetitions) passes with an
+    `InconclusiveWarning`, or fails where `strict`.
 
     Args:
         records: of one task, simulator, mode and profile.
         metrics: that the task declares; the costs of `metrics.COSTS` are known besides.
 
     Attributes:
-        confidence: of the intervals by which claims are judged.
+        error: probability, at most, that a verdict on a claim is wrong.
+        strict: whether a claim that is not decided fails (`--sim-strict`).
     """
 
-    confidence: float = CONFIDENCE
+    error: float = ERROR
+    strict: bool = False
 
     def __init__(self, records: Iterable[Record], metrics: Iterable[Metric]) -> None:
         self.records: tuple[Record, ...] = tuple(records)
@@ -114,10 +128,7 @@ class ResultSet:
         """The interval of a metric's mean; without values its mean is nan and n is 0."""
         key = (name, confidence)
         if key not in self._intervals:
-            bounded = self.metric(name).bounded
-            self._intervals[key] = interval(
-                self.values(name), bounded=bounded, confidence=confidence
-            )
+            self._intervals[key] = interval(self.values(name), self.metric(name), confidence)
         return self._intervals[key]
 
     def failure_interval(self, confidence: float = CONFIDENCE) -> Interval:
@@ -126,17 +137,28 @@ class ResultSet:
         Raises:
             ValueError: no repetition has ended.
         """
-        return wilson(len(self.failures), len(self.ok) + len(self.failures), confidence)
+        return proportion(len(self.failures), len(self.ok) + len(self.failures), confidence)
 
     def judge(self, name: str, claim: Claim) -> Judgement:
         """What the repetitions say of a claim about a metric's true mean."""
-        return self._decide(claim, lambda: self.interval(name, self.confidence))
+        return self._decide(claim, lambda: self._judged(self.metric(name)))
+
+    def _judged(self, metric: Metric) -> Interval:
+        """The interval by which claims about a metric, or about failures, are judged."""
+        level = confidence(metric, self.error)
+        if metric is FAILURES:
+            return self.failure_interval(level)
+        return self.interval(metric.name, level)
 
     def _decide(self, claim: Claim, interval: Callable[[], Interval]) -> Judgement:
         return judge(claim, interval())
 
     def assert_at_least(self, name: str, threshold: float) -> None:
-        """Fail when the true mean is below `threshold`; shares are in 0..1."""
+        """Fail when the true mean is below `threshold`; shares are in 0..1.
+
+        Raises:
+            LimitError: a threshold that the metric cannot reach; so do the other assertions.
+        """
         __tracebackhide__ = True
         self._assert(name, at_least(threshold))
 
@@ -162,23 +184,17 @@ class ResultSet:
     def assert_failures_at_most(self, share: float) -> None:
         """Fail when more than `share` (0..1) of all repetitions ever made would fail."""
         __tracebackhide__ = True
-        if not 0 <= share <= 1:
-            raise ValueError(f"a share of failures lies in 0..1, not {share:g}")
+        check_threshold(FAILURES, share)
         self._assert_recorded()
-        found = self._decide(at_most(share), lambda: self.failure_interval(self.confidence))
-        sentence = f"{self._failed()}; {self._level} % interval {_percents(found.interval)}"
-        if found.verdict is Verdict.REFUTED:
-            raise AssertionError(f"{sentence}, which is above {100 * share:g} %")
-        if found.verdict is Verdict.INCONCLUSIVE:
-            warnings.warn(
-                f"{sentence}: inconclusive whether at most {100 * share:g} %, {found.advice}",
-                InconclusiveWarning,
-                stacklevel=2,
-            )
+        found = self._decide(at_most(share), lambda: self._judged(FAILURES))
+        sentence = f"{self._failed()} ({self._bounds(FAILURES, found.interval)})"
+        self._tell([found], FAILURES, lambda: sentence)
 
     def _assert(self, name: str, *claims: Claim) -> None:
         __tracebackhide__ = True
         metric = self.metric(name)
+        for claim in claims:
+            check_threshold(metric, claim.value)
         self._assert_recorded()
         if not self.ok:
             raise AssertionError(f"{name} cannot be judged: {self._failed()}")
@@ -187,40 +203,48 @@ class ResultSet:
                 f"{self.label}: {name} is not available in any of {len(self.ok)} repetitions"
             )
         found = [self.judge(name, claim) for claim in claims]
+        self._tell(found, metric, lambda: self._measured(metric))
+
+    def _tell(
+        self, found: Sequence[Judgement], metric: Metric, measured: Callable[[], str]
+    ) -> None:
+        """Fail, warn or say nothing."""
+        __tracebackhide__ = True
         for judgement in found:
             if judgement.verdict is Verdict.REFUTED:
                 wrong = "below" if judgement.claim.relation == "at least" else "above"
                 limit = metric.format(judgement.claim.value)
-                raise AssertionError(f"{self._measured(metric)}, which is {wrong} {limit}")
+                raise AssertionError(f"{measured()}, which is {wrong} {limit}")
         for judgement in found:
-            if judgement.verdict is Verdict.INCONCLUSIVE:
+            if not judgement.verdict.decided:
                 claim = f"{judgement.claim.relation} {metric.format(judgement.claim.value)}"
-                warnings.warn(
-                    f"{self._measured(metric)}: inconclusive whether {claim}, {judgement.advice}",
-                    InconclusiveWarning,
-                    stacklevel=3,
-                )
+                text = f"{measured()}: {judgement.verdict} whether {claim}, {judgement.advice}"
+                if self.strict:
+                    raise AssertionError(f"{text} (--sim-strict)")
+                warnings.warn(text, InconclusiveWarning, stacklevel=4)
 
     def _assert_recorded(self) -> None:
         __tracebackhide__ = True
         if len(self.interrupted) == len(self.records):
             raise AssertionError(f"{self.label}: no repetition has ended, nothing can be judged")
 
-    @property
-    def _level(self) -> str:
-        return f"{100 * self.confidence:.4g}"
+    def _bounds(self, metric: Metric, found: Interval) -> str:
+        """The interval by which a claim was judged, in words."""
+        if found.method == "constant":
+            return "the same in all repetitions"
+        level = f"{100 * (1 - self.error):.4g} %"
+        if not isfinite(found.high - found.low):
+            return f"no {level} bounds yet"
+        return f"{level} bounds {metric.format(found.low)} and {metric.format(found.high)}"
 
     def _measured(self, metric: Metric) -> str:
-        """What was measured, with simulator, mode, profile, interval and number of repetitions."""
-        found = self.interval(metric.name, self.confidence)
+        """What was measured, with simulator, mode, profile, bounds and number of repetitions."""
+        found = self._judged(metric)
         failed = f", {len(self.failures)} failed" if self.failures else ""
-        certainty = f"no {self._level} % interval yet"
-        if isfinite(found.high - found.low):
-            bounds = f"{metric.format(found.low)} to {metric.format(found.high)}"
-            certainty = f"{self._level} % interval {bounds}"
         return (
             f"{self.label}: {metric.name} is {metric.format(found.mean)} on average "
-            f"({certainty}, {found.n} repetition{'s' if found.n > 1 else ''}{failed})"
+            f"({self._bounds(metric, found)}, {found.n} repetition{'s' if found.n > 1 else ''}"
+            f"{failed})"
         )
 
     def _failed(self) -> str:
@@ -239,7 +263,3 @@ def _example(records: Sequence[Record]) -> str:
     message = first.error.message if first.error else ""
     place = f"repetition {first.repetition}, seed {first.seed}"
     return f" ({place}: {message})" if message else f" ({place})"
-
-
-def _percents(found: Interval) -> str:
-    return f"{100 * found.low:.3g} % to {100 * found.high:.3g} %"

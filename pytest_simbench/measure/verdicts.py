@@ -1,4 +1,9 @@
-"""Claims about a metric, and what the repetitions say of them: supported, refuted, inconclusive."""
+"""Claims about a metric, and what the repetitions say of them.
+
+A claim has one side, so a verdict can be wrong in one way only: a claim that is true is refuted, or
+one that is false supported. Each happens in at most `ERROR` of all runs, because a claim is judged
+by the ends of an interval each of which misses the truth so rarely.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +11,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal
 
-from pytest_simbench.measure.intervals import Interval
+from pytest_simbench.measure.intervals import CONFIDENCE, FEWEST, Interval
+from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.measure.power import further_repetitions
+
+ERROR = 1 - CONFIDENCE
+"""Probability that a verdict is wrong, at most."""
 
 
 class Verdict(StrEnum):
@@ -16,6 +25,12 @@ class Verdict(StrEnum):
     SUPPORTED = "supported"
     REFUTED = "refuted"
     INCONCLUSIVE = "inconclusive"
+    NOT_JUDGED = "not judged"
+    """Fewer than `FEWEST` repetitions."""
+
+    @property
+    def decided(self) -> bool:
+        return self in (Verdict.SUPPORTED, Verdict.REFUTED)
 
 
 @dataclass(frozen=True)
@@ -39,12 +54,21 @@ def at_most(value: float) -> Claim:
     return Claim("at most", value)
 
 
+def confidence(metric: Metric, error: float = ERROR) -> float:
+    """Of the interval whose ends each err in at most `error` of all runs.
+
+    Those of a proportion share the error of their interval evenly; those of a skewed value do not,
+    so that each may take all of it.
+    """
+    return 1 - (2 * error if metric.bounded else error)
+
+
 @dataclass(frozen=True)
 class Judgement:
     """A verdict on a claim.
 
     Attributes:
-        further: when inconclusive, about how many more repetitions would decide; None when more
+        further: when undecided, about how many more repetitions would decide; None when more
             than any run could have (the mean is at the threshold) or too few are there to tell.
     """
 
@@ -55,19 +79,26 @@ class Judgement:
 
     @property
     def advice(self) -> str:
-        """What to do about an inconclusive verdict, for messages; empty when decided."""
-        if self.verdict is not Verdict.INCONCLUSIVE:
+        """What to do about a claim that is not decided, for messages; empty when it is."""
+        if self.verdict.decided:
             return ""
+        if self.verdict is Verdict.NOT_JUDGED:
+            return f"a claim needs {FEWEST} repetitions or more"
         if self.further is not None:
             return f"about {self.further} more repetitions needed"
-        if self.interval.n < 2:
-            return "too few repetitions to tell how many more are needed"
         return "the mean is too close to the threshold for any number of repetitions"
 
 
 def judge(claim: Claim, interval: Interval) -> Judgement:
-    """Supported when the whole interval fulfils the claim, refuted when none of it does."""
+    """Supported when the whole interval fulfils the claim, refuted when none of it does.
+
+    A value that was the same in all repetitions is judged as it is.
+    """
+    if interval.n < FEWEST:
+        return Judgement(Verdict.NOT_JUDGED, claim, interval, None)
     low, high, value = interval.low, interval.high, claim.value
+    if interval.method == "constant":
+        low = high = interval.mean
     if claim.relation == "at least":
         supported, refuted = low >= value, high < value
     else:

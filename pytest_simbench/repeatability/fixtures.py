@@ -137,8 +137,9 @@ def _keep(case: Case, kind: str, experiment: Experiment, result: Mapping[str, An
 class Perturber:
     """One task in one simulator, to be perturbed; what `perturb(task)` gives."""
 
-    def __init__(self, case: Case, experiment: Experiment) -> None:
+    def __init__(self, case: Case, experiment: Experiment, strict: bool = False) -> None:
         self.case = case
+        self.strict = strict
         self.experiment = experiment
 
     @property
@@ -161,15 +162,20 @@ class Perturber:
         if self.case.protocol.smallest:
             options["examples"] = min(5, options.get("examples", 5))
         result = stability.stability(self.experiment, bounds, **options)
+        result = replace(result, strict=self.strict)
         _keep(self.case, "stability", self.experiment, result.to_wire())
         return result
 
-    def sensitivity(self, body: str, steps: int = 1) -> Sensitivity:
-        """Growth of a displacement of a cube by `steps` times 0.1 mm in x."""
+    def sensitivity(self, body: str, steps: int = 1, **options: Any) -> Sensitivity:
+        """Growth of a displacement of a cube by `steps` times 0.1 mm in x. Takes `moments=` for
+        tasks other than throwing."""
         from pytest_simbench.repeatability import stability
+        from pytest_simbench.repeatability.moments import THROWING_MOMENTS
         from pytest_simbench.repeatability.perturbation import Perturbation
 
-        result = stability.sensitivity(self.experiment, Perturbation("x", steps, body))
+        options.setdefault("moments", THROWING_MOMENTS)
+        displaced = Perturbation("x", steps, body)
+        result = stability.sensitivity(self.experiment, displaced, **options)
         _keep(self.case, "sensitivity", self.experiment, result.to_wire())
         return result
 
@@ -186,9 +192,11 @@ def perturb(
         own = handles(simbench_case) if sim_settings else None
         handle = own or request.getfixturevalue("simbench_handle")
 
+        strict = session_options.value(request.config, "sim_strict")
+
         def perturb_task(task: Task) -> Perturber:
             checked_task(task, "perturb")
-            return Perturber(simbench_case, _experiment(simbench_case, handle, task))
+            return Perturber(simbench_case, _experiment(simbench_case, handle, task), strict)
 
         yield perturb_task
 

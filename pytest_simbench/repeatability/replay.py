@@ -15,6 +15,7 @@ from functools import partial
 from pytest_simbench.client.errors import Unavailable, WorkerError
 from pytest_simbench.client.tape import Operation, TapedWorld
 from pytest_simbench.repeatability.episode import Episode, Experiment, changed
+from pytest_simbench.repeatability.moments import THROWING_MOMENTS, Moment
 from pytest_simbench.repeatability.motions import difference
 from pytest_simbench.repeatability.replay_result import Again, Replay
 from pytest_simbench.session.handle import SimulatorHandle
@@ -23,26 +24,6 @@ from pytest_simbench.tasks import Jitter, LeaningTowers
 
 ASTRAY = 0.3
 """How long a world goes on after its state was saved, before it is restored [s]."""
-
-
-@dataclass(frozen=True)
-class Moment:
-    """A moment of a task at which the state is saved and restored.
-
-    Attributes:
-        name: for tables.
-        phase: of the task.
-        operation: number of the operation in that phase before which it happens, from 0.
-    """
-
-    name: str
-    phase: str
-    operation: int = 0
-
-
-THROWING_MOMENTS = (Moment("in the grip", "wind up"), Moment("in flight", "throw", 1))
-"""Of `tasks.Throwing`: before winding up with the cube between the fingers, and when the swing has
-ended, by when the cube is on its way."""
 
 
 def replay(

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pytest_simbench.measure.metrics import significant
 from pytest_simbench.repeatability.episode import Episode
 from pytest_simbench.repeatability.motions import Difference
 
@@ -46,14 +47,14 @@ class Again:
             return "bit-identical"
         d = self.difference
         growth = ", ".join(
-            f"{1000 * gap:.3g} mm {after:g} s later"
+            f"{significant(1000 * gap)} mm {after:g} s later"
             for after, gap in d.growth.items()
             if gap is not None
         )
         what = f"first differs at t = {d.first:.2f} s"
         what += f" ({d.body})" if d.body else " (robot)"
         what += f", then {growth}" if growth else ""
-        what += f", {1000 * d.largest:.3g} mm at most"
+        what += f", {significant(1000 * d.largest)} mm at most"
         return what + (f"; changed {', '.join(self.changed)}" if self.changed else "")
 
     def to_wire(self) -> dict[str, Any]:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
-from pytest_simbench.measure.intervals import Interval, interval, wilson
+from pytest_simbench.measure.intervals import Interval, interval, proportion
+from pytest_simbench.measure.metrics import Metric, significant
+from pytest_simbench.measure.results import InconclusiveWarning
+from pytest_simbench.measure.verdicts import Verdict, at_least, confidence, judge
 from pytest_simbench.repeatability.attack import Attack, Perturbations
 from pytest_simbench.repeatability.episode import Experiment
+from pytest_simbench.repeatability.moments import Moment
 from pytest_simbench.repeatability.motions import gaps
 from pytest_simbench.repeatability.perturbation import (
     QUANTITIES,
@@ -19,7 +24,9 @@ from pytest_simbench.repeatability.perturbation import (
 from pytest_simbench.repeatability.search import bounds_in_words
 
 SENSITIVITY_TIMES = (0.1, 1.0, 5.0, 20.0)
-"""Simulated times at which sensitivity is told [s]."""
+"""Seconds after the task began at which sensitivity is told."""
+
+KEPT = Metric("kept", "kept", kind="share", of=1, doc="what a perturbed run keeps of the outcome")
 
 
 @dataclass(frozen=True)
@@ -32,6 +39,7 @@ class Stability:
         unchanged: how many runs gave the same outcome.
         bounds: largest changes, in words.
         worst: the perturbation that left least, and what it did, in words; "" when all was kept.
+        strict: whether a claim that is not decided fails (`--sim-strict`).
     """
 
     simulator: str
@@ -39,34 +47,42 @@ class Stability:
     unchanged: int
     bounds: str
     worst: str
+    strict: bool = False
 
     @property
     def share(self) -> Interval:
         """Mean of what was kept."""
-        return interval(self.kept, bounded=True)
+        return interval(self.kept, KEPT)
 
     @property
     def same(self) -> Interval:
         """Share of the runs whose outcome was the same."""
-        return wilson(self.unchanged, len(self.kept))
+        return proportion(self.unchanged, len(self.kept))
 
     @property
     def sentence(self) -> str:
         """For the report."""
         share, n = self.share, len(self.kept)
+        ends = f"[{100 * share.low:.0f}, {100 * share.high:.0f}]"
         text = (
-            f"kept {100 * share.mean:.3g} % [{100 * share.low:.0f}, {100 * share.high:.0f}] within "
-            f"{self.bounds}; the same outcome in {self.unchanged} of {n}"
+            f"kept {significant(100 * share.mean)} % {ends} within {self.bounds}; "
+            f"the same outcome in {self.unchanged} of {n}"
         )
         return f"{text}; worst: {self.worst}" if self.worst else text
 
     def assert_kept_at_least(self, least: float) -> None:
-        """Raise AssertionError when the data show that less than `least` of the task is kept: the
-        whole 95 % interval of its mean lies below."""
-        if self.share.high < least:
-            raise AssertionError(
-                f"{self.simulator}: at least {100 * least:g} % should be kept, but {self.sentence}"
-            )
+        """Raise AssertionError when the data show that less than `least` of the task is kept; warn,
+        or fail where `strict`, when they do not decide. See `measure.verdicts`.
+        """
+        found = judge(at_least(least), interval(self.kept, KEPT, confidence(KEPT)))
+        text = f"{self.simulator}: at least {significant(100 * least)} % should be kept, "
+        if found.verdict is Verdict.REFUTED:
+            raise AssertionError(f"{text}but {self.sentence}")
+        if not found.verdict.decided:
+            text += f"{found.verdict}: {self.sentence}, {found.advice}"
+            if self.strict:
+                raise AssertionError(f"{text} (--sim-strict)")
+            warnings.warn(text, InconclusiveWarning, stacklevel=2)
 
     def to_wire(self) -> dict[str, Any]:
         """Plain data for the run's records."""
@@ -133,8 +149,11 @@ class Sensitivity:
     Attributes:
         simulator: its name.
         perturbation: the displacement, in words.
-        ratio: by simulated time [s]: largest distance between a cube with and without it, over the
-            displacement (mm per mm); None where the episode was over.
+        ratio: by seconds after the task began, that is after its first motion began, or the world
+            where nothing moves by itself: largest distance between a cube with and without the
+            displacement, over it (mm per mm); None where the episode was over.
+        until: by a moment's name the largest of that ratio until then, from the beginning of the
+            world; None where the task never came to it.
         largest: of that ratio at any time.
     """
 
@@ -142,35 +161,63 @@ class Sensitivity:
     perturbation: str
     ratio: Mapping[float, float | None]
     largest: float
+    until: Mapping[str, float | None] = field(default_factory=dict)
 
     @property
     def sentence(self) -> str:
         """For the report."""
-        parts = [f"{r:.3g} at {t:g} s" for t, r in self.ratio.items() if r is not None]
-        return f"mm per mm after {self.perturbation}: {', '.join(parts)}; most {self.largest:.3g}"
+        parts = [f"{significant(r)} at {t:g} s" for t, r in self.ratio.items() if r is not None]
+        parts += [f"{significant(r)} until {n}" for n, r in self.until.items() if r is not None]
+        most = significant(self.largest)
+        return f"mm per mm after {self.perturbation}: {', '.join(parts)}; most {most}"
 
-    def assert_below(self, most: float, until: float) -> None:
-        """Raise AssertionError when the ratio exceeds `most` at one of the times up to `until`."""
-        for time, ratio in self.ratio.items():
-            if time <= until and ratio is not None and not ratio < most:
-                raise AssertionError(
-                    f"{self.simulator}: {self.sentence}; expected below {most:g} until {until:g} s"
-                )
+    def assert_below(self, most: float, until: float | str) -> None:
+        """Raise AssertionError when the ratio exceeds `most` before a time or a moment.
+
+        Args:
+            most: the largest ratio allowed.
+            until: seconds after the task began, or the name of one of the moments.
+
+        Raises:
+            ValueError: there is no such moment; lists those there are.
+        """
+        if isinstance(until, str):
+            if until not in self.until:
+                known = ", ".join(self.until) or "none"
+                raise ValueError(f"no moment is named {until!r}; there are: {known}")
+            judged, when = [self.until[until]], until
+        else:
+            judged, when = [r for t, r in self.ratio.items() if t <= until], f"{until:g} s"
+        found = [ratio for ratio in judged if ratio is not None]
+        if not found:
+            raise AssertionError(f"{self.simulator}: the task never came to {when}")
+        if not max(found) < most:
+            raise AssertionError(
+                f"{self.simulator}: {self.sentence}; expected below {most:g} until {when}"
+            )
 
     def to_wire(self) -> dict[str, Any]:
         """Plain data for the run's records."""
         return {
             "perturbation": self.perturbation,
             "ratio": {f"{time:g}": value for time, value in self.ratio.items()},
+            "until": dict(self.until),
             "largest": self.largest,
             "sentence": self.sentence,
         }
 
 
-def sensitivity(experiment: Experiment, perturbation: Perturbation) -> Sensitivity:
+def sensitivity(
+    experiment: Experiment, perturbation: Perturbation, moments: Sequence[Moment] = ()
+) -> Sensitivity:
     """Displace one cube by a little and send the same commands.
 
     The commands are those of the unperturbed run, so what grows is the simulator's own.
+
+    Args:
+        experiment: to be perturbed.
+        perturbation: in x or y.
+        moments: of the task, until which the growth is told.
 
     Raises:
         WorkerError: whatever happened to the worker.
@@ -180,12 +227,21 @@ def sensitivity(experiment: Experiment, perturbation: Perturbation) -> Sensitivi
         raise ValueError(f"sensitivity is told per millimetre, not for {perturbation}")
     base = experiment.run()
     moved = experiment.run([perturbation], play=base.tape)
-    between = gaps(base.motions, moved.motions)
-    size = abs(perturbation.amount)
-    found = {time: between.after(time) for time in SENSITIVITY_TIMES}
+    between, size = gaps(base.motions, moved.motions), abs(perturbation.amount)
+    gap = between.largest() / size
+    # Simulated time at which each operation of the tape begins [s].
+    starts = [float(motion.time[-1]) for motion in base.motions]
+    began = next((t for t, o in zip(starts, base.tape, strict=False) if o.kind == "follow"), 0.0)
+    ratios = {time: between.after(began + time) for time in SENSITIVITY_TIMES}
+    until: dict[str, float | None] = {}
+    for moment in moments:
+        number = moment.place(base.tape)
+        here = None if number is None else between.time <= starts[number] + 1e-9
+        until[moment.name] = None if here is None else float(gap[here].max())
     return Sensitivity(
         experiment.handle.case.simulator,
         str(perturbation),
-        {time: None if gap is None else gap / size for time, gap in found.items()},
-        float(between.largest().max()) / size,
+        {time: None if value is None else value / size for time, value in ratios.items()},
+        float(gap.max()),
+        until,
     )

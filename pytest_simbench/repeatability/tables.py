@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from pytest_simbench.measure.metrics import significant
 from pytest_simbench.repeatability.agreement import LIMITS, Agreement
 from pytest_simbench.repeatability.motions import GROWTH_TIMES
 from pytest_simbench.repeatability.replay_result import Again
@@ -113,10 +114,10 @@ def growth_columns(parted: Sequence[tuple[Line, Again]]) -> list[Column]:
     ]
     for after in GROWTH_TIMES:
         gaps = [d.growth.get(after) for _, _, d in found]
-        cells = [["" if gap is None else f"{1000 * gap:.3g}"] for gap in gaps]
+        cells = [["" if gap is None else significant(1000 * gap)] for gap in gaps]
         columns.append(Column(f"mm at {after:g} s", cells))
     columns += [
-        Column("mm at most", [[f"{1000 * d.largest:.3g}"] for _, _, d in found]),
+        Column("mm at most", [[significant(1000 * d.largest)] for _, _, d in found]),
         Column("outcome", [[_outcome(again)] for _, again, _ in found], left=True),
     ]
     return columns

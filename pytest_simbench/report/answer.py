@@ -1,9 +1,10 @@
-"""The result of a task in plain words, which claims no more than the intervals allow."""
+"""The result of a task in plain words, which claims no more than the tests between rows support."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pytest_simbench.measure.intervals import FEWEST
 from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.report import cells
 from pytest_simbench.report.pooling import Spread
@@ -17,15 +18,7 @@ def sentences(summary: TaskSummary) -> list[str]:
     """One sentence for each of the study's metrics that has a good direction, and the failures."""
     names = short_labels(summary.rows)
     found = [
-        _compare(
-            metric,
-            [
-                (name, row.metrics.get(metric.name))
-                for name, row in zip(names, summary.rows, strict=True)
-            ],
-        )
-        for metric in summary.study
-        if metric.better is not None
+        _compare(metric, summary, names) for metric in summary.study if metric.better is not None
     ]
     failed = [
         f"{name} {row.failed} of {row.attempts}"
@@ -51,38 +44,42 @@ def short_labels(rows: Sequence[Row]) -> list[str]:
     return labels
 
 
-def _compare(metric: Metric, found: Sequence[tuple[str, Spread | None]]) -> str:
-    """Who is best at one metric, and whether the intervals tell it apart from the others."""
+def _compare(metric: Metric, summary: TaskSummary, names: Sequence[str]) -> str:
+    """Who is ahead at one metric: only what the corrected tests between the rows support.
+
+    Ahead is who beats another and is beaten by nobody, behind who is beaten; a mean alone puts
+    nobody anywhere.
+    """
     sign = -1 if metric.better == "higher" else 1
-    ranked = sorted(
-        ((name, value) for name, value in found if value is not None),
-        key=lambda item: sign * item[1].mean,
-    )
-    if not ranked:
-        return ""
-    texts = [f"{name} {_value(value, metric)}" for name, value in ranked]
-    best = ranked[0][1]
-    if len(ranked) == 1:
-        return f"{metric.title}: {texts[0]}."
-    if any(value.low is None for _, value in ranked):
-        return f"{metric.title}: {_list(texts)}; too few repetitions to compare."
-    equal = [overlaps(best, value) for _, value in ranked]
-    if all(equal):
-        return f"{metric.title}: {_list(texts)}; the intervals overlap: no clear best."
-    if not any(equal[1:]):
-        return f"{metric.title}: {texts[0]} is ahead of {_list(texts[1:])}."
-    near = [text for text, same in zip(texts, equal, strict=True) if same]
-    behind = [text for text, same in zip(texts, equal, strict=True) if not same]
-    return (
-        f"{metric.title}: {_list(near)} lead with overlapping intervals; behind: {_list(behind)}."
-    )
-
-
-def overlaps(a: Spread, b: Spread) -> bool:
-    """Whether the two intervals share a value."""
-    if a.low is None or a.high is None or b.low is None or b.high is None:
-        return True
-    return a.low <= b.high and b.low <= a.high
+    values = {
+        place: value
+        for place, row in enumerate(summary.rows)
+        if (value := row.metrics.get(metric.name)) is not None
+    }
+    texts = {
+        place: f"{names[place]} {_value(value, metric)}"
+        for place, value in sorted(values.items(), key=lambda item: sign * item[1].mean)
+    }
+    if len(texts) < 2:
+        return "".join(f"{metric.title}: {text}." for text in texts.values())
+    everybody = list(texts.values())
+    if sum(value.count >= FEWEST for value in values.values()) < 2:
+        return f"{metric.title}: {_list(everybody)}; too few repetitions to compare."
+    wins = [win for win in summary.wins if win.metric.name == metric.name]
+    losers = {win.loser for win in wins}
+    winners = {win.winner for win in wins} - losers
+    ahead = [text for place, text in texts.items() if place in winners]
+    behind = [text for place, text in texts.items() if place in losers]
+    others = [text for place, text in texts.items() if place not in winners | losers]
+    if not ahead:
+        return f"{metric.title}: {_list(everybody)}; no difference is shown."
+    verb = "is" if len(ahead) == 1 else "are"
+    # "of" only where it is true of each: one row that beats every one that is behind.
+    beaten = {win.loser for win in wins if win.winner in winners}
+    of_each = len(ahead) == 1 and beaten == losers
+    over = f" of {_list(behind)}" if of_each else f"; behind: {_list(behind)}"
+    rest = f"; not told apart: {_list(others)}" if others else ""
+    return f"{metric.title}: {_list(ahead)} {verb} ahead{over}{rest}."
 
 
 def _value(found: Spread, metric: Metric) -> str:

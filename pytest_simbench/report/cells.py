@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from pytest_simbench.measure.intervals import wilson
-from pytest_simbench.measure.metrics import Metric
+from pytest_simbench.measure.intervals import proportion
+from pytest_simbench.measure.metrics import Metric, significant
 from pytest_simbench.report.pooling import Sampled, Spread
 from pytest_simbench.report.summary import Row
 
@@ -12,19 +12,14 @@ MISSING = "-"
 
 def number(value: float, digits: int = 3) -> str:
     """So many significant digits, zeros kept: 1.35, 0.80, 161."""
-    if value == 0:
-        return "0"
-    if abs(value) >= 10**digits:
-        return f"{value:.0f}"
-    text = f"{value:#.{digits}g}"
-    return f"{value:.0e}" if "e" in text else text.rstrip(".")
+    return significant(value, digits, keep_zeros=True)
 
 
 def metric_value(value: float, metric: Metric) -> str:
     """Without its unit: percent for shares and yes-or-no, else to the millimetre of a metre."""
     if metric.bounded:
         return f"{100 * value:.0f}"
-    return f"{value:.4g}" if abs(value) >= 1 else f"{value:.2g}"
+    return significant(value, 4 if abs(value) >= 1 else 2)
 
 
 def interval(found: Spread, metric: Metric) -> str:
@@ -84,7 +79,7 @@ def failures(row: Row) -> list[str]:
     """Failed repetitions of those that count, the interval of their share, the interrupted ones."""
     lines = [f"{row.failed} of {row.attempts}"]
     if row.attempts:
-        found = wilson(row.failed, row.attempts)
+        found = proportion(row.failed, row.attempts)
         lines.append(f"[{100 * found.low:.0f}, {100 * found.high:.0f}] %")
     if row.interrupted:
         lines.append(f"{row.interrupted} cut")

@@ -1,4 +1,4 @@
-"""Many repetitions' values as one: smallest, mean and largest; and all their samples together."""
+"""Many repetitions' values as one: smallest, mean and largest; and what was sampled."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ class Spread:
 
 @dataclass(frozen=True)
 class Sampled:
-    """A resource over all samples of all repetitions of a row.
+    """A resource over all repetitions of a row.
 
     Attributes:
-        mean, std: over the samples.
+        mean, std: of what was sampled, each repetition counting the same.
         peak: the largest value.
         low, high: the 95 % interval of the mean over the repetitions, None for too few.
     """
@@ -56,7 +56,7 @@ class Sampled:
 
 def interval_ends(values: Sequence[float], metric: Metric) -> tuple[float, float]:
     """Ends of the 95 % interval that the assertions use, see `measure.intervals`."""
-    found = interval(values, bounded=metric.bounded)
+    found = interval(values, metric)
     return found.low, found.high
 
 
@@ -84,10 +84,11 @@ def spread(
 def pooled(
     resources: Iterable[Mapping[str, Any]], name: str, ends: Ends = interval_ends
 ) -> Sampled | None:
-    """Mean and deviation over all samples, as if they had been taken in one go.
+    """Mean and deviation of what was sampled, each repetition counting the same.
 
-    The deviation is within and between repetitions: n samples of mean m_i and deviation s_i add
-    n (s_i^2 + (m_i - m)^2) to the sum of squares.
+    So the mean is that of the repetitions' means, whose interval is shown, however many samples a
+    repetition has. The deviation is within and between repetitions: with means m_i and deviations
+    s_i the variance is the mean of s_i^2 + (m_i - m)^2.
 
     Args:
         resources: of each repetition, as records hold them.
@@ -100,17 +101,15 @@ def pooled(
         found = use.get(name) or {}
         mean, count = found.get("mean"), use.get("samples") or 0
         if mean is not None and count > 0:
-            parts.append((count, mean, found.get("std") or 0.0))
+            parts.append((mean, found.get("std") or 0.0))
         if found.get("peak") is not None:
             peaks.append(float(found["peak"]))
-    if not parts:
+    over = spread([mean for mean, _ in parts], AMOUNT, ends)
+    if over is None:
         return None
-    total = sum(count for count, _, _ in parts)
-    mean = sum(count * m for count, m, _ in parts) / total
-    variance = sum(count * (s**2 + (m - mean) ** 2) for count, m, s in parts) / total
-    over = spread([m for _, m, _ in parts], AMOUNT, ends)
-    low, high = (None, None) if over is None else (over.low, over.high)
-    return Sampled(mean, math.sqrt(variance), max(peaks, default=None), low, high)
+    variance = statistics.fmean(std**2 + (mean - over.mean) ** 2 for mean, std in parts)
+    peak = max(peaks, default=None)
+    return Sampled(over.mean, math.sqrt(variance), peak, over.low, over.high)
 
 
 def pooled_by_phase(

@@ -25,6 +25,7 @@ from pytest_simbench.report.pooling import (
     pooled_by_phase,
     spread,
 )
+from pytest_simbench.simulator.choices import published_again
 
 PHASES = ("launch", "compile", "load", "plan", "step", "other")
 """Where the wall time of a repetition goes, in order."""
@@ -182,6 +183,8 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str, ends: 
     first = records[0]
     done = [record for record in records if record.status == "ok"]
     notes = list(dict.fromkeys(r.details["untested"] for r in records if "untested" in r.details))
+    again = published_again((r.task, r.seed, r.details.get("chosen_on", ())) for r in done)
+    notes += [again] * bool(again)
     if any(record.contended for record in done):
         notes.append("repetitions ran in parallel: its times and CPU are contended")
     if any(record.reused_worker for record in done):

@@ -29,6 +29,7 @@ from pytest_simbench.measure.resources import ResourceSampler
 from pytest_simbench.session.case import Case
 from pytest_simbench.session.interrupts import Interrupts
 from pytest_simbench.session.workers import IdleWorkers
+from pytest_simbench.simulator.choices import seeds_seen
 from pytest_simbench.tasks.base import Jitter, Outcome, Task
 from pytest_simbench.worker.text import LONGEST, named, readable, told
 
@@ -220,6 +221,8 @@ class Repetition:
         seconds["other"] = max(0.0, total - sum(seconds.values()))
         seconds["total"] = total
         details = {**outcome.details, "log": self._log_name()}
+        if seen := seeds_seen(case.adapter, case.profile):
+            details["chosen_on"] = [seeds.to_wire() for seeds in seen]
         if self._constructed.get("untested"):
             details["untested"] = self._constructed["untested"]
         if self._closing:

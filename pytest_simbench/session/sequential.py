@@ -1,9 +1,9 @@
 """`--reps auto`: repeat until each asserted claim is decided, or a limit is reached.
 
-Whoever looks at 95 % intervals again and again, and stops when one of them decides, is wrong more
-often than once in twenty. So the numbers of repetitions at which it is looked are fixed beforehand,
-and the intervals of a claim share the error among the looks (Bonferroni): with K looks each has a
-confidence of 1 - 0.05 / K, so that the chance that any of them misses the truth stays below 0.05.
+Whoever judges again and again, and stops when it decides, is wrong more often than once in twenty.
+So the numbers of repetitions at which it is looked are fixed beforehand, and the verdicts on a
+claim share the error among the looks (Bonferroni): with K looks each may err in 0.05 / K of all
+runs, so that the chance that any of them is wrong stays below 0.05.
 That holds whenever one stops and for each claim by itself, also when another claim asked for the
 repetitions. The price is about a third more repetitions than a single look at the right moment.
 
@@ -16,11 +16,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from pytest_simbench.measure.intervals import CONFIDENCE, Interval
+from pytest_simbench.measure.intervals import Interval
 from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.measure.record import Record
 from pytest_simbench.measure.results import ResultSet
-from pytest_simbench.measure.verdicts import Claim, Judgement, Verdict, judge
+from pytest_simbench.measure.verdicts import ERROR, Claim, Judgement, judge
 
 FIRST_LOOK = 10
 """Repetitions before the first look: fewer say nothing of their own spread."""
@@ -35,22 +35,22 @@ class Plan:
 
     Attributes:
         looks: numbers of repetitions, rising; the last is the limit.
-        confidence: of the interval at each look.
+        error: probability, at most, that the verdict of one look is wrong.
     """
 
     looks: tuple[int, ...]
-    confidence: float
+    error: float
 
     @classmethod
-    def up_to(cls, limit: int, confidence: float = CONFIDENCE) -> Plan:
-        """Looks at 10, 20, 40, ... and at `limit`, all together as sure as `confidence`."""
+    def up_to(cls, limit: int, error: float = ERROR) -> Plan:
+        """Looks at 10, 20, 40, ... and at `limit`, which all together err in at most `error`."""
         looks = []
         number = FIRST_LOOK
         while number < limit:
             looks.append(number)
             number *= GROWTH
         looks.append(limit)
-        return cls(tuple(looks), 1 - (1 - confidence) / len(looks))
+        return cls(tuple(looks), error / len(looks))
 
 
 class SequentialResultSet(ResultSet):
@@ -72,14 +72,14 @@ class SequentialResultSet(ResultSet):
     ) -> None:
         super().__init__(records, metrics)
         self.plan = plan
-        self.confidence = plan.confidence
+        self.error = plan.error
         self._more = more
 
     def _decide(self, claim: Claim, interval: Callable[[], Interval]) -> Judgement:
         while True:
             found = judge(claim, interval())
             later = [n for n in self.plan.looks if n > len(self.records)]
-            if found.verdict is not Verdict.INCONCLUSIVE or not later:
+            if found.verdict.decided or not later:
                 return found
             self.records = tuple(self._more(later[0]))
             self._intervals.clear()

@@ -1,6 +1,7 @@
 """What an adapter implements, its settings, capabilities and report of the world it built."""
 
 from pytest_simbench.simulator.base import Simulator
+from pytest_simbench.simulator.choices import SeedsSeen
 from pytest_simbench.simulator.errors import (
     DescriptionError,
     DivergedError,
@@ -27,6 +28,7 @@ __all__ = [
     "NotSupportedError",
     "ParityError",
     "PreparedRobot",
+    "SeedsSeen",
     "Settings",
     "SettingsError",
     "Simulator",

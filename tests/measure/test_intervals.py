@@ -1,181 +1,229 @@
-"""Intervals: known values, laws, and how often they hold the truth in simulated experiments."""
+"""Intervals: known values and laws. How often they hold the truth: test_coverage.py."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
-from scipy.stats import binom, norm, t
+from scipy.stats import t
 
 from pytest_simbench.measure.intervals import (
+    FEWEST,
     Interval,
-    bootstrap,
-    expanded_level,
-    interquartile_interval,
-    interquartile_mean,
+    betting,
     interval,
-    wilson,
+    proportion,
+    skewed_t,
+    varies,
 )
+from pytest_simbench.measure.metrics import Metric
+
+SHARE = Metric("placed", "placed", kind="share", of=15)
+YES_NO = Metric("hit", "hit", kind="yes_no")
+LENGTH = Metric("landing", "landing", "m")
+COUNT = Metric("picks", "picks")
 
 shares = st.lists(st.integers(0, 15).map(lambda k: k / 15), min_size=1, max_size=30)
 finite = st.floats(-1e6, 1e6)
 
 
-def test_twenty_of_twenty_proves_only_84_percent() -> None:
-    found = wilson(20, 20)
-    assert (round(found.low, 2), found.high) == (0.84, 1.0)
+def rounded(found: Interval, digits: int = 3) -> tuple[float, float]:
+    return round(found.low, digits), round(found.high, digits)
 
 
-def test_wilson_agrees_with_a_published_value() -> None:
-    """81 of 263: 0.2553 to 0.3662 (Newcombe 1998, Statistics in Medicine 17, table I, method 3)."""
-    found = wilson(81, 263)
-    assert (round(found.low, 4), round(found.high, 4)) == (0.2553, 0.3662)
+def test_twenty_of_twenty_proves_83_percent() -> None:
+    """0.025^(1 / 20) = 0.8316; one-sided, as claims are judged, 0.05^(1 / 20) = 0.8609."""
+    assert rounded(proportion(20, 20), 4) == (0.8316, 1.0)
+    assert rounded(proportion(20, 20, 0.9), 4) == (0.8609, 1.0)
 
 
-@pytest.mark.parametrize("n", [5, 20, 60])
-def test_wilson_covers_the_truth(n: int) -> None:
-    """Exact mean coverage over all proportions, from the binomial distribution itself."""
-    rates = np.linspace(0.02, 0.98, 49)
-    ends = [wilson(k, n) for k in range(n + 1)]
-    low = np.array([found.low for found in ends])
-    high = np.array([found.high for found in ends])
-    holds = (low <= rates[:, None]) & (rates[:, None] <= high)
-    coverage = (binom.pmf(np.arange(n + 1), n, rates[:, None]) * holds).sum(axis=1)
-    assert coverage.mean() == pytest.approx(0.95, abs=0.015)
-    assert coverage.min() > 0.83  # Wilson's known dips at small n
+def test_proportions_agree_with_published_values() -> None:
+    """81 of 263, 15 of 148, 0 of 20, 1 of 29 (Newcombe 1998, Statistics in Medicine 17, table I,
+    method 5)."""
+    for successes, n, low, high in (
+        (81, 263, 0.2527, 0.3676),
+        (15, 148, 0.0578, 0.1617),
+        (0, 20, 0.0, 0.1684),
+        (1, 29, 0.0009, 0.1776),
+    ):
+        assert rounded(proportion(successes, n), 4) == (low, high)
 
 
 @given(st.integers(1, 200), st.data())
-def test_wilson_is_symmetric_and_holds_its_proportion(n: int, data: st.DataObject) -> None:
+def test_a_proportion_is_symmetric_and_holds_itself(n: int, data: st.DataObject) -> None:
     k = data.draw(st.integers(0, n))
-    found, mirrored = wilson(k, n), wilson(n - k, n)
+    found, mirrored = proportion(k, n), proportion(n - k, n)
     assert 0 <= found.low <= k / n <= found.high <= 1
     assert found.low == pytest.approx(1 - mirrored.high, abs=1e-9)
+    assert (found.n, found.method, found.confidence) == (n, "exact", 0.95)
 
 
 @given(st.integers(1, 50), st.floats(0, 1))
-def test_wilson_of_a_fraction_is_rounded_outwards(n: int, rate: float) -> None:
-    found = wilson(rate * n, n)
+def test_a_fraction_is_rounded_outwards(n: int, rate: float) -> None:
+    found = proportion(rate * n, n)
     count = round(rate * n, 9)  # 2.9999999999999996 is 3
-    below, above = wilson(math.floor(count), n), wilson(math.ceil(count), n)
+    below, above = proportion(math.floor(count), n), proportion(math.ceil(count), n)
     assert (found.low, found.high) == (below.low, above.high)
 
 
-@pytest.mark.parametrize(("successes", "n"), [(3, 2), (-1, 5), (0, 0)])
-def test_wilson_refuses_what_is_no_proportion(successes: int, n: int) -> None:
-    with pytest.raises(ValueError, match="0 <= successes <= n"):
-        wilson(successes, n)
+@pytest.mark.parametrize(("successes", "n"), [(3, 2), (-1, 5), (0, 0), (0.5, 0)])
+def test_what_is_no_proportion_is_refused(successes: float, n: int) -> None:
+    with pytest.raises(ValueError, match="0 <= successes <= n and n >= 1, not"):
+        proportion(successes, n)
 
 
-Draw = Callable[[np.random.Generator, int], NDArray[np.float64]]
+def capital(values: list[float], m: float) -> float:
+    """What betting on values above m makes of 1: the definition, in plain words."""
+    stakes = [((k + 0.5) / 30, 0.7 / 30) for k in range(30)] + [(1.0, 0.3)]
+    return sum(part * math.prod(1 + stake * (x / m - 1) for x in values) for stake, part in stakes)
 
 
-@pytest.mark.parametrize(
-    ("draw", "truth", "n", "least"),
-    [
-        pytest.param(lambda r, n: r.normal(2, 3, n), 2.0, 20, 0.95, id="normal"),
-        pytest.param(lambda r, n: r.normal(2, 3, n), 2.0, 5, 0.91, id="normal, few"),
-        pytest.param(lambda r, n: r.exponential(1, n), 1.0, 20, 0.94, id="exponential"),
-        pytest.param(lambda r, n: r.binomial(15, 0.9, n) / 15, 0.9, 20, 0.95, id="shares"),
-        pytest.param(lambda r, n: r.binomial(15, 0.98, n) / 15, 0.98, 20, 0.97, id="high shares"),
-        pytest.param(lambda r, n: r.binomial(15, 0.98, n) / 15, 0.98, 5, 0.97, id="high, few"),
-        pytest.param(lambda r, n: r.binomial(1, 0.8, n) * 1.0, 0.8, 20, 0.95, id="yes-no"),
-    ],
-)
-def test_the_interval_of_a_mean_covers_the_truth(
-    draw: Draw, truth: float, n: int, least: float, monkeypatch: pytest.MonkeyPatch
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=12), st.sampled_from([0.9, 0.95, 0.99]))
+def test_bets_make_rich_at_the_ends_of_a_betting_interval(
+    values: list[float], confidence: float
 ) -> None:
-    """400 experiments each; `least` was measured with 1000, and two standard errors are allowed."""
-    monkeypatch.setattr("pytest_simbench.measure.intervals.RESAMPLES", 499)
-    rng = np.random.default_rng(1)
-    samples = [draw(rng, n) for _ in range(400)]
-    bounded = all(sample.min() >= 0 and sample.max() <= 1 for sample in samples)
-    held = sum(truth in interval(list(sample), bounded=bounded) for sample in samples)
-    assert held / 400 >= least - 2 * (least * (1 - least) / 400) ** 0.5
+    found = betting(values, confidence)
+    mirrored = [1 - value for value in values]
+    rich = 2 / (1 - confidence)
+    for end, sample in ((found.low, values), (1 - found.high, mirrored)):
+        if 1e-5 < end < sum(sample) / len(sample) - 1e-5:
+            assert capital(sample, end - 2e-6) >= rich * 0.999
+            assert capital(sample, end + 2e-6) <= rich * 1.001
 
 
-@given(st.lists(st.floats(-100, 100), min_size=3, max_size=30), st.floats(0.5, 0.99))
-def test_the_expanded_level_is_as_wide_as_students_t(values: list[float], level: float) -> None:
-    """The spread of bootstrap means is std / sqrt(n) with ddof 0; Student's interval has ddof 1."""
-    n = len(values)
-    student = t.ppf((1 + level) / 2, n - 1) * np.std(values, ddof=1) / n**0.5
-    normal = norm.ppf((1 + expanded_level(level, n)) / 2) * np.std(values) / n**0.5
-    assert normal == pytest.approx(student, rel=1e-3)
-
-
-def test_the_interval_of_the_interquartile_mean_covers_the_truth() -> None:
-    rng = np.random.default_rng(2)
-    held = sum(
-        0.0 in bootstrap(sample, interquartile_mean, resamples=999)
-        for sample in rng.standard_t(3, (300, 20))
-    )
-    assert 0.89 <= held / 300 <= 0.99
-
-
-def test_the_interquartile_mean_ignores_one_lost_repetition() -> None:
-    values = [0.9] * 10 + [0.95] * 9
-    assert interquartile_mean([*values, 0.0]) == pytest.approx(interquartile_mean([*values, 0.9]))
-    found = interquartile_interval([*values, 0.0])
-    assert 0.9 <= found.low <= found.mean <= found.high <= 0.95
-
-
-@given(shares)
-def test_shares_give_an_interval_within_0_and_1_that_holds_the_mean(values: list[float]) -> None:
-    found = interval(values, bounded=True)
-    assert -1e-12 <= found.low <= found.mean + 1e-12
-    assert found.mean <= found.high + 1e-12 <= 1 + 2e-12
+@given(shares, st.randoms())
+def test_shares_give_an_interval_within_0_and_1_that_holds_the_mean(
+    values: list[float], random: object
+) -> None:
+    found = interval(values, SHARE)
+    assert 0 <= found.low <= found.mean <= found.high <= 1
     assert found.mean == pytest.approx(np.mean(values))
-    assert found.n == len(values)
-    assert found.degenerate == (len(set(values)) == 1)
+    assert (found.n, found.method) == (len(values), "betting")
+    again = interval(sorted(values), SHARE)
+    assert again.low == pytest.approx(found.low, abs=1e-5)  # the order does not matter
 
 
-@given(st.lists(finite, min_size=2, max_size=12), st.floats(-1e3, 1e3))
+def test_twenty_perfect_shares_prove_80_percent_and_a_lost_cube_less() -> None:
+    """The full stake makes 0.3 / m^20 of the capital: m = (0.3 / 40)^(1 / 20) = 0.783 at least."""
+    perfect = interval([1.0] * 20, SHARE)
+    assert rounded(perfect) == (0.8, 1.0)
+    lost = interval([1.0] * 19 + [14 / 15], SHARE)
+    assert lost.low < perfect.low
+    assert lost.high < 1.0
+
+
+def test_more_repetitions_and_less_confidence_narrow_an_interval() -> None:
+    few, many = ([0.8, 0.9, 1.0] * k for k in (3, 12))
+    assert interval(many, SHARE).low > interval(few, SHARE).low
+    assert interval(few, SHARE, 0.8).low > interval(few, SHARE, 0.95).low
+    assert interval(few, SHARE, 0.8).high < interval(few, SHARE, 0.95).high
+
+
+@given(st.lists(finite, min_size=5, max_size=12), st.floats(-1e3, 1e3))
 def test_a_shift_of_the_values_shifts_the_interval(values: list[float], shift: float) -> None:
+    if np.ptp(values) < 1:
+        return
     near = max(map(abs, values)) * 1e-6 + 1e-3
-    found, moved = bootstrap(values, resamples=200), bootstrap(np.add(values, shift), resamples=200)
-    if found.method == moved.method:
-        assert moved.mean == pytest.approx(found.mean + shift, abs=near)
+    found, moved = skewed_t(values), skewed_t(list(np.add(values, shift)))
+    assert moved.mean == pytest.approx(found.mean + shift, abs=near)
+    assert moved.low == pytest.approx(found.low + shift, abs=near)
+    assert moved.high == pytest.approx(found.high + shift, abs=near)
+
+
+@given(st.lists(finite, min_size=5, max_size=12))
+def test_mirrored_values_mirror_the_interval_and_the_mean_is_within(values: list[float]) -> None:
+    if np.ptp(values) < 1:
+        return
+    found, mirrored = skewed_t(values), skewed_t([-value for value in values])
+    assert found.low <= found.mean <= found.high
+    assert mirrored.low == pytest.approx(-found.high, rel=1e-6, abs=1e-6)
+
+
+def test_values_without_skewness_have_students_interval() -> None:
+    """Of 1 to 5 with three degrees of freedom and 0.4 of the error."""
+    found = interval([1.0, 2.0, 3.0, 4.0, 5.0], COUNT)
+    reach = t.ppf(1 - 0.4 * 0.05 / 2, 3) * math.sqrt(2.5 / 5)
+    assert (found.mean, found.method) == (3.0, "t")
+    assert rounded(found, 6) == (round(3 - reach, 6), round(3 + reach, 6))
+
+
+def test_the_interval_of_skewed_values_reaches_farther_to_the_long_side() -> None:
+    """By Willink's formula: G(q) = ((1 + 6 a (q - a))^(1 / 3) - 1) / (2 a)."""
+    values = [1.0, 1.0, 1.0, 2.0, 6.0, 1.0]
+    found, n = interval(values, COUNT), 6
+    std = np.std(values, ddof=1)
+    third = np.sum((np.array(values) - 2.0) ** 3) * n / ((n - 1) * (n - 2))
+    a, q = third / (6 * math.sqrt(n) * std**3), t.ppf(1 - 0.01, 4)
+    upper = -(np.cbrt(1 + 6 * a * (-q - a)) - 1) / (2 * a)
+    assert found.high == pytest.approx(2 + upper * std / math.sqrt(n))
+    assert found.low == pytest.approx(2 - q * std / math.sqrt(n))
+    assert upper > q
 
 
 def test_the_same_values_give_the_same_interval() -> None:
-    values = [0.1, 0.4, 0.3, 0.9]
-    assert interval(values) == interval(values)
+    values = [0.1, 0.4, 0.3, 0.9, 0.2]
+    assert interval(values, COUNT) == interval(values, COUNT)
 
 
-def test_equal_shares_are_as_sure_as_their_number() -> None:
-    found = interval([1.0] * 20, bounded=True)
-    assert (round(found.low, 2), found.high, found.degenerate) == (0.84, 1.0, True)
-    half = interval([0.5] * 20, bounded=True)
-    assert (round(half.low, 2), round(half.high, 2)) == (0.30, 0.70)
+@pytest.mark.parametrize(
+    ("metric", "values", "spread"),
+    [
+        (LENGTH, [1.354, 1.354002, 1.353998], False),  # micrometres: the engine's rounding
+        (LENGTH, [1.354, 1.3556, 1.353], True),
+        (Metric("x", "x", "m", resolution=0.01), [1.354, 1.3556, 1.353], False),
+        (Metric("x", "x", "m", resolution=0.0), [1.354, 1.354002, 1.354], True),
+        (COUNT, [0.0, 0.0, 1.0], True),
+        (COUNT, [0.1 + 0.2, 0.3, 0.3], False),
+        (COUNT, [], False),
+    ],
+)
+def test_what_varies_by_less_than_its_resolution_does_not_vary(
+    metric: Metric, values: list[float], spread: bool
+) -> None:
+    assert varies(values, metric) is spread
 
 
-def test_equal_values_are_a_point_and_marked() -> None:
-    assert interval([1.5] * 4) == Interval(1.5, 1.5, 1.5, 4, "constant", True)
+def test_values_that_do_not_vary_have_no_interval() -> None:
+    for values in ([1.5] * 6, [1.5, 1.500001, 1.5, 1.5, 1.5, 1.500002]):
+        found = interval(values, LENGTH)
+        assert (found.low, found.high, found.method) == (-math.inf, math.inf, "constant")
+        assert found.mean == pytest.approx(1.5, abs=1e-6)
 
 
-def test_one_value_or_none_says_nothing_of_the_mean() -> None:
-    assert interval([2.0]) == Interval(2.0, -math.inf, math.inf, 1, "none", True)
-    nothing = interval([], bounded=True)
+def test_few_values_or_none_say_nothing_of_the_mean() -> None:
+    assert interval([2.0], COUNT) == Interval(2.0, -math.inf, math.inf, 1, "none")
+    few = interval([1.0, 2.0, 3.0, 4.0], COUNT)
+    assert (few.method, few.mean, few.n) == ("none", 2.5, FEWEST - 1)
+    nothing = interval([], SHARE)
     assert math.isnan(nothing.mean)
-    assert nothing.n == 0
-    assert nothing.to_wire()["low"] is None
+    assert (nothing.n, nothing.low, nothing.high) == (0, -math.inf, math.inf)
+
+
+def test_a_yes_or_no_is_exact_and_a_part_of_one_is_a_share() -> None:
+    assert interval([1.0, 0.0, 1.0], YES_NO) == proportion(2, 3)
+    assert interval([1.0, 0.5, 1.0], YES_NO).method == "betting"
 
 
 def test_values_that_cannot_be_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"shares lie in 0..1, not 0.5..1.2"):
-        interval([0.5, 1.2], bounded=True)
+    with pytest.raises(ValueError, match=r"shares lie in 0\.\.1, not \[0\.5, 1\.2\]"):
+        interval([0.5, 1.2], SHARE)
+    with pytest.raises(ValueError, match=r"shares lie in 0\.\.1, not \[-0\.1\]"):
+        betting([-0.1])
     with pytest.raises(ValueError, match="must be finite"):
-        interval([0.5, math.nan])
+        interval([0.5, math.nan], COUNT)
 
 
-def test_two_values_give_an_interval() -> None:
-    found = interval([1.0, 2.0])
-    assert found.low <= 1.5 <= found.high
-    assert math.isfinite(found.low)
-    assert 1.5 in found
-    assert found.half_width > 0
+def test_the_wire_form_has_no_number_where_nothing_is_known() -> None:
+    found = Interval(0.5, 0.25, 0.875, 20, "betting")
+    assert found.to_wire() == {
+        **{"mean": 0.5, "low": 0.25, "high": 0.875, "n": 20},
+        **{"method": "betting", "confidence": 0.95},
+    }
+    unknown = interval([], COUNT).to_wire()
+    assert (unknown["mean"], unknown["low"], unknown["high"]) == (None, None, None)
+    assert found.half_width == 0.3125
+    assert 0.25 in found
+    assert 0.2 not in found

@@ -8,7 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.measure.limits import FAILURES, Limit, LimitError, parse_limits
+from pytest_simbench.measure.limits import (
+    FAILURES,
+    Limit,
+    LimitError,
+    check_gate,
+    check_threshold,
+    parse_limits,
+)
 from pytest_simbench.measure.metrics import COSTS, Metric, UnknownMetric
 
 from .build import METRICS
@@ -84,3 +91,72 @@ def test_worse_one_way_is_better_the_other(before: float, after: float, percent:
     forth, back = limit.loss(RTF, before, after), limit.loss(RTF, after, before)
     assert (forth > 0) == (after < before)
     assert (forth > 0) == (back < 0)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("placed:5", "placed lies between 0 and 100 %; did you mean placed:5%?"),
+        ("placed:1", "placed lies between 0 and 100 %; did you mean placed:1%?"),
+        ("hit:100%", "hit lies between 0 and 100 %"),
+        ("placed:150%", "placed lies between 0 and 100 %"),
+        ("failures:2", "failures lies between 0 and 100 %; did you mean failures:2%?"),
+        ("rtf:200%", "rtf cannot fall by more than 100 %"),
+        ("rtf:100%", "rtf cannot fall by more than 100 %"),
+    ],
+)
+def test_a_limit_that_nothing_can_exceed_is_refused(text: str, reason: str) -> None:
+    with pytest.raises(LimitError) as caught:
+        parse_limits(text, METRICS)
+    assert str(caught.value) == f"{text} can never be exceeded: {reason}"
+
+
+@pytest.mark.parametrize(
+    "text", ["placed:99%", "placed:0.05", "placed:0%", "rtf:99%", "rtf:5", "ram:200%", "ram:500"]
+)
+def test_a_limit_that_something_can_exceed_is_taken(text: str) -> None:
+    (limit,) = parse_limits(text, METRICS)
+    metric = next(m for m in (*METRICS, *COSTS) if m.name == limit.metric)
+    worst = {"higher": (1.0, 0.0), "lower": (1.0, 1000.0)}[metric.better or ""]
+    if not metric.bounded and not limit.percent:
+        worst = (worst[0] * 100, worst[1])
+    assert limit.loss(metric, *worst) > limit.amount
+
+
+@pytest.mark.parametrize(
+    ("metric", "value", "message"),
+    [
+        (PLACED, 1.5, "placed is a share, so its threshold lies between 0 and 1, not at 1.5; did"),
+        (PLACED, 90.0, "between 0 and 1, not at 90; did you mean 0.9?"),
+        (PLACED, 900.0, "not at 900$"),
+        (PLACED, -1.0, "not at -1$"),
+        (PLACED, math.nan, "a threshold of placed is a finite number, not nan"),
+        (ERROR, math.inf, "a threshold of landing_error is a finite number, not inf"),
+    ],
+)
+def test_a_threshold_that_a_metric_cannot_reach_is_refused(
+    metric: Metric, value: float, message: str
+) -> None:
+    for check in (check_threshold, check_gate):
+        with pytest.raises(LimitError, match=message):
+            check(metric, value)
+
+
+def test_thresholds_at_the_ends_are_claims_but_no_gates() -> None:
+    for metric, value in ((PLACED, 0.0), (FAILURES, 1.0)):
+        check_threshold(metric, value)
+        with pytest.raises(LimitError, match=r"is always at (least|most) [01], so .* never fail"):
+            check_gate(metric, value)
+    for metric, value in ((RTF, 0.0), (RTF, -3.0)):
+        with pytest.raises(LimitError, match="rtf is always at least"):
+            check_gate(metric, value)
+    with pytest.raises(LimitError, match="ram is never below 0, so a threshold of -1 always fails"):
+        check_gate(next(cost for cost in COSTS if cost.name == "ram"), -1.0)
+
+
+@pytest.mark.parametrize(
+    ("metric", "value"),
+    [(PLACED, 0.01), (PLACED, 1.0), (FAILURES, 0.0), (FAILURES, 0.99), (RTF, 0.1), (ERROR, 0.0)],
+)
+def test_thresholds_that_can_fail_are_taken(metric: Metric, value: float) -> None:
+    check_gate(metric, value)

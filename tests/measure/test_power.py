@@ -8,19 +8,30 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import ttest_ind
 
-from pytest_simbench.measure.intervals import Interval, interval, wilson
+from pytest_simbench.measure.intervals import Interval, interval, proportion
+from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.measure.power import (
+    alike_rate,
     further_repetitions,
+    least_supported,
+    main,
+    passing_rate,
     repetitions_for_mean,
     repetitions_for_proportion,
     repetitions_to_detect,
 )
 
+COUNT = Metric("picks", "picks")
+HIT = Metric("hit", "hit", kind="yes_no")
+PLACED = Metric("placed", "placed", kind="share", of=15)
 
-def test_35_successes_show_90_percent() -> None:
-    """n / (n + z^2) >= 0.9 gives n >= 9 z^2 = 34.6."""
-    assert repetitions_for_proportion(1.0, 0.9) == 35
-    assert further_repetitions(wilson(20, 20), 0.9) == 15
+
+def test_36_successes_show_90_percent() -> None:
+    """0.025^(1 / n) >= 0.9 gives n >= 35.01; one-sided, 0.05^(1 / n), 28.4."""
+    assert repetitions_for_proportion(1.0, 0.9) == 36
+    assert repetitions_for_proportion(1.0, 0.9, 0.9) == 29
+    assert repetitions_for_proportion(0.0, 0.1) == 36
+    assert further_repetitions(proportion(20, 20), 0.9) == 16
 
 
 @settings(max_examples=40)
@@ -30,7 +41,7 @@ def test_the_repetitions_for_a_proportion_are_enough(rate: float, threshold: flo
     if n is None:
         assert abs(rate - threshold) < 0.02
     else:
-        assert threshold not in wilson(rate * n, n) or threshold == wilson(rate * n, n).low
+        assert threshold not in proportion(rate * n, n) or threshold == proportion(rate * n, n).low
 
 
 @settings(max_examples=40)
@@ -43,11 +54,11 @@ def test_more_repetitions_are_needed_nearer_the_threshold(rate: float, gap: floa
 
 @pytest.mark.parametrize("threshold", [0.05, 0.2, 0.9])
 def test_a_decided_claim_needs_no_more(threshold: float) -> None:
-    assert further_repetitions(Interval(0.5, 0.4, 0.6, 20, "bca"), threshold) == 0
+    assert further_repetitions(Interval(0.5, 0.4, 0.6, 20, "t"), threshold) == 0
 
 
 def test_the_width_of_a_mean_shrinks_with_the_root_of_n() -> None:
-    found = Interval(0.5, 0.25, 0.875, 20, "bca")
+    found = Interval(0.5, 0.25, 0.875, 20, "t")
     assert further_repetitions(found, 0.375) == 60  # the lower arm is twice the gap: 4 n
     assert further_repetitions(found, 0.625) == 160  # the upper one thrice: 9 n
     assert further_repetitions(found, 0.5) is None
@@ -55,8 +66,8 @@ def test_the_width_of_a_mean_shrinks_with_the_root_of_n() -> None:
 
 
 def test_one_value_cannot_tell() -> None:
-    assert further_repetitions(interval([1.0]), 0.5) is None
-    assert further_repetitions(interval([]), 0.5) is None
+    assert further_repetitions(interval([1.0], COUNT), 0.5) is None
+    assert further_repetitions(interval([], COUNT), 0.5) is None
 
 
 def test_further_repetitions_decide_in_simulation() -> None:
@@ -64,10 +75,10 @@ def test_further_repetitions_decide_in_simulation() -> None:
     rng = np.random.default_rng(3)
     first = rng.normal(1.0, 1.0, 20)
     first = (first - first.mean()) / first.std(ddof=1) + 1.0
-    more = further_repetitions(interval(list(first)), 0.7)
+    more = further_repetitions(interval(list(first), COUNT), 0.7)
     assert more is not None
     n = 20 + more
-    lows = [interval(list(sample)).low for sample in rng.normal(1.0, 1.0, (40, n))]
+    lows = [interval(list(sample), COUNT).low for sample in rng.normal(1.0, 1.0, (40, n))]
     assert 0.3 <= np.mean(np.array(lows) >= 0.7) <= 0.75
 
 
@@ -88,3 +99,63 @@ def test_the_power_is_reached_in_simulation(paired: bool) -> None:
         after = rng.normal(0.10, 0.15, (2000, n))
         p = ttest_ind(after, before, axis=1, alternative="greater").pvalue
     assert np.mean(p < 0.05) == pytest.approx(0.8, abs=0.06)
+
+
+def test_shares_without_a_loss_gain_with_their_number() -> None:
+    """Their interval is 0.3 m^-n = 40 wide or so: 1 / n, where that of a spread is its root."""
+    perfect = interval([1.0] * 20, PLACED)
+    more = further_repetitions(perfect, 0.9)
+    assert more is not None
+    assert 0.89 < interval([1.0] * (20 + more), PLACED).low < 0.91
+    assert further_repetitions(Interval(0.5, 0.25, 0.75, 20, "betting"), 0.375) == 60
+
+
+@pytest.mark.parametrize(
+    ("metric", "needed"), [(HIT, [None, None, 20, 37]), (PLACED, [None, None, 20, 39])]
+)
+def test_what_supports_80_percent_is_the_first_count_whose_interval_lies_above(
+    metric: Metric, needed: list[int | None]
+) -> None:
+    assert [least_supported(0.8, metric, n, 0.9) for n in (5, 10, 20, 40)] == needed
+    for n, k in ((20, 20), (40, needed[3] or 0)):
+        values = [1.0] * k + [0.0] * (n - k)
+        assert interval(values, metric, 0.9).low >= 0.8
+        assert interval([0.0, *values[1:]], metric, 0.9).low < 0.8
+
+
+def test_no_failure_of_20_supports_at_most_15_percent_and_not_10() -> None:
+    """0.05^(1 / 20) = 0.861, 0.05^(1 / 29) = 0.902."""
+    assert least_supported(0.85, HIT, 20, 0.9) == 20
+    assert least_supported(0.9, HIT, 28, 0.9) is None
+    assert least_supported(0.9, HIT, 29, 0.9) == 29
+
+
+@pytest.mark.parametrize("metric", [HIT, PLACED], ids=["yes_no", "share"])
+@pytest.mark.parametrize("chance", [0.5, 0.05])
+def test_the_passing_rate_passes_that_often_in_simulation(metric: Metric, chance: float) -> None:
+    rate = passing_rate(0.8, metric, 20, chance, 0.9)
+    high = [interval([1.0] * k + [0.0] * (20 - k), metric, 0.9).high for k in range(21)]
+    successes = np.random.default_rng(9).binomial(20, rate, 20_000)
+    passed = np.mean([high[k] >= 0.8 for k in successes])
+    assert passed == pytest.approx(chance, abs=0.012)
+
+
+def test_what_cannot_be_refuted_passes_at_any_rate() -> None:
+    """Of 5 repetitions without one success a rate of 45 % is still possible."""
+    assert passing_rate(0.2, HIT, 5, 0.05, 0.9) == 0.0
+    assert passing_rate(0.5, HIT, 5, 0.05, 0.9) > 0.0
+
+
+def test_repetitions_that_are_all_alike_are_refuted_below_their_rate() -> None:
+    rate = alike_rate(0.8, PLACED, 20, 0.9)
+    assert interval([rate - 0.002] * 20, PLACED, 0.9).high < 0.8
+    assert interval([rate + 0.002] * 20, PLACED, 0.9).high >= 0.8
+
+
+def test_the_table_of_the_docs_is_what_is_printed(
+    capsys: pytest.CaptureFixture[str], pytestconfig: pytest.Config
+) -> None:
+    main()
+    printed = capsys.readouterr().out
+    assert "| failures at most 15 % | 20 | 0 failures | 33 % | 51 % |  |" in printed
+    assert printed in (pytestconfig.rootpath / "docs" / "gate.md").read_text()

@@ -108,6 +108,11 @@ def test_limits_in_the_ini_file_wait_for_a_baseline_which_alone_fails_nothing(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (["--sim-compare-fail=rtf:200%"], "rtf:200% can never be exceeded: rtf cannot fall by *"),
+        (
+            ["--sim-compare-fail=placed:5"],
+            "placed:5 can never be exceeded: placed lies between 0 and 100 %; *placed:5%?",
+        ),
         (["--sim-compare-fail=landed"], "'landed' is not a limit like placed:5% or *"),
         (["--sim-compare-fail=landed:-5%"], "'landed:-5%' is not a limit like *"),
         (["--sim-compare-fail="], "'' is not a limit like placed:5% or *"),
@@ -142,6 +147,17 @@ def test_bad_input_is_one_sentence(
     result.stderr.fnmatch_lines([f"*{message}"])
     assert len(result.stderr.str().strip().splitlines()) == 1
     assert "Traceback" not in result.stderr.str() + result.stdout.str()
+
+
+def test_a_limit_of_another_package_s_share_that_nothing_can_exceed_fails_the_run(
+    pytester: pytest.Pytester, baseline: Path
+) -> None:
+    """That `landed` is a share is known only when its task has run."""
+    result = pytester.runpytest_subprocess(
+        *ARGUMENTS, "--sim-baseline=base", "--sim-compare-fail=landed:5"
+    )
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.stdout.fnmatch_lines(["FAILED landed:5 can never be exceeded: landed lies between 0*"])
 
 
 def test_limits_need_a_baseline(pytester: pytest.Pytester) -> None:

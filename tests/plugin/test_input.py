@@ -49,6 +49,16 @@ TEST = """
             "--sim-threshold=placed=x: the value must be a finite number",
         ),
         (
+            ["--sim-threshold=placed=90"],
+            "--sim-threshold=placed=90: placed is a share, so its threshold lies between 0 and 1, "
+            "not at 90; did you mean 0.9?",
+        ),
+        (
+            ["--sim-threshold=hit=0"],
+            "--sim-threshold=hit=0: hit is always at least 0, so that this threshold can never "
+            "fail",
+        ),
+        (
             ["--sim-threshold=plased=1"],
             "--sim-threshold=plased=1: no metric is named 'plased'; did you mean 'placed'? valid *",
         ),

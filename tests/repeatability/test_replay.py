@@ -8,8 +8,9 @@ from dataclasses import replace
 import pytest
 
 from pytest_simbench.repeatability.episode import Experiment
+from pytest_simbench.repeatability.moments import Moment
 from pytest_simbench.repeatability.motions import Difference
-from pytest_simbench.repeatability.replay import Moment, replay
+from pytest_simbench.repeatability.replay import replay
 from pytest_simbench.repeatability.replay_result import Again, Replay
 from pytest_simbench.session.handle import SimulatorHandle
 from pytest_simbench.simulator import Capability
@@ -92,6 +93,14 @@ def test_memory_of_earlier_worlds_is_found(replayed: Callable[..., Replay]) -> N
 
 def test_half_a_restore_is_found(replayed: Callable[..., Replay]) -> None:
     result = replayed("Forgetful")
+    assert broken(result) == {"restored in flight"}
+    with pytest.raises(AssertionError, match="restored in flight: first differs at t = 0.07 s"):
+        result.assert_as_claimed()
+
+
+def test_a_restore_that_only_holds_for_a_moment_is_found(replayed: Callable[..., Replay]) -> None:
+    """The world goes on for 0.3 s before it is restored: it has gone astray by then."""
+    result = replayed("Stale")
     assert broken(result) == {"restored in flight"}
     with pytest.raises(AssertionError, match="restored in flight: first differs at t = 0.07 s"):
         result.assert_as_claimed()

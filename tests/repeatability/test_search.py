@@ -127,6 +127,26 @@ def test_a_result_that_does_not_come_again_is_not_confirmed() -> None:
         doubtful.assert_found()
 
 
+@pytest.mark.parametrize("name", ["Moody", "Aging"])
+def test_what_the_perturbation_did_not_do_is_not_confirmed(
+    towers: Callable[..., Experiment], name: str
+) -> None:
+    """A world that was bad by itself: the same perturbation, or none, gives another result."""
+    finding = search(towers(name), {"y": 0.001}, examples=8, shrinks=5, at_once=1)
+    assert finding.effect == "topples tower 1"
+    assert finding.examples == 2  # the third world: unperturbed, first, second example
+    assert finding.confirmed is False
+    assert finding.sentence.endswith(" topples tower 1 (not confirmed by a second run)")
+    with pytest.raises(AssertionError, match="not confirmed"):
+        finding.assert_found()
+
+
+def test_a_true_finding_is_confirmed(towers: Callable[..., Experiment]) -> None:
+    finding = search(towers(), {"x": 0.012}, shrinks=2, at_once=1)
+    assert finding.confirmed is True
+    assert to_wire(finding)["confirmed"] is True
+
+
 def test_noise_is_no_finding(towers: Callable[..., Experiment]) -> None:
     """A simulator that never does the same twice cannot make the search flaky; what it finds at
     the edge may not be confirmed."""

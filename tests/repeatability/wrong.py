@@ -66,3 +66,38 @@ class Brittle(MuJoCo):
         if scene.ground_friction > 1.05:
             os.kill(os.getpid(), signal.SIGSEGV)
         super().load(scene)
+
+
+class Stale(MuJoCo):
+    """Restores what was saved a short while ago; what is older than 0.2 s it gets a little wrong."""
+
+    def restore(self, state: FloatArray) -> None:
+        old = self.data.time
+        super().restore(state)
+        if old - self.data.time > 0.2:
+            self.data.qvel[self._body_v] += 1e-9
+
+
+class Numbered(MuJoCo):
+    """Tilts the world by half a g when its number in the process is one of `tilted`."""
+
+    tilted: ClassVar[range] = range(0)
+    worlds: ClassVar[dict[type, int]] = {}
+
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        number = Numbered.worlds[type(self)] = Numbered.worlds.get(type(self), 0) + 1
+        if number in self.tilted:
+            self.model.opt.gravity[0] = -5.0
+
+
+class Moody(Numbered):
+    """One bad world, the third: it never comes again."""
+
+    tilted = range(3, 4)
+
+
+class Aging(Numbered):
+    """All worlds are bad from the third on, also the unperturbed one."""
+
+    tilted = range(3, 10_000)

@@ -1,63 +1,120 @@
-"""The sentences above a table: right, and no more certain than the intervals."""
+"""The sentences above a table: right, and no more certain than the tests between the rows."""
 
 from __future__ import annotations
 
+import re
+
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pytest_simbench.measure.comparison import Comparison
+from pytest_simbench.measure.contest import Win
 from pytest_simbench.measure.metrics import Metric
-from pytest_simbench.report.answer import overlaps, sentences, short_labels
+from pytest_simbench.report.answer import sentences, short_labels
+from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.pooling import Spread
 from pytest_simbench.report.summary import Row, TaskSummary, summarise
 
-from .samples import METRICS, stacking_run, throwing_run, two_errors
+from .samples import METRICS, record, stacking_run, throwing_run, two_errors
 
 SCORE = Metric("score", "score", "", "higher", "share", 10, study=True)
 
 
 def task(
-    metric: Metric = SCORE, failed: int = 0, **found: tuple[float, float, float]
+    found: dict[str, float],
+    beats: tuple[str, ...] = (),
+    metric: Metric = SCORE,
+    count: int = 20,
+    failed: int = 0,
 ) -> TaskSummary:
-    """A task whose rows have these means and intervals."""
+    """A task whose rows have these means, and wins like `a>b`."""
     rows = tuple(
         Row(
-            "t", name, "headless", "tuned", finished=20, failed=failed,
-            metrics={"score": Spread(20, low, mean, high, 0.1, low, high)},
+            "t", name, "headless", "tuned", finished=count, failed=failed,
+            metrics={"score": Spread(count, mean, mean, mean, 0.1, mean - 0.1, mean + 0.1)},
         )
-        for name, (low, mean, high) in found.items()
+        for name, mean in found.items()
     )  # fmt: skip
-    return TaskSummary("t", (metric,), rows)
+    places = list(found)
+    comparison = Comparison(0.0, 1.0, 0.001, "permutation", True, (count, count))
+    wins = tuple(
+        Win(*(places.index(name) for name in text.split(">")), metric, comparison, 0.001)
+        for text in beats
+    )
+    return TaskSummary("t", (metric,), rows, wins=wins)
 
 
 def test_sample_runs() -> None:
-    assert sentences(summarise(stacking_run(), METRICS, ends=two_errors)[0]) == [
+    (stacking,) = with_wins(summarise(stacking_run(), METRICS, ends=two_errors), stacking_run())
+    assert sentences(stacking) == [
         "placed: mujoco 99 % [97, 100] is ahead of pybullet 77 % [73, 80].",
         "at the end: mujoco 97 % [94, 99] is ahead of pybullet 90 % [87, 94].",
         "failures: pybullet 3 of 20.",
     ]
-    assert sentences(summarise(throwing_run(), METRICS, ends=two_errors)[0]) == [
-        "moved: mujoco 42 % [38, 45] and pybullet 39 % [34, 45]; "
-        "the intervals overlap: no clear best.",
+    (throwing,) = with_wins(summarise(throwing_run(), METRICS, ends=two_errors), throwing_run())
+    assert sentences(throwing) == [
+        "moved: mujoco 42 % [38, 45] and pybullet 39 % [34, 45]; no difference is shown.",
         "failures: none in 40 repetitions.",
     ]
 
 
-def test_leaders_that_overlap_are_not_ranked() -> None:
-    found = sentences(task(a=(0.1, 0.2, 0.3), b=(0.7, 0.8, 0.9), c=(0.85, 0.9, 0.95)))
-    assert found[0] == (
-        "score: c 90 % [85, 95] and b 80 % [70, 90] lead with overlapping intervals; "
-        "behind: a 20 % [10, 30]."
-    )
+@pytest.mark.parametrize(
+    ("beats", "sentence"),
+    [
+        (("c>a",), "c 90 % [80, 100] is ahead of a 20 % [10, 30]; not told apart: b 80 % [70, 90]"),
+        (("c>a", "b>a"), "c 90 % [80, 100] and b 80 % [70, 90] are ahead; behind: a 20 % [10, 30]"),
+        (("c>a", "b>a", "c>b"), "c 90 % [80, 100] is ahead of b 80 % [70, 90] and a 20 % [10, 30]"),
+        (("c>b", "b>a"), "c 90 % [80, 100] is ahead; behind: b 80 % [70, 90] and a 20 % [10, 30]"),
+        ((), "c 90 % [80, 100], b 80 % [70, 90] and a 20 % [10, 30]; no difference is shown"),
+    ],
+)
+def test_only_what_a_test_supports_is_ranked(beats: tuple[str, ...], sentence: str) -> None:
+    assert sentences(task({"a": 0.2, "b": 0.8, "c": 0.9}, beats))[0] == f"score: {sentence}."
+
+
+def test_wins_at_other_metrics_rank_nobody() -> None:
+    other = Metric("other", "other", "m", "lower")
+    found = task({"a": 0.2, "b": 0.8}, ("b>a",), other)
+    found = TaskSummary("t", (SCORE,), found.rows, wins=found.wins)
+    assert sentences(found)[0].endswith("; no difference is shown.")
+
+
+def test_nobody_leads_with_nothing() -> None:
+    """Two engines that never moved a cube, of four; "genesis 0 % and newton 0 % lead" it said."""
+    records = [
+        record(name, k, "throwing", metrics={"moved": moved})
+        for name, moved in (("genesis", 0.0), ("newton", 0.0), ("drake", 0.5), ("dart", 0.5))
+        for k in range(20)
+    ]
+    (found,) = with_wins(summarise(records, METRICS), records)
+    assert sentences(found)[0].startswith("moved: dart 50 % [")
+    assert "are ahead; behind: genesis 0 % [0, " in sentences(found)[0]
+    (nothing,) = with_wins(summarise(records[:40], METRICS), records[:40])
+    assert sentences(nothing)[0].endswith("; no difference is shown.")
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4])
+def test_few_repetitions_are_not_compared(count: int) -> None:
+    records = [
+        record(name, k, metrics={"placed": placed, "at_end": placed})
+        for name, placed in (("good", 1.0), ("poor", 0.0))
+        for k in range(count)
+    ]
+    (found,) = with_wins(summarise(records, METRICS), records)
+    assert found.wins == ()
+    assert sentences(found)[0].endswith("; too few repetitions to compare.")
+    assert sentences(task({"a": 0.2, "b": 0.8}, count=count))[0].endswith("to compare.")
 
 
 def test_lower_is_better_where_the_metric_says_so() -> None:
     metric = Metric("score", "error", "m", "lower", study=True)
-    found = sentences(task(metric, a=(0.1, 0.2, 0.3), b=(0.01, 0.02, 0.03)))
-    assert found[0] == "error: b 0.02 m [0.01, 0.03] is ahead of a 0.2 m [0.1, 0.3]."
+    found = sentences(task({"a": 0.2, "b": 0.11}, ("b>a",), metric))
+    assert found[0] == "error: b 0.11 m [0.01, 0.21] is ahead of a 0.2 m [0.1, 0.3]."
 
 
 def test_many_simulators_are_not_all_named() -> None:
-    found = sentences(task(SCORE, 0, **dict.fromkeys("abcdefgh", (0.4, 0.5, 0.6))))
+    found = sentences(task(dict.fromkeys("abcdefgh", 0.5)))
     assert found[0].startswith(
         "score: a 50 % [40, 60], b 50 % [40, 60], c 50 % [40, 60] and 5 more;"
     )
@@ -65,7 +122,11 @@ def test_many_simulators_are_not_all_named() -> None:
 
 def test_a_metric_without_a_good_direction_is_not_ranked() -> None:
     metric = Metric("score", "landing", "m", None, study=True)
-    assert sentences(task(metric, failed=1, a=(1.0, 1.1, 1.2))) == ["failures: a 1 of 21."]
+    assert sentences(task({"a": 1.1}, (), metric, failed=1)) == ["failures: a 1 of 21."]
+
+
+def test_a_single_simulator_is_told_without_a_rank() -> None:
+    assert sentences(task({"a": 0.5}))[0] == "score: a 50 % [40, 60]."
 
 
 def test_names_say_no_more_than_they_must() -> None:
@@ -78,11 +139,14 @@ def test_names_say_no_more_than_they_must() -> None:
     ]
 
 
-ENDS = st.tuples(st.floats(0, 1), st.floats(0, 1)).map(sorted)
+PAIRS = st.sets(st.sampled_from([f"{a}>{b}" for a in "abcd" for b in "abcd" if a < b]))
 
 
-@given(ENDS, ENDS)
-def test_overlap_is_symmetric_and_means_a_shared_value(a: list[float], b: list[float]) -> None:
-    first, second = (Spread(20, 0, 0, 0, 0, low, high) for low, high in (a, b))
-    shared = max(a[0], b[0]) <= min(a[1], b[1])
-    assert overlaps(first, second) == overlaps(second, first) == shared
+@given(PAIRS)
+def test_who_is_beaten_is_never_ahead(beats: set[str]) -> None:
+    """Letters are means: what beats another has the better one."""
+    found = task({"d": 0.1, "c": 0.3, "b": 0.5, "a": 0.7}, tuple(beats))
+    text = sentences(found)[0].removeprefix("score: ")
+    losers = {pair[2] for pair in beats}
+    ahead = text.partition(" ahead")[0] if " ahead" in text else ""
+    assert set(re.findall(r"([abcd]) \d", ahead)) == {pair[0] for pair in beats} - losers

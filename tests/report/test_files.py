@@ -14,13 +14,14 @@ import pytest
 from pytest_simbench.report import markdown
 from pytest_simbench.report.figures import FiguresUnavailable, write_figures
 from pytest_simbench.report.files import write_csv, write_report
+from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.summary import summarise
 
 from .samples import METRICS, REFERENCES, failed, record, stacking_run, throwing_run, two_errors
 
 
 def test_markdown_tables_hold_one_line_per_row() -> None:
-    (summary,) = summarise(stacking_run(), METRICS, ends=two_errors)
+    (summary,) = with_wins(summarise(stacking_run(), METRICS, ends=two_errors), stacking_run())
     lines = markdown.render_task(summary).splitlines()
     assert lines[0] == "## stacking: 20 repetitions each, protocol fast"
     assert lines[2] == "- placed: mujoco 99 % [97, 100] is ahead of pybullet 77 % [73, 80]."
@@ -28,11 +29,11 @@ def test_markdown_tables_hold_one_line_per_row() -> None:
         "| simulator | failed | placed % | at the end % | CPU % | RAM MB | x real time "
         "| CPU s/sim s | start s | end s |",
         "| :-- | --: | --: | --: | --: | --: | --: | --: | --: | --: |",
-        "| mujoco headless tuned | 0 of 20 [0, 16] % "
+        "| mujoco headless tuned | 0 of 20 [0, 17] % "
         "| 93 / 99 / 100 [97, 100] | 87 / 97 / 100 [94, 99] "
         "| 99 +- 3 [99, 99] | 150 +- 2 [150, 150] (peak 161) "
         "| 20 [20, 20] | 0.048 [0.048, 0.048] | 0.80 [0.80, 0.80] | 9.8 [9.8, 9.8] |",
-        "| pybullet headless tuned | 3 of 20 [5, 36] % "
+        "| pybullet headless tuned | 3 of 20 [3, 38] % "
         "| 67 / 77 / 87 [73, 80] | 80 / 90 / 100 [87, 94] "
         "| 99 +- 3 [99, 99] | 150 +- 2 [150, 150] (peak 161) "
         "| 20 [20, 20] | 0.048 [0.048, 0.048] | 0.80 [0.80, 0.80] | 9.8 [9.8, 9.8] |",

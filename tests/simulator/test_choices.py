@@ -1,0 +1,94 @@
+"""Settings are chosen on some seeds and published on others; where not, the report says so."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pytest
+
+from pytest_simbench.measure.record import Record
+from pytest_simbench.report.markdown import render_task as written
+from pytest_simbench.report.summary import summarise
+from pytest_simbench.report.tables import render_task
+from pytest_simbench.session.case import Case
+from pytest_simbench.session.repetition import Repetition
+from pytest_simbench.simulator.choices import SeedsSeen, published_again, seeds_seen
+from pytest_simbench.simulator.registry import adapter, registered
+from tests.report.samples import METRICS, record
+from tests.tiny import Falling
+
+SEEN = (SeedsSeen("throwing", 2022, 2041), SeedsSeen("stacking", 100, 100))
+
+
+def run(seeds: Sequence[int], task: str = "throwing", **changes: object) -> list[Record]:
+    declared = {"chosen_on": [seeds_.to_wire() for seeds_ in SEEN]}
+    return [
+        record("pybullet", k, task, seed=seed, details=declared, **changes)  # type: ignore[arg-type]
+        for k, seed in enumerate(seeds, start=1)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("seeds", "task", "sentence"),
+    [
+        (range(2022, 2042), "throwing", "seeds 2022 to 2041 of this task, and 20 of these 20"),
+        (range(2037, 2045), "throwing", "seeds 2022 to 2041 of this task, and 5 of these 8"),
+        ([2041], "throwing", "seeds 2022 to 2041 of this task, and 1 of these 1"),
+        ([100, 101], "stacking", "seed 100 of this task, and 1 of these 2"),
+    ],
+)
+def test_a_report_on_the_seeds_of_choosing_says_so_under_the_table(
+    seeds: Sequence[int], task: str, sentence: str
+) -> None:
+    (found,) = summarise(run(seeds, task), METRICS)
+    whole = f"its settings were chosen on {sentence} repetitions are of them: publish others"
+    assert [note for row in found.rows for note in row.notes] == [f"{whole} (--sim-seed)"]
+    for text in (render_task(found, 200), written(found)):
+        assert text.count(sentence) == 1
+
+
+@pytest.mark.parametrize(
+    ("seeds", "task"),
+    [(range(2042, 2062), "throwing"), ([2021], "throwing"), (range(2022, 2042), "stacking")],
+)
+def test_a_report_on_other_seeds_or_of_another_task_does_not(
+    seeds: Sequence[int], task: str
+) -> None:
+    (found,) = summarise(run(seeds, task), METRICS)
+    assert "chosen" not in render_task(found, 200)
+
+
+def test_only_repetitions_that_count_are_counted() -> None:
+    records = [*run([2022, 3000]), *run([2023], status="interrupted")]
+    (found,) = summarise(records, METRICS)
+    assert "1 of these 2 repetitions" in render_task(found, 200)
+
+
+def test_nothing_declared_is_nothing_said() -> None:
+    assert published_again([("throwing", 2022, [])]) == ""
+    assert published_again([]) == ""
+    assert seeds_seen("pytest_simbench.sims.pybullet:PyBullet", "default") == ()
+    assert seeds_seen("no.such.module:Adapter", "tuned") == ()
+    assert seeds_seen("pytest_simbench.sims.pybullet:Missing", "tuned") == ()
+
+
+def test_a_record_says_on_what_its_profile_was_chosen(case: Case) -> None:
+    made, _ = Repetition(case, Falling(), 1).run()
+    declared = seeds_seen(case.adapter, case.profile)
+    assert declared
+    assert Record.from_json(made.to_json()).details["chosen_on"] == [
+        {"task": seen.task, "first": seen.first, "last": seen.last} for seen in declared
+    ]
+
+
+@pytest.mark.parametrize("name", registered())
+def test_every_adapter_speaks_of_profiles_that_it_has(name: str) -> None:
+    cls = adapter(name)
+    assert cls.chosen_on.keys() <= cls.profiles.keys()
+    for seen in (seen for all_seen in cls.chosen_on.values() for seen in all_seen):
+        assert seen.task in ("stacking", "throwing")
+        assert 0 <= seen.first <= seen.last
+
+
+def test_pybullet_admits_the_seeds_of_its_throw() -> None:
+    assert SeedsSeen("throwing", 2022, 2041) in adapter("pybullet").chosen_on["tuned"]
