@@ -5,12 +5,15 @@ matplotlib is an optional extra and is imported only when a picture is drawn.
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from pytest_simbench.measure.metrics import Metric
+from pytest_simbench.measure.names import file_name
+from pytest_simbench.measure.run_folder import write_whole
 from pytest_simbench.report.answer import short_labels
 from pytest_simbench.report.pooling import Spread
 from pytest_simbench.report.summary import Row, TaskSummary
@@ -56,8 +59,10 @@ def write_figures(folder: Path, summaries: Sequence[TaskSummary]) -> list[Path]:
             axes[0].set_yticks(range(len(rows)), short_labels(rows))
             axes[0].set_ylim(len(rows) - 0.5, -0.5)
             figure.suptitle(_title(summary, rows, name), fontsize="medium")
-            path = folder / f"{summary.task}_{name}.png"
-            figure.savefig(path, dpi=DPI)
+            path = folder / f"{file_name(summary.task)}_{name}.png"
+            picture = io.BytesIO()
+            figure.savefig(picture, format="png", dpi=DPI)
+            write_whole(path, picture.getvalue())
             paths.append(path)
     return paths
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import re
+import os
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_simbench.client.tape import Operation
+from pytest_simbench.measure.names import file_name
 from pytest_simbench.scene import Scene
 from pytest_simbench.session.case import Case
 
@@ -23,15 +24,21 @@ class ExampleError(ValueError):
 
 
 def write_example(case: Case, name: str, scene: Scene, tape: Sequence[Operation]) -> Path:
-    """Write an episode to the run folder; one of the same name is replaced.
+    """Write an episode to the run folder; one of the same test and name is replaced.
 
     Under Hypothesis the last failing example is the smallest, so that is what stays.
+
+    Args:
+        case: simulator and settings.
+        name: the readable part of the file's name.
+        scene: of the episode.
+        tape: what was done.
 
     Raises:
         OSError: the folder cannot be written to.
     """
-    stem = re.sub(r"[^A-Za-z0-9_.=-]+", "_", name).strip("_")
-    path = case.folder / FOLDER / f"{stem}.json"
+    test = os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" ")[0]
+    path = case.folder / FOLDER / f"{file_name(name, test, case.test)}.json"
     example = {
         "schema": SCHEMA,
         "case": {key: getattr(case, key) for key in _KEPT} | {"changes": dict(case.changes)},

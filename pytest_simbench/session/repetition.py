@@ -6,7 +6,6 @@ import os
 import platform
 import time
 from collections.abc import Callable
-from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,13 @@ from pytest_simbench.client.world import Motion, World
 from pytest_simbench.measure.record import Failure, Record
 from pytest_simbench.measure.resources import ResourceSampler
 from pytest_simbench.session.case import Case
+from pytest_simbench.session.identity import (
+    file_stem,
+    limits,
+    parameters,
+    scene_digest,
+    settings,
+)
 from pytest_simbench.session.workers import IdleWorkers
 from pytest_simbench.tasks.base import Jitter, Outcome, Task
 
@@ -142,7 +148,7 @@ class Repetition:
     def _worker(self) -> WorkerProcess:
         process = self._idle.take() if self._idle is not None else None
         if process is None:
-            launch = self.case.launch(f"{self.case.short_name}-{self.number}")
+            launch = self.case.launch(file_stem(self.case, self.task, self.number))
             return WorkerProcess(launch, self.where)
         process.where = self.where
         self._reused = True
@@ -213,7 +219,13 @@ class Repetition:
             stepping=stepping,
             timeline={} if self._world is None else self._world.timeline,
             resources=resources,
-            settings={**self._constructed.get("settings", {}), **_parameters(self.task)},
+            settings={
+                **(self._constructed.get("settings") or settings(case)),
+                **parameters(self.task),
+            },
+            scene=scene_digest(self.task),
+            limits=limits(case, self.task),
+            attempt=case.attempt,
             versions={
                 "pytest-simbench": __version__,
                 **({"python": self._process.python_version} if self._process else {}),
@@ -239,7 +251,7 @@ class Repetition:
         if world is None or not world.trace or (case.trace == "retain-on-failure" and not failed):
             return
         motion = Motion.joined(world.trace)
-        name = self._log_name().removeprefix("logs/").removesuffix(".log")
+        name = file_stem(case, self.task, self.number)
         folder = case.folder / "traces"
         folder.mkdir(parents=True, exist_ok=True)
         np.savez_compressed(
@@ -267,10 +279,6 @@ def _failure(error: BaseException, where: Where) -> Failure:
     if isinstance(error, WorkerError):
         return Failure(type(error).__name__, error.what, error.phase, error.log_tail)
     return Failure(type(error).__name__, str(error), where.phase)
-
-
-def _parameters(task: Task) -> dict[str, Any]:
-    return {f"task.{key}": value for key, value in asdict(task).items()}  # type: ignore[call-overload]
 
 
 @cache

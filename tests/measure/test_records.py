@@ -43,7 +43,7 @@ any_record = st.builds(
     repetition=st.integers(min_value=0),
     seed=st.integers(min_value=0),
     status=st.sampled_from(["ok", "failed", "interrupted"]),
-    jitter=numbers,
+    jitter=st.floats(min_value=0, allow_nan=False, allow_infinity=False),
     error=st.none() | st.builds(Failure, st.text(min_size=1), names, names, st.text()),
     metrics=st.dictionaries(names, st.none() | numbers, max_size=4),
     details=st.dictionaries(names, json_values, max_size=3),
@@ -153,7 +153,7 @@ def test_a_truncated_line_is_reported_and_the_next_record_starts_its_own(tmp_pat
     path.write_text(record(0).to_json() + "\n" + record(1).to_json()[:-40])
     reading = read_records(path)
     assert [item.repetition for item in reading.records] == [0]
-    assert reading.problems == (f"{path}:2: the line was cut short and is left out",)
+    assert reading.problems[0].startswith(f"{path}:2: the line is damaged and left out: not JSON (")
     RecordFile(path).append(record(2))
     reading = read_records(path)
     assert [item.repetition for item in reading.records] == [0, 2]
