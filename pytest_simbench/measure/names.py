@@ -8,7 +8,7 @@ import re
 LONGEST = 80
 """Characters of the readable part: with digest, number and ending far below the 255 of Linux."""
 
-_PLAIN = re.compile(r"[a-z0-9_]([a-z0-9_.=-]*[a-z0-9_=])?")
+_PLAIN = re.compile(r"[a-z0-9_]([a-z0-9_.=-]*[a-z0-9_])?")
 _UNSAFE = re.compile(r"[^A-Za-z0-9_.=-]+")
 _DIGEST = re.compile(r"-[0-9a-f]{10}$")
 
@@ -28,7 +28,7 @@ def file_name(shown: str, *identity: object) -> str:
     # What ends like a digest could be the name of something else.
     if plain and not identity and not _DIGEST.search(shown):
         return shown
-    safe = _UNSAFE.sub("_", shown)[:LONGEST].strip("._-") or "unnamed"
+    safe = _UNSAFE.sub("_", shown)[:LONGEST].strip("._-=") or "unnamed"
     return f"{safe}-{digest(shown, *identity)}"
 
 

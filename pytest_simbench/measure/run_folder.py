@@ -86,7 +86,7 @@ class Claim:
     def __init__(self, folder: Path, *, shared: bool = False) -> None:
         self.folder = folder
         self._lock: int | None = None
-        self._made = not folder.exists()
+        self._made = not os.path.lexists(folder)
         try:
             folder.mkdir(parents=True, exist_ok=True)
             self._lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
@@ -147,8 +147,8 @@ def _probe(folder: Path) -> None:
 def _reason(folder: Path, error: OSError) -> str:
     """What is in the way, by name."""
     for path in (folder, *folder.parents):
-        if path.is_symlink() and not path.exists():
+        if os.path.islink(path) and not os.path.exists(path):
             return f"{path} is a link to nothing"
-        if path.exists():
+        if os.path.exists(path):
             return error.strerror or str(error) if path.is_dir() else f"{path} is a file"
     return error.strerror or str(error)

@@ -22,7 +22,8 @@ def settled(records: Iterable[Record]) -> list[Record]:
     One that came to an end counts before one that was interrupted; of several that came to an end
     the one of the last attempt, and of one attempt the one that was written last.
     """
-    found: dict[tuple[object, ...], list[Record]] = {}
+    found: list[Record] = []
+    places: dict[tuple[object, ...], list[int]] = {}
     for record in records:
         key = (
             record.test,
@@ -32,14 +33,15 @@ def settled(records: Iterable[Record]) -> list[Record]:
             record.repetition,
             record.seed,
         )
-        twins = found.setdefault(key, [])
-        for place, twin in enumerate(twins):
-            if agree(twin, record):
-                twins[place] = _better(twin, record)
+        twins = places.setdefault(key, [])
+        for place in twins:
+            if agree(found[place], record):
+                found[place] = _better(found[place], record)
                 break
         else:
-            twins.append(record)
-    return [record for twins in found.values() for record in twins]
+            twins.append(len(found))
+            found.append(record)
+    return found
 
 
 def _better(first: Record, later: Record) -> Record:
