@@ -123,9 +123,7 @@ def sim_settings() -> dict[str, Any]:
 @pytest.fixture
 def output_path(request: pytest.FixtureRequest) -> Path:
     """The run folder; it exists when the fixture is used."""
-    folder = run(request.config).folder
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
+    return run(request.config).use()
 
 
 def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: Any) -> Case:
@@ -144,7 +142,7 @@ def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: A
         mode=mode,
         profile=chosen.profile,
         adapter=registered()[name].value,
-        folder=this.folder,
+        folder=this.use(),
         changes={**settings, **chosen.changes.get(name, {})},
         python=chosen.python(name),
         spec=chosen.specs.get(name),

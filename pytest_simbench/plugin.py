@@ -106,10 +106,11 @@ def pytest_benchmark_compare_machine_info(config: pytest.Config, compared_benchm
 
 @pytest.hookimpl(tryfirst=True)  # before xdist starts its workers
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Complain of a bad baseline or limit, or of no run to resume, before anything runs."""
+    """Complain of a bad baseline or limit, or of a run folder, before anything runs."""
     config = session.config
-    if options.given(config, "sim_resume"):
-        run(config)
+    named = any(options.given(config, name) for name in ("sim_output", "sim_resume"))
+    if named and not (hasattr(config, "workerinput") or config.option.collectonly):
+        run(config).claim()
     asked = options.value(config, "sim_compare_fail") or options.value(config, "sim_baseline")
     if hasattr(config, "workerinput") or not (asked or SAVED in config.stash):
         return
@@ -206,10 +207,23 @@ def _fixtures(item: pytest.Item) -> Collection[str]:
     return found
 
 
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Complain of a run folder that the ini file names, if a test needs one, before it runs."""
+    config = session.config
+    if hasattr(config, "workerinput") or config.option.collectonly:
+        return
+    needs = {"sim_case", "output_path"}
+    if any(needs.intersection(getattr(item, "fixturenames", ())) for item in session.items):
+        run(config).claim()
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
-    """Tell an xdist worker which run folder all of them share."""
-    node.workerinput["simbench_folder"] = str(run(node.config).folder.absolute())
+    """Tell an xdist worker which run folder all of them share, and why it cannot be used."""
+    this = run(node.config)
+    this.problem = this.problem or this.occupied()
+    node.workerinput["simbench_folder"] = str(this.folder.absolute())
+    node.workerinput["simbench_problem"] = this.problem
 
 
 def _skipping_unavailable() -> Generator[None, Any, Any]:
@@ -267,7 +281,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     this.complete()
     if COMPARISON in config.stash and this.records:
         comparison = config.stash[COMPARISON]
-        comparison.make(this.records.values(), this.metrics)
+        comparison.make(this.records, this.metrics)
         if comparison.failed and session.exitstatus == pytest.ExitCode.OK:
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
@@ -47,48 +48,69 @@ class Repeating:
         task = self.case.protocol.version_of(task)
         self.this.declare(task)
         wanted = options.repetitions(self.node.config)
-        metrics = task.metrics
-        found = self.this.resume(self.node.nodeid, task.name)
+        fixed = wanted if isinstance(wanted, int) else None
+        case = replace(self.case, attempt=self.this.begin(self.case, task))
+        found = self._recorded(case, task, fixed)
         if isinstance(wanted, options.Auto):
             plan = Plan.up_to(wanted.limit)
-            first = self._up_to(plan.looks[0], task, found)
+            first = self._up_to(plan.looks[0], case, task, found)
             result: ResultSet = SequentialResultSet(
-                first, metrics, plan, lambda number: self._up_to(number, task, found)
+                first,
+                task.metrics,
+                plan,
+                lambda number: self._up_to(number, case, task, found),
             )
         else:
-            number = wanted or number_mark(self.node, "reps") or self.case.protocol.repetitions
-            result = ResultSet(self._up_to(int(number), task, found), metrics)
+            number = wanted or number_mark(self.node, "reps") or case.protocol.repetitions
+            result = ResultSet(self._up_to(int(number), case, task, found), task.metrics)
         result.strict = options.value(self.node.config, "sim_strict")
         self.results.append(result)
         return result
 
-    def _up_to(self, number: int, task: Task, found: dict[int, Record]) -> list[Record]:
+    def _recorded(self, case: Case, task: Task, wanted: int | None) -> dict[int, Record]:
+        """By repetition what the run that is completed has of these; now of this run."""
+        from pytest_simbench.resume import NotResumed
+
+        try:
+            return self.this.take(case, task, wanted)
+        except NotResumed as refusal:
+            pytest.fail(str(refusal), pytrace=False)
+
+    def _up_to(self, number: int, case: Case, task: Task, found: dict[int, Record]) -> list[Record]:
         """Records of all repetitions from 1 to `number`, and of what a resumed run has beyond.
 
         Args:
             number: of repetitions wanted.
+            case: with its attempt.
             task: to perform where one is missing.
             found: the records so far, by repetition; takes the new ones.
         """
         missing = [k for k in range(1, number + 1) if k not in found]
-        if self.this.resumed is not None and not self._may_resume:
-            refusal = self.this.resumed.refusal(self.case, task, run_more=bool(missing))
-            if refusal:
-                pytest.fail(refusal, pytrace=False)
-            self._may_resume = bool(missing)  # else it was not looked at the worker
         if missing:
+            if self.this.resumed is not None and not self._may_resume:
+                self._check_versions(case, task)
             self.this.begin_lines()
             jobs = options.value(self.node.config, "sim_jobs")
-            repeater = Repeater(self.case, jobs, self.this.progress, self.this.keep)
+            repeater = Repeater(case, jobs, self.this.progress, self.this.keep)
             found |= {r.repetition: r for r in repeater.run(task, missing).records}
         return [found[k] for k in sorted(found)]
+
+    def _check_versions(self, case: Case, task: Task) -> None:
+        from pytest_simbench.resume import NotResumed
+
+        assert self.this.resumed is not None
+        try:
+            self.this.resumed.check_versions(case, task)
+        except NotResumed as refusal:
+            pytest.fail(str(refusal), pytrace=False)
+        self._may_resume = True
 
     def finish(self, benchmark: Any) -> None:
         """Tell pytest-benchmark, where there is one, and JUnit; called when the test has ended."""
         for result in self.results:
             self.node.user_properties.extend(_properties(result))
         if self.results and benchmark is not None:
-            _benchmark(benchmark, self.results[0])
+            _benchmark(benchmark, self.results)
 
 
 def _properties(result: ResultSet) -> Iterator[tuple[str, float]]:
@@ -105,8 +127,13 @@ def _properties(result: ResultSet) -> Iterator[tuple[str, float]]:
                 yield f"{name}.high", found.high
 
 
-def _benchmark(benchmark: Any, result: ResultSet) -> None:
-    """Hand the finished repetitions to pytest-benchmark as rounds of worker seconds."""
+def _benchmark(benchmark: Any, results: list[ResultSet]) -> None:
+    """Hand the finished repetitions to pytest-benchmark as rounds of worker seconds.
+
+    pytest-benchmark has one result for a test: rounds are those of its first task. The records are
+    of all its tasks.
+    """
+    result = results[0]
     if not result.ok:
         return
     seconds = iter([record.stepping["wall"] for record in result.ok])
@@ -128,7 +155,7 @@ def _benchmark(benchmark: Any, result: ResultSet) -> None:
             "metrics": {name: result.values(name) for name in result.metrics},
             "seeds": [record.seed for record in result.ok],
             "costs": {name: [record.cost(name) for record in result.ok] for name in SAVED_COSTS},
-            saved.KEY: saved.to_extra_info(result.records),
+            saved.KEY: saved.to_extra_info(r for found in results for r in found.records),
         }
     )
     benchmark.pedantic(advance, rounds=len(result.ok), iterations=1, warmup_rounds=0)

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
 from pytest_simbench import options
+from pytest_simbench.measure.configuration import agree, task_parameters
 from pytest_simbench.measure.differences import differences
 from pytest_simbench.measure.record import Record, RecordError
-from pytest_simbench.measure.records import RECORDS_NAME, read_records
+from pytest_simbench.measure.records import RECORDS_NAME, read_records, repair
+from pytest_simbench.measure.series import configurations, short
 
 if TYPE_CHECKING:
     from pytest_simbench.session.case import Case
     from pytest_simbench.tasks.base import Task
-
-COMPARED = ("profile", "protocol", "jitter", "settings", "versions")
-"""What of a record must be the same in a run that is completed or joined."""
 
 
 def folder_to_resume(config: pytest.Config) -> Path | None:
@@ -54,6 +53,10 @@ def folder_to_resume(config: pytest.Config) -> Path | None:
     return runs[-1].parent
 
 
+class NotResumed(Exception):
+    """A test that cannot go on in this run; the message is one sentence."""
+
+
 class Resumed:
     """What an interrupted run has recorded.
 
@@ -61,7 +64,8 @@ class Resumed:
         folder: of the run.
 
     Attributes:
-        records: those of repetitions that came to an end; interrupted ones are run again.
+        records: all of them, interrupted ones too.
+        problems: damaged lines, one sentence each: those repetitions are run again.
 
     Raises:
         pytest.UsageError: its records cannot be read.
@@ -73,51 +77,98 @@ class Resumed:
             reading = read_records(folder)
         except RecordError as error:
             raise pytest.UsageError(f"--sim-resume: {error}") from None
-        self.records = [r for r in reading.records if r.status != "interrupted"]
+        self.records = reading.every
+        self.problems = reading.problems
+        self._taken: set[int] = set()
 
-    def refusal(self, case: Case, task: Task, *, run_more: bool) -> str:
-        """Why this test cannot go on here, as one sentence; nothing when it can.
+    def repair(self) -> None:
+        """Write the records anew without damaged lines; for one process alone."""
+        try:
+            kept = repair(self.folder)
+        except OSError as error:  # the lines are left out by every reader
+            self.problems += (f"{self.folder} could not be repaired ({error.strerror})",)
+        else:
+            if kept is not None:
+                self.problems += (f"the damaged records are kept in {kept}",)
+
+    def take(self, case: Case, task: Task, wanted: int | None) -> dict[int, Record]:
+        """By repetition what came to an end of these repetitions; interrupted ones are run again.
+
+        Settings, seeds, versions and whatever else `measure.configuration` lists are held against
+        what the options say now, without starting a worker.
+
+        Args:
+            case: as asked for now.
+            task: as it will be performed.
+            wanted: repetitions that the user asked for by number; None: as many as it takes.
+
+        Raises:
+            NotResumed: the records are of another configuration.
+        """
+        from pytest_simbench.session.identity import expected
+
+        now = expected(case, task)
+        of_test = [
+            record
+            for record in self.records
+            if (record.test, record.task, record.attempt) == (case.test, task.name, case.attempt)
+        ]
+        same = [record for record in of_test if task_parameters(record) == task_parameters(now)]
+        if not same:  # a task that this test repeats besides, or one that was changed
+            same = [record for record in of_test if id(record) not in self._taken]
+        self._taken |= {id(record) for record in same}
+        found = [] if all(agree(r, now, "resume") for r in same) else self._differences(same, now)
+        found += _seeds(same, case.seed)
+        if wanted is not None and any(record.repetition > wanted for record in same):
+            most = max(record.repetition for record in same)
+            found.append(f"--reps was {most} or more, is {wanted}")
+        if found:
+            raise NotResumed(self._sentence(case, found))
+        return {r.repetition: r for r in same if r.status != "interrupted"}
+
+    def check_versions(self, case: Case, task: Task) -> None:
+        """Before repetitions are added: ask a worker for what only it can tell.
 
         Args:
             case: as asked for now.
             task: to be performed.
-            run_more: whether repetitions are missing; a worker is then started for a moment, to
-                learn the simulator's settings and versions.
+
+        Raises:
+            NotResumed: the versions are not those of the run.
         """
-        of_test = [r for r in self.records if r.test == case.test]
-        seeds = _seeds(of_test, case.seed)
-        if seeds:
-            return self._sentence(case, [seeds])
         # A repetition that failed at its start knows neither settings nor versions.
-        of_test = [r for r in of_test if r.ok]
-        others = [
-            r for r in self.records if r.ok and (r.simulator, r.mode) == (case.simulator, case.mode)
-        ]
-        if not run_more or not others:
-            return ""
+        ended = [r for r in self.records if r.ok]
+        of_test = [r for r in ended if (r.test, r.task) == (case.test, task.name)]
+        others = [r for r in ended if (r.simulator, r.mode) == (case.simulator, case.mode)]
+        if not of_test and not others:
+            return
         from pytest_simbench.session.repetition import Repetition
 
         now, error = Repetition(case, task, 0).probe()
         if error is not None:
             raise error
-        if of_test:
-            found = differences({case.test: (of_test, [now])}, COMPARED)
-        else:  # another test of the same simulator: its task and its settings are its own
-            found = differences({case.test: (others, [now])}, ("versions",))
-        return self._sentence(case, [text.rpartition(" (")[0] for text in found])
+        # Another test of the same simulator has a task and settings of its own.
+        found = self._differences(of_test or others, now, ("versions",))
+        if found:
+            raise NotResumed(self._sentence(case, found))
+
+    def _differences(
+        self, before: Sequence[Record], now: Record, fields: Sequence[str] | None = None
+    ) -> list[str]:
+        found = []
+        for group in configurations(before):
+            found += differences({now.test: (group, [now])}, "resume", fields)
+        return [text.rpartition(" (")[0] for text in dict.fromkeys(found)]
 
     def _sentence(self, case: Case, found: list[str]) -> str:
-        if not found:
-            return ""
-        name = case.test.rpartition("::")[2]
         return (
-            f"{name} of the run {self.folder} is not resumed, since its repetitions would not be "
-            f"comparable: {'; '.join(found)}"
+            f"{short(case.test)} of the run {self.folder} is not resumed, since its repetitions "
+            f"would not be comparable: {'; '.join(found)}"
         )
 
 
-def _seeds(records: Iterable[Record], base: int) -> str:
+def _seeds(records: Iterable[Record], base: int) -> list[str]:
     for record in records:
         if record.seed != base + record.repetition - 1:
-            return f"--sim-seed was {record.seed - record.repetition + 1}, is {base}"
-    return ""
+            return [f"--sim-seed was {record.seed - record.repetition + 1}, is {base}"]
+    return []

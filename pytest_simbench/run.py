@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import threading
+from collections import Counter
 from collections.abc import Iterable
-from contextlib import suppress
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,25 +18,35 @@ from pytest_simbench.text import for_terminal
 if TYPE_CHECKING:
     from pytest_simbench.measure.metrics import Metric
     from pytest_simbench.measure.record import Record
+    from pytest_simbench.measure.run_folder import Claim
     from pytest_simbench.report.progress import Progress
     from pytest_simbench.resume import Resumed
+    from pytest_simbench.session.case import Case
     from pytest_simbench.tasks.base import Task
+
+RUNS = ".simbench"
+"""Where runs without an `--sim-output` lie, in pytest's root folder."""
 
 
 class Run:
     """One pytest invocation, or one xdist worker's share of it.
 
     Attributes:
-        folder: of this run; made when the first record is written.
-        records: made or received by this process.
+        folder: of this run; made by `use`, before the first test that needs it.
+        problem: why the folder cannot be used, as a sentence, for tests that need it.
+        records: made or received by this process; all of the run once it is complete.
         resumed: the interrupted run that this one completes, if it does.
     """
 
     def __init__(self, config: pytest.Config) -> None:
         self.config = config
+        self._shared_by: dict[str, Any] | None = getattr(config, "workerinput", None)
         self.folder = self._choose_folder()
+        self.problem: str = (self._shared_by or {}).get("simbench_problem", "")
         self.displays = Displays()
-        self.records: dict[tuple[str, int, int], Record] = {}
+        self.records: list[Record] = []
+        self._claim: Claim | None = None
+        self._attempts: Counter[tuple[str, str, str]] = Counter()
         self._file: Any = None
         self._lock = threading.Lock()
         self._progress: Progress | None = None
@@ -50,9 +60,8 @@ class Run:
             self.resumed = Resumed(self.folder)
 
     def _choose_folder(self) -> Path:
-        shared = getattr(self.config, "workerinput", {}).get("simbench_folder")
-        if shared:
-            return Path(shared)
+        if self._shared_by is not None and "simbench_folder" in self._shared_by:
+            return Path(self._shared_by["simbench_folder"])
         if self.config.getoption("sim_resume") is not None:
             from pytest_simbench.resume import folder_to_resume
 
@@ -62,8 +71,59 @@ class Run:
         given = options.value(self.config, "sim_output")
         if given:
             return Path(self.config.invocation_params.dir, given)
-        stamp = datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
-        return self.config.rootpath / ".simbench" / stamp
+        from pytest_simbench.measure.run_folder import new_name
+
+        return new_name(self.config.rootpath / RUNS)
+
+    def claim(self) -> None:
+        """Make the folder this run's own; may be called again.
+
+        Raises:
+            pytest.UsageError: it holds another run, another run is under way in it, or it cannot
+                be written to.
+        """
+        if self._claim is not None:
+            return
+        from pytest_simbench.measure.run_folder import Claim, FolderError, holds_run
+
+        try:
+            self._claim = Claim(self.folder, shared=self._shared_by is not None)
+        except FolderError as error:
+            raise pytest.UsageError(str(error)) from None
+        if self._shared_by is not None:
+            return
+        if self.resumed is not None:
+            self.resumed.repair()
+            self._problems += self.resumed.problems
+        elif holds_run(self.folder):
+            self._claim.close()
+            self._claim = None
+            raise pytest.UsageError(self.occupied())
+
+    def occupied(self) -> str:
+        """That the folder holds another run, as a sentence with what to do; empty if it does not.
+
+        For xdist's controller, which does not know whether any test needs the folder.
+        """
+        from pytest_simbench.measure.run_folder import holds_run
+
+        if self._claim is not None or self.resumed is not None or not holds_run(self.folder):
+            return ""
+        return (
+            f"{self.folder} already holds a run; complete that one with --sim-resume="
+            f"{self.folder}, or give another --sim-output"
+        )
+
+    def use(self) -> Path:
+        """The folder, for a test that writes to it; the test fails where it cannot be used."""
+        if not self.problem:
+            try:
+                self.claim()
+            except pytest.UsageError as error:
+                self.problem = str(error)
+        if self.problem:
+            pytest.fail(self.problem, pytrace=False)
+        return self.folder
 
     @property
     def progress(self) -> Progress:
@@ -102,17 +162,32 @@ class Run:
         from pytest_simbench.measure.records import RECORDS_NAME, RecordFile
 
         with self._lock:
-            self.records[_key(record)] = record
+            self.records.append(record)
             if self._file is None:
                 self._file = RecordFile(self.folder / RECORDS_NAME)
             self._file.append(record)
 
-    def resume(self, test: str, task: str) -> dict[int, Record]:
-        """By repetition what the run that is completed has recorded of a test; now of this run."""
-        found = [] if self.resumed is None else self.resumed.records
-        ours = {r.repetition: r for r in found if r.test == test and r.task == task}
-        self.records |= {_key(record): record for record in ours.values()}
-        return ours
+    def begin(self, case: Case, task: Task) -> int:
+        """How often this process has begun these repetitions, with this time.
+
+        More than once when a plugin reruns a failed test, or a test repeats a task twice.
+        """
+
+        key = (case.test, task.name, json.dumps(task.parameters(), default=str))
+        self._attempts[key] += 1
+        return self._attempts[key]
+
+    def take(self, case: Case, task: Task, wanted: int | None) -> dict[int, Record]:
+        """By repetition what the run that is completed has recorded; of this run from now on.
+
+        Raises:
+            NotResumed: it was of another configuration.
+        """
+        if self.resumed is None:
+            return {}
+        found = self.resumed.take(case, task, wanted)
+        self.records += found.values()
+        return found
 
     def declare(self, task: Task) -> None:
         """Remember a task's metrics and references for the report."""
@@ -141,35 +216,36 @@ class Run:
 
     def of_test(self, test: str) -> list[str]:
         """Records of one test as JSON lines, to travel with its report."""
-        return [r.to_json() for r in self.records.values() if r.test == test]
+        return [r.to_json() for r in self.records if r.test == test]
 
     def receive(self, lines: Iterable[str]) -> None:
         """Take over records that came with a report, from an xdist worker for instance."""
         from pytest_simbench.measure.record import Record
 
-        for line in lines:
-            record = Record.from_json(line)
-            self.records.setdefault(_key(record), record)
+        self.records += [Record.from_json(line) for line in lines]
 
-    def _read_folder(self) -> list[str]:
-        """Records that other processes wrote; problems, as sentences."""
-        from pytest_simbench.measure.records import RECORDS_NAME, read_records
+    def _read_folder(self) -> list[Record]:
+        """Records that other processes wrote; what is wrong with them becomes a problem."""
+        from pytest_simbench.measure.records import RECORDS_NAME, RecordError, scan
 
         path = self.folder / RECORDS_NAME
         if not path.is_file():
             return []
         try:
-            reading = read_records(path)
-        except ValueError as error:
-            return [str(error)]
-        for record in reading.records:
-            self.records.setdefault(_key(record), record)
-        return list(reading.problems)
+            reading = scan(path)
+        except RecordError as error:
+            self._problems.append(str(error))
+            return []
+        self._problems += [*reading.problems, *reading.refused]
+        return list(reading.every)
 
     def complete(self) -> None:
         """Gather what other processes recorded; called when all tests have ended."""
-        if self.records or self._shared():
-            self._problems = self._read_folder()
+        from pytest_simbench.measure.series import settled
+
+        if (self.records or self._shared()) and not self.problem:
+            # Those in memory come last: they are there although the disk may be full.
+            self.records = settled([*self._read_folder(), *self.records])
         if self.records:
             self._declare_known()
 
@@ -189,15 +265,19 @@ class Run:
         from pytest_simbench.report.summary import summarise
         from pytest_simbench.report.tables import render_run
 
-        records = sorted(self.records.values(), key=lambda r: (r.test, r.repetition))
+        records = sorted(self.records, key=lambda r: (r.test, r.repetition))
         summaries = with_wins(summarise(records, self._metrics, self._references), records)
-        reporter.write_sep("=", "simulator comparison")
-        reporter.write_line(render_run(summaries, reporter._tw.fullwidth, self.folder))
-        problems = list(self._problems)
-        with suppress(OSError):
-            problems += write_report(self.folder, summaries, records)
+        written = write_report(self.folder, summaries, records)
+        unsaved = self._unsaved()
+        problems = [*self._problems, *written.problems]
         problems.append(append_summary("\n".join([comparison, markdown.render_run(summaries)])))
-        for line in filter(None, [*map(for_terminal, problems), *self._unsaved()]):
+        reporter.write_sep("=", "simulator comparison")
+        whole = written.complete and not unsaved
+        folder = self.folder if whole else None
+        reporter.write_line(render_run(summaries, reporter._tw.fullwidth, folder))
+        if not whole:
+            problems.insert(0, f"\nwhat could be written is in {self.folder}")
+        for line in [*map(for_terminal, filter(None, problems)), *unsaved]:
             reporter.write_line(line)
 
     def _shared(self) -> bool:
@@ -205,7 +285,7 @@ class Run:
 
     def _declare_known(self) -> None:
         """Metrics of our own tasks; an xdist controller performed none itself."""
-        names = {record.task for record in self.records.values()} - set(self._metrics)
+        names = {record.task for record in self.records} - set(self._metrics)
         if names:
             from pytest_simbench.tasks import Stacking, Throwing
 
@@ -224,7 +304,5 @@ class Run:
         self.displays.close()
         if self._file is not None:
             self._file.close()
-
-
-def _key(record: Record) -> tuple[str, int, int]:
-    return (record.test, record.repetition, record.seed)
+        if self._claim is not None:
+            self._claim.close()

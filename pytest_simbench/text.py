@@ -15,7 +15,7 @@ LONGEST_LINE = 2000
 """Characters of a line that are shown; more is nobody's message, and may be megabytes."""
 
 LONGEST_LABEL = 100
-"""Characters of a label in a picture, and of a file's name."""
+"""Characters of a label in a picture."""
 
 BLANK = "&#8203;"
 """A blank without width: it keeps GitHub from making links and mentions of parts of a text."""
@@ -64,11 +64,6 @@ def for_csv(value: Any) -> Any:
 def for_figure(text: str) -> str:
     """A label: one short line. Formulas are switched off where the picture is drawn."""
     return in_one_line(text, LONGEST_LABEL)
-
-
-def for_file(name: str) -> str:
-    """A file's name, of letters, digits and `_.=-`, that stays in its folder."""
-    return re.sub(r"[^A-Za-z0-9_.=-]+", "_", name).strip("_.")[:LONGEST_LABEL] or "unnamed"
 
 
 _NUMBER = r"-?[\d.]+(?:e[-+]?\d+)?"

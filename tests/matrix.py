@@ -150,8 +150,8 @@ def steps(place: Place) -> Iterator[Step]:
     if "xdist" in place.plugins:
         yield Step((*suites, *smallest, "-n2"), ("2 passed", "simulator comparison"), files)
     if {"rerunfailures", "seleniumbase"} & set(place.plugins):
-        yield Step(("test_again.py", *smallest), ("1 passed, 1 rerun", r"benchmark 'test_again': 1 tests"),
-                   (("test_again.py", RERUN),))  # fmt: skip
+        said = ("1 passed, 1 rerun", r"benchmark 'test_again': 1 tests")
+        yield Step(("test_again.py", *smallest), said, (("test_again.py", RERUN),))
 
 
 def check(python: Path, step: Step) -> str:

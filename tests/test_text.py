@@ -17,7 +17,6 @@ from pytest_simbench.text import (
     LONGEST_LINE,
     for_csv,
     for_figure,
-    for_file,
     for_markdown,
     for_terminal,
     in_one_line,
@@ -134,10 +133,6 @@ def test_numbers_stay_numbers(value: object) -> None:
 
 @examples
 @given(TEXTS)
-def test_labels_and_file_names_are_short(text: str) -> None:
+def test_labels_are_short(text: str) -> None:
     assert len(for_figure(text)) <= LONGEST_LABEL
     assert for_figure(text).isprintable()
-    name = for_file(text)
-    assert 0 < len(name) <= LONGEST_LABEL
-    assert name not in (".", "..")
-    assert not set(name) - set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.=-")

@@ -11,6 +11,7 @@ from typing import Any
 from pytest_simbench.measure.record import Record, RecordError
 from pytest_simbench.measure.records import RECORDS_NAME, read_records
 from pytest_simbench.measure.saved import KEY, from_extra_info
+from pytest_simbench.measure.series import settled
 
 FORMS = f"a run folder, its {RECORDS_NAME}, or a file written with --benchmark-json"
 """What a baseline may be, for messages."""
@@ -62,11 +63,11 @@ def read_baseline(path: Path) -> Baseline:
 
 def _benchmark_file(path: Path) -> dict[str, Any] | None:
     """The content of a file of pytest-benchmark; None when it is none."""
-    if path.is_dir():
+    if not path.is_file():
         return None
     try:
         data = json.loads(path.read_bytes())
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return None  # a record file, which has a JSON object on each line, or garbage
     return data if isinstance(data, dict) and "benchmarks" in data else None
 
@@ -95,4 +96,4 @@ def from_benchmarks(saved: Mapping[str, Any], name: str) -> Baseline:
             f"the baseline {name} holds no repetition of a simulator that this version can "
             f"compare; give {FORMS}"
         )
-    return Baseline(name, tuple(records))
+    return Baseline(name, tuple(settled(records)))

@@ -31,6 +31,7 @@ from pytest_simbench.measure.limits import FAILURES, Limit
 from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.measure.record import Record
 from pytest_simbench.measure.results import ResultSet
+from pytest_simbench.measure.series import by_test
 from pytest_simbench.measure.speed import without_speed
 
 
@@ -168,20 +169,12 @@ def _corrected(found: Iterable[Change | None]) -> tuple[Change, ...]:
 def _by_test(
     baseline: Iterable[Record], current: Iterable[Record], metrics: Mapping[str, Sequence[Metric]]
 ) -> tuple[dict[str, ResultSet], dict[str, ResultSet]]:
-    """Both runs' result sets by test, without its file: that depends on where pytest ran."""
-    runs = [list(baseline), list(current)]
-    short = all(len({r.test for r in run}) == len({_name(r.test) for r in run}) for run in runs)
-    sides: list[dict[str, ResultSet]] = []
-    for run in runs:
-        groups: dict[str, list[Record]] = {}
-        for record in run:
-            groups.setdefault(_name(record.test) if short else record.test, []).append(record)
-        sides.append({t: ResultSet(g, metrics.get(g[0].task, ())) for t, g in groups.items()})
-    return sides[0], sides[1]
-
-
-def _name(test: str) -> str:
-    return test.rpartition("::")[2]
+    """Both runs' result sets by test and configuration."""
+    before, after = by_test([list(baseline), list(current)])
+    return tuple(  # type: ignore[return-value]
+        {name: ResultSet(found, metrics.get(found[0].task, ())) for name, found in side.items()}
+        for side in (before, after)
+    )
 
 
 def _vain(result: ResultSet, limit: Limit) -> str:

@@ -6,11 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
+from pytest_simbench.measure.configuration import task_parameters
 from pytest_simbench.measure.differences import differences
 from pytest_simbench.measure.record import Record
-
-SAME = ("profile", "protocol", "jitter", "deviations", "settings", "versions")
-"""What of a record must be the same in runs that are joined; machines may differ."""
+from pytest_simbench.measure.series import by_test, configurations
 
 
 class JoinError(ValueError):
@@ -24,12 +23,10 @@ class Joined:
     Attributes:
         record: under its new number.
         run: name of the run that it comes from.
-        number: its repetition there.
     """
 
     record: Record
     run: str
-    number: int
 
 
 def join(runs: Mapping[str, Sequence[Record]]) -> list[Joined]:
@@ -45,16 +42,12 @@ def join(runs: Mapping[str, Sequence[Record]]) -> list[Joined]:
     Raises:
         JoinError: a seed is there twice, or settings or versions differ.
     """
-    ended = {name: [r for r in run if r.status != "interrupted"] for name, run in runs.items()}
-    whole = any(
-        len({r.test for r in run}) > len({_short(r.test) for r in run}) for run in ended.values()
-    )
+    ended = [[r for r in run if r.status != "interrupted"] for run in runs.values()]
     tests: dict[str, dict[str, list[Record]]] = {}
-    for name, run in ended.items():
-        for record in run:
-            key = record.test if whole else _short(record.test)
-            tests.setdefault(key, {}).setdefault(name, []).append(record)
-    found: list[Joined] = []
+    for name, groups in zip(runs, by_test(ended, apart=_task_parameters), strict=True):
+        for test, found in groups.items():
+            tests.setdefault(test, {})[name] = found
+    joined: list[Joined] = []
     for test, parts in tests.items():
         _check(test, parts)
         every = [(record, name) for name, run in parts.items() for record in run]
@@ -62,12 +55,24 @@ def join(runs: Mapping[str, Sequence[Record]]) -> list[Joined]:
         id_ = every[0][0].test
         for record, name in sorted(every, key=lambda item: item[0].seed):
             number = record.seed - first + 1
-            found.append(Joined(_renumbered(record, number, id_), name, record.repetition))
-    return found
+            joined.append(Joined(replace(record, test=id_, repetition=number, attempt=1), name))
+    return joined
+
+
+def _task_parameters(records: Sequence[Record]) -> list[list[Record]]:
+    """A test's records by the parameters of their task: it may repeat several."""
+    groups: dict[str, list[Record]] = {}
+    for record in records:
+        groups.setdefault(task_parameters(record), []).append(record)
+    return list(groups.values())
 
 
 def _check(test: str, parts: Mapping[str, Sequence[Record]]) -> None:
     for name, run in parts.items():
+        groups = configurations(run)
+        if len(groups) > 1:
+            other = "; ".join(differences({test: (groups[0], groups[1])}, "merge"))
+            raise JoinError(f"{name} holds several configurations: {other}")
         twice = len(run) - len({record.seed for record in run})
         if twice:
             raise JoinError(f"{name} has {twice} of its seeds of {test} twice")
@@ -81,26 +86,9 @@ def _check(test: str, parts: Mapping[str, Sequence[Record]]) -> None:
                 "of its own with --sim-seed"
             )
         # A repetition that failed at its start knows neither settings nor versions.
-        known = [r for r in first if r.ok], [r for r in second if r.ok]
-        other = differences({test: known}, SAME) if all(known) else []
-        if other:
+        known = [r for r in first if r.ok] or first, [r for r in second if r.ok] or second
+        other_found = differences({test: known}, "merge")
+        if other_found:
             raise JoinError(
-                f"{a} and {b} are not parts of one run: {'; '.join(other)} (the first is {a})"
+                f"{a} and {b} are not parts of one run: {'; '.join(other_found)} (the first is {a})"
             )
-
-
-def _renumbered(record: Record, number: int, test: str) -> Record:
-    details = dict(record.details)
-    if details.get("log"):
-        details["log"] = file_of(str(details["log"]), record.repetition, number)
-    return replace(record, test=test, repetition=number, details=details)
-
-
-def file_of(name: str, old: int, new: int) -> str:
-    """A repetition's file (`logs/test-3.log`) under another number."""
-    stem, _, ending = name.rpartition(f"-{old}.")
-    return f"{stem}-{new}.{ending}" if stem else name
-
-
-def _short(test: str) -> str:
-    return test.rpartition("::")[2]

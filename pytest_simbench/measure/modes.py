@@ -6,8 +6,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from pytest_simbench.measure.comparison import ALPHA, Equivalence, equivalence
+from pytest_simbench.measure.configuration import text
 from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.measure.record import Record
+from pytest_simbench.measure.series import series, told
 
 MARGIN = 0.05
 """Shares that differ by less than this count as the same: not a whole cube of 15."""
@@ -49,13 +51,17 @@ class ModeComparison:
 def compare_modes(records: Sequence[Record], metrics: Iterable[Metric]) -> list[ModeComparison]:
     """Every simulator that ran in both modes, at each of the study's shares, paired by seed."""
     shares = [metric for metric in metrics if metric.study and metric.bounded]
-    sides: dict[tuple[str, str, str], dict[str, dict[int, Record]]] = {}
-    for record in records:
-        if record.ok:
-            key = (record.simulator, record.profile, record.test.split("[")[0])
-            sides.setdefault(key, {}).setdefault(record.mode, {})[record.seed] = record
+    sides: dict[tuple[object, ...], dict[str, dict[int, Record]]] = {}
+    named: dict[tuple[object, ...], tuple[str, str, str]] = {}
+    for row in series(record for record in records if record.ok):
+        of = row.subject
+        # The two modes of one test and configuration.
+        key = (*of._replace(mode=""), text(told(row.records)))
+        named[key] = (of.simulator, of.profile, of.function)
+        sides.setdefault(key, {})[of.mode] = {record.seed: record for record in row.records}
     found = []
-    for (simulator, profile, test), modes in sides.items():
+    for side, modes in sides.items():
+        simulator, profile, test = named[side]
         if not {"headless", "gui"} <= set(modes):
             continue
         for metric in shares:

@@ -5,18 +5,20 @@ matplotlib is an optional extra and is imported only when a picture is drawn.
 
 from __future__ import annotations
 
+import io
 import math
 import warnings
 from collections.abc import Sequence
-from itertools import count
 from pathlib import Path
 from typing import Any
 
 from pytest_simbench.measure.metrics import Metric
+from pytest_simbench.measure.names import file_name
+from pytest_simbench.measure.run_folder import write_whole
 from pytest_simbench.report.answer import short_labels
 from pytest_simbench.report.pooling import Spread
 from pytest_simbench.report.summary import Row, TaskSummary
-from pytest_simbench.text import for_figure, for_file
+from pytest_simbench.text import for_figure
 
 DPI = 120
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
@@ -75,16 +77,12 @@ def _draw(folder: Path, summaries: Sequence[TaskSummary]) -> list[Path]:
             axes[0].set_yticks(range(len(rows)), map(for_figure, short_labels(rows)))
             axes[0].set_ylim(len(rows) - 0.5, -0.5)
             figure.suptitle(_title(summary, rows, name), fontsize="medium")
-            path = _path(folder, f"{for_file(summary.task)}_{name}", paths)
-            figure.savefig(path, dpi=DPI)
+            path = folder / f"{file_name(summary.task)}_{name}.png"
+            picture = io.BytesIO()
+            figure.savefig(picture, format="png", dpi=DPI)
+            write_whole(path, picture.getvalue())
             paths.append(path)
     return paths
-
-
-def _path(folder: Path, name: str, taken: Sequence[Path]) -> Path:
-    """A file of that name; tasks whose names differ in odd characters alone get numbers."""
-    names = (folder / f"{name}{f'_{number}' if number > 1 else ''}.png" for number in count(1))
-    return next(path for path in names if path not in taken)
 
 
 def _title(summary: TaskSummary, rows: Sequence[Row], name: str) -> str:

@@ -8,7 +8,8 @@ from dataclasses import replace
 from pytest_simbench.measure.contest import wins
 from pytest_simbench.measure.modes import compare_modes
 from pytest_simbench.measure.record import Record
-from pytest_simbench.report.summary import TaskSummary, row_key
+from pytest_simbench.measure.series import comparable, series
+from pytest_simbench.report.summary import TaskSummary
 
 
 def with_wins(summaries: Iterable[TaskSummary], records: Sequence[Record]) -> list[TaskSummary]:
@@ -20,22 +21,13 @@ def with_wins(summaries: Iterable[TaskSummary], records: Sequence[Record]) -> li
     """
     found = []
     for summary in summaries:
-        groups: dict[tuple[str, ...], list[Record]] = {}
-        for record in sorted(
-            (r for r in records if r.task == summary.task), key=lambda r: (row_key(r), r.repetition)
-        ):
-            groups.setdefault(row_key(record), []).append(record)
-        sides = dict(enumerate(groups.values()))  # the rows' order
-        rows = summary.rows
+        rows = series(r for r in records if r.task == summary.task)  # the summary's order
         result = wins(
-            sides,
+            {place: row.records for place, row in enumerate(rows)},
             summary.metrics,
-            lambda a, b, rows=rows: (  # type: ignore[misc]
-                (rows[a].mode, rows[a].profile, rows[a].test)
-                == (rows[b].mode, rows[b].profile, rows[b].test)
-            ),
+            lambda a, b, rows=rows: comparable(rows[a], rows[b]),  # type: ignore[misc]
         )
-        own = [record for group in groups.values() for record in group]
+        own = [record for row in rows for record in row.records]
         modes = tuple(c.sentence for c in compare_modes(own, summary.metrics))
         found.append(replace(summary, wins=tuple(result), modes=modes))
     return found

@@ -1,4 +1,4 @@
-"""From records to the rows of a table: one row per simulator, mode and profile of a task.
+"""From records to the rows of a table: one row per test and configuration of a task.
 
 Every renderer (terminal, Markdown, pictures) reads these rows, so that all of them tell the same
 numbers. Failed and interrupted repetitions are counted and left out of everything else, as in the
@@ -8,13 +8,13 @@ reference study.
 from __future__ import annotations
 
 import statistics
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from pytest_simbench.measure.contest import Win
 from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.measure.record import Record
+from pytest_simbench.measure.series import series
 from pytest_simbench.report.pooling import (
     AMOUNT,
     Ends,
@@ -52,10 +52,11 @@ class Cause:
 
 @dataclass(frozen=True)
 class Row:
-    """One simulator in one mode with one profile at one task.
+    """One configuration of one simulator at one task.
 
     Attributes:
-        test: the test's function name, where rows differ in it alone; else empty.
+        test: what tells it from other rows of its simulator, mode and profile, for instance
+            `timestep=0.004` or the test's function name; else empty.
         finished, failed, interrupted: counts of repetitions.
         metrics: by metric name; None where no repetition has the value.
         start, end: seconds from launch to the start and the end of the task.
@@ -152,26 +153,12 @@ def summarise(
     summaries = []
     for task, found in by_task.items():
         declared = tuple(metrics.get(task) or _undeclared(found))
-        groups: dict[tuple[str, ...], list[Record]] = {}
-        for record in sorted(found, key=lambda r: (row_key(r), r.repetition)):
-            groups.setdefault(row_key(record), []).append(record)
-        same = Counter(key[:4] for key in groups)
-        rows = tuple(
-            _row(group, declared, key[4] if same[key[:4]] > 1 else "", ends)
-            for key, group in groups.items()
-        )
+        rows = tuple(_row(r.records, declared, r.label, ends) for r in series(found))
         protocols = ", ".join(sorted({record.protocol for record in found}))
         summaries.append(
             TaskSummary(task, declared, rows, dict((references or {}).get(task, {})), protocols)
         )
     return summaries
-
-
-def row_key(record: Record) -> tuple[str, ...]:
-    """What records of one row share; rows are sorted by it."""
-    # Headless before gui, as in the study's table; the test's name without its parameters.
-    shown = "1" if record.mode == "gui" else "0"
-    return (record.simulator, shown + record.mode, record.profile, "", record.test.split("[")[0])
 
 
 def _undeclared(records: Sequence[Record]) -> list[Metric]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 from typing import Protocol as Interface
 
 from pytest_simbench.client.process import Launch
+from pytest_simbench.measure.names import file_name
 from pytest_simbench.session.protocol import PROTOCOLS, Protocol
 
 
@@ -52,6 +52,7 @@ class Case:
         fresh: start a new worker for each repetition all the same.
         contended: repetitions run side by side, so their times are not comparable.
         folder: the run folder.
+        attempt: of the same repetitions in this process, see `measure.record`.
     """
 
     test: str
@@ -76,6 +77,7 @@ class Case:
     compile_timeout: float = 0.0
     fresh: bool = False
     contended: bool = False
+    attempt: int = 1
 
     @property
     def reuses_worker(self) -> bool:
@@ -84,9 +86,8 @@ class Case:
 
     @property
     def short_name(self) -> str:
-        """The test's name without its file, fit for a file name."""
-        name = self.test.rpartition("::")[2]
-        return re.sub(r"[^A-Za-z0-9_.=-]+", "_", name).strip("_")
+        """The test's name without its file, fit for a file name; no other test has it."""
+        return file_name(self.test.rpartition("::")[2], self.test)
 
     def launch(self, name: str) -> Launch:
         """How to start a worker of this case; its log is `logs/NAME.log` in the run folder.

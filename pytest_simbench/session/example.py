@@ -7,7 +7,7 @@ interpreter, adapter, environment and the files of the robot are this machine's 
 from __future__ import annotations
 
 import json
-import re
+import os
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -19,6 +19,7 @@ import numpy as np
 
 from pytest_simbench.client.environments import Environment, interpreter, missing
 from pytest_simbench.client.tape import ARRAYS, Operation
+from pytest_simbench.measure.names import file_name
 from pytest_simbench.robot.panda import panda
 from pytest_simbench.scene import Robot, Scene
 from pytest_simbench.session.case import Case
@@ -72,15 +73,21 @@ def write_example(
     tape: Sequence[Operation],
     versions: Mapping[str, str] | None = None,
 ) -> Path:
-    """Write an episode to the run folder; one of the same name is replaced.
+    """Write an episode to the run folder; one of the same test and name is replaced.
 
     Under Hypothesis the last failing example is the smallest, so that is what stays.
+
+    Args:
+        case: simulator and settings.
+        name: the readable part of the file's name.
+        scene: of the episode.
+        tape: what was done.
 
     Raises:
         OSError: the folder cannot be written to.
     """
-    stem = re.sub(r"[^A-Za-z0-9_.=-]+", "_", name).strip("_")[:200]
-    path = case.folder / FOLDER / f"{stem}.json"
+    test = os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" ")[0]
+    path = case.folder / FOLDER / f"{file_name(name, test, case.test)}.json"
     world = scene.to_wire()
     if scene.robot is not None and scene.robot.name in ROBOTS:
         world["robot"] = {k: v for k, v in world["robot"].items() if k not in ROBOT_FILES}

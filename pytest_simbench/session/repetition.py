@@ -27,6 +27,12 @@ from pytest_simbench.client.world import Motion, World
 from pytest_simbench.measure.record import Failure, Record
 from pytest_simbench.measure.resources import ResourceSampler
 from pytest_simbench.session.case import Case
+from pytest_simbench.session.identity import (
+    file_stem,
+    limits,
+    scene_digest,
+    settings,
+)
 from pytest_simbench.session.interrupts import Interrupts
 from pytest_simbench.session.workers import IdleWorkers
 from pytest_simbench.simulator.choices import seeds_seen
@@ -170,7 +176,7 @@ class Repetition:
             self._made(process)
             return process
         try:
-            launch = self.case.launch(f"{self.case.short_name}-{self.number}")
+            launch = self.case.launch(file_stem(self.case, self.task, self.number))
         except DisplayError as error:
             raise DisplayLost(str(error), self.where) from None
         return WorkerProcess(launch, self.where, deadline=deadline, made=self._made)
@@ -245,7 +251,13 @@ class Repetition:
             stepping=stepping,
             timeline={} if self._world is None else self._world.timeline,
             resources=resources,
-            settings={**self._constructed.get("settings", {}), **self.task.parameters()},
+            settings={
+                **(self._constructed.get("settings") or settings(case)),
+                **self.task.parameters(),
+            },
+            scene=scene_digest(self.task),
+            limits=limits(case, self.task),
+            attempt=case.attempt,
             versions={
                 "pytest-simbench": __version__,
                 **({"python": self._process.python_version} if self._process else {}),
@@ -275,7 +287,7 @@ class Repetition:
         if world is None or not world.trace or (case.trace == "retain-on-failure" and not failed):
             return ""
         motion = Motion.joined(world.trace)
-        name = self._log_name().removeprefix("logs/").removesuffix(".log")
+        name = file_stem(case, self.task, self.number)
         folder = case.folder / "traces"
         try:
             folder.mkdir(parents=True, exist_ok=True)

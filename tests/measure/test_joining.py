@@ -10,31 +10,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.measure.joining import JoinError, file_of, join
+from pytest_simbench.measure.joining import JoinError, join
 from pytest_simbench.measure.record import Record
 
 from .build import record
 
 
 def straight(count: int, first: int = 2022) -> list[Record]:
-    return [
-        record(
-            k,
-            seed=first + k - 1,
-            metrics={"placed": 1 / k},
-            details={"log": f"logs/test_stacking_engine-headless-{k}.log"},
-        )
-        for k in range(1, count + 1)
-    ]
+    return [record(k, seed=first + k - 1, metrics={"placed": 1 / k}) for k in range(1, count + 1)]
 
 
 def shard(whole: list[Record], start: int, end: int) -> list[Record]:
     """What a machine records that starts at the seed of repetition `start`."""
-    found = []
-    for number, item in enumerate(whole[start:end], start=1):
-        log = file_of(str(item.details["log"]), item.repetition, number)
-        found.append(replace(item, repetition=number, details={"log": log}))
-    return found
+    return [replace(r, repetition=k) for k, r in enumerate(whole[start:end], start=1)]
 
 
 @given(cuts=st.lists(st.integers(0, 30), max_size=4), seed=st.integers())
@@ -47,9 +35,37 @@ def test_shards_in_any_order_make_the_straight_run(cuts: list[int], seed: int) -
 
 
 def test_each_record_tells_where_its_files_are() -> None:
-    whole = straight(3)
+    whole = [replace(r, details={"log": f"logs/{r.seed}.log"}) for r in straight(3)]
     found = join({"a": shard(whole, 0, 2), "b": shard(whole, 2, 3)})
-    assert [(item.run, item.number) for item in found] == [("a", 1), ("a", 2), ("b", 1)]
+    assert [(item.run, item.record.details["log"]) for item in found] == [
+        ("a", "logs/2022.log"),
+        ("a", "logs/2023.log"),
+        ("b", "logs/2024.log"),
+    ]
+
+
+def test_a_test_that_repeats_two_tasks_is_joined_task_by_task() -> None:
+    def parts(first: int) -> list[Record]:
+        runs = straight(2, first)
+        return [
+            *(replace(r, settings={"task.towers": 3}) for r in runs),
+            *(replace(r, settings={"task.towers": 4}) for r in runs),
+        ]
+
+    found = join({"b": parts(2024), "a": parts(2022)})
+    numbers = [(i.record.settings["task.towers"], i.record.repetition) for i in found]
+    assert numbers == [(t, k) for t in (3, 4) for k in (1, 2, 3, 4)]
+
+
+def test_a_run_of_two_configurations_is_refused() -> None:
+    mixed = [*straight(2), *(replace(r, settings={"timestep": 0.01}) for r in straight(2, 2024))]
+    with pytest.raises(JoinError, match=r"a holds several configurations: settings.timestep was"):
+        join({"a": mixed})
+
+
+def test_the_last_attempt_is_the_only_one_of_the_whole() -> None:
+    again = [replace(r, attempt=2) for r in straight(2)]
+    assert [item.record.attempt for item in join({"a": again})] == [1, 1]
 
 
 def test_what_was_interrupted_is_left_out_and_may_be_in_the_other_part() -> None:
@@ -79,14 +95,20 @@ def test_overlaps_are_refused(first: int, message: str) -> None:
         join({"a": straight(3), "b": straight(3, first)})
 
 
-@pytest.mark.parametrize("name", ["settings", "versions", "profile", "protocol", "jitter"])
+@pytest.mark.parametrize(
+    "name", ["settings", "versions", "profile", "protocol", "jitter", "scene", "limits"]
+)
 def test_differences_are_refused_and_named(name: str) -> None:
-    value = {"settings": {"timestep": 1.0}, "versions": {"engine": "3"}, "jitter": 0.5}.get(
-        name, "x"
-    )
+    value = {
+        "settings": {"timestep": 1.0},
+        "versions": {"engine": "3"},
+        "limits": {"timeout": 5.0},
+        "jitter": 0.5,
+    }.get(name, "x")
+    ours = [replace(r, scene="s", limits={"timeout": 4.0}) for r in straight(3)]
     other = [replace(r, **{name: value}) for r in straight(3, 3000)]
     with pytest.raises(JoinError, match=f"a and b are not parts of one run: {name}.* was "):
-        join({"a": straight(3), "b": other})
+        join({"a": ours, "b": other})
 
 
 def test_what_failed_before_it_knew_its_settings_may_be_joined() -> None:

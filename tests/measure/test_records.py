@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +16,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.measure.records import (
+    LARGEST_LINE,
     RECORDS_NAME,
     Failure,
+    Reading,
     Record,
     RecordError,
     RecordFile,
     read_records,
+    repair,
+    scan,
 )
 
 from .build import failed, record
@@ -43,7 +49,7 @@ any_record = st.builds(
     repetition=st.integers(min_value=0),
     seed=st.integers(min_value=0),
     status=st.sampled_from(["ok", "failed", "interrupted"]),
-    jitter=numbers,
+    jitter=st.floats(min_value=0, allow_nan=False, allow_infinity=False),
     error=st.none() | st.builds(Failure, st.text(min_size=1), names, names, st.text()),
     metrics=st.dictionaries(names, st.none() | numbers, max_size=4),
     details=st.dictionaries(names, json_values, max_size=3),
@@ -153,7 +159,7 @@ def test_a_truncated_line_is_reported_and_the_next_record_starts_its_own(tmp_pat
     path.write_text(record(0).to_json() + "\n" + record(1).to_json()[:-40])
     reading = read_records(path)
     assert [item.repetition for item in reading.records] == [0]
-    assert reading.problems == (f"{path}:2: the line was cut short and is left out",)
+    assert reading.problems[0].startswith(f"{path}:2: the line is damaged and left out: not JSON (")
     RecordFile(path).append(record(2))
     reading = read_records(path)
     assert [item.repetition for item in reading.records] == [0, 2]
@@ -267,3 +273,180 @@ def test_costs_are_read_from_the_record() -> None:
     assert (found.cost("start"), found.cost("end"), found.cost("total")) == (1.2, 9.0, 9.5)
     bare = record(stepping={"wall": 0.0, "simulated": 1.0}, resources={}, timeline={}, seconds={})
     assert all(bare.cost(name) is None for name in ("rtf", "cpu", "ram", "ram_peak", "start"))
+
+
+def test_each_record_is_on_the_disk_before_the_next_thing_happens(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What `fsync` was called on, and what the file held then."""
+    path = tmp_path / RECORDS_NAME
+    synced: list[int] = []
+    real = os.fsync
+
+    def fsync(descriptor: int) -> None:
+        if os.path.samestat(os.fstat(descriptor), os.stat(path)):
+            synced.append(len(path.read_bytes().splitlines()))
+        real(descriptor)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    file = RecordFile(path)
+    for number in (1, 2, 3):
+        assert file.append(record(number))
+        assert synced == list(range(1, number + 1))
+
+
+def test_a_new_file_is_on_the_disk_by_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folders: list[bool] = []
+    real = os.fsync
+
+    def fsync(descriptor: int) -> None:
+        folders.append(os.path.samestat(os.fstat(descriptor), os.stat(tmp_path)))
+        real(descriptor)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    RecordFile(tmp_path / RECORDS_NAME).append(record(1))
+    assert True in folders
+
+
+DAMAGE = {
+    "NULs": b"\0" * 4096,
+    "NULs and a newline": b"\0" * 100 + b"\n",
+    "torn": b'{"schema": 1, "test": "t',
+    "half a character": '{"test": "ä'.encode()[:-1],
+    "UTF-16": '{"test": 1}\n'.encode("utf-16"),
+    "random bytes": bytes(range(1, 10)) + bytes(range(11, 256)),
+    "deep": b"[" * 100_000,
+    "deep object": b'{"a":' * 5000,
+    "not a number": b'{"test": NaN}',
+    "a number without end": b'{"seed": ' + b"9" * 10_000 + b"}",
+    "a list": b"[]",
+    "a long line": b"x" * (LARGEST_LINE + 1000),
+}
+
+
+@pytest.mark.parametrize("kind", DAMAGE)
+@pytest.mark.parametrize("place", ["start", "middle", "end"])
+def test_damage_loses_nothing_else_and_is_repaired(tmp_path: Path, kind: str, place: str) -> None:
+    lines = [record(k).to_json().encode() + b"\n" for k in range(4)]
+    at = {"start": 0, "middle": 2, "end": 4}[place]
+    path = tmp_path / RECORDS_NAME
+    path.write_bytes(b"".join([*lines[:at], DAMAGE[kind].rstrip(b"\n") + b"\n" * (at < 4)]))
+    for k in range(at, 4):
+        with path.open("ab") as file:
+            file.write(lines[k])
+    RecordFile(path).append(record(4))
+    reading = read_records(tmp_path)
+    assert [r.repetition for r in reading.records] == [0, 1, 2, 3, 4]
+    assert reading.problems
+    assert reading.problems[0].startswith(f"{path}:{at + 1}: the line is damaged and left out: ")
+    assert all(len(problem) < 400 for problem in reading.problems)
+    before = path.read_bytes()
+    kept = repair(tmp_path)
+    assert kept is not None
+    assert kept.read_bytes() == before
+    assert read_records(tmp_path) == Reading(reading.records, (), (), reading.every)
+    assert path.read_bytes() == b"".join([*lines, record(4).to_json().encode() + b"\n"])
+    assert repair(tmp_path) is None
+
+
+@given(st.binary(max_size=40), st.integers(0, 3))
+def test_any_bytes_between_records_lose_none_of_them(garbage: bytes, at: int) -> None:
+    lines = [record(k).to_json().encode() + b"\n" for k in range(4)]
+    lines.insert(at, garbage.replace(b"\n", b" ") + b"\n")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, RECORDS_NAME)
+        path.write_bytes(b"".join(lines))
+        found = scan(path)
+    assert [r.repetition for r in found.every] == [0, 1, 2, 3]
+
+
+def test_a_newline_that_became_nul_loses_no_record(tmp_path: Path) -> None:
+    path = tmp_path / RECORDS_NAME
+    path.write_bytes(b"\0\0\0".join(record(k).to_json().encode() for k in range(3)) + b"\n")
+    reading = read_records(path)
+    assert [r.repetition for r in reading.records] == [0, 1, 2]
+    assert reading.problems == (f"{path}:1: the line is damaged and left out: it holds NUL bytes",)
+
+
+def test_a_record_too_long_to_be_read_keeps_all_but_its_details(tmp_path: Path) -> None:
+    path = tmp_path / RECORDS_NAME
+    details = {"log": "logs/a.log", "poses": "x" * LARGEST_LINE}
+    RecordFile(path).append(record(1, details=details, metrics={"placed": 0.5}))
+    (found,) = read_records(path).records
+    assert found.metrics == {"placed": 0.5}
+    assert found.details["log"] == "logs/a.log"
+    assert "more than a record may have" in found.details["left_out"]
+
+
+@pytest.mark.parametrize("kind", ["fifo", "device", "link out"])
+def test_only_an_ordinary_file_in_the_folder_is_read(tmp_path: Path, kind: str) -> None:
+    run = tmp_path / "run"
+    run.mkdir()
+    path = run / RECORDS_NAME
+    (tmp_path / "other").write_text(record(1).to_json() + "\n")
+    if kind == "fifo":
+        os.mkfifo(path)
+    else:
+        path.symlink_to({"device": "/dev/zero", "link out": tmp_path / "other"}[kind])
+    with pytest.raises(RecordError, match=r"no ordinary file|leads out of its folder"):
+        read_records(run)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"test": 3}, "'test' must be str, not int"),
+        ({"test": "x" * 5000}, "'test' has 5000 characters, at most 2000 are read"),
+        ({"jitter": -1}, "'jitter' must be at least 0"),
+        ({"attempt": 0}, "'attempt' must be at least 1"),
+        ({"repetition": -3}, "'repetition' must be at least 0"),
+        ({"seed": 10**400}, "'seed' is larger than any number of ours"),
+        ({"metrics": {"placed": 10**400}}, "'metrics.placed' is larger than any number"),
+        ({"seconds": {"total": "long"}}, "'seconds.total' must be a number, not 'long'"),
+        ({"stepping": {"wall": [1]}}, "'stepping.wall' must be a number"),
+        ({"timeline": {"start": {}}}, "'timeline.start' must be a number"),
+        ({"limits": {"timeout": "x"}}, "'limits.timeout' must be a number"),
+        ({"resources": {"rss_mb": 3}}, "'resources.rss_mb' must be dict, not int"),
+        ({"resources": {"samples": "x"}}, "'resources.samples' must be a number"),
+        ({"resources": {"samples": -1}}, "'resources.samples' must be at least 0"),
+        ({"resources": {"phases": {"load": {"rss_mb": {"mean": "x"}}}}}, "'resources.phases.load."),
+        ({"versions": {"engine": 3}}, "'versions.engine' must be str, not int"),
+        ({"details": {"log": ["a"]}}, "'details.log' must be str, not list"),
+        ({"details": {"untested": {}}}, "'details.untested' must be str, not dict"),
+        ({"deviations": [3]}, "'deviations' must be str, not int"),
+        ({"error": {"type": "E", "message": 3}}, "'error.message' must be str, not int"),
+        ({"schema": 0}, "schema 0 "),
+        ({"schema": "x" * 999}, "schema 'xxxx"),
+    ],
+)
+def test_foreign_records_of_wrong_types_are_refused(
+    tmp_path: Path, change: dict[str, Any], message: str
+) -> None:
+    path = tmp_path / RECORDS_NAME
+    wrong = json.dumps({**record().to_dict(), **change})
+    path.write_text(record().to_json() + "\n" + wrong + "\n")
+    with pytest.raises(RecordError) as caught:
+        read_records(path)
+    assert str(caught.value).startswith(f"{path}:2: {message}")
+    assert len(str(caught.value)) < 400
+    assert len(scan(path).records) == 1
+
+
+def test_infinite_numbers_and_deep_nests_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / RECORDS_NAME
+    good = record(details={"a": 1}).to_json()
+    deep = "[" * 60 + "]" * 60
+    for text, message in ((deep, "nested more than 32"), ("1e999", "must be a finite number")):
+        path.write_text(good.replace('{"a": 1}', f'{{"a": {text}}}') + "\n")
+        with pytest.raises(RecordError, match=rf":1: .*{message}"):
+            read_records(path)
+
+
+def test_a_text_that_no_file_takes_can_be_written_again(tmp_path: Path) -> None:
+    path = tmp_path / RECORDS_NAME
+    RecordFile(path).append(record(details={"note": "\ud800 x"}))
+    path.write_text(path.read_text().replace("? x", "\\udfff x"))
+    (found,) = read_records(path).records
+    assert found.details["note"].encode("utf-8") == b"? x"

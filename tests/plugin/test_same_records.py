@@ -117,8 +117,9 @@ def test_sharded_and_merged_then_judged_without_running(
     assert merged.ret == pytest.ExitCode.OK
     merged.stdout.fnmatch_lines(["falling: 4 repetitions*"])
     assert kept(folder / "whole") == straight
-    logs = sorted(path.name for path in (folder / "whole" / "logs").iterdir())
-    assert logs == [f"test_{t}_mujoco-headless-{k}.log" for t in ("one", "two") for k in "1234"]
+    names = [json.loads(line)["details"]["log"] for line in straight]
+    assert [name[:9] for name in names] == ["logs/test"] * 8
+    assert {path.name for path in (folder / "whole/logs").iterdir()} == {n[5:] for n in names}
     run(pytester, "--reps=4", "--sim-resume=whole").assert_outcomes(passed=2)
     assert kept(folder / "whole") == straight
 
@@ -135,11 +136,13 @@ def test_resuming_is_refused_with_the_difference(pytester: pytest.Pytester, fold
         result.assert_outcomes(failed=1)
         result.stdout.fnmatch_lines([f"test_one*would not be comparable: {difference}"])
         assert "Traceback" not in result.stdout.str()
-    # Another test of the same simulator may have other settings, but not another version.
+    # Another test of the same simulator may have other settings, but not another version; nor
+    # may a test of which nothing is missing.
     path = folder / "out" / "records.jsonl"
     path.write_text(text.replace('"mujoco": "', '"mujoco": "0.'))
     result = run(pytester, "--reps=1", "--sim-resume=out")
-    result.assert_outcomes(passed=1, failed=1)
+    result.assert_outcomes(failed=2)
+    result.stdout.fnmatch_lines(['test_one*would not be comparable: versions.mujoco was "0.*'])
     result.stdout.fnmatch_lines(['test_two*would not be comparable: versions.mujoco was "0.*'])
     assert len(path.read_text().splitlines()) == 1
 

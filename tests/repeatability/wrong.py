@@ -69,7 +69,7 @@ class Brittle(MuJoCo):
 
 
 class Stale(MuJoCo):
-    """Restores what was saved a short while ago; what is older than 0.2 s it gets a little wrong."""
+    """Restores what was saved just now; what is older than 0.2 s it gets a little wrong."""
 
     def restore(self, state: FloatArray) -> None:
         old = self.data.time

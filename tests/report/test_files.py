@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import re
 import struct
 import subprocess
@@ -13,7 +14,7 @@ import pytest
 
 from pytest_simbench.report import markdown
 from pytest_simbench.report.figures import FiguresUnavailable, write_figures
-from pytest_simbench.report.files import write_csv, write_report
+from pytest_simbench.report.files import Written, csv_of, write_report
 from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.summary import summarise
 
@@ -54,14 +55,12 @@ def test_markdown_of_nothing() -> None:
     assert markdown.render_run([]) == "No repetition was recorded.\n"
 
 
-def test_csv_has_one_line_per_repetition(tmp_path: Path) -> None:
+def test_csv_has_one_line_per_repetition() -> None:
     records = [
         record(metrics={"placed": 0.8, "at_end": None}),
         failed("WorkerHung", "settle", "no answer", repetition=2),
     ]
-    write_csv(tmp_path / "a.csv", records)
-    with (tmp_path / "a.csv").open(newline="") as file:
-        first, second = csv.DictReader(file)
+    first, second = csv.DictReader(io.StringIO(csv_of(records), newline=""))
     assert (first["simulator"], first["repetition"], first["seed"]) == ("mujoco", "1", "1001")
     assert (first["metrics.placed"], first["metrics.at_end"]) == ("0.8", "")
     assert (first["cost.rtf"], first["seconds.step"], first["error.type"]) == ("20.0", "8.0", "")
@@ -72,7 +71,7 @@ def test_csv_has_one_line_per_repetition(tmp_path: Path) -> None:
 def test_report_folder(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
     records = stacking_run() + throwing_run()
-    assert write_report(tmp_path, summarise(records, METRICS, REFERENCES), records) == []
+    assert write_report(tmp_path, summarise(records, METRICS, REFERENCES), records) == Written()
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "report.csv",
         "report.md",
@@ -110,7 +109,9 @@ def test_without_matplotlib_one_line_says_so(
     summaries = summarise(records, METRICS)
     with pytest.raises(FiguresUnavailable, match=r"pip install 'pytest-simbench\[figures\]'"):
         write_figures(tmp_path, summaries)
-    (line,) = write_report(tmp_path, summaries, records)
+    written = write_report(tmp_path, summaries, records)
+    assert written.complete
+    (line,) = written.problems
     assert line.startswith("no pictures: matplotlib is missing")
     assert (tmp_path / "report.md").exists()
     assert not list(tmp_path.glob("*.png"))

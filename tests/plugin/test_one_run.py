@@ -1,0 +1,224 @@
+"""A folder is one run and a row one configuration, whatever is typed, and however it is run."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+TEST = """
+    from tests.tiny import Falling
+
+    def test_falling(repeat):
+        repeat(Falling(duration=0.2))
+"""
+
+
+def run(pytester: pytest.Pytester, *arguments: str) -> pytest.RunResult:
+    return pytester.runpytest_subprocess("--sim=mujoco", "--reps=1", *arguments)
+
+
+def records(folder: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in (folder / "records.jsonl").read_text().splitlines()]
+
+
+def test_a_folder_with_a_run_is_refused_before_anything_runs(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(TEST)
+    run(pytester, "--sim-output=o").assert_outcomes(passed=1)
+    before = {path: path.read_bytes() for path in Path("o").rglob("*") if path.is_file()}
+    for arguments in (["--sim-output=o", "--sim-set=mujoco.timestep=0.004"], ["--sim-output=o/."]):
+        for more in ([], ["-n2"]):
+            result = run(pytester, *arguments, *more)
+            assert result.ret == pytest.ExitCode.USAGE_ERROR
+            result.stderr.fnmatch_lines(["ERROR: *o already holds a run; complete that one with*"])
+            assert "Traceback" not in result.stderr.str() + result.stdout.str()
+    assert {path: path.read_bytes() for path in before} == before
+    # The ini file names a folder for every run: those that record nothing may go on.
+    pytester.makeini("[pytest]\nsim_output = o\n")
+    result = run(pytester)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["ERROR: *already holds a run; *"])
+    result = run(pytester, "-n2")
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines(["*already holds a run; *"])
+    assert "simulator comparison" not in result.stdout.str()
+    unrelated = pytester.makepyfile(test_unrelated="def test_it(): pass")
+    for more in ([], ["-n1"]):
+        result = run(pytester, str(unrelated), *more)
+        result.assert_outcomes(passed=1)
+        assert "simulator comparison" not in result.stdout.str()
+    assert run(pytester, "--collect-only", "-q").ret == pytest.ExitCode.OK
+    assert {path: path.read_bytes() for path in before} == before
+
+
+@pytest.mark.parametrize("arguments", [[], ["-n1"]], ids=["plain", "xdist"])
+def test_two_processes_on_one_folder(pytester: pytest.Pytester, arguments: list[str]) -> None:
+    pytester.makepyfile(TEST.replace("0.2", "30.0"))
+    command = [sys.executable, "-m", "pytest", "--sim=mujoco", "--reps=2", "--sim-output=o"]
+    both = [
+        subprocess.Popen(
+            [*command, *arguments],
+            cwd=pytester.path,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        )
+        for _ in range(2)
+    ]
+    told = [process.communicate(timeout=300) for process in both]
+    assert sorted(process.returncode for process in both) == [0, 4], told
+    assert [r["repetition"] for r in records(pytester.path / "o")] == [1, 2]
+    (refused,) = [err for (_, err), p in zip(told, both, strict=True) if p.returncode == 4]
+    assert b"another run is under way in" in refused or b"already holds a run" in refused
+
+
+def test_bad_folders_are_one_sentence_before_anything_runs(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(TEST)
+    pytester.path.joinpath("file").touch()
+    pytester.path.joinpath("link").symlink_to("nowhere/at/all")
+    for output, message in (("file", "file is a file"), ("file/x", "file is a file"),
+                            ("link", "link is a link to nothing"), ("/proc/x", "*"),
+                            ("x" * 300, "File name too long")):  # fmt: skip
+        result = run(pytester, f"--sim-output={output}")
+        assert result.ret == pytest.ExitCode.USAGE_ERROR
+        result.stderr.fnmatch_lines([f"ERROR: the run folder *{message}*"])
+        assert len(result.stderr.str().strip().splitlines()) == 1
+
+
+SETTINGS = """
+    import pytest
+    from tests.tiny import Falling
+
+    @pytest.fixture(params=[0.001, 0.004])
+    def sim_settings(request):
+        return {"timestep": request.param}
+
+    class TestA:
+        def test_falling(self, repeat):
+            repeat(Falling(duration=0.2))
+
+    class TestB:
+        def test_falling(self, repeat):
+            repeat(Falling(duration=0.2))
+            repeat(Falling(duration=0.1))
+"""
+
+
+@pytest.mark.parametrize(
+    "arguments", [[], ["-n2"], ["--sim-jobs=2"]], ids=["plain", "xdist", "jobs"]
+)
+def test_each_setting_class_and_task_is_a_row_with_files_of_its_own(
+    pytester: pytest.Pytester, arguments: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    pytester.makepyfile(SETTINGS)
+    result = run(pytester, "--sim-output=o", "--sim-trace=on", *arguments)
+    result.assert_outcomes(passed=4)
+    found = records(pytester.path / "o")
+    assert len(found) == 6
+    for folder, ending in (("logs", "log"), ("traces", "npz")):
+        names = [path.name for path in (pytester.path / "o" / folder).iterdir()]
+        assert len(names) == 6
+        assert all(name.endswith(f"-1.{ending}") for name in names)
+    assert len({r["details"]["log"] for r in found}) == 6
+    table = (pytester.path / "o" / "report.md").read_text()
+    for step in ("0.001", "0.004"):
+        assert table.count(f"TestA::test\\_falling timestep={step} | 0 of 1") == 1
+        for duration in ("0.2", "0.1"):
+            assert f"TestB::test\\_falling timestep={step} task.duration={duration} |" in table
+    result = run(pytester, "--sim-resume=o", "--sim-trace=on", *arguments)
+    result.assert_outcomes(passed=4)
+    assert records(pytester.path / "o") == found
+
+
+def test_the_gate_and_saved_benchmarks_keep_them_apart(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(SETTINGS)
+    run(pytester, "--sim-output=a", "--benchmark-json=a.json").assert_outcomes(passed=4)
+    for baseline in ("a", "a.json"):
+        result = run(pytester, f"--sim-baseline={baseline}", f"--sim-output=o-{baseline}")
+        result.assert_outcomes(passed=4)
+        text = result.stdout.str()
+        assert "different in the baseline" not in text
+        assert "is not in the baseline" not in text
+        assert "did not run" not in text
+        assert "test_falling[0.004-mujoco-headless] (falling 2)" in text
+    saved = json.loads((pytester.path / "a.json").read_text())["benchmarks"]
+    steps = {b["name"]: b["extra_info"]["settings"]["timestep"] for b in saved}
+    assert {(n.split("[")[1][:5], s) for n, s in steps.items()} == {
+        ("0.001", 1e-3),
+        ("0.004", 4e-3),
+    }
+    both = [len(b["extra_info"]["simbench"]["repetitions"]) for b in saved]
+    assert sorted(both) == [1, 1, 2, 2]
+
+
+def test_a_second_attempt_replaces_the_first_in_tables_and_both_stay(
+    pytester: pytest.Pytester,
+) -> None:
+    """As pytest-rerunfailures does: the same test, once more in the same process."""
+    pytester.makepyfile(
+        TEST + "        repeat(Falling(duration=0.2))\n".replace("        ", "    ", 1)
+    )
+    path = pytester.path / "o"
+    result = run(pytester, "--sim-output=o")
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines(["falling: 1 repetition, protocol fast"])
+    assert [(r["repetition"], r["attempt"]) for r in records(path)] == [(1, 1), (1, 2)]
+    assert len(list((path / "logs").iterdir())) == 2
+    found = records(path)
+    result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=2", "--sim-resume=o")
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines(["falling: 2 repetitions, protocol fast"])
+    assert records(path)[:2] == found
+    assert [(r["repetition"], r["attempt"]) for r in records(path)[2:]] == [(2, 1), (2, 2)]
+
+
+def test_what_could_not_be_written_is_said_and_not_shown_as_there(
+    pytester: pytest.Pytester,
+) -> None:
+    pytester.makepyfile(TEST)
+    folder = pytester.mkdir("o")
+    (folder / "report.md").mkdir()
+    result = run(pytester, "--sim-output=o")
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines(["*o/report.md could not be written (Is a directory)"])
+    assert "records, logs and report:" not in result.stdout.str()
+    assert (folder / "report.csv").is_file()
+    assert not list(folder.glob("*.part"))
+
+
+def test_a_folder_deleted_while_running_loses_no_record(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        """
+        import shutil
+        from tests.tiny import Falling
+
+        def test_falling(repeat, output_path):
+            repeat(Falling(duration=0.2))
+            shutil.rmtree(output_path)
+            repeat(Falling(duration=0.1))
+        """
+    )
+    result = run(pytester, "--sim-output=o")
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines(["*task.duration=0.1*", "*task.duration=0.2*"])
+    assert len(records(pytester.path / "o")) == 1
+
+
+@pytest.mark.parametrize("name", ["a/b", "..", "a b", "Ünï", "x" * 300, "falling/../../up"])
+def test_any_name_of_a_task_has_its_report(name: str, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
+    from pytest_simbench.report.files import write_report
+    from pytest_simbench.report.summary import summarise
+    from tests.report.samples import record
+
+    folder = tmp_path / "run"
+    found = [record(task=name, metrics={"placed": k / 9}, repetition=k) for k in (1, 2)]
+    found += [record(task=name.swapcase() + "'", metrics={"placed": 0.1})]
+    written = write_report(folder, summarise(found, {}), found)
+    assert written.complete
+    assert len(list(folder.glob("*.png"))) == 6
+    assert list(tmp_path.iterdir()) == [folder]
