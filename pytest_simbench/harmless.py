@@ -35,6 +35,14 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, Any]:
     return report
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_warning_recorded(warning_message: Any) -> None:
+    """Warnings of ours, of a claim that is undecided for instance."""
+    warning = warning_message.message
+    if type(warning).__module__.partition(".")[0] == __package__:
+        warning.args = tuple(for_terminal(str(arg)) for arg in warning.args)
+
+
 def _harmless(shown: Any) -> Any:
     """A failure's or a skip's representation, whose lines are all printable."""
     if isinstance(shown, str):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pytest_simbench.scene.checks import SceneError, check_number
 from pytest_simbench.scene.pose import FloatArray
 
 
@@ -18,12 +19,25 @@ class Trajectory:
         position: (n, n_joints) [rad or m]; row 0 is the set point at the start.
         velocity: (n, n_joints) [rad/s or m/s].
         effort: (n, n_joints) feed-forward from the model's inverse dynamics [N m or N].
+
+    Raises:
+        SceneError: arrays that do not fit each other, or a number that is not finite.
     """
 
     tick: float
     position: FloatArray
     velocity: FloatArray
     effort: FloatArray
+
+    def __post_init__(self) -> None:
+        check_number(self.tick, "the tick [s] of a trajectory", 0.0, above=True)
+        arrays = (self.position, self.velocity, self.effort)
+        shapes = [np.shape(rows) for rows in arrays]
+        if len(set(shapes)) > 1 or len(shapes[0]) != 2 or not shapes[0][0]:
+            told = ", ".join(map(str, shapes))
+            raise SceneError(f"a trajectory of the shapes {told}; give 3 times (rows, joints)")
+        if not all(np.isfinite(rows).all() for rows in arrays):
+            raise SceneError("a trajectory holds a number that is not finite")
 
     @property
     def duration(self) -> float:

@@ -9,11 +9,17 @@ import numpy as np
 
 from pytest_simbench.simulator.files import FileError, read_file
 
-LARGEST_MESH = 64 * 2**20
-"""[bytes]; a binary STL of 1.3 million triangles. Engines collide hulls of some thousand."""
+LARGEST_MESH = 16 * 2**20
+"""[bytes]"""
+
+MOST_TRIANGLES = 200_000
+"""As many as MuJoCo takes of an STL (its XML reference, asset/mesh)."""
 
 FARTHEST = 1e6
 """No vertex is farther from its origin, in the file's unit."""
+
+THINNEST = 1e-6
+"""Extent in the shortest direction over that in the longest."""
 
 PACKAGE = "package://"
 
@@ -62,42 +68,22 @@ def mesh_path(filename: str, urdf: str, packages: Mapping[str, str]) -> Path:
 
 
 def check_mesh(path: Path) -> None:
-    """Raise `FileError` unless a file is an STL or OBJ mesh of finite coordinates."""
-    ending = path.suffix.lower()
-    if ending not in (".stl", ".obj"):
-        raise FileError(f"{path} is no mesh that every engine reads; give an .stl or .obj file")
+    """Raise `FileError` unless a file is a binary STL mesh that has a convex hull."""
+    if path.suffix.lower() != ".stl":
+        raise FileError(f"{path} is no mesh that every engine reads; give a binary .stl file")
     data = read_file(path, LARGEST_MESH, "the mesh")
-    points = _stl_points(data) if ending == ".stl" else _obj_points(data)
-    if points is None or len(points) < 3:
-        raise FileError(f"{path} holds no {ending[1:].upper()} mesh")
+    count = int.from_bytes(data[80:84], "little")
+    if len(data) != 84 + count * TRIANGLE.itemsize or not count:
+        raise FileError(f"{path} holds no binary STL mesh; write it anew from a mesh editor")
+    if count > MOST_TRIANGLES:
+        raise FileError(f"{path} has {count} triangles; simplify it to {MOST_TRIANGLES} or fewer")
+    points = np.frombuffer(data, TRIANGLE, offset=84)["corners"].reshape(-1, 3).astype(float)
     if not (np.abs(points) <= FARTHEST).all():  # false for NaN
         raise FileError(f"{path} has a vertex that is not finite, or more than {FARTHEST:g} away")
+    spread = np.linalg.eigvalsh(np.cov(points.T))
+    if not spread[0] > THINNEST**2 * spread[2]:
+        raise FileError(f"{path} is flat: it has no convex hull, which is what engines collide")
 
 
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 """One of a binary STL, after 80 bytes of header and the number of triangles (uint32)."""
-
-
-def _stl_points(data: bytes) -> np.ndarray | None:
-    """Corners of the triangles, (n, 3); None for what is no STL."""
-    if len(data) >= 84:
-        count = int.from_bytes(data[80:84], "little")
-        if len(data) == 84 + count * TRIANGLE.itemsize:
-            return np.frombuffer(data, TRIANGLE, offset=84)["corners"].reshape(-1, 3)
-    if not data.lstrip().lower().startswith(b"solid"):
-        return None
-    return _vertices(data, b"vertex")
-
-
-def _obj_points(data: bytes) -> np.ndarray | None:
-    """Vertices, (n, 3); None for what is no OBJ with faces."""
-    has_faces = any(line.split()[:1] == [b"f"] for line in data.splitlines())
-    return _vertices(data, b"v") if has_faces else None
-
-
-def _vertices(data: bytes, word: bytes) -> np.ndarray | None:
-    rows = [line.split()[1:4] for line in data.splitlines() if line.split()[:1] == [word]]
-    try:
-        return np.array([[float(part) for part in row] for row in rows]).reshape(-1, 3)
-    except ValueError:
-        return None

@@ -13,7 +13,9 @@ from tests.hostile import assert_harmless_terminal
 EVIL = "\x1b]0;owned\x07\x1b[2Jred\r\u202e\x9b31m"
 
 TEST = """
+    import warnings
     import pytest
+    from pytest_simbench.measure.results import InconclusiveWarning
     from tests.tiny import Falling
 
     EVIL = {evil!r}
@@ -29,6 +31,9 @@ TEST = """
     def test_value(sim_name):
         local = EVIL
         assert sim_name == EVIL
+
+    def test_warns(sim_name):
+        warnings.warn(InconclusiveWarning("perhaps " + EVIL))
 
     def test_skipped(sim_name):
         pytest.skip("because " + EVIL)
@@ -47,10 +52,11 @@ def test_failures_and_skips(pytester: pytest.Pytester, style: str) -> None:
     result = pytester.runpytest_subprocess(
         "--sim=mujoco", "--reps=1", f"--tb={style}", "-l", "-rA", "--color=no"
     )
-    result.assert_outcomes(failed=2, skipped=1)
+    result.assert_outcomes(failed=2, passed=1, skipped=1)
     text = plain(result)
     assert r"no \x1b]0;owned\x07\x1b[2Jred \u202e\x9b31m" in text
     assert r"because \x1b" in text
+    assert r"perhaps \x1b" in text
 
 
 def hostile_run(folder: Path, records: Path) -> None:
