@@ -44,7 +44,7 @@ from pytest_simbench.session.case import Case
 from pytest_simbench.session.repeat import Repeater
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, cube
 
-STALL, TIMEOUT, MEMORY = 5.0, 15.0, 900.0
+STALL, TIMEOUT, MEMORY = 5.0, 15.0, 200.0
 """Limits of every repetition: silence [s], time from launch [s], memory [MB]."""
 
 SLACK = 15.0
@@ -106,7 +106,7 @@ FAULTS = (
     Fault("wrong shape", cause=("EngineFailed", "float64 (2, 13)"), phase="load"),
     Fault("wrong type of number", cause=("EngineFailed", "float32"), phase="load"),
     Fault("bodies in another order", cause=("EngineFailed", "order"), phase="load"),
-    Fault("memory up to the limit", cause=("OutOfMemory", "--sim-memory-limit")),
+    Fault("memory up to the limit", cause=("OutOfMemory", "--sim-memory-limit"), phase=None),
     Fault("memory refused", cause=("OutOfMemory", "allocate")),
     Fault("slow", cause=("RepetitionTimeout", "--sim-timeout")),
     Fault("child left behind", "ok"),
@@ -115,7 +115,7 @@ FAULTS = (
     Fault("log deleted", "ok"),
     Fault("folder deleted", "ok"),
     Fault("log flooded", "ok"),
-    Fault("display killed", cause=("DisplayLost", "SIGKILL")),
+    Fault("display killed", cause=("DisplayLost", "SIGKILL"), phase=None),
     Fault("Ctrl-C", "interrupted", ("KeyboardInterrupt", ""), None),
     Fault("Ctrl-C three times", "interrupted", ("KeyboardInterrupt", ""), None),
     Fault("SIGKILL of pytest"),
@@ -153,7 +153,7 @@ class Falling(Task):
                 for child in psutil.Process().children():
                     if child.name() == "Xvfb":
                         child.kill()
-            if self.fault.startswith("Ctrl-C"):
+            if self.fault.startswith("Ctrl-C") or self.fault == "slow":
                 world.wait(1e6)
             world.wait(DURATION)
         return Outcome({"landed": sum(p.position[2] < 0.03 for p in world.poses().values()) / 2})

@@ -71,10 +71,10 @@ def close_pipes() -> None:
 
 
 def eat() -> None:
-    """Memory up to the limit, at 100 MB a moment."""
+    """Memory up to the limit, at 10 MB a moment."""
     hoard = []
     while True:
-        hoard.append(np.ones(12_500_000))
+        hoard.append(np.ones(1_250_000))
         time.sleep(0.02)
 
 
@@ -197,7 +197,7 @@ class Chaos(Simulator):
     def step(self) -> None:
         super().step()  # type: ignore[safe-super]
         if self.fault == "slow":
-            time.sleep(0.2)
+            time.sleep(0.02)
         if not self.happened and self.time >= self.at:
             self.happened = True
             STEPPING.get(self.fault, lambda: None)()

@@ -24,8 +24,8 @@ PR_SET_CHILD_SUBREAPER = 36
 GONE = object()
 """In place of a request: the client is gone."""
 
-GRACE = 2.0
-"""For the client's reaper to end this process [s]: it finds our children through us."""
+GRACE = 5.0
+"""For the client, or its reaper, to end this process [s]: they find our children through us."""
 
 
 class PackageFinder:
