@@ -120,6 +120,11 @@ def cube(name: str, pose: Pose, colour: tuple[float, float, float, float]) -> Bo
     return Box(name, (CUBE_SIZE,) * 3, pose, mass=CUBE_MASS, colour=colour)
 
 
+def distance(a: Pose, b: Pose) -> float:
+    """Between two positions [m]."""
+    return float(np.linalg.norm(np.subtract(a.position, b.position)))
+
+
 def generators(seed: int) -> tuple[np.random.Generator, np.random.Generator, np.random.Generator]:
     """Independent random generators of a repetition: start jitter, cube order, planner."""
     jitter, order, planner = np.random.SeedSequence(seed).spawn(3)

@@ -22,6 +22,7 @@ from pytest_simbench.tasks.base import (
     Outcome,
     Task,
     cube,
+    distance,
     generators,
 )
 from pytest_simbench.tasks.manipulator import FULL_SPEED, LostCube, Manipulator, Speeds
@@ -279,11 +280,6 @@ def _placed(place: Place, pose: Pose) -> bool:
 def _strict(place: Place, pose: Pose) -> bool:
     offset = np.abs(np.subtract(pose.position, place.pose.position))
     return bool((offset <= STRICT_DISTANCE).all() and pose.tilt() < STRICT_TILT)
-
-
-def distance(a: Pose, b: Pose) -> float:
-    """Between two positions [m]."""
-    return float(np.linalg.norm(np.subtract(a.position, b.position)))
 
 
 def error_of(target: Pose, pose: Pose) -> Sequence[float]:

@@ -12,12 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-import numpy as np
-
 from pytest_simbench.client.world import World
 from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.scene import Box, Pose, Scene
-from pytest_simbench.tasks.base import CUBE_SIZE, Count, Jitter, Outcome, Task, cube
+from pytest_simbench.tasks.base import CUBE_SIZE, Count, Jitter, Outcome, Task, cube, distance
 
 STANDING_DISTANCE = 0.01
 """A cube farther than this from its place when the scene was built has fallen [m]."""
@@ -82,10 +80,8 @@ class LeaningTowers(Task):
             world.wait(self.settle)
         world.mark("end")
         fallen, toppled = [], set()
-        for number, (body, pose) in enumerate(
-            zip(world.scene.free_bodies, world.poses().values(), strict=True)
-        ):
-            if np.linalg.norm(np.subtract(pose.position, body.pose.position)) > STANDING_DISTANCE:
+        for number, body in enumerate(world.scene.free_bodies):
+            if distance(world.pose(body.name), body.pose) > STANDING_DISTANCE:
                 fallen.append(body.name)
                 toppled.add(self.tower_of(number))
         total = len(self.margins) * self.levels

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -343,7 +344,8 @@ def test_the_studys_rules() -> None:
         speeds=Speeds(1.0, 1.0, 1.0),
         settle=60.0,
     )
-    assert Stacking(towers=1, levels=2, settle=1.0).study().cubes == 2
+    own = Stacking(1, 2, True, 0.01, 2.0, False, 0.01, Speeds(0.5, 0.5, 0.5), settle=1.0)
+    assert own.study() == replace(Stacking().study(), towers=1, levels=2)  # its size stays
     assert Stacking() == Stacking(
         3, 5, True, 0.005, 0.5, False, 0.0, Speeds(1.0, 0.6, 0.3), 60.0
     )  # fmt: skip
