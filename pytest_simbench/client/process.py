@@ -313,17 +313,16 @@ class WorkerProcess:
         """End the worker and all that it started at once; from any thread, again and again."""
         if self._ended:
             return
-        self._know_family()
-        self._connection.cut()
+        reaper.reap(self._mark)
         for process in self._family:
             with contextlib.suppress(psutil.Error):
                 process.kill()
-        reaper.reap(self._mark)
+        self._connection.cut()
         self._connection.close()
         self._ended = True
 
     def _know_family(self) -> None:
-        """Note the worker's descendants, which may have thrown their mark away."""
+        """Note the worker's descendants, before it ends by itself and is theirs no longer."""
         popen = self._connection.popen
         if popen is not None:
             with contextlib.suppress(psutil.Error):

@@ -91,22 +91,42 @@ def marked(mark: str) -> list[psutil.Process]:
 
 
 def descendants(processes: Iterable[psutil.Process]) -> set[psutil.Process]:
-    """All children of children; some may have thrown their mark away."""
+    """All living children of children; some may have thrown their mark away."""
     found: set[psutil.Process] = set()
     for process in processes:
         with contextlib.suppress(psutil.Error):
             found.update(process.children(recursive=True))
-    return found
+    return {process for process in found if not _ended(process)}
+
+
+def _ended(process: psutil.Process) -> bool:
+    try:
+        return bool(process.status() == psutil.STATUS_ZOMBIE)
+    except psutil.Error:
+        return True
 
 
 def reap(mark: str) -> None:
-    """End all processes that carry the mark, their descendants, and what they start meanwhile."""
+    """End all processes that carry the mark, their descendants, and what they start meanwhile.
+
+    The marked are stopped first, and outlive their descendants: a worker adopts those that lose
+    their parent, so while it is there none gets away.
+    """
     until = time.monotonic() + REAP_TIMEOUT
-    while (found := marked(mark)) and time.monotonic() < until:
-        for process in [*found, *descendants(found)]:
-            with contextlib.suppress(psutil.Error):
-                process.kill()
+    while found := marked(mark):
+        for process in found:
+            _send(process, signal.SIGSTOP)
+        below, late = descendants(found), time.monotonic() > until
+        for process in [*below, *found] if late else below or found:
+            _send(process, signal.SIGKILL)
+        if late:
+            return
         time.sleep(0.01)
+
+
+def _send(process: psutil.Process, number: int) -> None:
+    with contextlib.suppress(psutil.Error):
+        process.send_signal(number)
 
 
 def main(mark: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import _thread
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -228,20 +228,35 @@ def test_an_interrupt_while_the_record_is_kept(case: Case) -> None:
     assert [record.status for record in records] == ["ok"]
 
 
+def test_an_interrupt_while_the_worker_is_ended(
+    case: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The worst moment for the second one: the first has been caught, and nothing is written."""
+    kill = WorkerProcess.kill
+
+    def interrupted(process: WorkerProcess) -> None:
+        _thread.interrupt_main()
+        time.sleep(0.05)
+        kill(process)
+
+    monkeypatch.setattr(WorkerProcess, "kill", interrupted)
+    thread = interrupt_after(2.0)
+    records, raised = kept(case, Falling(1e6))
+    thread.join()
+    assert raised
+    assert [record.status for record in records] == ["interrupted"]
+
+
 def test_a_time_out_is_a_failure_also_while_the_run_is_interrupted(case: Case) -> None:
-    """It happened first; what Ctrl-C ended is only what it ended."""
+    """What Ctrl-C ended is interrupted, and only that."""
     records: list[Record] = []
-    case = replace(case, timeout=3.0)
-    repeater = Repeater(case, 2, Silent(), records.append)  # type: ignore[arg-type]
 
-    def stop(keep: Callable[[Record], None]) -> Callable[[Record], None]:
-        def first(record: Record) -> None:
-            repeater._stopping.set()
-            keep(record)
+    class Stopping(Silent):
+        def phase(self, name: str) -> None:
+            if name == "fall":
+                repeater._stopping.set()  # Ctrl-C came, and has not reached this worker yet
 
-        return first
-
-    repeater.keep = stop(records.append)
+    repeater = Repeater(replace(case, timeout=3.0), 2, Stopping(), records.append)  # type: ignore[arg-type]
     repeater.run(Falling(1e6), [1])
     assert [(r.status, r.error and r.error.type) for r in records] == [
         ("failed", "RepetitionTimeout")

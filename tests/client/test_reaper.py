@@ -80,6 +80,9 @@ def started(folder: Path, adapter: str) -> tuple[subprocess.Popen[bytes], list[p
             break
         time.sleep(0.1)
     time.sleep(2.0)  # the worker is stepping, or stuck, by now
+    ids = folder / "ids"
+    while adapter.endswith("Parent") and not (ids.exists() and ids.read_text().count("\n") == 3):
+        time.sleep(0.1)
     return program, me.children(recursive=True)
 
 
@@ -111,7 +114,7 @@ def test_a_run_that_ends_well_leaves_nothing(tmp_path: Path) -> None:
             family.update(psutil.Process(program.pid).children(recursive=True))
         except psutil.NoSuchProcess:
             break
-        time.sleep(0.02)
+        time.sleep(0.2)
     assert program.wait() == 0
     assert family
     assert gone([process.pid for process in family], 2.0)
