@@ -183,6 +183,12 @@ def test_untouched_cubes_moved_by_more_than_1_cm(offset: dict[str, float], moved
     assert set(outcome.details["untouched_moved"]) == ({"cube_01"} if moved else set())
 
 
+def test_a_cube_moved_by_1_cm_sharp_has_not_moved() -> None:
+    for by, moved in ((0.01, 0.0), (math.nextafter(0.01, 1.0), 1.0)):
+        knock = Mishap("settle", 1.0, move("cube_18", y=by))  # which stands at y = 0
+        assert score(ONE, knock, jitter=Jitter(0.0, 0.0))["untouched_moved"] == moved
+
+
 def test_untouched_is_measured_from_when_the_cubes_had_settled() -> None:
     early = Mishap("settle start", 0.19, move("cube_01", x=-0.02))
     assert score(ONE, early)["untouched_moved"] == 0.0
