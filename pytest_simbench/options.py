@@ -199,7 +199,11 @@ def _ini(config: pytest.Config, item: Option) -> tuple[str, Any]:
         if name in _ours(config):
             try:
                 raw = config.getini(name)
-            except (TypeError, ValueError, pytest.UsageError) as error:  # not a text, or quotes that do not match
+            except (
+                TypeError,
+                ValueError,
+                pytest.UsageError,
+            ) as error:  # not a text, or quotes that do not match
                 raise pytest.UsageError(f"the ini option {name}: {error}") from None
             if raw is not None:
                 return f"the ini option {name}", raw

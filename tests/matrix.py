@@ -187,6 +187,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         subprocess.run(
             [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", str(built), str(HERE)],
             check=True,
+            stderr=subprocess.DEVNULL,  # the build's own warnings
         )
         for place in EVERY if given.all or given.only else QUICK:
             if given.only not in (None, place.name):

@@ -65,9 +65,7 @@ def test_a_link_is_not_followed(config: pytest.Config) -> None:
     assert interpreter_path("./link", "", config) == str(here / "link")
 
 
-@pytest.mark.parametrize(
-    "name", ["with blank", "a,b", "a//b", "it's", 'say "x"', "50%", "a=b", "ü"]
-)
+@pytest.mark.parametrize("name", ["with blank", "a,b", "a//b", "it's", 'say "x"', "50%", "ü"])
 def test_a_worker_runs_in_a_folder_of_any_name(pytester: pytest.Pytester, name: str) -> None:
     wrapper(pytester.path / name / "python")
     pytester.makepyfile(
