@@ -183,9 +183,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     failed = 0
     with tempfile.TemporaryDirectory() as temporary:
         folder = (given.folder or Path(temporary)).absolute()
-        built = Path(temporary, "wheel")
+        built, copy = Path(temporary, "wheel"), Path(temporary, "source")
+        hidden = shutil.ignore_patterns(".*", "build", "*.egg-info")  # an old build would stay in
+        shutil.copytree(HERE, copy, ignore=hidden)
         subprocess.run(
-            [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", str(built), str(HERE)],
+            [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", str(built), str(copy)],
             check=True,
             stderr=subprocess.DEVNULL,  # the build's own warnings
         )
