@@ -68,8 +68,9 @@ def checked_specification(text: str, where: str) -> str:
         if key not in (*TYPES, *KEYS) and not (key.startswith("env:") and key != "env:"):
             _refuse(where, f"{key!r} is none of execnet's keys; choose from "
                     f"{', '.join((*TYPES, *KEYS))}, separated by //")  # fmt: skip
-        if bool(equals and value) == (key in ("popen", "dont_write_bytecode")):
-            _refuse(where, f"{key} takes {'no' if equals else 'a'} value")
+        bare = key in ("popen", "dont_write_bytecode")
+        if bool(equals if bare else not value):
+            _refuse(where, f"{key} takes {'no' if bare else 'a'} value")
         parts[key] = value
     kinds = [kind for kind in TYPES if kind in parts]
     if len(kinds) != 1:

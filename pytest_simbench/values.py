@@ -70,7 +70,6 @@ class Kind(ABC):
         """
 
 
-@dataclass(frozen=True)
 class Flag(Kind):
     """On or off; in an ini file a word that says so."""
 
@@ -87,7 +86,7 @@ class Flag(Kind):
         return self.words[word]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Number(Kind):
     """A finite number from `low` to `high`, both included."""
 
@@ -139,7 +138,7 @@ class Auto:
     limit: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Repetitions(Kind):
     """A number of repetitions up to `most`, `auto`, or `auto:LIMIT`.
 
@@ -164,7 +163,7 @@ class Repetitions(Kind):
             raise BadValue(texts[-1], f"{number.advice}, auto or auto:LIMIT") from None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Choice(Kind):
     """One of a few words."""
 
@@ -176,7 +175,6 @@ class Choice(Kind):
         return texts[-1]
 
 
-@dataclass(frozen=True)
 class Word(Kind):
     """A name."""
 
@@ -193,7 +191,6 @@ def _word(text: str, whole: str) -> str:
     return word
 
 
-@dataclass(frozen=True)
 class Words(Kind):
     """Names, separated by commas (in an ini file by blanks too)."""
 
@@ -203,7 +200,6 @@ class Words(Kind):
         return [_word(part, text) for text in texts or [""] for part in text.split(",")]
 
 
-@dataclass(frozen=True)
 class File(Kind):
     """A path, of which this machine's file system could have a file."""
 
@@ -219,7 +215,6 @@ class File(Kind):
         return path
 
 
-@dataclass(frozen=True)
 class Files(Kind):
     """Paths, each given by itself."""
 
@@ -229,7 +224,7 @@ class Files(Kind):
         return [File().read([text]) for text in texts or [""]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Assignments(Kind):
     """`KEY=VALUE` texts, each key once.
 
@@ -274,7 +269,6 @@ class Assignments(Kind):
             raise BadValue(part, "the value must be a finite number") from None
 
 
-@dataclass(frozen=True)
 class Limits(Kind):
     """`METRIC:LIMIT,...`; which metrics there are is known later, see `measure.limits`."""
 

@@ -1,0 +1,125 @@
+"""What a test gives our fixtures: a wrong one is one sentence, and nothing is simulated."""
+
+from __future__ import annotations
+
+import pytest
+
+HEAD = """
+import math
+import pytest
+from tests.tiny import Falling
+from pytest_simbench.tasks import Throwing
+
+class Other(Falling):
+    name = "other"
+
+"""
+
+TESTS = {
+    "repeat(Throwing)": "repeat(Throwing) got a class instead of a task: write repeat(Throwing())",
+    "repeat(5)": "repeat(5) takes a task, for instance repeat(Throwing())",
+    "repeat(None)": "repeat(None) takes a task",
+    "repeat('stacking' * 999)": "repeat('stackingstacking*...) takes a task",
+    "replay(Throwing)": "replay(Throwing) got a class instead of a task",
+    "replay(5)": "replay(5) takes a task",
+    "perturb(Throwing)": "perturb(Throwing) got a class instead of a task",
+    "perturb([])": "perturb([[]]) takes a task",
+    "threshold(5, 1)": "threshold(5, ...) takes the name of a metric as a text",
+    "threshold('', 1)": "threshold('', ...) takes the name of a metric as a text",
+    "threshold('placed', 'much')": "threshold('placed', *much*) takes a finite number",
+    "threshold('placed', math.nan)": "threshold('placed', nan) takes a finite number",
+    "threshold('placed', True)": "threshold('placed', True) takes a finite number",
+}
+
+
+def no_traceback(result: pytest.RunResult) -> None:
+    text = result.stdout.str() + result.stderr.str()
+    assert "Traceback (" not in text
+    assert "Error:" not in text
+
+
+def test_wrong_arguments(pytester: pytest.Pytester) -> None:
+    calls = "".join(
+        f"def test_{number}({call.partition('(')[0]}):\n    {call}\n\n"
+        for number, call in enumerate(TESTS)
+    )
+    pytester.makepyfile(HEAD + calls)
+    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=out")
+    result.assert_outcomes(failed=len(TESTS))
+    result.stdout.fnmatch_lines([f"{message}*" for message in TESTS.values()])
+    no_traceback(result)
+    assert not (pytester.path / "out").exists()
+
+
+def test_one_task_twice_in_a_test(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        HEAD
+        + """
+def test_twice(repeat):
+    repeat(Falling())
+    repeat(Falling(duration=0.1))
+
+def test_two_tasks(repeat):
+    repeat(Falling())
+    repeat(Other())
+"""
+    )
+    result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=1")
+    result.assert_outcomes(failed=1, passed=1)
+    result.stdout.fnmatch_lines(["repeat() is called for the task 'falling' a second time in one*"])
+    no_traceback(result)
+
+
+SETTINGS = {
+    "{'speed': 1}": "mujoco has no setting 'speed'; choose from timestep=*",
+    "{3: 1}": "mujoco has no setting 3; choose from timestep=*",
+    "{'timestep': 'fast'}": "mujoco.timestep=fast: give a finite number",
+    "{'timestep': None}": "mujoco.timestep=None: give a finite number",
+    "{'timestep': float('inf')}": "mujoco.timestep=inf: give a finite number",
+    "{'timestep': 5}": "mujoco.timestep=5: give a number of seconds from 1e-06 to 0.1",
+    "{'noslip_iterations': 1.5}": "mujoco.noslip_iterations=1.5: give a whole number",
+    "{'solref': 3}": "mujoco.solref=3: give 2 numbers, separated by '/'",
+    "{'cone': 3}": "mujoco.cone=3: choose from pyramidal, elliptic",
+}
+
+
+def test_wrong_settings(pytester: pytest.Pytester) -> None:
+    given = [*SETTINGS, "[1]", "None", "'timestep=0.1'"]
+    parts = [
+        f"class Test{number}:\n"
+        f"    @pytest.fixture\n    def sim_settings(self):\n        return {value}\n\n"
+        "    def test_it(self, repeat):\n        repeat(Falling())\n"
+        for number, value in enumerate(given)
+    ]
+    pytester.makepyfile(HEAD + "\n".join(parts))
+    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=out")
+    result.assert_outcomes(errors=len(given))
+    result.stdout.fnmatch_lines(
+        [
+            *(f"the fixture sim_settings: {message}" for message in SETTINGS.values()),
+            "the fixture sim_settings gives *1*; it must give a dict of settings by name*",
+            "the fixture sim_settings gives None; it must give a dict of settings by name*",
+            "the fixture sim_settings gives *; it must give a dict of settings by name*",
+        ]
+    )
+    no_traceback(result)
+    assert not (pytester.path / "out").exists()
+
+
+def test_good_settings_are_taken(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        HEAD
+        + """
+import numpy as np
+
+@pytest.fixture
+def sim_settings():
+    return {"timestep": np.float32(0.01), "noslip_iterations": np.int64(3), "solref": [0.01, 1]}
+
+def test_it(repeat):
+    settings = repeat(Falling()).records[0].settings
+    assert settings["timestep"] == pytest.approx(0.01)
+    assert settings["noslip_iterations"] == 3
+"""
+    )
+    pytester.runpytest_subprocess("--sim=mujoco", "--reps=1").assert_outcomes(passed=1)

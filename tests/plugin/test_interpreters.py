@@ -1,0 +1,139 @@
+"""`--sim-python` and `--sim-spec`: whatever cannot be one is said before a worker is started."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from pytest_simbench.interpreters import checked_specification, interpreter_path
+
+
+@pytest.fixture
+def config(pytester: pytest.Pytester) -> pytest.Config:
+    return pytester.parseconfig()
+
+
+def wrapper(path: Path, executable: bool = True) -> Path:
+    """An interpreter that is this one under another path."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(f'#!/bin/sh\nexec {sys.executable} "$@"\n')
+    path.chmod(0o755 if executable else 0o644)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("/nowhere/python", "there is no such file"),
+        ("no-such-program", "there is no such program on the PATH"),
+        ("~/no-such-file/python", "there is no such file"),
+        ("~no-such-user/python", "there is no such file"),
+        ("folder", "there is no such program on the PATH"),
+        ("./folder", "is a folder; give the interpreter in it"),
+        ("./venv", "is a folder; give the interpreter in it, /.*/venv/bin/python"),
+        ("./plain.txt", "the file cannot be executed"),
+        ("folder//none", "there is no such file"),
+        ("/dev/null", "the file cannot be executed"),
+    ],
+)
+def test_no_interpreter(config: pytest.Config, text: str, message: str) -> None:
+    here = config.invocation_params.dir
+    (here / "folder").mkdir()
+    wrapper(here / "venv" / "bin" / "python")
+    wrapper(here / "plain.txt", executable=False)
+    with pytest.raises(pytest.UsageError, match=f"^--sim-python=x: {message}"):
+        interpreter_path(text, "--sim-python=x", config)
+
+
+def test_paths_become_absolute(config: pytest.Config, monkeypatch: pytest.MonkeyPatch) -> None:
+    here = config.invocation_params.dir
+    python = wrapper(here / "a, b" / "bin" / "python")
+    monkeypatch.setenv("HOME", str(here))
+    monkeypatch.setenv("PATH", f"{python.parent}:{os.environ['PATH']}")
+    for text in (str(python), "a, b/bin/python", "./a, b//bin///python", f"/{python}", "python",
+                 "~/a, b/bin/python", "venv/../a, b/bin/python"):  # fmt: skip
+        assert interpreter_path(text, "", config) == str(python)
+
+
+def test_a_link_is_not_followed(config: pytest.Config) -> None:
+    """A virtual environment's interpreter is a link, and knows by its path where it belongs."""
+    here = config.invocation_params.dir
+    (here / "link").symlink_to(sys.executable)
+    assert interpreter_path("./link", "", config) == str(here / "link")
+
+
+@pytest.mark.parametrize("name", ["with blank", "a,b", "a//b", "it's", 'say "x"', "50%", "ü"])
+def test_a_worker_runs_in_a_folder_of_any_name(pytester: pytest.Pytester, name: str) -> None:
+    wrapper(pytester.path / name / "python")
+    pytester.makepyfile(
+        """
+        from pytest_simbench.scene import Scene
+
+        def test_it(sim):
+            sim(Scene("s")).wait(0.1)
+        """
+    )
+    result = pytester.runpytest_subprocess("--sim=mujoco", f"--sim-python=mujoco={name}/python")
+    result.assert_outcomes(passed=1)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("garbage", "'garbage' is none of execnet's keys; choose from popen, ssh, "),
+        ("popen//", "'' is none of execnet's keys"),
+        ("popen//pyhton=x", "'pyhton' is none of execnet's keys"),
+        ("popen//_spec=x", "'_spec' is none of execnet's keys"),
+        ("popen//python=", "python takes a value"),
+        ("popen=3", "popen takes no value"),
+        ("ssh", "ssh takes a value"),
+        ("ssh=", "ssh takes a value"),
+        ("python=/bin/sh", "give one of popen, ssh, socket, vagrant_ssh"),
+        ("popen//ssh=host", "give one of popen, ssh, socket, vagrant_ssh"),
+        ("popen//popen", "popen is there twice"),
+        ("popen//execmodel=magic", "execmodel must be main_thread_only or thread"),
+        ("popen//nice=very", "nice takes a whole number"),
+        ("socket=host", "socket takes HOST:PORT"),
+        ("socket=host:99999", "socket takes HOST:PORT"),
+        ("socket=:22", "socket takes HOST:PORT"),
+        ("popen//env:=3", "'env:' is none of execnet's keys"),
+        ("popen//via=other", "'via' is none of execnet's keys"),
+        ("popen//python=/nowhere/python", "there is no program /nowhere/python"),
+        ("popen//python='", "python= holds quotes that do not match"),
+    ],
+)
+def test_no_specification(text: str, message: str) -> None:
+    with pytest.raises(pytest.UsageError, match=f"^--sim-spec=x: {message}"):
+        checked_specification(text, "--sim-spec=x")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["popen", f"popen//python={sys.executable} -u", "ssh=user@host//python=/usr/bin/python3",
+     "socket=localhost:8888", "popen//env:A=b//nice=-5//chdir=/tmp//dont_write_bytecode",
+     "ssh=-p 2222 host//ssh_config=~/c//execmodel=thread", "vagrant_ssh=box"],
+)  # fmt: skip
+def test_specifications(text: str) -> None:
+    assert checked_specification(text, "") == text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--sim-python=nosuch=sh"], "unknown simulator 'nosuch'; choose from "),
+        (["--sim-python=mujoco=/x//y,z"], "--sim-python=mujoco=/x//y,z: there is no such file"),
+        (["--sim-spec=mujoco=x"], "--sim-spec=mujoco=x: 'x' is none of execnet's keys"),
+        (["--sim-spec=mujoco=popen", "--sim-python=mujoco=sh"], "mujoco has both --sim-python and"),
+        (["--sim-python=mujoco=sh", "--sim-python=mujoco=sh"], "mujoco is given twice; give it"),
+    ],
+)
+def test_said_before_anything_runs(
+    pytester: pytest.Pytester, arguments: list[str], message: str
+) -> None:
+    result = pytester.runpytest_subprocess(*arguments)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines([f"ERROR: *{message}*"])
+    assert len(result.stderr.lines) <= 2
