@@ -160,6 +160,17 @@ def test_a_start_that_fails_still_records_its_settings(case: Case) -> None:
     assert record.to_dict()["settings"] == expected(case, Falling()).to_dict()["settings"]
 
 
+def test_a_time_out_failed_and_is_not_run_again(case: Case, save: Save) -> None:
+    from pytest_simbench.session.repetition import Repetition
+
+    case = replace(case, timeout=3.0)
+    record, error = Repetition(case, Falling(duration=1e5), 1).run()
+    assert error is not None
+    assert record.error is not None
+    assert (record.status, record.error.type) == ("failed", "RepetitionTimeout")
+    assert list(save(record).take(case, Falling(duration=1e5), None)) == [1]
+
+
 TEST = """
     from tests.tiny import Falling
 
