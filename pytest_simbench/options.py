@@ -61,7 +61,7 @@ OPTIONS = (
            "int", "N"),
     Option("--sim-memory-limit", None, "memory a worker may use before it is killed", "float",
            "MB"),
-    Option("--sim-output", None, "run folder, of one run (default: .simbench/TIME-ID)", "text", "DIR"),
+    Option("--sim-output", None, "folder of the run (default: .simbench/TIME-ID)", "text", "DIR"),
     Option("--sim-trace", "off", "write joint and body motion at 50 Hz into the run folder",
            "text", "WHEN", ("off", "on", "retain-on-failure")),
     Option("--sim-threshold", [], "change a threshold of the suites: placed=0.9", "list",
