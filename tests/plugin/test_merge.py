@@ -13,6 +13,7 @@ import pytest_simbench.tasks  # noqa: F401 - pytester would import native module
 from pytest_simbench.measure.record import Record
 from pytest_simbench.measure.records import RecordFile, read_records
 from pytest_simbench.merge import merge_runs
+from pytest_simbench.session.identity import file_stem_of
 from tests.measure.build import record
 
 
@@ -30,8 +31,8 @@ def merge(pytester: pytest.Pytester, *runs: str, output: str = "whole") -> int:
 
 def test_logs_and_traces_are_copied_under_names_of_ours(pytester: pytest.Pytester) -> None:
     for name, seed in (("a", 1), ("b", 2)):
-        saved(pytester.path / name, seed, "logs/x-1.log")
-        for path in ("logs/x-1.log", "traces/x-1.npz"):
+        found = saved(pytester.path / name, seed, "logs/x-1.log")
+        for path in ("logs/x-1.log", f"traces/{file_stem_of(found)}.npz"):
             file = pytester.path / name / path
             file.parent.mkdir(exist_ok=True)
             file.write_text(f"{path} of {name}")
