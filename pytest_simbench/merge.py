@@ -93,17 +93,18 @@ def _copy(
     records, refused = [], []
     for item in joined:
         stem, folder = file_stem_of(item.record), folders[item.run]
-        log = item.record.details.get("log") or ""
         details = dict(item.record.details)
-        if log:
+        if log := item.was.details.get("log") or "":
             details["log"] = ""
-            trace = f"traces/{Path(log).stem}.npz"
-            for source, target in ((log, f"logs/{stem}.log"), (trace, f"traces/{stem}.npz")):
-                try:
-                    if _copied(inside(folder, source), to, target) and source == log:
-                        details["log"] = target
-                except FolderError as error:
-                    refused.append(f"not copied: {error}")
+        for source, target in (
+            (log, f"logs/{stem}.log"),
+            (f"traces/{file_stem_of(item.was)}.npz", f"traces/{stem}.npz"),
+        ):
+            try:
+                if source and _copied(inside(folder, source), to, target) and source == log:
+                    details["log"] = target
+            except FolderError as error:
+                refused.append(f"not copied: {error}")
         records.append(replace(item.record, details=details))
     return records, list(dict.fromkeys(refused))
 

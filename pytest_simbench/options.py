@@ -111,7 +111,7 @@ OPTIONS = (
            "(records are marked contended)", 1, metavar="N"),
     Option("--sim-memory-limit", Number(1, 1e9), "memory a worker may use before it is killed",
            metavar="MB"),
-    Option("--sim-output", File(), "run folder (default: .simbench/TIME)", metavar="DIR"),
+    Option("--sim-output", File(), "folder of the run (default: .simbench/TIME-ID)", metavar="DIR"),
     Option("--sim-trace", Choice(("off", "on", "retain-on-failure")), "write joint and body motion "
            "at 50 Hz into the run folder: off, on, retain-on-failure", "off", metavar="WHEN"),
     Option("--sim-threshold", Assignments("METRIC=NUMBER", numbers=True), "change a threshold of "

@@ -44,13 +44,18 @@ def folder_to_resume(config: pytest.Config) -> Path | None:
                 "--sim-resume=RUN with the folder of a run"
             )
         return folder
-    runs = sorted(config.rootpath.glob(f".simbench/*/{RECORDS_NAME}"))
+    runs = sorted(config.rootpath.glob(f".simbench/*/{RECORDS_NAME}"), key=_begun)
     if not runs:
         raise pytest.UsageError(
             f"there is no run to resume in {config.rootpath / '.simbench'}; write "
             "--sim-resume=RUN with the folder of a run"
         )
     return runs[-1].parent
+
+
+def _begun(records: Path) -> tuple[str, float]:
+    """When a run began, by its folder's name; of one second, the one written to last."""
+    return records.parent.name[: len("2026-07-01_12-00-00")], records.stat().st_mtime
 
 
 class NotResumed(Exception):

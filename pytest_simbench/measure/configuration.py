@@ -102,7 +102,7 @@ def values(record: Record, use: Use) -> dict[str, Any]:
         key: value
         for name in equal_to(use)
         for key, value in _flat(name, getattr(record, name))
-        if not (name in NEW and value in ("", None))
+        if not (name in NEW and value == "")
     }
 
 

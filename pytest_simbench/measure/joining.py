@@ -23,10 +23,12 @@ class Joined:
     Attributes:
         record: under its new number.
         run: name of the run that it comes from.
+        was: the record as it stands there.
     """
 
     record: Record
     run: str
+    was: Record
 
 
 def join(runs: Mapping[str, Sequence[Record]]) -> list[Joined]:
@@ -55,7 +57,8 @@ def join(runs: Mapping[str, Sequence[Record]]) -> list[Joined]:
         id_ = every[0][0].test
         for record, name in sorted(every, key=lambda item: item[0].seed):
             number = record.seed - first + 1
-            joined.append(Joined(replace(record, test=id_, repetition=number, attempt=1), name))
+            ours = replace(record, test=id_, repetition=number, attempt=1)
+            joined.append(Joined(ours, name, record))
     return joined
 
 

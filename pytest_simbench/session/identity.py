@@ -127,18 +127,16 @@ def _content(path: str) -> str:
 
 def file_stem(case: Case, task: Task, number: int) -> str:
     """The name of a repetition's log and trace, without folder and ending; no other has it."""
-    shown = case.test.rpartition("::")[2]
-    return f"{file_name(shown, *_identity(case.test, task.name, task.parameters()))}" + (
-        f"-{number}" if case.attempt == 1 else f"-{number}-attempt-{case.attempt}"
-    )
+    return _stem(case.test, task.name, task.parameters(), number, case.attempt)
 
 
 def file_stem_of(record: Record) -> str:
-    """The same for a record of a run that is joined with others."""
+    """The same for a record, as its run named them."""
     task = {key: value for key, value in record.settings.items() if key.startswith("task.")}
-    shown = record.test.rpartition("::")[2]
-    return f"{file_name(shown, *_identity(record.test, record.task, task))}-{record.repetition}"
+    return _stem(record.test, record.task, task, record.repetition, record.attempt)
 
 
-def _identity(test: str, task: str, of_task: Mapping[str, Any]) -> tuple[str, ...]:
-    return test, task, json.dumps(of_task, sort_keys=True, default=list)
+def _stem(test: str, task: str, of_task: Mapping[str, Any], number: int, attempt: int) -> str:
+    told = json.dumps(of_task, sort_keys=True, default=list)
+    name = file_name(test.rpartition("::")[2], test, task, told)
+    return f"{name}-{number}" if attempt == 1 else f"{name}-{number}-attempt-{attempt}"

@@ -159,9 +159,7 @@ def test_a_second_attempt_replaces_the_first_in_tables_and_both_stay(
     pytester: pytest.Pytester,
 ) -> None:
     """As pytest-rerunfailures does: the same test, once more in the same process."""
-    pytester.makepyfile(
-        TEST + "        repeat(Falling(duration=0.2))\n".replace("        ", "    ", 1)
-    )
+    pytester.makepyfile(f"{TEST.rstrip()}\n        repeat(Falling(duration=0.2))\n")
     path = pytester.path / "o"
     result = run(pytester, "--sim-output=o")
     result.assert_outcomes(passed=1)

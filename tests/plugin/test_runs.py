@@ -111,8 +111,10 @@ def test_jobs_run_side_by_side_and_say_so(pytester: pytest.Pytester) -> None:
 
 def test_benchmark_rounds_are_worker_seconds_and_compare(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(TEST)
-    arguments = ["--sim=mujoco", "--reps=3", "--sim-output=out", "--benchmark-autosave"]
-    pytester.runpytest_subprocess(*arguments, "--benchmark-json=b.json").assert_outcomes(passed=1)
+    arguments = ["--sim=mujoco", "--reps=3", "--benchmark-autosave"]
+    pytester.runpytest_subprocess(
+        *arguments, "--benchmark-json=b.json", "--sim-output=out"
+    ).assert_outcomes(passed=1)
     (benchmark,) = json.loads((pytester.path / "b.json").read_text())["benchmarks"]
     kept = records(pytester.path / "out")
     seconds = [r["stepping"]["wall"] for r in kept]  # type: ignore[index]
@@ -224,7 +226,7 @@ def test_k_and_x_choose_and_stop(pytester: pytest.Pytester) -> None:
         repeat(Falling()).assert_at_most("landed", -1.0)
 """
     )
-    arguments = ["--sim=mujoco,pybullet", "--reps=1", "--sim-output=out"]
+    arguments = ["--sim=mujoco,pybullet", "--reps=1"]
     result = pytester.runpytest_subprocess(*arguments, "-k", "falling and mujoco")
     result.assert_outcomes(passed=1, deselected=3)
     result = pytester.runpytest_subprocess(*arguments, "-k", "impossible", "-x")

@@ -1,0 +1,222 @@
+"""A run is gone on with only as it was begun, also when nothing of it is missing."""
+
+from __future__ import annotations
+
+import fnmatch
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_simbench.measure.record import Record
+from pytest_simbench.measure.records import RecordFile
+from pytest_simbench.resume import NotResumed, Resumed
+from pytest_simbench.session.case import Case
+from pytest_simbench.session.identity import expected
+from pytest_simbench.session.protocol import PROTOCOLS
+from tests.tiny import Falling
+
+Save = Callable[..., Resumed]
+
+
+@pytest.fixture
+def save(tmp_path: Path) -> Save:
+    """A run folder with these records, to be resumed."""
+
+    def saved(*records: Record) -> Resumed:
+        file = RecordFile(tmp_path / "records.jsonl")
+        for record in records:
+            assert file.append(record)
+        return Resumed(tmp_path)
+
+    return saved
+
+
+def ended(case: Case, task: Falling, *numbers: int, **changes: Any) -> list[Record]:
+    """Records of repetitions that went well."""
+    return [
+        replace(expected(case, task, k), status="ok", metrics={"landed": 1.0}, **changes)
+        for k in numbers
+    ]
+
+
+def test_what_came_to_an_end_is_taken(case: Case, save: Save) -> None:
+    task = Falling()
+    cut = replace(ended(case, task, 3)[0], status="interrupted", metrics={})
+    found = save(*ended(case, task, 1, 2), cut).take(case, task, None)
+    assert sorted(found) == [1, 2]
+    assert save().take(replace(case, test="another[mujoco-headless]"), task, None) == {}
+
+
+@pytest.mark.parametrize(
+    ("now", "difference"),
+    [
+        ({"changes": {"timestep": "0.01"}}, "settings.timestep was 0.001, is 0.01"),
+        ({"changes": {"cone": "pyramidal"}}, 'settings.cone was "elliptic", is "pyramidal"'),
+        ({"profile": "default"}, 'profile was "tuned", is "default"; settings.*'),
+        ({"jitter": 50.0}, "jitter was 1.0, is 50.0"),
+        ({"protocol": PROTOCOLS["paper"]}, 'protocol was "fast", is "paper"'),
+        ({"seed": 770001}, "--sim-seed was 2022, is 770001"),
+        ({"timeout": 3.0}, "limits.timeout was 60.0, is 3.0"),
+        ({"stall_timeout": 3.0}, "limits.stall_timeout was 20.0, is 3.0"),
+        ({"memory_limit": 100.0}, "limits.memory_limit was null, is 100.0"),
+    ],
+    ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
+)
+@pytest.mark.parametrize("status", ["ok", "interrupted", "failed"])
+def test_a_complete_run_is_held_against_the_options_without_a_worker(
+    case: Case, save: Save, now: dict[str, Any], difference: str, status: str
+) -> None:
+    before = [replace(r, status=status) for r in ended(case, Falling(), 1, 2)]
+    with pytest.raises(NotResumed) as refused:
+        save(*before).take(replace(case, **now), Falling(), None)
+    assert fnmatch.fnmatch(
+        str(refused.value),
+        "test_x[[]mujoco-headless] of the run * is not resumed, since its repetitions would not be "
+        f"comparable: {difference}",
+    )
+
+
+def test_the_tasks_parameters_and_scene_are_compared(case: Case, save: Save) -> None:
+    resumed = save(*ended(case, Falling(), 1))
+    with pytest.raises(NotResumed, match=r"settings.task.duration was 0.6, is 9.0"):
+        resumed.take(case, Falling(duration=9.0), None)
+    with pytest.raises(NotResumed, match=r"scene was "):
+        save(*ended(case, Falling(), 2, scene="of another task")).take(case, Falling(), None)
+
+
+@pytest.mark.parametrize("name", ["mujoco", "pytest-simbench", "python"])
+def test_versions_that_are_known_here_are_compared(case: Case, save: Save, name: str) -> None:
+    versions = expected(case, Falling()).versions
+    assert name in versions
+    old = ended(case, Falling(), 1, versions={**versions, name: "0.0.1"})
+    with pytest.raises(NotResumed, match=f'versions.{name} was "0.0.1", is "'):
+        save(*old).take(case, Falling(), None)
+
+
+def test_versions_of_somebody_elses_interpreter_are_not_guessed(case: Case) -> None:
+    other = replace(case, python="/somewhere/bin/python")
+    assert list(expected(other, Falling()).versions) == ["pytest-simbench"]
+
+
+def test_fewer_repetitions_than_recorded_are_refused_and_more_are_not(
+    case: Case, save: Save
+) -> None:
+    resumed = save(*ended(case, Falling(), 1, 2, 3))
+    with pytest.raises(NotResumed, match="--reps was 3 or more, is 2"):
+        resumed.take(case, Falling(), 2)
+    assert len(resumed.take(case, Falling(), 4)) == 3
+    assert len(resumed.take(case, Falling(), None)) == 3
+
+
+def test_a_mixture_of_an_older_plugin_is_refused(case: Case, save: Save) -> None:
+    coarse = replace(case, changes={"timestep": 0.004})
+    resumed = save(*ended(coarse, Falling(), 1, 2), *ended(case, Falling(), 3, 4))
+    with pytest.raises(NotResumed, match="settings.timestep was 0.004, is 0.001"):
+        resumed.take(case, Falling(), None)
+
+
+def test_two_tasks_of_one_test_are_taken_one_by_one(case: Case, save: Save) -> None:
+    first, second = Falling(duration=0.2), Falling(duration=0.1)
+    resumed = save(*ended(case, first, 1, 2), *ended(case, second, 1))
+    assert [len(resumed.take(case, task, None)) for task in (first, second)] == [2, 1]
+    begun = Resumed(resumed.folder)
+    begun.records = tuple(ended(case, first, 1, 2))  # it had not come to the second task
+    assert [len(begun.take(case, task, None)) for task in (first, second)] == [2, 0]
+
+
+def test_each_attempt_gets_its_own(case: Case, save: Save) -> None:
+    again = replace(case, attempt=2)
+    resumed = save(*ended(case, Falling(), 1, 2), *ended(again, Falling(), 1))
+    assert len(resumed.take(case, Falling(), None)) == 2
+    assert len(resumed.take(again, Falling(), None)) == 1
+
+
+def test_records_of_before_scene_and_limits_were_kept_go_on(case: Case, save: Save) -> None:
+    old = ended(case, Falling(), 1, scene="", limits={})
+    assert len(save(*old).take(case, Falling(), None)) == 1
+
+
+def test_expected_is_what_the_worker_reports(case: Case) -> None:
+    from pytest_simbench.session.repetition import Repetition
+
+    case = replace(case, changes={"timestep": "0.002"})
+    record, error = Repetition(case, Falling(duration=0.01), 1).run()
+    assert error is None
+    now = expected(case, Falling(duration=0.01)).to_dict()
+    for name in ("settings", "scene", "limits", "profile", "protocol", "jitter", "versions"):
+        assert record.to_dict()[name] == now[name]
+
+
+def test_a_start_that_fails_still_records_its_settings(case: Case) -> None:
+    from pytest_simbench.session.repetition import Repetition
+
+    record, error = Repetition(replace(case, python="/nowhere/python"), Falling(), 1).run()
+    assert error is not None
+    assert record.status == "failed"
+    assert record.to_dict()["settings"] == expected(case, Falling()).to_dict()["settings"]
+
+
+def test_a_time_out_failed_and_is_not_run_again(case: Case, save: Save) -> None:
+    from pytest_simbench.session.repetition import Repetition
+
+    case = replace(case, timeout=3.0)
+    record, error = Repetition(case, Falling(duration=1e5), 1).run()
+    assert error is not None
+    assert record.error is not None
+    assert (record.status, record.error.type) == ("failed", "RepetitionTimeout")
+    assert list(save(record).take(case, Falling(duration=1e5), None)) == [1]
+
+
+TEST = """
+    from tests.tiny import Falling
+
+    def test_falling(repeat, threshold):
+        repeat(Falling(duration=0.2)).assert_at_most("landed", threshold("landed", 1.0))
+"""
+
+
+def test_on_the_command_line(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(TEST)
+
+    def run(*arguments: str) -> pytest.RunResult:
+        return pytester.runpytest_subprocess("--sim=mujoco", *arguments)
+
+    run("--reps=3", "--sim-output=o").assert_outcomes(passed=1)
+    path = pytester.path / "o" / "records.jsonl"
+    lines = path.read_bytes().splitlines(keepends=True)
+    resume = ("--reps=3", "--sim-resume=o")
+    for change in ("--sim-set=mujoco.timestep=0.01", "--jitter=50"):
+        result = run(*resume, change)
+        result.assert_outcomes(failed=1)
+        result.stdout.fnmatch_lines(["*is not resumed, since its repetitions would not be*"])
+        assert path.read_bytes() == b"".join(lines)
+    run(*resume, "--sim-threshold=landed=0.5", "-n1").assert_outcomes(passed=1)
+    # A power loss took the second record.
+    path.write_bytes(lines[0] + b"\0" * len(lines[1]) + lines[2])
+    result = run(*resume, "-n1")
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines(
+        [
+            "falling: 3 repetitions, protocol fast",
+            "*records.jsonl:2: the line is damaged and left out: it holds NUL bytes",
+            "the damaged records are kept in *records.jsonl.damaged-1",
+        ]
+    )
+    again = path.read_bytes().splitlines(keepends=True)
+    assert [again[0], again[1]] == [lines[0], lines[2]]
+    assert [json.loads(line)["repetition"] for line in again] == [1, 3, 2]
+
+
+def test_a_newer_schema_is_one_sentence(pytester: pytest.Pytester, case: Case, save: Save) -> None:
+    resumed = save(*ended(case, Falling(), 1))
+    path = resumed.folder / "records.jsonl"
+    path.write_text(path.read_text().replace('"schema": 1', '"schema": 9'))
+    result = pytester.runpytest_subprocess("--sim=mujoco", f"--sim-resume={resumed.folder}")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(
+        ["ERROR: --sim-resume: *records.jsonl:1: schema 9 was written by a newer pytest-simbench*"]
+    )
