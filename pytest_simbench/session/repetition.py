@@ -161,7 +161,7 @@ class Repetition:
     def _enter(self, phase: str) -> None:
         self.where.phase = phase
         if self._sampler is not None:
-            self._sampler.phase = phase.split(" ")[0]
+            self._sampler.phase = group(phase)
         self._on_phase(phase)
 
     def _finish(self, error: BaseException | None) -> dict[str, Any]:
@@ -253,6 +253,16 @@ class Repetition:
             joint_names=list(world.scene.robot.joint_names if world.scene.robot else ()),
             body_names=[body.name for body in world.scene.free_bodies],
         )
+
+
+def group(phase: str) -> str:
+    """Phases whose resources are told together: `pick cube 3 of 15` is a `pick`.
+
+    What counts on is left out, from `cube` or a number on; `settle start` and `settle` differ.
+    """
+    words = phase.split(" ")
+    counted = (k for k, word in enumerate(words) if word == "cube" or word[:1].isdigit())
+    return " ".join(words[: next(counted, len(words))]) or phase
 
 
 def _scaled(jitter: float) -> Jitter:

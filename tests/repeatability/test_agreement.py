@@ -66,8 +66,8 @@ def test_commands_that_part() -> None:
 
 
 def moving(label: str, ends: Sequence[float]) -> Sample:
-    """A cube that falls sideways, with 2 m/s2, from the moment at which the second of two waits begins, however
-    long the first one took; `ends` are the ends of the waits [s]."""
+    """A cube that falls sideways, with 2 m/s2, from the moment at which the second of two waits
+    begins, however long the first one took; `ends` are the ends of the waits [s]."""
     motions, began = [], 0.0
     for number, end in enumerate((0.0, *ends)):
         time = np.array([0.0]) if number == 0 else np.linspace(began, end, 6)[1:]
