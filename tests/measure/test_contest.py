@@ -89,8 +89,8 @@ def planted(values: dict[str, list[float]], name: str) -> dict[str, list[Record]
 
 
 def test_a_small_p_value_among_many_is_no_win() -> None:
-    """By itself the pair is a win; among 36 pairs of nine sides such a p value is to be expected."""
-    high, low = [1.0] * 10, [1.0] * 4 + [0.0] * 6
+    """By itself the pair is a win; among 36 pairs of nine sides it is to be expected."""
+    high, low = [1.0] * 10, [1.0] * 3 + [0.0] * 7
     pair = planted({"a": high, "b": low}, "hit")
     pair["b"] = [replace(r, seed=r.seed + 500) for r in pair["b"]]
     (found,) = wins(pair, METRICS)
