@@ -17,7 +17,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pytest_simbench.sims.genesis_engine import array_of, numbers, start_engine, tensors_in
+from pytest_simbench.sims.genesis_engine import (
+    array_of,
+    forget_worlds,
+    numbers,
+    start_engine,
+    tensors_in,
+)
 from pytest_simbench.sims.genesis_world import (
     LEAST_FRICTION,
     GenesisSettings,
@@ -306,4 +312,5 @@ class Genesis(Simulator):
         if self.world is not None:
             self.world.destroy()
             self.world = None
+            forget_worlds()
             gc.collect()  # scene, solver and entities refer to each other

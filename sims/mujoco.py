@@ -23,6 +23,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pytest_simbench.sims.mujoco_pictures import DISABLED, renderer
 
 from pytest_simbench.scene import Box, FloatArray, Scene
 from pytest_simbench.simulator import (
@@ -97,7 +98,7 @@ class MuJoCo(Simulator):
             Deviation("", "contacts are soft by design: cubes sink in and creep a little"),
         ),
         install_size_mb=60,
-        environment={"MUJOCO_GL": "egl"},
+        environment=DISABLED,
     )
     profiles: ClassVar[Mapping[str, Settings]] = {
         "default": MuJoCoSettings(),
@@ -278,7 +279,7 @@ class MuJoCo(Simulator):
             width,
             height,
         ):
-            self._renderer = mujoco.Renderer(self.model, height, width)
+            self._renderer = renderer(mujoco, self.model, width, height)
         self._renderer.update_scene(self.data, _camera())
         return np.array(self._renderer.render())
 

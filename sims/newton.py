@@ -18,6 +18,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pytest_simbench.sims.mujoco_pictures import DISABLED, renderer
 from pytest_simbench.sims.newton_world import NewtonSettings, build_model, make_solver, names
 
 from pytest_simbench.scene import FloatArray, Scene
@@ -80,7 +81,7 @@ class Newton(Simulator):
         ),
         caches={"WARP_CACHE_PATH": "warp"},
         install_size_mb=900,
-        environment={"MUJOCO_GL": "egl"},
+        environment=DISABLED,
     )
     profiles: ClassVar[Mapping[str, Settings]] = {
         "default": NewtonSettings(),
@@ -286,9 +287,9 @@ class Newton(Simulator):
         camera = mujoco.MjvCamera()
         camera.lookat[:] = _LOOK_AT
         camera.distance, camera.azimuth, camera.elevation = 2.2, 140.0, -25.0
-        with mujoco.Renderer(model, height, width) as renderer:
-            renderer.update_scene(self.solver.mj_data, camera)
-            return np.array(renderer.render())
+        with renderer(mujoco, model, width, height) as drawing:
+            drawing.update_scene(self.solver.mj_data, camera)
+            return np.array(drawing.render())
 
     def _open_window(self) -> None:
         import newton.viewer

@@ -1,7 +1,9 @@
 """Throw a cube at a pyramid of six, with a Franka Panda (task 2 of the reference study).
 
-Thresholds hold for the upper end of each 95 % interval: a simulator fails when the data show that
-it is worse. Change them with `--sim-threshold hit=0.5`.
+A simulator fails when the data show that it is worse than a threshold. With 20 repetitions one that
+hits with 80 % passes, one with 62 % half of the time, and one with 44 % one time in twenty;
+failures of 15 % or less are supported when there is none (docs/gate.md). Change thresholds with
+`--sim-threshold hit=0.5`.
 """
 
 from pytest_simbench.tasks import Throwing
@@ -10,6 +12,6 @@ from pytest_simbench.tasks import Throwing
 def test_throwing(repeat, threshold):
     result = repeat(Throwing())
 
-    result.assert_failures_at_most(threshold("failures", 0.1))
+    result.assert_failures_at_most(threshold("failures", 0.15))
     result.assert_at_least("hit", threshold("hit", 0.8))
-    result.assert_at_least("moved", threshold("moved", 0.1))
+    result.assert_at_least("moved", threshold("moved", 0.2))

@@ -11,8 +11,9 @@ from pytest_simbench.report.pooling import merged_order
 from pytest_simbench.report.summary import PHASES, Row, TaskSummary
 
 LEGEND = (
-    "min / mean / max over the finished repetitions, [95 % interval of the mean]. CPU in % of one "
-    "core and RAM in MB: mean +- deviation over all samples of worker and children. x real time: "
+    "min / mean / max over the finished repetitions, [95 % interval of the mean]; none for fewer "
+    "than 5 values and for values that are all alike. CPU in % of one core and RAM in MB: mean +- "
+    "deviation of worker and children, each repetition counting the same. x real time: "
     "simulated over wall seconds of stepping; at full speed, compare CPU s per simulated s. Start "
     "and end of the task: seconds from launch."
 )

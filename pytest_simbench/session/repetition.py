@@ -198,7 +198,7 @@ class Repetition:
     def _enter(self, phase: str) -> None:
         self.where.phase = phase
         if self._sampler is not None:
-            self._sampler.phase = phase.split(" ")[0]
+            self._sampler.phase = group(phase)
         self._on_phase(phase)
 
     def _finish(self, error: BaseException | None) -> dict[str, Any]:
@@ -302,6 +302,16 @@ class Repetition:
         except OSError as error:
             return f"the trace could not be written: {named(error)}"
         return ""
+
+
+def group(phase: str) -> str:
+    """Phases whose resources are told together: `pick cube 3 of 15` is a `pick`.
+
+    What counts on is left out, from `cube` or a number on; `settle start` and `settle` differ.
+    """
+    words = phase.split(" ")
+    counted = (k for k, word in enumerate(words) if word == "cube" or word[:1].isdigit())
+    return " ".join(words[: next(counted, len(words))]) or phase
 
 
 def _scaled(jitter: float) -> Jitter:

@@ -78,3 +78,54 @@ def test_many_true_differences_survive_the_correction() -> None:
     rng = np.random.default_rng(5)
     sides = {f"{rate:g}": side(rng, rate) for rate in (0.95, 0.7, 0.45, 0.2)}
     assert len([win for win in names(sides) if win[2] == "placed"]) == 6
+
+
+def planted(values: dict[str, list[float]], name: str) -> dict[str, list[Record]]:
+    """Sides whose repetitions have these values of a metric."""
+    return {
+        side: [record(k, metrics={name: value}) for k, value in enumerate(found)]
+        for side, found in values.items()
+    }
+
+
+def test_a_small_p_value_among_many_is_no_win() -> None:
+    """By itself the pair is a win; among 36 pairs of nine sides it is to be expected."""
+    high, low = [1.0] * 10, [1.0] * 3 + [0.0] * 7
+    pair = planted({"a": high, "b": low}, "hit")
+    pair["b"] = [replace(r, seed=r.seed + 500) for r in pair["b"]]
+    (found,) = wins(pair, METRICS)
+    assert (found.winner, found.loser, found.metric.name) == ("a", "b", "hit")
+    # Tested are hit and failures, and rtf, CPU cost and RAM, in which all are the same.
+    assert found.p_value == pytest.approx(5 * found.comparison.p_value)
+    assert 0.002 < found.comparison.p_value < 0.01
+    middle = [1.0] * 7 + [0.0] * 3
+    crowd = planted({f"s{n}": middle for n in range(7)}, "hit")
+    assert wins({**pair, **crowd}, METRICS) == []
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_fewer_than_five_repetitions_win_nothing(n: int) -> None:
+    costs = {"stepping": {"wall": 80.0, "cpu": 79.0, "simulated": 140.0}}
+    good = [record(k, metrics={"placed": 1.0}) for k in range(n)]
+    poor = [record(50 + k, metrics={"placed": 0.0}, **costs) for k in range(n)]
+    assert wins({"good": good, "poor": poor}, METRICS) == []
+
+
+def test_what_cannot_vary_wins_nothing() -> None:
+    """A deterministic engine lands in the same place whatever the seed: the micrometres between
+    its repetitions are rounding, and twenty of them are one value."""
+    rng = np.random.default_rng(6)
+    same = {name: list(at + 1e-6 * rng.random(20)) for name, at in (("a", 0.013), ("b", 0.025))}
+    assert wins(planted(same, "landing_error"), METRICS) == []
+    spread = list(0.04 + 0.004 * rng.random(20))
+    assert wins(planted({**same, "c": spread}, "landing_error"), METRICS) == []
+    wide = {"a": list(0.013 + 0.004 * rng.random(20)), "c": spread}
+    assert names(planted(wide, "landing_error")) == [("a", "c", "landing_error")]
+
+
+def test_a_difference_below_the_resolution_is_no_win() -> None:
+    rng = np.random.default_rng(7)
+    first = list(0.013 + 0.004 * rng.random(20))
+    for gap, won in ((0.0005, False), (0.0020, True)):
+        sides = planted({"a": first, "b": [x + gap for x in first]}, "landing_error")
+        assert bool(wins(sides, METRICS)) is won

@@ -12,6 +12,7 @@ import textwrap
 import time
 from collections.abc import Callable, Iterator
 
+import psutil
 import pytest
 
 from pytest_simbench.measure.resources import ResourceSampler, ResourceUse, Sample, Spread
@@ -140,8 +141,23 @@ def test_samples_carry_the_phase_of_their_moment(start: Start) -> None:
     assert list(phases)[-2:] == ["load", "step"]
     step = phases["step"].rss_mb
     assert step is not None
-    assert step.mean == pytest.approx(210, abs=15)
+    assert step.mean == pytest.approx(psutil.Process(process.pid).memory_info().rss / 1e6, rel=0.01)
     assert sum(len(phase.samples) for phase in phases.values()) == len(use.samples)
+
+
+def test_memory_is_in_millions_of_bytes(start: Start) -> None:
+    """Not in MiB, which are 5 % more: samples, mean and peak."""
+    process = start(ALLOCATE)
+    go(process)
+    look = psutil.Process(process.pid)
+    until(lambda: look.memory_info().rss > 200e6)
+    with ResourceSampler(process.pid, 0.02) as sampler:
+        until(lambda: len(sampler._samples) > 3)
+    use, now = sampler.stop(), look.memory_info().rss
+    assert use.rss_mb is not None
+    assert 1e6 * use.samples[-1].rss_mb == pytest.approx(now, rel=0.01)
+    assert 1e6 * use.rss_mb.mean == pytest.approx(now, rel=0.01)
+    assert 1e6 * (use.peak_mb or 0) == pytest.approx(now, rel=0.01)
 
 
 def test_the_memory_limit_is_reported_once_and_can_end_the_process(start: Start) -> None:

@@ -100,11 +100,13 @@ def test_interrupted_and_resumed(
     stopped = run(pytester, "--reps=4", "--sim-output=out")
     assert stopped.ret == pytest.ExitCode.INTERRUPTED
     assert kept(folder / "out") == straight[:2]
+    assert stopped.stdout.str().count("1 cut") == 1
     monkeypatch.delenv("STOP_AT")
     result = run(pytester, "--reps=4", "--sim-resume=out", *arguments)
     result.assert_outcomes(passed=2)
     assert kept(folder / "out") == straight
-    assert "2 interrupted" not in result.stdout.str()
+    assert " cut" not in result.stdout.str()
+    assert "0 of 4" in result.stdout.str()
     result.stdout.fnmatch_lines(["falling: 4 repetitions*"])
 
 

@@ -66,16 +66,14 @@ def test_commands_that_part() -> None:
 
 
 def moving(label: str, ends: Sequence[float]) -> Sample:
-    """A cube that moves at 1 m/s from the moment at which the second of two waits begins, however
-    long the first one took; `ends` are the ends of the waits [s]."""
+    """A cube that falls sideways, with 2 m/s2, from the moment at which the second of two waits
+    begins, however long the first one took; `ends` are the ends of the waits [s]."""
     motions, began = [], 0.0
     for number, end in enumerate((0.0, *ends)):
         time = np.array([0.0]) if number == 0 else np.linspace(began, end, 6)[1:]
         bodies = np.zeros((len(time), 1, 13))
         if number == 2:
-            bodies[:, 0, 0], bodies[:, 0, 7] = time - began, 1.0
-        if number == 1:
-            bodies[-1, 0, 7] = 1.0  # it begins to move just then
+            bodies[:, 0, 0], bodies[:, 0, 7] = (time - began) ** 2, 2 * (time - began)
         motions.append(Motion(time, np.zeros((len(time), 2, 0)), bodies))
         began = end
     return Sample(label, "t", 1, ["cube"], motions, [None, None], [0.4, 0.5], {})
@@ -83,7 +81,7 @@ def moving(label: str, ends: Sequence[float]) -> Sample:
 
 def test_each_operation_has_a_clock_of_its_own() -> None:
     """The steps of one simulator make a wait of 0.4 s last 0.41 s. At the same moment of the same
-    motion the cubes are together; by the wall of simulated time they would be 10 mm apart."""
+    motion the cubes are together; at the same simulated time they are 10 mm apart."""
     first, second = moving("a", (0.4, 0.9)), moving("b", (0.41, 0.91))
     found = agreement(first, second)
     assert found.partings == {0.001: None, 0.01: None}

@@ -69,7 +69,7 @@ class Brittle(MuJoCo):
 
 
 class Stale(MuJoCo):
-    """Restores what was saved just now; what is older than 0.2 s it gets a little wrong."""
+    """Restores what was saved a short while ago; what is older than 0.2 s a little wrong."""
 
     def restore(self, state: FloatArray) -> None:
         old = self.data.time
@@ -87,8 +87,12 @@ class Numbered(MuJoCo):
     def load(self, scene: Scene) -> None:
         super().load(scene)
         number = Numbered.worlds[type(self)] = Numbered.worlds.get(type(self), 0) + 1
-        if number in self.tilted:
+        self._tilted = number in self.tilted
+
+    def step(self) -> None:
+        if self._tilted:  # not yet in `load`, where it would be read back
             self.model.opt.gravity[0] = -5.0
+        super().step()
 
 
 class Moody(Numbered):

@@ -11,16 +11,47 @@ from hypothesis import strategies as st
 
 from pytest_simbench.scene import SceneError, Trajectory
 
+TIMESTEPS = st.sampled_from([0.0005, 0.001, 0.002, 1 / 240, 0.004, 0.01])
 
-@given(st.integers(2, 50), st.sampled_from([0.0005, 0.001, 0.002, 1 / 240, 0.004, 0.01]))
-def test_a_linear_motion_stays_linear(rows: int, timestep: float) -> None:
+
+@given(st.integers(2, 50), TIMESTEPS)
+def test_a_linear_motion_stays_linear_and_each_array_itself(rows: int, timestep: float) -> None:
     ramp = np.linspace(0.0, 1.0, rows)[:, None] * np.ones(3)
-    trajectory = Trajectory(0.004, ramp, ramp, ramp)
+    trajectory = Trajectory(0.004, ramp, 2 * ramp, -3 * ramp)
     resampled = trajectory.resampled(timestep)
     steps = len(resampled.position)
-    assert abs(steps * timestep - trajectory.duration) <= max(timestep / 2, timestep) + 1e-12
-    expected = np.minimum(np.arange(1, steps + 1) * timestep / trajectory.duration, 1.0)
-    assert np.allclose(resampled.position, expected[:, None], atol=1e-9)
+    share = np.minimum(np.arange(1, steps + 1) * timestep / trajectory.duration, 1.0)[:, None]
+    assert np.allclose(resampled.position, share, atol=1e-9)
+    assert np.allclose(resampled.velocity, 2 * share, atol=1e-9)
+    assert np.allclose(resampled.effort, -3 * share, atol=1e-9)
+    assert resampled.tick == timestep
+
+
+@given(st.integers(2, 50), TIMESTEPS)
+def test_it_ends_within_half_a_step_of_its_end(rows: int, timestep: float) -> None:
+    """No step is left out or added, but that there is always one."""
+    flat = np.zeros((rows, 1))
+    trajectory = Trajectory(0.004, flat, flat, flat)
+    late = len(trajectory.resampled(timestep).position) * timestep - trajectory.duration
+    assert late <= timestep / 2 + 1e-12 or trajectory.duration < timestep / 2
+    assert late >= -timestep / 2 - 1e-12
+
+
+@pytest.mark.parametrize(
+    ("timestep", "expected"),
+    [
+        (0.004, [1.0, 4.0, 9.0]),  # at the rows: row 0, the start, is not commanded again
+        (0.002, [0.5, 1.0, 2.5, 4.0, 6.5, 9.0]),  # between them, straight
+        (0.008, [4.0, 9.0]),  # beyond the end, the end
+        (0.1, [9.0]),
+    ],
+)
+def test_a_bent_motion_is_sampled_straight_between_its_rows(
+    timestep: float, expected: list[float]
+) -> None:
+    rows = np.array([[0.0], [1.0], [4.0], [9.0]])
+    found = Trajectory(0.004, rows, rows, rows).resampled(timestep)
+    assert found.position.ravel().tolist() == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(

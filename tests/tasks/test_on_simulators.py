@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from contextlib import closing
 from dataclasses import dataclass, replace
 
@@ -67,6 +68,7 @@ def test_unreachable_cubes_are_counted_and_the_task_goes_on(case: Case) -> None:
     assert record.metrics["at_end_strict"] == 1.0
 
 
+@pytest.mark.skipif(shutil.which("Xvfb") is None, reason="no Xvfb: apt-get install xvfb")
 @pytest.mark.parametrize("name", able_to(Capability.WINDOW))
 def test_with_a_window_the_outcome_is_the_same(case: Case, name: str) -> None:
     headless, throw = case_of(case, name), Throwing(settle=1.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
@@ -12,7 +12,9 @@ from pytest_simbench.sims.mujoco import MuJoCo
 from pytest_simbench.robot.panda import panda
 from pytest_simbench.scene import Box, Pose, Scene, Trajectory
 from pytest_simbench.simulator import DivergedError
+from pytest_simbench.worker import control
 from pytest_simbench.worker.stepping import Stepper
+from tests.worker.toys import Toy
 
 CUBE = Box("cube", (0.05, 0.05, 0.05), Pose.at(0.5, 0.0, 0.5, yaw=0.3), mass=0.1)
 
@@ -30,8 +32,112 @@ def test_time_and_clocks_advance_together(stepper: Stepper) -> None:
     assert stepper.simulator.time == pytest.approx(0.25)
     assert stepper.clocks.steps == 250
     assert stepper.clocks.simulated == pytest.approx(0.25)
-    assert 0 < stepper.clocks.wall < 10
-    assert 0 < stepper.clocks.cpu < 10
+    stepper.wait(0.1, None)
+    assert stepper.clocks.steps == 350
+    assert stepper.clocks.simulated == pytest.approx(0.35)
+
+
+def stepping(toy: Toy, beat: Callable[[float], None] = lambda at: None) -> Stepper:
+    return Stepper(toy, beat)
+
+
+def test_the_wall_clock_is_that_of_the_steps_alone() -> None:
+    """Not of looks at the state, windows, pacing, or the control workload."""
+    toy = Toy(sleep=0.002, look=0.01)
+    stepper = stepping(toy)
+    stepper.wait(0.1, 0.01)
+    assert toy.looked >= 10
+    assert toy.wall <= stepper.clocks.wall < toy.wall + 0.05
+    toy.gui, toy.look = True, 0.0
+    stepper.wait(0.1, None)
+    assert toy.pictures >= 2
+    assert toy.wall <= stepper.clocks.wall < toy.wall + 0.05
+    assert stepper.clocks.simulated / stepper.clocks.wall == pytest.approx(0.2 / toy.wall, rel=0.3)
+
+
+def test_pacing_waits_for_the_clock_and_is_not_the_steps_time() -> None:
+    toy = Toy(burn=0.0002)
+    stepper = stepping(toy)
+    stepper.real_time = True
+    began = time.perf_counter()
+    stepper.wait(0.4, None)
+    assert time.perf_counter() - began >= 0.39
+    assert stepper.clocks.wall < toy.wall + 0.05
+
+
+def test_cpu_seconds_are_those_of_the_steps_and_not_the_control_s(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def slow() -> float:
+        began = time.process_time()
+        while time.process_time() - began < 0.02:
+            pass
+        return 0.0
+
+    monkeypatch.setattr(control, "workload", slow)
+    toy = Toy(burn=0.001)
+    stepper = stepping(toy)
+    began = time.process_time()
+    stepper.wait(0.4, None)
+    spent = time.process_time() - began
+    runs = stepper.control.to_wire()
+    assert runs["control_runs"] * runs["control_cpu"] >= 0.02
+    assert runs["control_cpu"] == pytest.approx(0.02, rel=0.2)
+    assert toy.burnt <= stepper.clocks.cpu <= toy.burnt + 0.015
+    assert stepper.clocks.cpu <= spent - 0.9 * stepper.control.cpu
+
+
+def test_sleeping_is_no_cpu_time() -> None:
+    toy = Toy(sleep=0.002)
+    stepper = stepping(toy)
+    stepper.wait(0.2, None)
+    assert stepper.clocks.cpu < 0.3 * stepper.clocks.wall
+
+
+def test_signs_of_life_come_while_it_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pytest_simbench.worker.stepping.HEARTBEAT_PERIOD", 0.05)
+    beats: list[float] = []
+    toy = Toy(sleep=0.002)
+    stepping(toy, beats.append).wait(0.6, None)
+    assert 2 <= len(beats) <= 14
+    assert beats == sorted(beats)
+    assert all(0.0 < at <= 0.6 + 1e-9 for at in beats)
+
+
+def test_each_step_gets_its_own_command_and_a_wait_none() -> None:
+    toy = Toy()
+    stepper = stepping(toy)
+    rows = np.arange(6.0)[:, None]
+    stepper.follow(Trajectory(0.002, rows, 10 * rows, 100 * rows), None)
+    assert [c.ravel().tolist() for c in toy.commands] == [
+        [k, 10.0 * k, 100.0 * k] for k in (1.0, 2.0, 3.0, 4.0, 5.0)
+    ]
+    assert toy.steps == 5
+    stepper.wait(0.01, None)
+    assert (len(toy.commands), toy.steps) == (5, 10)
+    stepper.wait(0.0, None)
+    assert toy.steps == 11  # a wait is a step at least
+
+
+@pytest.mark.parametrize("what", ["bodies", "joints"])
+@pytest.mark.parametrize("at", [0.04, 0.3])
+def test_a_state_that_is_no_number_is_seen_within_a_tenth_of_a_second(
+    what: str, at: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    toy = Toy()
+    step = toy.step
+
+    def failing() -> None:
+        step()
+        if toy.time >= at:
+            broken = np.full((1, 13) if what == "bodies" else (2, 1), np.inf)
+            name = "body_state" if what == "bodies" else "joint_state"
+            monkeypatch.setattr(toy, name, lambda: broken)
+
+    monkeypatch.setattr(toy, "step", failing)
+    with pytest.raises(DivergedError, match=f"the state of the {what} is not finite at t = "):
+        stepping(toy).wait(0.5 if at > 0.1 else 0.05, None)
+    assert toy.time <= at + 0.1 + 1e-9
 
 
 def test_log_at_its_period(stepper: Stepper) -> None:
