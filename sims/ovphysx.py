@@ -106,8 +106,21 @@ class OvPhysX(Simulator):
         deviations=(
             Deviation("timestep", "an argument of each step, which PhysX does not report"),
             Deviation("gravity", "PhysX reports no gravity through this package"),
-            Deviation("ground/friction", "PhysX reports no material of a static plane"),
+            Deviation(
+                "ground/friction ground/restitution", "PhysX reports no material of a static plane"
+            ),
             Deviation("gripper/coupled", "PhysX reports no mimic joints"),
+            Deviation("body/*/damping link/*/damping", "PhysX reports no damping of bodies"),
+            Deviation("body/*/dynamic", "PhysX does not report which bodies are kinematic"),
+            Deviation("body/*/touches link/*/touches", "PhysX does not report collision groups"),
+            Deviation(
+                "link/*/meshes",
+                "a convex hull that PhysX makes of a mesh has at most 64 corners",
+                within=4e-3,
+            ),
+            Deviation(
+                "link/*/boxes", "measured by sweeping a box, which PhysX rounds", within=1e-4
+            ),
         ),
         requirements=(
             "ovphysx==0.7.0.74035321",

@@ -22,7 +22,8 @@ import numpy as np
 from pytest_simbench import __version__
 from pytest_simbench.scene import Scene, Trajectory
 from pytest_simbench.simulator import ParityError, Simulator, SimulatorError, SimulatorInfo
-from pytest_simbench.simulator.parity import check, expected_quantities
+from pytest_simbench.simulator.parity import check
+from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.worker.stepping import Stepper
 from pytest_simbench.worker.wire import pack, unpack

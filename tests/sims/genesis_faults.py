@@ -80,7 +80,7 @@ FAULTS: dict[str, Fault] = {
     "body/cube_05/friction": of_geom("cube_05", changed("dyn_info.geoms.friction", to=0.5)),
     "gravity": other_gravity,
     "timestep": other_timestep,
-    "body/table/size": of_geom("table", changed("dyn_info.geoms.data", 2, to=0.276)),
+    "body/table/boxes": of_geom("table", changed("dyn_info.geoms.data", 2, to=0.276)),
     "body/table/pose": lower_table,
     "joint/panda_joint4/stiffness": of_drive(changed("dyn_info.dofs.act_gain", to=4950.0)),
     "joint/panda_joint4/damping": of_drive(changed("dyn_info.dofs.act_bias", 2, to=-495.0)),

@@ -104,7 +104,7 @@ FAULTS: dict[str, Callable[[Any], None]] = {
     "body/cube_05/mass": lambda s: body(s, "cube_05").mass.__setitem__(0, 1.0),
     "body/cube_05/inertia": lambda s: body(s, "cube_05").inertia.__imul__(1.2),
     "body/cube_05/friction": lambda s: geom(s, "cube_05").friction.__setitem__(0, 0.5),
-    "body/cube_05/size": lambda s: geom(s, "cube_05").size.__setitem__(1, 0.02),
+    "body/cube_05/boxes": lambda s: geom(s, "cube_05").size.__setitem__(1, 0.02),
     "body/table/pose": sunk_table,
     "gravity": lambda s: s.solver.mj_model.opt.gravity.__setitem__(2, -9.7),
     "timestep": lambda s: setattr(s.solver.mj_model.opt, "timestep", 0.005),
