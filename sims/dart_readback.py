@@ -19,7 +19,7 @@ from pytest_simbench.simulator.shapes import DIRECTIONS, box_corners, outlines, 
 dartpy = lazy_import("dartpy")
 
 _PROBE, _AWAY = 2.0, 3.0
-"""Edge of the box that measures, and how far from a link's origin its face stands [m]."""
+"""Edge of the box that measures, and how far from a mesh's origin its face stands [m]."""
 
 
 class ReadBack:
@@ -117,11 +117,12 @@ class ReadBack:
         group.addShapeFrame(shape)
         group.addShapeFrame(self.probe)
         option = dartpy.collision.DistanceOption(False, -1.0)
-        reaches = []
-        for direction in DIRECTIONS @ place.rotation().T:
-            self.probe.setRelativeTransform(_facing(direction, place.translation()))
+        centre, reaches = shape.getWorldTransform().translation(), []
+        directions = DIRECTIONS @ place.rotation().T
+        for direction in directions:
+            self.probe.setRelativeTransform(_facing(direction, centre))
             reaches.append(_AWAY - group.distance(option))
-        return np.array(reaches)
+        return np.array(reaches) + directions @ (centre - place.translation())
 
     def _can_touch(self, a: str, b: str) -> bool:
         first, second = self._body(a), self._body(b)

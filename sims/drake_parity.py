@@ -130,11 +130,11 @@ class ReadBack:
         """Whether the main shapes of two can collide; of two links, whether any can."""
         pairs = [(x, y) for x in self._shapes(a) for y in self._shapes(b)]
         found = (not self.inspector.CollisionFiltered(x, y) for x, y in pairs)
-        return any(found) if a[:4] == b[:4] == "link" else all(found)
+        return any(found) if a[:4] == b[:4] == "link" else bool(pairs) and all(found)
 
     def _shapes(self, name: str) -> Sequence[Any]:
         """All but the spheres, which do not collide with each other."""
-        made = self.world.shapes[name.partition("/")[2] or name]
+        made = self.world.shapes.get(name.partition("/")[2] or name, [])
         return [m for m in made if not isinstance(self.inspector.GetShape(m), geometry.Sphere)]
 
     def _robot(self, prepared: PreparedRobot) -> dict[str, Any]:

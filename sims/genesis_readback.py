@@ -179,7 +179,7 @@ class ReadBack:
         links = a.startswith("link/") and b.startswith("link/")
         first, second = self._shapes(self._link(a)), self._shapes(self._link(b))
         found = np.maximum(self._pairs[np.ix_(first, second)], self._pairs[np.ix_(second, first)].T)
-        return bool((found >= 0).any() if links else (found >= 0).all())
+        return bool((found >= 0).any() if links else found.size and (found >= 0).all())
 
     def _link(self, name: str) -> Any:
         kind, _, rest = name.partition("/")

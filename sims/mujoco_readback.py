@@ -167,6 +167,8 @@ class ReadBack:
         """
         model = self.model
         first, second = self._geoms(a), self._geoms(b)
+        if not (first and second):
+            return False
         kinds = model.geom_contype[first][:, None] & model.geom_conaffinity[second]
         kinds |= model.geom_conaffinity[first][:, None] & model.geom_contype[second]
         low, high = sorted(int(model.geom_bodyid[geoms[0]]) for geoms in (first, second))

@@ -11,7 +11,6 @@ from pytest_simbench.sims.ovphysx_session import Session
 
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import PreparedRobot, one_value
-from pytest_simbench.simulator.kinematics import link_poses
 from pytest_simbench.simulator.shapes import box_corners, outlines, reach
 
 _FRICTIONS = ("staticFriction", "dynamicFriction")
@@ -33,7 +32,11 @@ _Values = Mapping[str, Mapping[str, FloatArray]]
 
 
 def read_back(
-    session: Session, scene: Scene, prepared: PreparedRobot | None, units: FloatArray
+    session: Session,
+    scene: Scene,
+    prepared: PreparedRobot | None,
+    units: FloatArray,
+    places: Mapping[str, Pose],
 ) -> dict[str, Any]:
     """Every quantity that PhysX can tell.
 
@@ -42,6 +45,8 @@ def read_back(
         scene: the names of what was built; no value is taken from it.
         prepared: the names of the robot's joints and links.
         units: of the sessions' joint positions, (n_joints,) [rad or m].
+        places: where the stage put the links; PhysX's scene queries find them there until the
+            first step.
     """
     reported: dict[str, Any] = {"ground/height": session.height(usd.GROUND)}
     values = session.read("RIGID_BODY", *_ATTRIBUTES)
@@ -53,21 +58,20 @@ def read_back(
         if not box.fixed:
             reported |= _inertial(values, path, prefix)
     if prepared is not None:
-        reported |= _links(session, prepared)
+        reported |= _links(session, prepared, places)
         reported |= _joints(session, prepared, units)
     return reported
 
 
-def _links(session: Session, prepared: PreparedRobot) -> dict[str, Any]:
+def _links(session: Session, prepared: PreparedRobot, places: Mapping[str, Pose]) -> dict[str, Any]:
     values = session.read("ARTICULATION_LINK", *_ATTRIBUTES)
     reported: dict[str, Any] = {}
-    # Before the first step PhysX's scene queries find the links where the stage put them.
-    placed = link_poses(prepared, dict.fromkeys(prepared.robot.joint_names, 0.0))
     for index, (name, link) in enumerate(prepared.links.items()):
         path, prefix = usd.link_path(index), f"link/{name}"
         kinds: tuple[list[FloatArray], list[FloatArray]] = ([], [])
         for k, shape in enumerate(link.shapes[: int(values["shapeCount"][path])]):
-            kinds[shape.size is None].append(session.reach(f"{path}/shape_{k}", placed[name]))
+            found = session.reach(f"{path}/shape_{k}", places[name], shape.pose)
+            kinds[shape.size is None].append(found)
         reported |= _part(values, path, prefix) | outlines(prefix, *kinds)
         if name != prepared.root:
             reported |= _inertial(values, path, prefix)

@@ -111,13 +111,18 @@ class Session:
                 size[k] = np.subtract(ends[0][0]["position"], ends[1][0]["position"]) @ axis
         return size
 
-    def reach(self, collider: str, pose: Pose) -> FloatArray:
+    def reach(self, collider: str, pose: Pose, aim: Pose) -> FloatArray:
         """How far a collider reaches in each of `DIRECTIONS`, in the frame at `pose`, (26,) [m].
+
+        Args:
+            collider: its prim.
+            pose: of the frame, in the world.
+            aim: a point in or near the collider, in the frame.
 
         PhysX's sessions report no geometry, so a large flat box is swept towards it from each side;
         where it hits nothing, it is nan.
         """
-        origin, found = np.asarray(pose.position), np.full(len(DIRECTIONS), np.nan)
+        centre, found = np.asarray((pose * aim).position), np.full(len(DIRECTIONS), np.nan)
         for k, direction in enumerate(DIRECTIONS @ pose.rotation().T):
             hits = self.physx.sweep(
                 ovphysx_types.SceneQueryGeometryType.BOX,
@@ -125,13 +130,13 @@ class Session:
                 2 * _SPAN,
                 ovphysx_types.SceneQueryMode.ALL,
                 half_extent=(_SPAN, _SPAN, _FLAT),
-                position=(origin + (_SPAN + _FLAT) * direction).tolist(),
+                position=(centre + (_SPAN + _FLAT) * direction).tolist(),
                 rotation=_turn_of_z(direction),
             )
             distances = [h["distance"] for h in self._of(collider, hits)]
             if distances:
                 found[k] = _SPAN - min(distances)
-        return found
+        return found + DIRECTIONS @ np.asarray(aim.position)
 
     def height(self, collider: str) -> float:
         """Height of a plane above the origin, by a ray from above [m]."""

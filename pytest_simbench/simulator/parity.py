@@ -5,7 +5,8 @@ What is compared stands in `simulator.quantities`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,57 @@ LENGTH_TOLERANCE = 1e-5
 """Of what single precision composes from several poses [m]: link poses, outlines, centres."""
 
 
+@dataclass(frozen=True)
+class Comparison:
+    """A world held against its scene.
+
+    Attributes:
+        wrong: a sentence for each quantity that differs from the scene, and is not excused.
+        deviations: a sentence for each declared deviation that counts in this world: a quantity
+            differs by it, the engine does not tell one that it excuses, or it concerns none.
+        untold: the quantities that the engine does not tell, as declared.
+    """
+
+    wrong: Mapping[str, str]
+    deviations: Sequence[str]
+    untold: Collection[str]
+
+
+def compare(
+    expected: Mapping[str, Any],
+    reported: Mapping[str, Any],
+    deviations: Iterable[Deviation],
+    simulator: str,
+) -> Comparison:
+    """Hold what a simulator reports against what is expected of it."""
+    deviations = tuple(deviations)
+    wrong: dict[str, str] = {}
+    untold: dict[str, Deviation] = {}
+    differing: dict[Deviation, str] = {}
+    for name, value in expected.items():
+        deviation = next((d for d in deviations if d.excuses(name)), None)
+        if name not in reported:
+            if deviation is None or deviation.within is not None:
+                wrong[name] = f"{simulator} reports nothing, and declares no deviation"
+            else:
+                untold[name] = deviation
+        elif not _equal(name, value, reported[name]):
+            text = f"scene {_text(value)}, {simulator} {_text(reported[name])}"
+            text += _difference_text(value, reported[name])
+            if deviation is None:
+                wrong[name] = text
+            elif _within(deviation, value, reported[name]):
+                differing.setdefault(deviation, f"{name}: {text}")
+            else:
+                limit = f"declared is at most {deviation.within:g}: {deviation.reason}"
+                wrong[name] = f"{text} ({limit})"
+    for name in sorted(set(reported) - set(expected)):
+        wrong[name] = "reported, but not part of the scene"
+    untellable = set(untold.values())
+    sentences = [_sentence(d, d in untellable, differing.get(d)) for d in deviations]
+    return Comparison(wrong, [sentence for sentence in sentences if sentence], list(untold))
+
+
 def check(
     expected: Mapping[str, Any],
     reported: Mapping[str, Any],
@@ -29,38 +81,12 @@ def check(
 ) -> list[str]:
     """Compare; return one sentence for each declared deviation that counts in this world.
 
-    A deviation counts when a quantity differs by it, when the engine does not tell a quantity that
-    it excuses, and always when it concerns no quantity.
-
     Raises:
         ParityError: a quantity differs, or differs by more than its deviation allows, or is neither
             reported nor declared; the message gives both values of each (the first ten).
     """
-    deviations = tuple(deviations)
-    untold = set()
-    differing: dict[Deviation, list[str]] = {d: [] for d in deviations}
-    wrong = []
-    for name, value in expected.items():
-        deviation = next((d for d in deviations if d.excuses(name)), None)
-        if name not in reported:
-            if deviation is None or deviation.within is not None:
-                wrong.append(f"{name}: {simulator} reports nothing, and declares no deviation")
-            else:
-                untold.add(deviation)
-            continue
-        if _equal(name, value, reported[name]):
-            continue
-        text = f"{name}: scene {_text(value)}, {simulator} {_text(reported[name])}"
-        text += _difference_text(value, reported[name])
-        if deviation is not None and _within(deviation, value, reported[name]):
-            differing[deviation].append(text)
-            continue
-        if deviation is not None:
-            text += f" (declared is at most {deviation.within:g}: {deviation.reason})"
-        wrong.append(text)
-    wrong += [
-        f"{name}: reported, but not part of the scene" for name in set(reported) - set(expected)
-    ]
+    comparison = compare(expected, reported, deviations, simulator)
+    wrong = [f"{name}: {text}" for name, text in comparison.wrong.items()]
     if wrong:
         more = f"; and {len(wrong) - 10} more" if len(wrong) > 10 else ""
         raise ParityError(
@@ -68,11 +94,10 @@ def check(
             + "; ".join(wrong[:10])
             + more
         )
-    sentences = [_sentence(d, d in untold, differing[d]) for d in deviations]
-    return [sentence for sentence in sentences if sentence]
+    return list(comparison.deviations)
 
 
-def _sentence(deviation: Deviation, untold: bool, differing: list[str]) -> str:
+def _sentence(deviation: Deviation, untold: bool, differing: str | None) -> str:
     """What stands in the record; the same in every repetition of a task."""
     if not deviation.quantity:
         return deviation.reason
@@ -80,7 +105,7 @@ def _sentence(deviation: Deviation, untold: bool, differing: list[str]) -> str:
     if differing and deviation.within is not None:
         found.append(f"differs by at most {deviation.within:g}")
     elif differing:
-        found.append(differing[0])
+        found.append(differing)
     if not found:
         return ""
     return f"{deviation.quantity}: {deviation.reason} ({'; '.join(found)})"

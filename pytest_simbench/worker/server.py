@@ -22,6 +22,7 @@ import numpy as np
 from pytest_simbench import __version__
 from pytest_simbench.scene import Scene, Trajectory
 from pytest_simbench.simulator import ParityError, Simulator, SimulatorError, SimulatorInfo
+from pytest_simbench.simulator.memory import remembering
 from pytest_simbench.simulator.parity import check
 from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.simulator.settings import changed
@@ -127,8 +128,13 @@ class Server:
             simulator.refresh_window()
         return {"excused": excused, **self.do_state()}
 
-    def do_read_back(self) -> dict[str, Any]:
-        return self._constructed().read_back()
+    def do_read_back(self, remember: dict[str, Any] | None = None) -> dict[str, Any]:
+        """What the engine says; the adapter made to remember another scene meanwhile, if given."""
+        simulator = self._constructed()
+        if remember is None:
+            return simulator.read_back()
+        with remembering(simulator, Scene.from_wire(remember)):
+            return simulator.read_back()
 
     def do_state(self) -> dict[str, Any]:
         simulator = self._constructed()
