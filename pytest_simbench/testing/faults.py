@@ -246,6 +246,11 @@ FAULTS: dict[str, Fault] = {
         "body/brick/boxes",
         of_body("brick", size=(0.1, 0.058, 0.03)),
     ),
+    "body_inertia": Fault(
+        "the brick is 2 mm thinner, and its inertia with it",
+        "body/brick/inertia",
+        of_body("brick", size=(0.1, 0.058, 0.03)),
+    ),
     "body_pose": Fault(
         "the cube is 1 mm aside",
         "body/cube/pose",
