@@ -35,6 +35,34 @@ FAULTS: dict[str, tuple[str, str, str]] = {
     "joint/panda_joint4/initial_position": ("joint_3", "state:angular:physics:position", "-90"),
     "link/panda_link4/mass": ("link_4", "physics:mass", "5"),
     "link/panda_link4/inertia": ("link_4", "physics:diagonalInertia", "(1, 1, 1)"),
+    "body/brick/com": ("body_1", "physics:centerOfMass", "(0.01, 0, 0)"),
+    "body/brick/gravity": (
+        "body_1",
+        "physics:mass",
+        "0.23\nbool physxRigidBody:disableGravity = true",
+    ),
+    "body/brick/margin": (
+        "body_1",
+        "material:binding:physics",
+        "</World/friction_0p7>\nfloat physxCollision:restOffset = 0.002",
+    ),
+    "body/brick/restitution": ("friction_0p7", "physics:restitution", "0.5"),
+    "link/panda_link4/restitution": ("friction_1p0", "physics:restitution", "0.5"),
+    "link/panda_link4/margin": (
+        "link_4",
+        "material:binding:physics",
+        "</World/friction_1p0>\nfloat physxCollision:restOffset = 0.002",
+    ),
+    "link/panda_link4/gravity": (
+        "link_4",
+        "physics:mass",
+        "3.587895\nbool physxRigidBody:disableGravity = true",
+    ),
+    "joint/panda_joint4/friction": (
+        "joint_3",
+        "physxJointAxis:angular:armature",
+        "0.1\nfloat physxJointAxis:angular:staticFrictionEffort = 0.5",
+    ),
     "link/panda_leftfinger/friction": (
         "link_8",
         "material:binding:physics",
