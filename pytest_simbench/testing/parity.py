@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from pytest_simbench.scene import Pose
+from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.parity import Comparison, compare
 from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
 from pytest_simbench.testing.faults import FAULTS, Fault, true_scene
+from pytest_simbench.testing.state import busy_scene, require_same, swing_and_wait
 from pytest_simbench.testing.subject import Subject, require
 
 POSITION = 1e-5
@@ -52,6 +54,17 @@ def read_back_is_the_engines(subject: Subject) -> None:
             np.allclose(pose[:3], world.bodies[0, :3], atol=POSITION + step),
             f"read_back gives position {pose[:3]} of a cube that is at {world.bodies[0, :3]}",
         )
+
+
+@check(Capability.DETERMINISTIC)
+def reading_changes_nothing(subject: Subject) -> None:
+    """A world that was read back moves on, bit for bit, as one that was not: cubes falling and
+    colliding, the arm swinging."""
+    scene, runs = busy_scene(), []
+    for parity in (False, True):
+        with subject.world(scene, fresh=True, parity=parity) as world:
+            runs.append(swing_and_wait(world, scene, subject.timestep))
+    require_same("read back and not", runs[1], runs[0])
 
 
 @check()

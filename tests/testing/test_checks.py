@@ -52,6 +52,7 @@ FAULTS: list[tuple[type[Simulator], str]] = [
     (wrong.StiffJoint, "limp_arm_falls"),
     (wrong.WeightlessLink, "limp_arm_falls"),
     (wrong.StrongWrist, "every_effort_limit_counts"),
+    (wrong.Meddler, "reading_changes_nothing"),
     (wrong.TiltedAxis, "parity_in_any_posture"),
     (wrong.NoEffortLimit, "effort_limit_bounds_acceleration"),
     (wrong.NoEffortLimit, "weak_joint_sags"),

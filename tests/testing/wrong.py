@@ -180,6 +180,15 @@ class SlipperyHand(Lying):
         self.model.geom_friction[:, 0] = 0.01
 
 
+class Meddler(MuJoCo):
+    """Steps while it is asked."""
+
+    def read_back(self) -> dict[str, Any]:
+        told = super().read_back()
+        self.data.qvel[-1] += 1e-9
+        return told
+
+
 class EchoLimits(MuJoCo):
     """Tells the joint limits of the description instead of the engine's."""
 
