@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
+from pytest_simbench.sims.dart_readback import ReadBack
 
 from pytest_simbench.scene import Box, FloatArray, Scene
 from pytest_simbench.simulator import (
@@ -31,7 +32,6 @@ from pytest_simbench.simulator import (
     Simulator,
     SimulatorInfo,
     lazy_import,
-    one_value,
 )
 
 dartpy = lazy_import("dartpy")
@@ -85,14 +85,17 @@ class DART(Simulator):
                 Capability.WINDOW,
                 Capability.SAVE_RESTORE,
                 Capability.CONTACT_COUNT,
-                Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,
             }
         ),
         deviations=(
             Deviation("joint/*/armature", "DART has no rotor inertia"),
-            Deviation("joint/*/stiffness", "servo motors are velocity constraints, no springs"),
-            Deviation("joint/*/damping", "servo motors are velocity constraints, no dampers"),
+            Deviation(
+                "joint/*/stiffness joint/*/damping",
+                "servo motors are velocity constraints, neither springs nor dampers",
+            ),
+            Deviation("link/*/damping", "DART has no damping of links"),
+            Deviation("body/*/margin link/*/margin", "DART's shapes have no margin"),
             Deviation(
                 "joint/*finger_joint2/effort_limit",
                 "the second finger has no drive: it follows the first, by up to both their limits",
@@ -113,6 +116,7 @@ class DART(Simulator):
     settings: DARTSettings
 
     def load(self, scene: Scene) -> None:
+        self.scene = scene
         self.world = world = dartpy.simulation.World()
         self._set_options(world, scene)
         self._ground = self._add_ground(scene.ground_friction)
@@ -223,47 +227,9 @@ class DART(Simulator):
         self.command(initial, 0 * initial, 0 * initial)
 
     def read_back(self) -> dict[str, Any]:
-        ground = self._ground.getShapeNode(0)
-        height = ground.getShape().getOffset() + ground.getWorldTransform().translation()[2]
-        reported: dict[str, Any] = {
-            "gravity": self.world.getGravity(),
-            "timestep": self.world.getTimeStep(),
-            "ground/friction": ground.getDynamicsAspect().getFrictionCoeff(),
-            "ground/height": height,
-        }
-        for name, body in self._bodies.items():
-            shape = body.getShapeNode(0)
-            reported[f"body/{name}/size"] = shape.getShape().getSize()
-            reported[f"body/{name}/friction"] = shape.getDynamicsAspect().getFrictionCoeff()
-            place = shape.getWorldTransform()
-            reported[f"body/{name}/pose"] = [*place.translation(), *place.quaternion().wxyz()]
-            if body.getSkeleton().isMobile():
-                reported[f"body/{name}/mass"] = body.getMass()
-                reported[f"body/{name}/inertia"] = np.diag(body.getInertia().getMoment())
-        if self.prepared is not None:
-            self._read_back_robot(self.prepared, reported)
-        return reported
-
-    def _read_back_robot(self, prepared: PreparedRobot, reported: dict[str, Any]) -> None:
-        robot, fingers = self._robot, prepared.robot.gripper.joints
-        kind = robot.getJoint(fingers[1]).getActuatorType()
-        reported["gripper/coupled"] = float(kind == dartpy.dynamics.ActuatorType.MIMIC)
-        for name in prepared.robot.joint_names:
-            joint = robot.getJoint(name)
-            limits = [joint.getPositionLowerLimit(0), joint.getPositionUpperLimit(0)]
-            reported[f"joint/{name}/limits"] = limits
-            reported[f"joint/{name}/effort_limit"] = one_value(
-                [-joint.getForceLowerLimit(0), joint.getForceUpperLimit(0)]
-            )
-            reported[f"joint/{name}/initial_position"] = joint.getPosition(0)
-        for link in prepared.moving_links:
-            body = robot.getBodyNode(link.name)
-            moments = np.linalg.eigvalsh(body.getInertia().getMoment())
-            reported[f"link/{link.name}/mass"] = body.getMass()
-            reported[f"link/{link.name}/inertia"] = np.sort(moments)
-            shapes = [shape for shape in body.getShapeNodes() if shape.hasDynamicsAspect()]
-            values = {shape.getDynamicsAspect().getFrictionCoeff() for shape in shapes}
-            reported[f"link/{link.name}/friction"] = np.array(sorted(values)).squeeze()
+        return ReadBack(
+            self.world, self._ground, self._bodies, self._robot, self.scene, self.prepared
+        ).all()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         # Servo motors find the effort themselves, so there is nothing to feed forward.

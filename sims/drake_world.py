@@ -70,6 +70,7 @@ class World:
 
     Attributes:
         plant, scene_graph: Drake's bodies and joints, and their shapes.
+        scene: what was built.
         prepared: the reduced robot, or None.
         bodies, links, joints, drives: Drake's objects by the scene's names; a fixed box is part of
             the world body.
@@ -79,7 +80,7 @@ class World:
     """
 
     def __init__(self, scene: Scene, settings: DrakeSettings, builder: Any) -> None:
-        self.settings = settings
+        self.settings, self.scene = settings, scene
         self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         self.plant, self.scene_graph = plants.AddMultibodyPlant(self._options(), builder)
         self.scene_graph.set_config(self._surfaces())

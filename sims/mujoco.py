@@ -24,6 +24,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 from pytest_simbench.sims.mujoco_pictures import DISABLED, renderer
+from pytest_simbench.sims.mujoco_readback import Numbers, ReadBack
 
 from pytest_simbench.scene import Box, FloatArray, Scene
 from pytest_simbench.simulator import (
@@ -35,7 +36,6 @@ from pytest_simbench.simulator import (
     Simulator,
     SimulatorInfo,
     lazy_import,
-    one_value,
 )
 
 mujoco = lazy_import("mujoco")
@@ -90,7 +90,6 @@ class MuJoCo(Simulator):
                 Capability.SAVE_RESTORE,
                 Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
-                Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -196,48 +195,16 @@ class MuJoCo(Simulator):
             body.add_freejoint(name=f"{box.name}/free")
 
     def read_back(self) -> dict[str, Any]:
-        model = self.model
-        ground = model.geom("ground")
-        reported: dict[str, Any] = {
-            "gravity": model.opt.gravity,
-            "timestep": model.opt.timestep,
-            "ground/height": ground.pos[2],
-            "ground/friction": ground.friction[0],
-        }
-        for box in self.scene.bodies:
-            body, geom = model.body(box.name), model.geom(box.name)
-            reported[f"body/{box.name}/size"] = 2 * geom.size
-            reported[f"body/{box.name}/friction"] = geom.friction[0]
-            data = self.data.body(box.name)
-            reported[f"body/{box.name}/pose"] = np.concatenate([data.xpos, data.xquat])
-            if body.dofnum[0]:
-                reported[f"body/{box.name}/mass"] = body.mass[0]
-                reported[f"body/{box.name}/inertia"] = body.inertia
-        if self.prepared is not None:
-            self._read_back_robot(self.prepared, reported)
-        return reported
-
-    def _read_back_robot(self, prepared: PreparedRobot, reported: dict[str, Any]) -> None:
-        model = self.model
-        pairs = zip(model.eq_obj1id, model.eq_obj2id, model.eq_type, strict=True)
-        fingers = {model.joint(name).id for name in prepared.robot.gripper.joints}
-        reported["gripper/coupled"] = any(
-            {a, b} == fingers and kind == mujoco.mjtEq.mjEQ_JOINT for a, b, kind in pairs
+        model, prepared = self.model, self.prepared
+        numbers = Numbers(
+            model.geom("ground").id,
+            {box.name: model.geom(box.name).id for box in self.scene.bodies},
+            {} if prepared is None else {name: model.body(name).id for name in prepared.links},
+            {}
+            if prepared is None
+            else {name: model.joint(name).id for name in prepared.robot.joint_names},
         )
-        for name in prepared.robot.joint_names:
-            joint, drive = model.joint(name), model.actuator(name)
-            reported[f"joint/{name}/limits"] = joint.range
-            reported[f"joint/{name}/effort_limit"] = one_value(drive.forcerange * [-1, 1])
-            reported[f"joint/{name}/stiffness"] = -drive.biasprm[1]
-            reported[f"joint/{name}/damping"] = -drive.biasprm[2] + float(joint.damping[0])
-            reported[f"joint/{name}/armature"] = joint.armature[0]
-            reported[f"joint/{name}/initial_position"] = self.data.qpos[joint.qposadr[0]]
-        for link in prepared.moving_links:
-            body = model.body(link.name)
-            geoms = np.flatnonzero(model.geom_bodyid == body.id)
-            reported[f"link/{link.name}/mass"] = body.mass[0]
-            reported[f"link/{link.name}/inertia"] = np.sort(body.inertia)
-            reported[f"link/{link.name}/friction"] = one_value(model.geom_friction[geoms, 0])
+        return ReadBack(model, self.data, self.scene, prepared, numbers).all()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self.data.ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness

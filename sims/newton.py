@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 from pytest_simbench.sims.mujoco_pictures import DISABLED, renderer
+from pytest_simbench.sims.mujoco_readback import Numbers, ReadBack
 from pytest_simbench.sims.newton_world import NewtonSettings, build_model, make_solver, names
 
 from pytest_simbench.scene import FloatArray, Scene
@@ -30,7 +31,6 @@ from pytest_simbench.simulator import (
     Simulator,
     SimulatorInfo,
     lazy_import,
-    one_value,
 )
 
 newton = lazy_import("newton")
@@ -58,7 +58,6 @@ class Newton(Simulator):
                 Capability.SAVE_RESTORE,
                 Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
-                Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -156,29 +155,19 @@ class Newton(Simulator):
 
     def read_back(self) -> dict[str, Any]:
         """From MuJoCo's model, which is what is stepped."""
+        prepared = self.prepared
+        bodies = self.solver.mjc_body_to_newton.numpy()[0].tolist()
+        labels = names(self.model.body_label)
+        links = () if prepared is None else prepared.links
+        joints = () if prepared is None else prepared.robot.joint_names
+        numbers = Numbers(
+            self._geom("ground"),
+            {box.name: self._geom(box.name) for box in self.scene.bodies},
+            {name: bodies.index(labels.index(name)) for name in links},
+            dict(zip(joints, self._mujoco_joints(), strict=True)),
+        )
         model, data = self.solver.mj_model, self.solver.mj_data
-        ground = model.geom(self._geom("ground"))
-        reported: dict[str, Any] = {
-            "gravity": model.opt.gravity,
-            "timestep": model.opt.timestep,
-            "ground/height": ground.pos[2],
-            "ground/friction": ground.friction[0],
-        }
-        for box in self.scene.bodies:
-            geom = model.geom(self._geom(box.name))
-            place = data.geom(geom.id)
-            rotation = np.empty(4)
-            mujoco.mju_mat2Quat(rotation, place.xmat)
-            reported[f"body/{box.name}/size"] = 2 * geom.size
-            reported[f"body/{box.name}/friction"] = geom.friction[0]
-            reported[f"body/{box.name}/pose"] = np.concatenate([place.xpos, rotation])
-            body = model.body(int(geom.bodyid[0]))
-            if body.dofnum[0]:
-                reported[f"body/{box.name}/mass"] = body.mass[0]
-                reported[f"body/{box.name}/inertia"] = _inertia(body)
-        if self.prepared is not None:
-            self._read_back_robot(self.prepared, reported)
-        return reported
+        return ReadBack(model, data, self.scene, prepared, numbers).all()
 
     def _geom(self, label: str) -> int:
         """MuJoCo's number of Newton's shape with this label."""
@@ -188,37 +177,6 @@ class Newton(Simulator):
         """Newton's number of each of MuJoCo's geoms."""
         numbers: list[int] = self.solver.mjc_geom_to_newton_shape.numpy()[0].tolist()
         return numbers
-
-    def _read_back_robot(self, prepared: PreparedRobot, reported: dict[str, Any]) -> None:
-        model, data = self.solver.mj_model, self.solver.mj_data
-        bodies = self.solver.mjc_body_to_newton.numpy()[0].tolist()
-        ids = dict(zip(prepared.robot.joint_names, self._mujoco_joints(), strict=True))
-        fingers = {ids[joint] for joint in prepared.robot.gripper.joints}
-        reported["gripper/coupled"] = any(
-            {a, b} == fingers and kind == mujoco.mjtEq.mjEQ_JOINT and active
-            for a, b, kind, active in zip(
-                model.eq_obj1id, model.eq_obj2id, model.eq_type, data.eq_active, strict=True
-            )
-        )
-        for name, at in ids.items():
-            dof = model.jnt_dofadr[at]
-            drive = int(np.flatnonzero(model.actuator_trnid[:, 0] == at)[0])
-            gain, bias = model.actuator_gainprm[drive], model.actuator_biasprm[drive]
-            passive = np.ravel(model.dof_damping[dof])[0]
-            range_ = model.actuator_forcerange[drive] * model.actuator_forcelimited[drive]
-            limit = one_value(np.minimum(range_ * [-1, 1], model.jnt_actfrcrange[at] * [-1, 1]))
-            reported[f"joint/{name}/limits"] = model.jnt_range[at]
-            reported[f"joint/{name}/effort_limit"] = limit
-            reported[f"joint/{name}/stiffness"] = one_value([gain[0], -bias[1]])
-            reported[f"joint/{name}/damping"] = passive - bias[2]
-            reported[f"joint/{name}/armature"] = model.dof_armature[dof]
-            reported[f"joint/{name}/initial_position"] = data.qpos[model.jnt_qposadr[at]]
-        for link in prepared.moving_links:
-            body = model.body(bodies.index(names(self.model.body_label).index(link.name)))
-            reported[f"link/{link.name}/mass"] = body.mass[0]
-            reported[f"link/{link.name}/inertia"] = np.sort(body.inertia)
-            frictions = model.geom_friction[model.geom_bodyid == body.id, 0]
-            reported[f"link/{link.name}/friction"] = one_value(frictions)
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self._ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness
@@ -322,11 +280,3 @@ _LOOK_AT = (0.5, 0.0, 0.35)
 
 _STATE = ("joint_q", "joint_qd", "body_q", "body_qd")
 """Arrays of Newton's state."""
-
-
-def _inertia(body: Any) -> FloatArray:
-    """Diagonal of a body's inertia in its own axes; MuJoCo may have permuted them."""
-    rotation = np.empty(9)
-    mujoco.mju_quat2Mat(rotation, body.iquat)
-    turn = rotation.reshape(3, 3)
-    return np.diag(turn @ np.diag(body.inertia) @ turn.T)

@@ -28,7 +28,7 @@ from pytest_simbench.sims import ovphysx_stage as usd
 from pytest_simbench.sims.ovphysx_readback import read_back
 from pytest_simbench.sims.ovphysx_session import Session
 
-from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
@@ -39,6 +39,7 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
+from pytest_simbench.simulator.kinematics import link_poses
 
 ovphysx_types = lazy_import("ovphysx.types")
 
@@ -107,8 +108,21 @@ class OvPhysX(Simulator):
         deviations=(
             Deviation("timestep", "an argument of each step, which PhysX does not report"),
             Deviation("gravity", "PhysX reports no gravity through this package"),
-            Deviation("ground/friction", "PhysX reports no material of a static plane"),
+            Deviation(
+                "ground/friction ground/restitution", "PhysX reports no material of a static plane"
+            ),
             Deviation("gripper/coupled", "PhysX reports no mimic joints"),
+            Deviation("body/*/damping link/*/damping", "PhysX reports no damping of bodies"),
+            Deviation("body/*/dynamic", "PhysX does not report which bodies are kinematic"),
+            Deviation("body/*/touches link/*/touches", "PhysX does not report collision groups"),
+            Deviation(
+                "link/*/meshes",
+                "a convex hull that PhysX makes of a mesh has at most 64 corners",
+                within=4e-3,
+            ),
+            Deviation(
+                "link/*/boxes", "measured by sweeping a box, which PhysX rounds", within=1e-4
+            ),
         ),
         requirements=(
             "ovphysx==0.7.0.74035321",
@@ -144,10 +158,12 @@ class OvPhysX(Simulator):
         self._free = [usd.body_path(i) for i, box in enumerate(scene.bodies) if not box.fixed]
         self._joints: list[str] = []
         self._unit = np.empty(0)
+        self._placed: dict[str, Pose] = {}
         if self.prepared is not None:
             robot = self.prepared.robot
             self._joints = [usd.joint_path(i) for i in range(len(robot.joints))]
             self._stiffness = robot.column("stiffness")
+            self._placed = link_poses(self.prepared, dict.fromkeys(robot.joint_names, 0.0))
             kinds = {joint.name: joint.kind for joint in self.prepared.joints}
             turning = [kinds[name] == "revolute" for name in robot.joint_names]
             self._unit = np.where(turning, np.pi / 180, 1.0)  # of the sessions, which count degrees
@@ -231,7 +247,7 @@ class OvPhysX(Simulator):
         return state
 
     def read_back(self) -> dict[str, Any]:
-        return read_back(self.session, self.scene, self.prepared, self._unit)
+        return read_back(self.session, self.scene, self.prepared, self._unit, self._placed)
 
     def save(self) -> _Saved:
         values = {}

@@ -9,13 +9,15 @@ from __future__ import annotations
 import math
 import tempfile
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.simulator import lazy_import
+from pytest_simbench.simulator.shapes import DIRECTIONS
 
 ovphysx = lazy_import("ovphysx")
 ovphysx_types = lazy_import("ovphysx.types")
@@ -24,6 +26,9 @@ schema_support = lazy_import("ovphysx.samples.python_samples.schema_support")
 
 REACH = 5.0
 """How far outside a body the rays begin that measure it [m]."""
+
+_SPAN, _FLAT = 1.0, 0.05
+"""Half edges of the flat box that measures a link, and from how far away it does [m]."""
 
 _registered = False
 
@@ -95,29 +100,69 @@ class Session:
                 session.commit_sync(group)
 
     def size(self, collider: str, pose: Pose) -> FloatArray:
-        """Extents of a collider along the axes of its body at `pose`, by rays from outside [m].
+        """Extents of a box along the axes of its body at `pose`, by rays from outside [m].
 
-        PhysX's sessions report no geometry. Where a ray misses it is nan.
+        Where a ray misses it is nan.
         """
         centre, size = np.asarray(pose.position), np.full(3, np.nan)
         for k, axis in enumerate(pose.rotation().T):
-            ends = [self._hits(collider, centre + s * REACH * axis, -s * axis) for s in (1, -1)]
+            ends = [self._ray(collider, centre + s * REACH * axis, -s * axis) for s in (1, -1)]
             if all(ends):
-                size[k] = (ends[0][0] - ends[1][0]) @ axis
+                size[k] = np.subtract(ends[0][0]["position"], ends[1][0]["position"]) @ axis
         return size
+
+    def reach(self, collider: str, pose: Pose, aim: Pose) -> FloatArray:
+        """How far a collider reaches in each of `DIRECTIONS`, in the frame at `pose`, (26,) [m].
+
+        Args:
+            collider: its prim.
+            pose: of the frame, in the world.
+            aim: a point in or near the collider, in the frame.
+
+        PhysX's sessions report no geometry, so a large flat box is swept towards it from each side;
+        where it hits nothing, it is nan.
+        """
+        centre, found = np.asarray((pose * aim).position), np.full(len(DIRECTIONS), np.nan)
+        for k, direction in enumerate(DIRECTIONS @ pose.rotation().T):
+            hits = self.physx.sweep(
+                ovphysx_types.SceneQueryGeometryType.BOX,
+                (-direction).tolist(),
+                2 * _SPAN,
+                ovphysx_types.SceneQueryMode.ALL,
+                half_extent=(_SPAN, _SPAN, _FLAT),
+                position=(centre + (_SPAN + _FLAT) * direction).tolist(),
+                rotation=_turn_of_z(direction),
+            )
+            distances = [h["distance"] for h in self._of(collider, hits)]
+            if distances:
+                found[k] = _SPAN - min(distances)
+        return found + DIRECTIONS @ np.asarray(aim.position)
 
     def height(self, collider: str) -> float:
         """Height of a plane above the origin, by a ray from above [m]."""
-        hits = self._hits(collider, np.array([0.0, 0.0, REACH]), np.array([0.0, 0.0, -1.0]))
-        return float(hits[0][2]) if hits else math.nan
+        hits = self._ray(collider, np.array([0.0, 0.0, REACH]), np.array([0.0, 0.0, -1.0]))
+        return float(hits[0]["position"][2]) if hits else math.nan
 
-    def _hits(self, collider: str, start: FloatArray, direction: FloatArray) -> list[FloatArray]:
+    def _ray(
+        self, collider: str, start: FloatArray, direction: FloatArray
+    ) -> list[Mapping[str, Any]]:
         """Where a ray of twice `REACH` enters the collider."""
         mode = ovphysx_types.SceneQueryMode.ALL
         hits = self.physx.raycast(start.tolist(), direction.tolist(), 2 * REACH, mode)
+        return self._of(collider, hits)
+
+    def _of(self, collider: str, hits: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+        """The hits on one collider."""
         paths = self.physx.get_scene_query_paths_from_ids([hit["collision"] for hit in hits])
-        found = zip(hits, paths, strict=True)
-        return [np.array(hit["position"]) for hit, path in found if path == collider]
+        return [hit for hit, path in zip(hits, paths, strict=True) if path == collider]
+
+    def dof_joints(self) -> list[str]:
+        """Prim paths of the articulation's joints in the order of the Jacobian's columns."""
+        target = ovphysx_types.SimObjectType.ARTICULATION
+        scope = ovphysx_types.ObjectScope.ALL
+        with self.physx.read_sync(target, ["dofJointPath"], scope=scope) as result:
+            handles = np.array(result.groups[0].tensors[0].numpy(), dtype=np.uint64).ravel()
+            return [result.dictionary.path_to_string(int(handle)) for handle in handles]
 
 
 def _register_schemas() -> None:
@@ -127,3 +172,12 @@ def _register_schemas() -> None:
         paths = [str(path) for path in schema_support.physx_schema_paths()]
         ovstage.population.register_usd_schemas(paths)
         _registered = True
+
+
+def _turn_of_z(direction: FloatArray) -> tuple[float, float, float, float]:
+    """Quaternion x, y, z, w of the shortest turn from the z axis to `direction`."""
+    x, y, z = (float(value) for value in direction)
+    if z < -1 + 1e-9:
+        return (1.0, 0.0, 0.0, 0.0)
+    length = math.sqrt(2 + 2 * z)
+    return (-y / length, x / length, 0.0, length / 2)

@@ -14,7 +14,6 @@ MARKS: tuple[tuple[str, Capability], ...] = (
     ("deterministic", Capability.DETERMINISTIC),
     ("save and restore", Capability.SAVE_RESTORE),
     ("restores exactly", Capability.EXACT_RESTORE),
-    ("contact forces", Capability.CONTACT_FORCES),
     ("GPU", Capability.GPU),
 )
 """Capabilities that get a column; every simulator runs headless."""

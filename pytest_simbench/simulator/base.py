@@ -60,7 +60,7 @@ class Simulator(ABC):
 
     @abstractmethod
     def read_back(self) -> dict[str, Any]:
-        """What the engine says that it built, by the names of `parity.expected_quantities`.
+        """What the engine says that it built, by the names in `simulator.quantities`.
 
         Values must come from the engine, never from the scene. What the engine cannot tell is
         left out and declared in `info.deviations`.

@@ -17,7 +17,6 @@ class Capability(StrEnum):
     EXACT_RESTORE = "exact_restore"
     """A restored run equals, bit for bit, the one that was neither saved nor restored."""
     CONTACT_COUNT = "contact_count"
-    CONTACT_FORCES = "contact_forces"
     DETERMINISTIC = "deterministic"
     GPU = "gpu"
 
@@ -27,16 +26,19 @@ class Deviation:
     """Something of the scene that an engine cannot express or cannot report.
 
     Attributes:
-        quantity: pattern of the parity quantities that it excuses ("joint/*/armature"), or "" when
-            it concerns no quantity that is read back.
+        quantity: patterns of the quantities that it excuses ("body/*/margin link/*/margin"), or ""
+            when it concerns no quantity that is read back.
         reason: why, in one sentence for the user.
+        within: the largest difference that it excuses, in the quantity's unit; None excuses any,
+            and that the engine does not tell the quantity.
     """
 
     quantity: str
     reason: str
+    within: float | None = None
 
     def excuses(self, quantity: str) -> bool:
-        return bool(self.quantity) and fnmatchcase(quantity, self.quantity)
+        return any(fnmatchcase(quantity, pattern) for pattern in self.quantity.split())
 
 
 @dataclass(frozen=True)

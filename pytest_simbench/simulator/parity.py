@@ -1,67 +1,76 @@
 """Parity: does the world that the engine built equal the scene?
 
-Quantities have names: `gravity`, `timestep`, `ground/height`, `ground/friction`,
-`body/NAME/{mass,inertia,size,pose,friction}`, `joint/NAME/{limits,effort_limit,stiffness,damping,
-armature,initial_position}`, `link/NAME/{mass,inertia,friction}`, and `gripper/coupled` (1 when
-the fingers are). Links are those of the prepared robot (`simulator.urdf`), in which fixed joints
-are merged. Inertias are principal moments, ascending for links, along x, y, z for boxes.
+What is compared stands in `simulator.quantities`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import Robot, Scene
 from pytest_simbench.simulator.errors import ParityError
 from pytest_simbench.simulator.info import Deviation
-from pytest_simbench.simulator.settings import Settings
-from pytest_simbench.simulator.urdf import PreparedRobot
 
 RELATIVE_TOLERANCE = 1e-4
 ABSOLUTE_TOLERANCE = 1e-6
 """Single-precision engines keep 7 digits; a wrong mass or height differs by far more."""
 
-
-def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
-    """Every quantity that an engine should report of a scene."""
-    quantities: dict[str, Any] = {
-        "gravity": scene.gravity,
-        "timestep": settings.timestep,
-        "ground/height": 0.0,
-        "ground/friction": scene.ground_friction,
-    }
-    for body in scene.bodies:
-        prefix = f"body/{body.name}"
-        quantities[f"{prefix}/size"] = body.size
-        quantities[f"{prefix}/pose"] = body.pose.as_array()
-        quantities[f"{prefix}/friction"] = body.friction
-        if not body.fixed:
-            quantities[f"{prefix}/mass"] = body.mass
-            quantities[f"{prefix}/inertia"] = body.inertia()
-    if scene.robot is not None:
-        quantities.update(_robot_quantities(scene.robot))
-    return quantities
+LENGTH_TOLERANCE = 1e-5
+"""Of what single precision composes from several poses [m]: link poses, outlines, centres."""
 
 
-def _robot_quantities(robot: Robot) -> dict[str, Any]:
-    prepared = PreparedRobot(robot)
-    quantities: dict[str, Any] = {"gripper/coupled": 1.0}
-    for joint in robot.joints:
-        prefix = f"joint/{joint.name}"
-        quantities[f"{prefix}/limits"] = prepared.limits[joint.name]
-        quantities[f"{prefix}/effort_limit"] = joint.effort_limit
-        quantities[f"{prefix}/stiffness"] = joint.stiffness
-        quantities[f"{prefix}/damping"] = joint.damping
-        quantities[f"{prefix}/armature"] = joint.armature
-        quantities[f"{prefix}/initial_position"] = joint.initial_position
-    for link in prepared.moving_links:
-        quantities[f"link/{link.name}/mass"] = link.mass
-        quantities[f"link/{link.name}/inertia"] = link.principal_inertia()
-        quantities[f"link/{link.name}/friction"] = robot.friction
-    return quantities
+@dataclass(frozen=True)
+class Comparison:
+    """A world held against its scene.
+
+    Attributes:
+        wrong: a sentence for each quantity that differs from the scene, and is not excused.
+        deviations: a sentence for each declared deviation that counts in this world: a quantity
+            differs by it, the engine does not tell one that it excuses, or it concerns none.
+        untold: the quantities that the engine does not tell, as declared.
+    """
+
+    wrong: Mapping[str, str]
+    deviations: Sequence[str]
+    untold: Collection[str]
+
+
+def compare(
+    expected: Mapping[str, Any],
+    reported: Mapping[str, Any],
+    deviations: Iterable[Deviation],
+    simulator: str,
+) -> Comparison:
+    """Hold what a simulator reports against what is expected of it."""
+    deviations = tuple(deviations)
+    wrong: dict[str, str] = {}
+    untold: dict[str, Deviation] = {}
+    differing: dict[Deviation, str] = {}
+    for name, value in expected.items():
+        deviation = next((d for d in deviations if d.excuses(name)), None)
+        if name not in reported:
+            if deviation is None or deviation.within is not None:
+                wrong[name] = f"{simulator} reports nothing, and declares no deviation"
+            else:
+                untold[name] = deviation
+        elif not _equal(name, value, reported[name]):
+            text = f"scene {_text(value)}, {simulator} {_text(reported[name])}"
+            text += _difference_text(value, reported[name])
+            if deviation is None:
+                wrong[name] = text
+            elif _within(deviation, value, reported[name]):
+                differing.setdefault(deviation, f"{name}: {text}")
+            else:
+                limit = f"declared is at most {deviation.within:g}: {deviation.reason}"
+                wrong[name] = f"{text} ({limit})"
+    for name in sorted(set(reported) - set(expected)):
+        wrong[name] = "reported, but not part of the scene"
+    untellable = set(untold.values())
+    sentences = [_sentence(d, d in untellable, differing.get(d)) for d in deviations]
+    return Comparison(wrong, [sentence for sentence in sentences if sentence], list(untold))
 
 
 def check(
@@ -70,29 +79,14 @@ def check(
     deviations: Iterable[Deviation],
     simulator: str,
 ) -> list[str]:
-    """Compare; return a sentence for each excused difference.
+    """Compare; return one sentence for each declared deviation that counts in this world.
 
     Raises:
-        ParityError: a quantity differs, or is neither reported nor declared as a deviation; the
-            message gives both values of each (the first ten).
+        ParityError: a quantity differs, or differs by more than its deviation allows, or is neither
+            reported nor declared; the message gives both values of each (the first ten).
     """
-    excused, wrong = [], []
-    for name, value in expected.items():
-        deviation = next((d for d in deviations if d.excuses(name)), None)
-        if name not in reported:
-            if deviation is None:
-                wrong.append(f"{name}: {simulator} reports nothing, and declares no deviation")
-            continue
-        if _equal(name, value, reported[name]):
-            continue
-        text = f"{name}: scene {_text(value)}, {simulator} {_text(reported[name])}"
-        if deviation is None:
-            wrong.append(text)
-        else:
-            excused.append(f"{text} (declared: {deviation.reason})")
-    wrong += [
-        f"{name}: reported, but not part of the scene" for name in set(reported) - set(expected)
-    ]
+    comparison = compare(expected, reported, deviations, simulator)
+    wrong = [f"{name}: {text}" for name, text in comparison.wrong.items()]
     if wrong:
         more = f"; and {len(wrong) - 10} more" if len(wrong) > 10 else ""
         raise ParityError(
@@ -100,7 +94,21 @@ def check(
             + "; ".join(wrong[:10])
             + more
         )
-    return excused
+    return list(comparison.deviations)
+
+
+def _sentence(deviation: Deviation, untold: bool, differing: str | None) -> str:
+    """What stands in the record; the same in every repetition of a task."""
+    if not deviation.quantity:
+        return deviation.reason
+    found = ["not told by the engine"] if untold else []
+    if differing and deviation.within is not None:
+        found.append(f"differs by at most {deviation.within:g}")
+    elif differing:
+        found.append(differing)
+    if not found:
+        return ""
+    return f"{deviation.quantity}: {deviation.reason} ({'; '.join(found)})"
 
 
 def one_value(values: Any) -> Any:
@@ -116,12 +124,37 @@ def _equal(name: str, expected: Any, reported: Any) -> bool:
     a, b = np.asarray(expected, dtype=float), np.asarray(reported, dtype=float)
     if a.shape != b.shape:
         return False
-    if name.endswith("/pose") and np.dot(a[3:], b[3:]) < 0:
+    kind = name.rpartition("/")[2]
+    if kind == "pose" and np.dot(a[3:], b[3:]) < 0:
         b = np.concatenate([b[:3], -b[3:]])  # q and -q are the same rotation
-    if name.endswith(("/inertia", "/mass")):
-        return bool(np.allclose(a, b, rtol=RELATIVE_TOLERANCE, atol=1e-12))
-    return bool(np.allclose(a, b, rtol=RELATIVE_TOLERANCE, atol=ABSOLUTE_TOLERANCE))
+    if kind in ("inertia", "mass"):  # of a tensor, relative to its largest element
+        return bool(np.abs(a - b).max() <= RELATIVE_TOLERANCE * np.abs(a).max() + 1e-12)
+    composed = kind in ("boxes", "meshes", "com", "axis") or name.startswith("link/")
+    absolute = LENGTH_TOLERANCE if composed else ABSOLUTE_TOLERANCE
+    return bool(np.allclose(a, b, rtol=RELATIVE_TOLERANCE, atol=absolute))
+
+
+def _within(deviation: Deviation, expected: Any, reported: Any) -> bool:
+    if deviation.within is None:
+        return True
+    gap = _gap(expected, reported)
+    return gap is not None and gap <= deviation.within
+
+
+def _gap(expected: Any, reported: Any) -> float | None:
+    """The largest difference of two arrays; None where they have different shapes."""
+    a, b = np.asarray(expected, dtype=float), np.asarray(reported, dtype=float)
+    return float(np.abs(a - b).max(initial=0.0)) if a.shape == b.shape else None
 
 
 def _text(value: Any) -> str:
-    return np.array2string(np.asarray(value, dtype=float), precision=6, separator=", ")
+    array = np.asarray(value, dtype=float)
+    if array.size > 9:
+        return "x".join(map(str, array.shape)) + " numbers"
+    return np.array2string(array, precision=6, separator=", ").replace("\n", "")
+
+
+def _difference_text(expected: Any, reported: Any) -> str:
+    gap = _gap(expected, reported)
+    big = np.size(expected) > 9
+    return f", which differ by up to {gap:.3g}" if big and gap is not None else ""

@@ -33,6 +33,13 @@ class Settings:
 
     timestep: float = 0.002
 
+    def quantities(self) -> Mapping[str, Any]:
+        """What these settings make of quantities that a scene leaves at 0, by pattern of names.
+
+        For options of an engine that act on bodies, links or joints: `body/*/damping`, say.
+        """
+        return {}
+
     def to_wire(self) -> dict[str, Any]:
         return dataclasses.asdict(self)
 

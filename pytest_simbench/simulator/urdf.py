@@ -44,10 +44,6 @@ class Link:
     inertia: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
     shapes: list[Shape] = field(default_factory=list)
 
-    def principal_inertia(self) -> FloatArray:
-        """Principal moments, ascending, (3,)."""
-        return np.sort(np.linalg.eigvalsh(self.inertia))
-
     def absorb(self, other: Link, pose: Pose) -> None:
         """Weld `other`, placed at `pose` in this link's frame, onto this link."""
         rotation, offset = pose.rotation(), np.asarray(pose.position)

@@ -23,7 +23,7 @@ import pytest
 from pytest_simbench.client.environments import missing
 from pytest_simbench.simulator import Simulator
 from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.testing import contract, drives, physics, state
+from pytest_simbench.testing import contract, drives, dynamics, interaction, parity, physics, state
 from pytest_simbench.testing.checks import CHECKS, Check
 from pytest_simbench.testing.expected import (
     ConformanceWarning,
@@ -44,6 +44,9 @@ __all__ = [
     "conformance_checks",
     "contract",
     "drives",
+    "dynamics",
+    "interaction",
+    "parity",
     "physics",
     "state",
 ]

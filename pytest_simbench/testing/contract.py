@@ -10,7 +10,7 @@ import sys
 import numpy as np
 
 from pytest_simbench.client.errors import WorkerError
-from pytest_simbench.scene import Box, Pose, Scene, Trajectory
+from pytest_simbench.scene import Pose, Trajectory
 from pytest_simbench.simulator import Capability, Settings
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.testing import scenes
@@ -185,38 +185,6 @@ def commands_persist(subject: Subject) -> None:
             error = np.abs(world.joints[0] - goal)
             require_close("joint error after the command", error[:7].max(), 0, 5e-3, "rad")
             require_close("finger error after the command", error[7:].max(), 0, 1e-3, "m")
-
-
-@check()
-def parity_of_full_scene(subject: Subject) -> None:
-    """A world with robot, fixed and free bodies, odd sizes and tilted gravity passes parity."""
-    scene = Scene(
-        "full",
-        (
-            Box("table", (0.9, 0.9, 0.3), Pose.at(0.8, 0.0, 0.15), friction=0.7),
-            Box("brick", (0.1, 0.06, 0.03), Pose.at(0.5, 0.1, 0.315, yaw=0.4), 0.23, 0.7),
-            scenes.cube("cube", Pose.at(0.6, -0.1, 0.325, yaw=-1.0), friction=0.7),
-        ),
-        robot=scenes.arm(),
-        gravity=(0.3, -0.2, -3.7),
-        ground_friction=0.7,
-    )
-    with subject.world(scene):
-        pass  # loading checks parity
-
-
-@check()
-def read_back_is_the_engines(subject: Subject) -> None:
-    """What is read back comes from the engine: once a cube fell, its pose is the present one, or
-    that of the step before, where an engine derives poses at the start of a step."""
-    with subject.world(scenes.falling()) as world:
-        world.wait(0.3)
-        pose = np.asarray(world.process.request("read_back")["body/falling/pose"])
-        step = float(np.linalg.norm(world.bodies[0, 7:10])) * subject.timestep
-        require(
-            np.allclose(pose[:3], world.bodies[0, :3], atol=SINGLE + step),
-            f"read_back gives position {pose[:3]} of a cube that is at {world.bodies[0, :3]}",
-        )
 
 
 @check()

@@ -6,7 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Scene, Trajectory
+from pytest_simbench.scene import (
+    STANDARD_GRAVITY,
+    FloatArray,
+    Robot,
+    Scene,
+    Trajectory,
+    Vector3,
+)
 from pytest_simbench.simulator import Deviation
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
@@ -16,16 +23,16 @@ ARM_TICK = 0.004
 """Control tick of the set points [s], as in the tasks."""
 
 
-def _model(robot: Robot) -> Any:
+def model_of(robot: Robot) -> Any:
     from pytest_simbench.robot.model import RobotModel
 
     return RobotModel(robot)
 
 
-def _gravity_effort(robot: Robot, q: FloatArray) -> FloatArray:
+def gravity_effort(robot: Robot, q: FloatArray, gravity: Vector3 = STANDARD_GRAVITY) -> FloatArray:
+    """Efforts that hold the robot at rest at `q`, (n_joints,) [N m, N]."""
     zero = np.zeros((1, len(q)))
-    gravity = np.array(STANDARD_GRAVITY)
-    return np.asarray(_model(robot).inverse_dynamics(gravity, q[None], zero, zero)[0])
+    return np.asarray(model_of(robot).inverse_dynamics(np.array(gravity), q[None], zero, zero)[0])
 
 
 @check()
@@ -42,7 +49,7 @@ def static_hold(subject: Subject) -> None:
         require_close("sag under gravity", float(np.abs(start - q)[:7].max()), 0, 5e-3, "rad")
         return
     held = (robot.column("stiffness") * (start - q))[:7]
-    law = _gravity_effort(robot, q)[:7]
+    law = gravity_effort(robot, q)[:7]
     tolerance = 0.03 * float(np.abs(law).max())
     for joint, value, expected in zip(robot.joints, held, law, strict=False):
         require_close(f"holding torque of {joint.name}", value, expected, tolerance, "N m")
@@ -64,8 +71,8 @@ def tracks_trajectory(subject: Subject) -> None:
     q = start + (goal - start) * (10 * s**3 - 15 * s**4 + 6 * s**5)
     v = (goal - start) * (30 * s**2 - 60 * s**3 + 30 * s**4) / 1.5
     a = (goal - start) * (60 * s - 180 * s**2 + 120 * s**3) / 1.5**2
-    effort = _model(robot).inverse_dynamics(np.array(STANDARD_GRAVITY), q, v, a)
-    rest = _gravity_effort(robot, start)
+    effort = model_of(robot).inverse_dynamics(np.array(STANDARD_GRAVITY), q, v, a)
+    rest = gravity_effort(robot, start)
     hold = Trajectory(ARM_TICK, *(np.array([r, r]) for r in (start, 0 * start, rest)))
     with subject.world(scenes.arm_alone(robot)) as world:
         world.follow(hold)
@@ -85,24 +92,17 @@ def effort_limit_bounds_acceleration(subject: Subject) -> None:
     the effort limit and nothing else: its axis is vertical and M does not depend on it. After
     0.1 s p <= 1.05 limit t, and >= 0.8 limit t so that the limit is reached. A declared lack
     of rotor inertia is left out of M."""
-    import pinocchio as pin
-
     robot = scenes.arm()
     start = robot.column("initial_position")
     goal = start.copy()
     goal[0] += 2.0
-    model = _model(robot)
     far = Trajectory(subject.timestep, *(np.array([r, r]) for r in (goal, 0 * goal, 0 * goal)))
     with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "arm weightless")) as world:
         world.follow(far)
         world.wait(0.1 - subject.timestep)
         t, (q, v) = world.time, world.joints
-    if any(d.excuses(f"joint/{robot.joints[0].name}/armature") for d in _deviations(subject)):
-        model.pin.armature = np.zeros(len(q))
-    data = model.pin.createData()
-    upper = np.triu(pin.crba(model.pin, data, q))
-    mass = upper + np.triu(upper, 1).T
-    momentum, limit = float((mass @ v)[0]), robot.joints[0].effort_limit
+    momentum = float(joint_momentum(robot, q, v, has_armature(subject))[0])
+    limit = robot.joints[0].effort_limit
     require(
         momentum <= 1.05 * limit * t,
         f"joint 1 gained {momentum:.3g} N m s in {t:.3g} s, its limit allows {limit * t:.3g}",
@@ -119,7 +119,7 @@ def weak_joint_sags(subject: Subject) -> None:
     than 0.05 rad within 0.5 s, while with its own limit it holds within 0.02 rad."""
     robot = scenes.arm()
     q = robot.column("initial_position")
-    load = np.abs(_gravity_effort(robot, q)[:7])
+    load = np.abs(gravity_effort(robot, q)[:7])
     index = int(load.argmax())
     name = robot.joints[index].name
     moved = []
@@ -163,11 +163,36 @@ def grip_holds(subject: Subject) -> None:
     require_close("creep of the held cube", away, 0.0, 2e-3, "m")
 
 
+def has_armature(subject: Subject) -> bool:
+    """Whether the engine has rotor inertia, which an adapter may declare to lack."""
+    name = f"joint/{scenes.arm().joints[0].name}/armature"
+    return not any(deviation.excuses(name) for deviation in subject.cls.info.deviations)
+
+
+def joint_momentum(robot: Robot, q: FloatArray, v: FloatArray, armature: bool) -> FloatArray:
+    """Momentum of each joint, M(q) v, (n_joints,) [kg m^2/s, kg m/s]."""
+    import pinocchio as pin
+
+    model = model_of(robot).pin
+    if not armature:
+        model.armature = np.zeros(len(q))
+    upper = np.triu(pin.crba(model, model.createData(), q))
+    return np.asarray((upper + np.triu(upper, 1).T) @ v)
+
+
+def hold_command(scene: Scene, timestep: float) -> Trajectory:
+    """One command: everything at its start, gravity compensated."""
+    robot = scene.robot or scenes.arm()
+    start = robot.column("initial_position")
+    effort = gravity_effort(robot, start, scene.gravity)
+    return Trajectory(timestep, *(np.array([r, r]) for r in (start, 0 * start, effort)))
+
+
 def close_command(scene: Scene, timestep: float) -> Trajectory:
     """One command: arm at its start with gravity compensated, fingers closed."""
     robot = scene.robot or scenes.arm()
     goal = robot.column("initial_position")
-    effort = _gravity_effort(robot, goal)
+    effort = gravity_effort(robot, goal, scene.gravity)
     goal[robot.finger_indices] = robot.gripper.closed
     effort[robot.finger_indices] = 0.0
     return Trajectory(timestep, *(np.array([r, r]) for r in (goal, 0 * goal, effort)))

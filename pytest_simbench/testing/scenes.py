@@ -77,19 +77,41 @@ def with_joint(robot: Robot, name: str, **values: Any) -> Robot:
     return replace(robot, joints=joints)
 
 
+def at_random(robot: Robot, rng: np.random.Generator) -> Robot:
+    """The same robot starting at random joint positions, its fingers alike."""
+    from pytest_simbench.simulator import PreparedRobot
+
+    limits = PreparedRobot(robot).limits
+    opening = rng.uniform(0.2, 0.8)
+    for joint in robot.joints:
+        low, high = limits[joint.name]
+        share = opening if joint.name in robot.gripper.joints else rng.uniform(0.1, 0.9)
+        robot = with_joint(robot, joint.name, initial_position=float(low + share * (high - low)))
+    return robot
+
+
 def arm_alone(
     robot: Robot | None = None, gravity: Vector3 = STANDARD_GRAVITY, name: str = "arm"
 ) -> Scene:
     return Scene(name, robot=robot or arm(), gravity=gravity)
 
 
-def grip() -> Scene:
-    """The Panda with a cube between its nearly closed fingers."""
+def grip(
+    robot: Robot | None = None, mass: float = MASS, gap: float = 2e-4, name: str = "grip"
+) -> Scene:
+    """The Panda with a cube between its fingers, which stand `gap` [m] from it on either side."""
     from pytest_simbench.robot.model import RobotModel
 
-    robot = arm()
+    robot = robot or arm()
     for finger in robot.gripper.joints:
-        robot = with_joint(robot, finger, initial_position=EDGE / 2 + 2e-4)
+        robot = with_joint(robot, finger, initial_position=EDGE / 2 + gap)
     start = robot.column("initial_position")
-    held = cube("held", RobotModel(robot).tool_pose(np.asarray(start)))
-    return Scene("grip", (held,), robot=robot)
+    held = cube("held", RobotModel(robot).tool_pose(np.asarray(start)), mass)
+    return Scene(name, (held,), robot=robot)
+
+
+def squeezing(robot: Robot, force: float) -> Robot:
+    """The same robot, each finger pressing with at most `force` [N]."""
+    for finger in robot.gripper.joints:
+        robot = with_joint(robot, finger, effort_limit=force)
+    return replace(robot, gripper=replace(robot.gripper, squeeze=force))

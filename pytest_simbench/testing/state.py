@@ -16,7 +16,7 @@ from pytest_simbench.testing.drives import close_command
 from pytest_simbench.testing.subject import Subject, logged, require
 
 
-def _busy_scene() -> Scene:
+def busy_scene() -> Scene:
     cubes = [scenes.cube(f"c{i}", Pose.at(0.5, 0.02 * i, 0.1 + 0.08 * i)) for i in range(3)]
     return Scene("busy", tuple(cubes), robot=scenes.arm())
 
@@ -43,7 +43,7 @@ def require_same(what: str, a: Motion, b: Motion) -> None:
             )
 
 
-def _run(world: World, scene: Scene, timestep: float) -> Motion:
+def swing_and_wait(world: World, scene: Scene, timestep: float) -> Motion:
     world.follow(_swing(scene, timestep, 0.2))
     return logged(world.wait(1.0, log_period=0.02))
 
@@ -52,7 +52,7 @@ def _run(world: World, scene: Scene, timestep: float) -> Motion:
 def restore_repeats(subject: Subject) -> None:
     """From a restored state the same future follows every time, bit for bit: cubes falling and
     colliding, the arm moving under the command that was in force when the state was saved."""
-    scene = _busy_scene()
+    scene = busy_scene()
     with subject.world(scene) as world:
         world.follow(_swing(scene, subject.timestep, 0.3))
         world.wait(0.1)
@@ -75,7 +75,7 @@ def restore_repeats(subject: Subject) -> None:
 def restore_continues(subject: Subject) -> None:
     """A run that was saved, and one that was restored as well, equal bit for bit the run that was
     not interrupted."""
-    scene, runs = _busy_scene(), []
+    scene, runs = busy_scene(), []
     for interrupted in (False, True):
         with subject.world(scene) as world:
             world.follow(_swing(scene, subject.timestep, 0.3))
@@ -108,20 +108,20 @@ def restore_in_the_grip(subject: Subject) -> None:
 @check(Capability.DETERMINISTIC)
 def fresh_processes_agree(subject: Subject) -> None:
     """Two fresh processes compute the same, bit for bit."""
-    scene, runs = _busy_scene(), []
+    scene, runs = busy_scene(), []
     for _ in range(2):
         with subject.world(scene, fresh=True) as world:
-            runs.append(_run(world, scene, subject.timestep))
+            runs.append(swing_and_wait(world, scene, subject.timestep))
     require_same("two fresh processes", runs[1], runs[0])
 
 
 @check(Capability.DETERMINISTIC)
 def reused_process_agrees(subject: Subject) -> None:
     """A second world in one process, after another scene was in between, computes the same."""
-    scene, runs = _busy_scene(), []
+    scene, runs = busy_scene(), []
     for _ in range(2):
         with subject.world(scene) as world:
-            runs.append(_run(world, scene, subject.timestep))
+            runs.append(swing_and_wait(world, scene, subject.timestep))
         with subject.world(scenes.tower()) as world:
             world.wait(0.1)
     require_same("two worlds in one process", runs[1], runs[0])
@@ -133,10 +133,10 @@ def window_changes_nothing(subject: Subject) -> None:
     1 mm. Skipped where there is no display."""
     if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         pytest.skip("no display; start one, e.g. with xvfb-run")
-    scene, runs = _busy_scene(), []
+    scene, runs = busy_scene(), []
     for gui in (False, True):
         with subject.world(scene, fresh=True, gui=gui) as world:
-            runs.append(_run(world, scene, subject.timestep))
+            runs.append(swing_and_wait(world, scene, subject.timestep))
     if subject.can(Capability.DETERMINISTIC):
         require_same("with and without a window", runs[1], runs[0])
     else:
@@ -149,7 +149,7 @@ def picture_shows_something(subject: Subject) -> None:
     """An offscreen picture has the size asked for, (height, width, 3) bytes, more than one
     colour, and another one is drawn when the scene is another."""
     pictures = []
-    for scene in (_busy_scene(), scenes.tower()):
+    for scene in (busy_scene(), scenes.tower()):
         with subject.world(scene) as world:
             pictures.append(world.render(160, 120))
     for picture in pictures:

@@ -132,13 +132,14 @@ class Subject:
         fresh: bool = False,
         gui: bool = False,
         changes: Mapping[str, Any] | None = None,
+        parity: bool = True,
     ) -> Iterator[World]:
-        """A world of `scene`, parity checked; in a process of its own if `fresh` or `gui`."""
+        """A world of `scene`, checked if `parity`; in a process of its own if `fresh` or `gui`."""
         alone = fresh or gui
         process = self.launch(gui=gui) if alone else self.shared()
         try:
             self.construct(process, changes, gui)
-            yield World(process, scene)
+            yield World(process, scene, parity=parity)
         except WorkerError:
             process.kill()
             raise

@@ -20,7 +20,9 @@ from typing import Any
 from pytest_simbench import __version__
 from pytest_simbench.scene import Scene, Trajectory
 from pytest_simbench.simulator import Simulator, SimulatorError, SimulatorInfo
-from pytest_simbench.simulator.parity import check, expected_quantities
+from pytest_simbench.simulator.memory import remembering
+from pytest_simbench.simulator.parity import check
+from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.simulator.robot_check import check_names
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.worker.state import check_following, check_log, check_start, checked_state
@@ -133,8 +135,13 @@ class Server:
             simulator.refresh_window()
         return {"excused": excused, **self.do_state()}
 
-    def do_read_back(self) -> dict[str, Any]:
-        return self._constructed().read_back()
+    def do_read_back(self, remember: dict[str, Any] | None = None) -> dict[str, Any]:
+        """What the engine says; the adapter made to remember another scene meanwhile, if given."""
+        simulator = self._constructed()
+        if remember is None:
+            return simulator.read_back()
+        with remembering(simulator, Scene.from_wire(remember)):
+            return simulator.read_back()
 
     def do_state(self) -> dict[str, Any]:
         return checked_state(self._constructed(), self.scene)

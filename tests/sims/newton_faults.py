@@ -100,15 +100,71 @@ def uncouple(s: Any) -> None:
     s.solver.mj_data.eq_active[:] = 0
 
 
+def in_geom(name: str, array: str, value: Any) -> Callable[[Any], None]:
+    """Sets an array's rows of all geoms of a link, or of the one of a body or the ground."""
+
+    def plant(s: Any) -> None:
+        model = s.solver.mj_model
+        link = name.startswith("panda")
+        rows = model.geom_bodyid == body(s, name).id if link else [geom(s, name).id]
+        getattr(model, array)[rows] = value
+
+    return plant
+
+
+def ghost(name: str) -> Callable[[Any], None]:
+    def plant(s: Any) -> None:
+        for array in ("geom_contype", "geom_conaffinity"):
+            in_geom(name, array, 0)(s)
+
+    return plant
+
+
+def lifted_ground(s: Any) -> None:
+    ground = geom(s, "ground").id
+    s.solver.mj_model.geom_pos[ground, 2] = 0.01
+    s.solver.mj_model.geom_sameframe[ground] = 0  # else MuJoCo takes the body's frame
+
+
+def centre(s: Any) -> None:
+    s.solver.mj_model.body_ipos[body(s, "cube_05").id, 0] += 0.01
+    s.solver.mj_model.body_sameframe[body(s, "cube_05").id] = 0
+
+
+def damped(s: Any) -> None:
+    start = body(s, "cube_05").dofadr[0]
+    s.solver.mj_model.dof_damping[start : start + 6] = 0.1
+
+
+def weightless(name: str) -> Callable[[Any], None]:
+    return lambda s: s.solver.mj_model.body_gravcomp.__setitem__(body(s, name).id, 1.0)
+
+
+BOUNCY = (0.02, 0.1)
+"""MuJoCo's time constant and damping ratio of a contact that gives back most of the speed."""
+
 FAULTS: dict[str, Callable[[Any], None]] = {
+    "ground/restitution": in_geom("ground", "geom_solref", BOUNCY),
+    "body/cube_05/restitution": in_geom("cube_05", "geom_solref", BOUNCY),
+    "body/cube_05/margin": in_geom("cube_05", "geom_margin", 0.002),
+    "body/cube_05/touches": ghost("cube_05"),
+    "body/cube_05/com": centre,
+    "body/cube_05/damping": damped,
+    "body/cube_05/gravity": weightless("cube_05"),
+    "link/panda_link4/restitution": in_geom("panda_link4", "geom_solref", BOUNCY),
+    "link/panda_link4/margin": in_geom("panda_link4", "geom_margin", 0.002),
+    "link/panda_link4/touches": ghost("panda_link4"),
+    "link/panda_link4/damping": lambda s: setattr(s.solver.mj_model.opt, "viscosity", 0.1),
+    "link/panda_link4/gravity": weightless("panda_link4"),
+    "joint/panda_joint4/friction": in_model("dof_frictionloss", 0.5),
     "body/cube_05/mass": lambda s: body(s, "cube_05").mass.__setitem__(0, 1.0),
     "body/cube_05/inertia": lambda s: body(s, "cube_05").inertia.__imul__(1.2),
     "body/cube_05/friction": lambda s: geom(s, "cube_05").friction.__setitem__(0, 0.5),
-    "body/cube_05/size": lambda s: geom(s, "cube_05").size.__setitem__(1, 0.02),
+    "body/cube_05/boxes": lambda s: geom(s, "cube_05").size.__setitem__(1, 0.02),
     "body/table/pose": sunk_table,
     "gravity": lambda s: s.solver.mj_model.opt.gravity.__setitem__(2, -9.7),
     "timestep": lambda s: setattr(s.solver.mj_model.opt, "timestep", 0.005),
-    "ground/height": lambda s: geom(s, "ground").pos.__setitem__(2, 0.01),
+    "ground/height": lifted_ground,
     "ground/friction": lambda s: geom(s, "ground").friction.__setitem__(0, 0.5),
     "joint/panda_joint4/stiffness": gain(1),
     "joint/panda_joint4/damping": gain(2),

@@ -13,7 +13,8 @@ from pytest_simbench.sims.dart import DART
 
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import ParityError
-from pytest_simbench.simulator.parity import check, expected_quantities
+from pytest_simbench.simulator.parity import check
+from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.tasks import Jitter, Stacking
 from pytest_simbench.testing import scenes
@@ -175,7 +176,7 @@ FAULTS: dict[str, Callable[[DART], None]] = {
     "body/cube_05/inertia": lambda s: turned(s._bodies["cube_05"], 1.2),
     "body/cube_05/friction": lambda s: surface(shape_of(s, "cube_05"), 0.5),
     "body/cube_05/pose": moved,
-    "body/table/size": lambda s: shape_of(s, "table").getShape().setSize([0.5, 0.5, 0.2]),
+    "body/table/boxes": lambda s: shape_of(s, "table").getShape().setSize([0.5, 0.5, 0.2]),
     "joint/panda_joint4/limits": lambda s: joint(s).setPositionUpperLimit(0, 0.5),
     "joint/panda_joint4/effort_limit": lambda s: joint(s).setForceUpperLimit(0, 174.0),
     "joint/panda_joint4/initial_position": lambda s: joint(s).setPosition(0, -2.0),

@@ -22,8 +22,11 @@ from pytest_simbench.client.errors import EngineFailed, Where, WorldParityError
 from pytest_simbench.client.process import Launch, WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.scene import FloatArray, Scene, Trajectory
+from pytest_simbench.simulator.parity import compare
+from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
 from pytest_simbench.testing import scenes
+from tests.sims.coverage import uncovered
 from tests.sims.genesis_faults import FAULTS
 
 ADAPTER = "tests.sims.genesis_faults:FaultyGenesis"
@@ -48,7 +51,13 @@ def worker() -> Iterator[WorkerProcess]:
     process.close()
 
 
-def load(worker: WorkerProcess, scene: Scene, profile: str = "tuned", **changes: Any) -> World:
+def load(
+    worker: WorkerProcess,
+    scene: Scene,
+    profile: str = "tuned",
+    parity: bool = True,
+    **changes: Any,
+) -> World:
     worker.request(
         "construct",
         timeout=120.0,
@@ -58,7 +67,7 @@ def load(worker: WorkerProcess, scene: Scene, profile: str = "tuned", **changes:
         gui=False,
         real_time=False,
     )
-    return World(worker, scene)
+    return World(worker, scene, parity=parity)
 
 
 @pytest.mark.parametrize("task", [Stacking(), Throwing()], ids=lambda task: task.name)
@@ -68,8 +77,22 @@ def test_an_honest_world_passes(worker: WorkerProcess, task: Any) -> None:
 
 @pytest.mark.parametrize("quantity", FAULTS)
 def test_fault_is_caught(worker: WorkerProcess, quantity: str) -> None:
-    with pytest.raises(WorldParityError, match=f"{re.escape(quantity)}: scene .*, genesis "):
-        load(worker, Stacking().scene(1, Jitter()), fault=quantity)
+    scene = Stacking().scene(1, Jitter())
+    world = load(worker, scene, parity=False, fault=quantity)
+    expected = expected_quantities(scene, Genesis.profiles["tuned"])
+    reported = world.process.request("read_back")
+    wrong = compare(expected, reported, Genesis.info.deviations, "genesis").wrong
+    assert re.match("scene .*, genesis ", wrong[quantity])
+
+
+def test_a_fault_ends_the_loading(worker: WorkerProcess) -> None:
+    with pytest.raises(WorldParityError, match="gravity: scene .*, genesis "):
+        load(worker, Stacking().scene(1, Jitter()), fault="gravity")
+
+
+def test_nothing_is_left_out(worker: WorkerProcess) -> None:
+    world = load(worker, Stacking().scene(1, Jitter()))
+    assert uncovered(world.process.request("read_back"), FAULTS) == set()
 
 
 def held(position: FloatArray, effort: FloatArray, timestep: float) -> Trajectory:

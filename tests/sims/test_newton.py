@@ -14,7 +14,10 @@ from pytest_simbench.client.errors import Where, WorldParityError
 from pytest_simbench.client.process import Launch, WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.scene import Scene
+from pytest_simbench.simulator.parity import compare
+from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
+from tests.sims.coverage import uncovered
 from tests.sims.newton_faults import FAULTS
 
 ADAPTER = "tests.sims.newton_faults:FaultyNewton"
@@ -39,7 +42,13 @@ def worker() -> Iterator[WorkerProcess]:
     process.close()
 
 
-def load(worker: WorkerProcess, scene: Scene, profile: str = "tuned", fault: str = "") -> World:
+def load(
+    worker: WorkerProcess,
+    scene: Scene,
+    profile: str = "tuned",
+    fault: str = "",
+    parity: bool = True,
+) -> World:
     worker.request(
         "construct",
         adapter=ADAPTER,
@@ -48,7 +57,7 @@ def load(worker: WorkerProcess, scene: Scene, profile: str = "tuned", fault: str
         gui=False,
         real_time=False,
     )
-    return World(worker, scene)
+    return World(worker, scene, parity=parity)
 
 
 @pytest.mark.parametrize("profile", ["default", "tuned"])
@@ -59,5 +68,19 @@ def test_an_honest_world_passes(worker: WorkerProcess, task: Any, profile: str) 
 
 @pytest.mark.parametrize("quantity", FAULTS)
 def test_fault_is_caught(worker: WorkerProcess, quantity: str) -> None:
-    with pytest.raises(WorldParityError, match=f"{re.escape(quantity)}: scene .*, newton "):
-        load(worker, Stacking().scene(1, Jitter()), fault=quantity)
+    scene = Stacking().scene(1, Jitter())
+    world = load(worker, scene, parity=False, fault=quantity)
+    expected = expected_quantities(scene, Newton.profiles["tuned"])
+    reported = world.process.request("read_back")
+    wrong = compare(expected, reported, Newton.info.deviations, "newton").wrong
+    assert re.match("scene .*, newton ", wrong[quantity])
+
+
+def test_a_fault_ends_the_loading(worker: WorkerProcess) -> None:
+    with pytest.raises(WorldParityError, match="gravity: scene .*, newton "):
+        load(worker, Stacking().scene(1, Jitter()), fault="gravity")
+
+
+def test_nothing_is_left_out(worker: WorkerProcess) -> None:
+    world = load(worker, Stacking().scene(1, Jitter()))
+    assert uncovered(world.process.request("read_back"), FAULTS) == set()

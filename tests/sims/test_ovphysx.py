@@ -18,6 +18,7 @@ from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Trajectory
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
 from pytest_simbench.testing import Subject, scenes
 
+from .coverage import uncovered
 from .ovphysx_faults import FAULTS, faulty
 
 ABSENT = missing(OvPhysX.info)
@@ -49,6 +50,11 @@ def test_fault_is_caught(quantity: str) -> None:
         Subject(faulty(quantity)).world(SCENE, fresh=True),
     ):
         pass
+
+
+def test_nothing_is_left_out() -> None:
+    with Subject(OvPhysX).world(SCENE) as world:
+        assert uncovered(world.process.request("read_back"), FAULTS) == set()
 
 
 def held(position: FloatArray, effort: FloatArray, timestep: float) -> Trajectory:

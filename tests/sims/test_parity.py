@@ -11,7 +11,8 @@ from pytest_simbench.sims.mujoco import MuJoCo
 from pytest_simbench.sims.pybullet import PyBullet
 
 from pytest_simbench.simulator import ParityError, Simulator
-from pytest_simbench.simulator.parity import check, expected_quantities
+from pytest_simbench.simulator.parity import check
+from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
 from tests.conftest import HERE
@@ -91,7 +92,7 @@ MUJOCO_FAULTS: dict[str, Callable[[Any], None]] = {
     "body/cube_05/friction": lambda s: s.model.geom("cube_05").friction.__setitem__(0, 0.5),
     "gravity": lambda s: s.model.opt.gravity.__setitem__(2, -9.7),
     "timestep": lambda s: setattr(s.model.opt, "timestep", 0.005),
-    "body/table/size": shorter_table,
+    "body/table/boxes": shorter_table,
     "body/table/pose": shorter_table,
     "joint/panda_joint4/stiffness": gain(1),
     "joint/panda_joint4/damping": gain(2),

@@ -12,7 +12,8 @@ from pytest_simbench.sims.pybullet import PyBullet
 
 from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.simulator import ParityError
-from pytest_simbench.simulator.parity import check, expected_quantities
+from pytest_simbench.simulator.parity import check
+from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.tasks import Jitter, Throwing
 
 SCENE = Throwing().scene(1, Jitter())

@@ -19,7 +19,8 @@ from pytest_simbench.sims.sapien import SAPIEN, SAPIENSettings
 
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene
 from pytest_simbench.simulator import ParityError, PreparedRobot
-from pytest_simbench.simulator.parity import check, expected_quantities
+from pytest_simbench.simulator.parity import check
+from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.tasks import Jitter, Stacking
 from pytest_simbench.testing import scenes
 
@@ -363,7 +364,7 @@ def test_fault_is_caught(quantity: str) -> None:
     ("quantity", "built"),
     [
         ("gravity", replace(SCENE, gravity=(0.0, 0.0, -9.7))),
-        ("body/table/size", replace(SCENE, bodies=(Box("table", (0.9, 0.9, 0.2), Pose()),))),
+        ("body/table/boxes", replace(SCENE, bodies=(Box("table", (0.9, 0.9, 0.2), Pose()),))),
     ],
 )
 def test_another_scene_is_caught(quantity: str, built: Scene) -> None:

@@ -1,0 +1,154 @@
+"""The quantities of a scene: what every engine is asked for, by name, and what it must answer.
+
+    gravity, timestep, gripper/coupled
+    ground/{height, friction, restitution}
+    body/NAME/{pose, boxes, meshes, friction, restitution, margin, dynamic, touches}
+        and of a free body {mass, com, inertia, damping, gravity}
+    link/NAME/{pose, boxes, meshes, friction, restitution, margin, touches}
+        and of a link that moves {mass, com, inertia, damping, gravity}
+    joint/NAME/{axis, limits, effort_limit, stiffness, damping, friction, armature,
+        initial_position}
+
+Links are those of the prepared robot (`simulator.urdf`), in which fixed joints are merged; its base
+is the link `base`, whose frame is the world's.
+
+- pose: position and quaternion w, x, y, z of the body's or link's frame in the world, (7,).
+- boxes, meshes: the reach of each collision shape of that kind in the 26 directions of
+  `shapes.DIRECTIONS`, in the body's or link's frame, (n_shapes, 26) [m]; a mesh counts as its
+  convex hull.
+- com: centre of mass in that frame (3,) [m]; inertia: tensor about it in axes of that frame,
+  (3, 3) [kg m^2].
+- friction: Coulomb's coefficient; restitution: 0, nothing bounces; margin: the distance from its
+  shape at which it rests on others, 0 [m].
+- damping of a body or link: resistance to its linear and angular motion, (2,) [1/s], 0.
+- gravity of a body or link: the share of the scene's gravity that it feels, 1.
+- dynamic: 1 if forces can move the body, else 0.
+- touches: the shares of ground, bodies and links that it can collide with, (3,). Links do not
+  collide with links; what can never meet (fixed things) is left out of count; 0 where
+  nothing is left.
+- axis: velocity of the joint's child link at unit joint speed, angular before linear, in that
+  link's frame, (6,).
+- damping of a joint: of its drive and all else that resists in proportion to velocity; friction:
+  what resists its motion beside that [N m, N], 0.
+- coupled: 1 if the fingers are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from fnmatch import fnmatchcase
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Robot, Scene
+from pytest_simbench.simulator.kinematics import link_poses, motion_subspace
+from pytest_simbench.simulator.settings import Settings
+from pytest_simbench.simulator.shapes import box_corners, outlines, reach, shape_points
+from pytest_simbench.simulator.urdf import PreparedRobot
+
+
+def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
+    """Every quantity that an engine should report of a scene."""
+    prepared = None if scene.robot is None else PreparedRobot(scene.robot)
+    quantities: dict[str, Any] = {
+        "gravity": scene.gravity,
+        "timestep": settings.timestep,
+        "ground/height": 0.0,
+        "ground/friction": scene.ground_friction,
+        "ground/restitution": 0.0,
+    }
+    for body in scene.bodies:
+        quantities |= _named(
+            f"body/{body.name}",
+            pose=body.pose.as_array(),
+            friction=body.friction,
+            restitution=0.0,
+            margin=0.0,
+            dynamic=float(not body.fixed),
+        )
+        quantities |= outlines(f"body/{body.name}", [reach(box_corners(body.size))], [])
+        if not body.fixed:
+            inertia = np.diag(body.inertia())
+            quantities |= _inertial(f"body/{body.name}", body.mass, np.zeros(3), inertia)
+    if prepared is not None:
+        quantities |= _robot_quantities(prepared.robot, prepared)
+    robots = _links(prepared)
+    quantities |= touches(scene, prepared, lambda a, b: not (a in robots and b in robots))
+    for pattern, value in settings.quantities().items():
+        quantities |= {name: value for name in quantities if fnmatchcase(name, pattern)}
+    return quantities
+
+
+def _named(prefix: str, **values: Any) -> dict[str, Any]:
+    return {f"{prefix}/{name}": value for name, value in values.items()}
+
+
+def _inertial(prefix: str, mass: float, com: FloatArray, inertia: FloatArray) -> dict[str, Any]:
+    return _named(prefix, mass=mass, com=com, inertia=inertia, damping=np.zeros(2), gravity=1.0)
+
+
+def _robot_quantities(robot: Robot, prepared: PreparedRobot) -> dict[str, Any]:
+    quantities: dict[str, Any] = {"gripper/coupled": 1.0}
+    axes = {joint.name: motion_subspace(joint) for joint in prepared.joints}
+    for joint in robot.joints:
+        quantities |= _named(
+            f"joint/{joint.name}",
+            axis=axes[joint.name],
+            limits=prepared.limits[joint.name],
+            effort_limit=joint.effort_limit,
+            stiffness=joint.stiffness,
+            damping=joint.damping,
+            friction=0.0,
+            armature=joint.armature,
+            initial_position=joint.initial_position,
+        )
+    poses = link_poses(prepared, {joint.name: joint.initial_position for joint in robot.joints})
+    moving = {link.name for link in prepared.moving_links}
+    for link in prepared.links.values():
+        prefix = f"link/{link.name}"
+        quantities[f"{prefix}/pose"] = poses[link.name].as_array()
+        quantities |= outlines(
+            prefix,
+            [reach(shape_points(shape)) for shape in link.shapes if shape.size],
+            [reach(shape_points(shape)) for shape in link.shapes if not shape.size],
+        )
+        if link.shapes:
+            quantities |= _named(prefix, friction=robot.friction, restitution=0.0, margin=0.0)
+        if link.name in moving:
+            quantities |= _inertial(prefix, link.mass, link.centre, link.inertia)
+    return quantities
+
+
+def touches(
+    scene: Scene, prepared: PreparedRobot | None, can_touch: Callable[[str, str], Any]
+) -> dict[str, Any]:
+    """The quantities `body/NAME/touches` and `link/NAME/touches`.
+
+    Args:
+        can_touch: whether two of "ground", `body/NAME` and `link/NAME` can collide, as the engine
+            (or, for what is expected, the scene) has it; only asked where one of them can move.
+    """
+    links = _links(prepared)
+    bodies = [f"body/{body.name}" for body in scene.bodies]
+    still = {"ground", *(f"body/{body.name}" for body in scene.fixed_bodies)}
+    if prepared is not None:
+        still.add(f"link/{prepared.root}")
+
+    def share(name: str, others: Iterable[str]) -> float:
+        asked = [o for o in others if o != name and not (o in still and name in still)]
+        answers = [bool(can_touch(name, other)) for other in asked]
+        return float(np.mean(answers)) if answers else 0.0
+
+    groups = (["ground"], bodies, links)
+    return {
+        f"{name}/touches": np.array([share(name, group) for group in groups])
+        for name in [*bodies, *links]
+    }
+
+
+def _links(prepared: PreparedRobot | None) -> list[str]:
+    """The links that have shapes, as `link/NAME`."""
+    if prepared is None:
+        return []
+    return [f"link/{link.name}" for link in prepared.links.values() if link.shapes]

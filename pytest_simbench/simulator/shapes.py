@@ -1,0 +1,115 @@
+"""What a collision shape is compared by: how far it reaches, and the files that meshes come from.
+
+An engine may keep a box as a box, a mesh as its convex hull or as triangles, and number the shapes
+of a link as it likes. How far each reaches in 26 directions (its support function) is the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.simulator.errors import DescriptionError
+from pytest_simbench.simulator.urdf import Shape
+
+_GRID = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+DIRECTIONS: FloatArray = _GRID / np.linalg.norm(_GRID, axis=1, keepdims=True)
+"""The 26 directions to faces, edges and corners of a cube, unit vectors, (26, 3)."""
+
+_ORDER = np.sqrt(np.arange(2.0, 28.0))
+"""Weights of the directions that put shapes in an order of their own; roots, so that no
+symmetry makes two different shapes equal."""
+
+_STL_HEADER, _STL_TRIANGLE = (
+    84,
+    np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")]),
+)
+"""Layout of a binary STL file: header and count [bytes], then one record a triangle."""
+
+
+def reach(points: FloatArray) -> FloatArray:
+    """How far points (n, 3) reach in each of `DIRECTIONS` from the frame's origin [m], (26,)."""
+    return np.asarray((np.atleast_2d(points) @ DIRECTIONS.T).max(axis=0))
+
+
+def outlines(
+    prefix: str, boxes: Iterable[FloatArray], meshes: Iterable[FloatArray]
+) -> dict[str, FloatArray]:
+    """The quantities `boxes` and `meshes` of a body or link named `prefix`.
+
+    Args:
+        prefix: of the quantities' names.
+        boxes, meshes: each shape by its `reach`.
+
+    Returns:
+        Of each kind the reaches in an order of their own, (n_shapes, 26) [m].
+    """
+    return {f"{prefix}/boxes": _ordered(boxes), f"{prefix}/meshes": _ordered(meshes)}
+
+
+def _ordered(reaches: Iterable[FloatArray]) -> FloatArray:
+    rows = np.array(list(reaches), dtype=float).reshape(-1, len(DIRECTIONS))
+    return np.asarray(rows[np.argsort(rows @ _ORDER)])
+
+
+def box_corners(size: Sequence[float] | FloatArray) -> FloatArray:
+    """Corners (8, 3) of a box of edge lengths `size` about its centre [m]."""
+    return np.asarray(np.array(list(product((-0.5, 0.5), repeat=3))) * np.asarray(size))
+
+
+def placed(points: FloatArray, pose: Pose) -> FloatArray:
+    """Points (n, 3) given in the frame at `pose`."""
+    return np.asarray(points @ pose.rotation().T + np.asarray(pose.position))
+
+
+def shape_points(shape: Shape) -> FloatArray:
+    """Corners of a box or a mesh in the frame of its link, (n, 3) [m]."""
+    corners = box_corners(shape.size) if shape.size else mesh_points(shape.mesh or "")
+    return placed(corners, shape.pose)
+
+
+def mesh_points(path: str) -> FloatArray:
+    """The distinct corners of a mesh, (n, 3) [m].
+
+    Raises:
+        DescriptionError: the file is neither STL nor OBJ.
+    """
+    return _mesh_points(path, Path(path).stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=64)
+def _mesh_points(path: str, _changed: int) -> FloatArray:
+    reader = {".stl": _stl_points, ".obj": _obj_points}.get(Path(path).suffix.lower())
+    points = reader(Path(path)) if reader else None
+    if points is None or not len(points):
+        raise DescriptionError(f"{path} is no STL or OBJ file: collision meshes must be one")
+    return np.unique(points, axis=0)
+
+
+def _stl_points(path: Path) -> FloatArray | None:
+    data = path.read_bytes()
+    count = int.from_bytes(data[80:_STL_HEADER], "little")
+    if len(data) == _STL_HEADER + count * _STL_TRIANGLE.itemsize:
+        triangles = np.frombuffer(data, _STL_TRIANGLE, count, _STL_HEADER)
+        return np.asarray(triangles["corners"], dtype=float).reshape(-1, 3)
+    if not data.lstrip().startswith(b"solid"):
+        return None
+    return _points_after("vertex", data)
+
+
+def _obj_points(path: Path) -> FloatArray | None:
+    return _points_after("v", path.read_bytes())
+
+
+def _points_after(word: str, data: bytes) -> FloatArray | None:
+    lines = (line.split() for line in data.decode("utf-8", "replace").splitlines())
+    try:
+        rows = [[float(x) for x in line[1:4]] for line in lines if line and line[0] == word]
+        return np.array(rows, dtype=float).reshape(-1, 3)
+    except ValueError:
+        return None

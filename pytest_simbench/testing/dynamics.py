@@ -1,0 +1,127 @@
+"""Checks of the arm's own dynamics: inertia, gravity torque and effort limit of every joint."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Pose, Robot, Trajectory
+from pytest_simbench.simulator import PreparedRobot
+from pytest_simbench.testing import scenes
+from pytest_simbench.testing.checks import check
+from pytest_simbench.testing.drives import gravity_effort, has_armature, joint_momentum, model_of
+from pytest_simbench.testing.subject import Subject, require, require_close
+
+_FALL = 0.2
+"""For how long the limp arm falls [s]."""
+
+
+@check()
+def limp_arm_falls(subject: Subject) -> None:
+    """An arm without drives falls as its inertia and its weight say, and nothing else brakes it:
+    from two random postures, after 0.2 s every joint's speed is that of Pinocchio's forward
+    dynamics within 5 % of the fastest joint's. A declared lack of rotor inertia is left out."""
+    rng = np.random.default_rng(3)
+    for _ in range(2):
+        robot, law = _falling_arm(subject, rng)
+        with subject.world(scenes.arm_alone(robot, name="limp arm")) as world:
+            world.wait(_FALL)
+            speeds = world.joints[1, : len(law)]
+        tolerance = 0.05 * float(np.abs(law).max())
+        for joint, value, expected in zip(robot.arm_joints, speeds, law, strict=True):
+            require_close(f"speed of limp {joint.name}", value, expected, tolerance, "rad/s")
+
+
+def _falling_arm(subject: Subject, rng: np.random.Generator) -> tuple[Robot, FloatArray]:
+    """A robot high above the ground whose arm has no drives, and its speeds after the fall.
+
+    Its posture is random, but such that no joint reaches its limits.
+    """
+    while True:
+        robot = scenes.at_random(replace(scenes.arm(), base=Pose.at(0.0, 0.0, 2.0)), rng)
+        for joint in robot.arm_joints:
+            limp = {"stiffness": 1e-3, "damping": 1e-3, "effort_limit": 1e-6}
+            robot = scenes.with_joint(robot, joint.name, **limp)
+        path, speeds = _fall(robot, has_armature(subject))
+        limits = PreparedRobot(robot).limits
+        low, high = np.array([limits[joint.name] for joint in robot.arm_joints]).T
+        if (path > low + 0.05).all() and (path < high - 0.05).all():
+            return robot, speeds
+
+
+def _fall(robot: Robot, armature: bool) -> tuple[FloatArray, FloatArray]:
+    """Positions (n, n_arm) and final speeds (n_arm,) of the falling arm, its fingers held."""
+    import pinocchio as pin
+
+    full, q = model_of(robot).pin, robot.column("initial_position")
+    fingers = [full.getJointId(name) for name in robot.gripper.joints]
+    model: Any = pin.buildReducedModel(full, fingers, q)
+    n = model.nv
+    model.armature = robot.column("armature")[:n] if armature else np.zeros(n)
+    model.gravity.linear = robot.base.rotation().T @ np.array(STANDARD_GRAVITY)
+    data, q, v, path = model.createData(), q[:n].copy(), np.zeros(n), []
+    dt = 1e-4
+    for _ in range(round(_FALL / dt)):
+        v = v + dt * pin.aba(model, data, q, v, np.zeros(n))
+        q = q + dt * v
+        path.append(q)
+    return np.array(path), v
+
+
+@check()
+def every_effort_limit_counts(subject: Subject) -> None:
+    """Each arm joint does what its effort limit allows and no more. Where gravity loads it: with
+    1.25 times the effort that it asks of every joint the arm holds (0.02 rad in 0.3 s), with 0.7
+    times in one joint that one gives way (0.03 rad). Where not: under a far command with a limit
+    of 0.5 N m its momentum (M(q) q')_j is 0.5 N m t after 50 ms, within -20 and +5 %."""
+    gravity = (7.0, 5.0, -11.0)
+    robot = scenes.at_random(scenes.arm(), np.random.default_rng(14))
+    q = robot.column("initial_position")
+    load = np.abs(gravity_effort(robot, q, gravity)[: len(robot.arm_joints)])
+    strong = robot
+    for joint, effort in zip(robot.arm_joints, load, strict=True):
+        strong = scenes.with_joint(strong, joint.name, effort_limit=1.25 * float(effort) + 0.1)
+    moved = _gives_way(subject, strong, gravity)
+    for joint, value in zip(robot.arm_joints, moved, strict=True):
+        require_close(f"motion of {joint.name} with 1.25 times the effort", value, 0, 0.02, "rad")
+    for k, joint in enumerate(robot.arm_joints):
+        if load[k] < 0.5:
+            _speeds_up(subject, robot, k)
+            continue
+        weak = scenes.with_joint(strong, joint.name, effort_limit=0.7 * float(load[k]))
+        value = float(_gives_way(subject, weak, gravity)[k])
+        require(
+            value > 0.03,
+            f"{joint.name} holds {load[k]:.3g} N m with a limit of {0.7 * load[k]:.3g}: it gave "
+            f"way by {value:.2g} rad",
+        )
+
+
+def _speeds_up(subject: Subject, robot: Robot, k: int) -> None:
+    """Joint `k`, under a far command without gravity, gains its limit times the time."""
+    limit, seconds, name = 0.5, 0.05, robot.joints[k].name
+    robot = scenes.with_joint(robot, name, effort_limit=limit, stiffness=100.0, damping=1e-3)
+    start = robot.column("initial_position")
+    goal = start.copy()
+    goal[k] += 1.0 if goal[k] < 0 else -1.0
+    far = Trajectory(subject.timestep, *(np.array([r, r]) for r in (goal, 0 * goal, 0 * goal)))
+    with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "speeding up")) as world:
+        world.follow(far)
+        world.wait(seconds - subject.timestep)
+        t, (q, v) = world.time, world.joints
+    gained = abs(float(joint_momentum(robot, q, v, has_armature(subject))[k]))
+    require_close(f"momentum gained by {name}", gained, 0.925 * limit * t, 0.125 * limit * t, "")
+
+
+def _gives_way(subject: Subject, robot: Robot, gravity: tuple[float, float, float]) -> FloatArray:
+    """How far the arm's joints move in 0.3 s under a command to stay, gravity compensated."""
+    start = robot.column("initial_position")
+    effort = gravity_effort(robot, start, gravity)
+    hold = Trajectory(subject.timestep, *(np.array([r, r]) for r in (start, 0 * start, effort)))
+    with subject.world(scenes.arm_alone(robot, gravity, "weak arm")) as world:
+        world.follow(hold)
+        world.wait(0.3)
+        moved = np.abs(world.joints[0] - start)[: len(robot.arm_joints)]
+    return np.asarray(moved)

@@ -1,0 +1,272 @@
+"""Worlds with one planted fault each: what the parity check must see.
+
+An adapter is given the faulty scene to build, and what it reads back is held against the true one.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import Box, Pose, Robot, Scene
+from pytest_simbench.simulator.shapes import mesh_points
+from pytest_simbench.testing import scenes
+
+Plant = Callable[[Scene, Path], Scene]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One way in which a world may be built wrong.
+
+    Attributes:
+        what: in plain words.
+        quantity: that must be found to differ.
+        plant: makes the faulty scene of the true one; files go into the folder.
+    """
+
+    what: str
+    quantity: str
+    plant: Plant
+
+
+def true_scene() -> Scene:
+    """The Panda in front of a table with a brick and a cube, odd sizes, tilted gravity."""
+    return Scene(
+        "full",
+        (
+            Box("table", (0.9, 0.9, 0.3), Pose.at(0.8, 0.0, 0.15), friction=0.7),
+            Box("brick", (0.1, 0.06, 0.03), Pose.at(0.5, 0.1, 0.315, yaw=0.4), 0.23, 0.7),
+            scenes.cube("cube", Pose.at(0.6, -0.1, 0.325, yaw=-1.0), friction=0.7),
+        ),
+        robot=replace(scenes.arm(), friction=0.7),
+        gravity=(0.3, -0.2, -3.7),
+        ground_friction=0.7,
+    )
+
+
+def of_scene(**values: Any) -> Plant:
+    return lambda scene, _: replace(scene, **values)
+
+
+def of_body(name: str, **values: Any) -> Plant:
+    return lambda scene, _: scene.with_body(replace(scene.body(name), **values))
+
+
+def of_robot(**values: Any) -> Plant:
+    return lambda scene, _: replace(scene, robot=replace(_robot(scene), **values))
+
+
+def of_joint(name: str, **factors: float) -> Plant:
+    """Values of one joint's drive, multiplied."""
+
+    def plant(scene: Scene, _: Path) -> Scene:
+        robot = _robot(scene)
+        joint = next(joint for joint in robot.joints if joint.name == name)
+        values = {key: factor * getattr(joint, key) for key, factor in factors.items()}
+        return replace(scene, robot=scenes.with_joint(robot, name, **values))
+
+    return plant
+
+
+def of_description(path: str, edit: Callable[[ET.Element, Robot, Path], None]) -> Plant:
+    """An element of the URDF, edited."""
+
+    def plant(scene: Scene, folder: Path) -> Scene:
+        robot = _robot(scene)
+        tree = ET.parse(robot.urdf)
+        element = tree.getroot().find(path)
+        if element is None:
+            raise LookupError(f"{robot.urdf} has no {path}")
+        edit(element, robot, folder)
+        tree.write(folder / "faulty.urdf")
+        return replace(scene, robot=replace(robot, urdf=str(folder / "faulty.urdf")))
+
+    return plant
+
+
+def _robot(scene: Scene) -> Robot:
+    if scene.robot is None:
+        raise LookupError(f"scene {scene.name} has no robot")
+    return scene.robot
+
+
+def _set(**values: str) -> Callable[[ET.Element, Robot, Path], None]:
+    return lambda element, robot, folder: element.attrib.update(values)
+
+
+def _without_shapes(link: ET.Element, robot: Robot, folder: Path) -> None:
+    for shape in link.findall("collision"):
+        link.remove(shape)
+
+
+def _scaled(mesh: ET.Element, robot: Robot, folder: Path) -> None:
+    """A mesh 1.3 times as large, as an OBJ or STL file of its own."""
+    package, _, rest = mesh.attrib["filename"].removeprefix("package://").partition("/")
+    points = 1.3 * mesh_points(str(Path(robot.packages[package]) / rest))
+    corners = np.resize(points, (3 * math.ceil(len(points) / 3), 3)).reshape(-1, 3, 3)
+    record = np.zeros(
+        len(corners), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")]
+    )
+    record["corners"] = corners
+    path = folder / "scaled.stl"
+    path.write_bytes(bytes(80) + len(corners).to_bytes(4, "little") + record.tobytes())
+    mesh.attrib["filename"] = str(path)
+
+
+def _moved(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Callable[..., None]:
+    """An <origin> moved."""
+
+    def edit(origin: ET.Element, robot: Robot, folder: Path) -> None:
+        at = np.array([float(part) for part in origin.attrib.get("xyz", "0 0 0").split()])
+        origin.attrib["xyz"] = " ".join(map(str, at + np.array([x, y, z])))
+
+    return edit
+
+
+def _turned_inertia(inertia: ET.Element, robot: Robot, folder: Path) -> None:
+    """Turned by 90 degrees about z: x becomes y, y becomes minus x."""
+    old = dict(inertia.attrib)
+    negative = str(-float(old["ixy"]))
+    turned = str(-float(old["iyz"]))
+    inertia.attrib.update(ixx=old["iyy"], iyy=old["ixx"], ixy=negative, ixz=turned, iyz=old["ixz"])
+
+
+_LINK, _JOINT = "link[@name='panda_link4']", "joint[@name='panda_joint4']"
+_TILTED = f"{math.sin(math.radians(5))} 0 {math.cos(math.radians(5))}"
+
+FAULTS: dict[str, Fault] = {
+    "finger_shape": Fault(
+        "the rubber tip of a finger is 3 mm thinner",
+        "link/panda_leftfinger/boxes",
+        of_description(
+            "link[@name='panda_leftfinger']/collision[4]/geometry/box",
+            _set(size="17.5e-3 12.2e-3 18.5e-3"),
+        ),
+    ),
+    "finger_pad": Fault(
+        "the rubber tip of a finger is 2 mm nearer to the hand",
+        "link/panda_leftfinger/boxes",
+        of_description("link[@name='panda_leftfinger']/collision[4]/origin", _moved(z=-0.002)),
+    ),
+    "mesh_scale": Fault(
+        "the mesh of link 4 is 1.3 times as large",
+        "link/panda_link4/meshes",
+        of_description(f"{_LINK}/collision/geometry/mesh", _scaled),
+    ),
+    "no_shape": Fault(
+        "link 4 has no collision shape",
+        "link/panda_link4/meshes",
+        of_description(_LINK, _without_shapes),
+    ),
+    "joint_origin": Fault(
+        "joint 4 is 10 mm aside",
+        "link/panda_link4/pose",
+        of_description(f"{_JOINT}/origin", _moved(y=0.01)),
+    ),
+    "joint_axis": Fault(
+        "the axis of joint 1 is turned by 5 degrees",
+        "joint/panda_joint1/axis",
+        of_description("joint[@name='panda_joint1']/axis", _set(xyz=_TILTED)),
+    ),
+    "joint_limits": Fault(
+        "joint 4 stops 0.1 rad earlier",
+        "joint/panda_joint4/limits",
+        of_description(f"{_JOINT}/limit", _set(lower="-2.9718")),
+    ),
+    "link_mass": Fault(
+        "link 4 weighs 5 kg",
+        "link/panda_link4/mass",
+        of_description(f"{_LINK}/inertial/mass", _set(value="5.0")),
+    ),
+    "centre_of_mass": Fault(
+        "the centre of mass of link 4 is 100 mm off",
+        "link/panda_link4/com",
+        of_description(f"{_LINK}/inertial/origin", _moved(y=-0.1)),
+    ),
+    "inertia_turned": Fault(
+        "the inertia of link 4 is turned by 90 degrees",
+        "link/panda_link4/inertia",
+        of_description(f"{_LINK}/inertial/inertia", _turned_inertia),
+    ),
+    "inertia_scaled": Fault(
+        "the inertia of link 4 is 20 % larger about x",
+        "link/panda_link4/inertia",
+        of_description(f"{_LINK}/inertial/inertia", _set(ixx="0.031")),
+    ),
+    "base": Fault(
+        "the base is 10 mm aside",
+        "link/panda_link1/pose",
+        of_robot(base=Pose.at(0.0, 0.01, 0.0)),
+    ),
+    "finger_friction": Fault(
+        "the robot's friction is 20", "link/panda_leftfinger/friction", of_robot(friction=20.0)
+    ),
+    "stiffness": Fault(
+        "the drive of joint 4 is 10 % stiffer",
+        "joint/panda_joint4/stiffness",
+        of_joint("panda_joint4", stiffness=1.1),
+    ),
+    "drive_damping": Fault(
+        "the drive of joint 4 damps 10 % more",
+        "joint/panda_joint4/damping",
+        of_joint("panda_joint4", damping=1.1),
+    ),
+    "effort_limit": Fault(
+        "joint 4 has twice its effort limit",
+        "joint/panda_joint4/effort_limit",
+        of_joint("panda_joint4", effort_limit=2.0),
+    ),
+    "squeeze": Fault(
+        "the fingers squeeze twice as strongly",
+        "joint/panda_finger_joint1/effort_limit",
+        lambda scene, folder: of_joint("panda_finger_joint1", effort_limit=2.0)(
+            of_joint("panda_finger_joint2", effort_limit=2.0)(scene, folder), folder
+        ),
+    ),
+    "armature": Fault(
+        "joint 4 has half its rotor inertia",
+        "joint/panda_joint4/armature",
+        of_joint("panda_joint4", armature=0.5),
+    ),
+    "initial_position": Fault(
+        "joint 4 starts 1 % nearer to zero",
+        "joint/panda_joint4/initial_position",
+        of_joint("panda_joint4", initial_position=0.99),
+    ),
+    "body_mass": Fault("the cube weighs 1 kg", "body/cube/mass", of_body("cube", mass=1.0)),
+    "body_size": Fault(
+        "the brick is 2 mm thinner",
+        "body/brick/boxes",
+        of_body("brick", size=(0.1, 0.058, 0.03)),
+    ),
+    "body_inertia": Fault(
+        "the brick is 2 mm thinner, and its inertia with it",
+        "body/brick/inertia",
+        of_body("brick", size=(0.1, 0.058, 0.03)),
+    ),
+    "body_pose": Fault(
+        "the cube is 1 mm aside",
+        "body/cube/pose",
+        of_body("cube", pose=Pose.at(0.601, -0.1, 0.325, yaw=-1.0)),
+    ),
+    "body_friction": Fault(
+        "the brick's friction is 0.5", "body/brick/friction", of_body("brick", friction=0.5)
+    ),
+    "fixed_body": Fault(
+        "the cube is fixed in the world", "body/cube/dynamic", of_body("cube", mass=0.0)
+    ),
+    "gravity": Fault(
+        "gravity is 1 % stronger", "gravity", of_scene(gravity=(0.303, -0.202, -3.737))
+    ),
+    "ground_friction": Fault(
+        "the ground's friction is 0.5", "ground/friction", of_scene(ground_friction=0.5)
+    ),
+}
+"""By short names."""

@@ -1,0 +1,98 @@
+"""Checks of what an adapter reads back: honest worlds pass, faulty ones do not, nothing echoes."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from pytest_simbench.scene import Pose
+from pytest_simbench.simulator import Capability
+from pytest_simbench.simulator.parity import Comparison, compare
+from pytest_simbench.simulator.quantities import expected_quantities
+from pytest_simbench.testing import scenes
+from pytest_simbench.testing.checks import check
+from pytest_simbench.testing.faults import FAULTS, Fault, true_scene
+from pytest_simbench.testing.state import busy_scene, require_same, swing_and_wait
+from pytest_simbench.testing.subject import Subject, require
+
+POSITION = 1e-5
+"""Engines in single precision keep about 7 digits; after some arithmetic 5 are safe."""
+
+
+@check()
+def parity_of_full_scene(subject: Subject) -> None:
+    """A world with robot, fixed and free bodies, odd sizes and tilted gravity passes parity."""
+    with subject.world(true_scene()):
+        pass  # loading checks parity
+
+
+@check()
+def parity_in_any_posture(subject: Subject) -> None:
+    """The links stand where the description has them, at three random joint positions too, with
+    the base moved and turned: parity holds there."""
+    rng = np.random.default_rng(0)
+    robot = scenes.arm()
+    for _ in range(3):
+        base = Pose.at(0.2 * rng.uniform(), -0.1, 0.1, yaw=3 * rng.uniform())
+        moved = scenes.at_random(replace(robot, base=base), rng)
+        with subject.world(scenes.arm_alone(moved, name="posture")):
+            pass  # loading checks parity
+
+
+@check()
+def read_back_is_the_engines(subject: Subject) -> None:
+    """What is read back comes from the engine: once a cube fell, its pose is the present one, or
+    that of the step before, where an engine derives poses at the start of a step."""
+    with subject.world(scenes.falling()) as world:
+        world.wait(0.3)
+        pose = np.asarray(world.process.request("read_back")["body/falling/pose"])
+        step = float(np.linalg.norm(world.bodies[0, 7:10])) * subject.timestep
+        require(
+            np.allclose(pose[:3], world.bodies[0, :3], atol=POSITION + step),
+            f"read_back gives position {pose[:3]} of a cube that is at {world.bodies[0, :3]}",
+        )
+
+
+@check(Capability.DETERMINISTIC)
+def reading_changes_nothing(subject: Subject) -> None:
+    """A world that was read back moves on, bit for bit, as one that was not: cubes falling and
+    colliding, the arm swinging."""
+    scene, runs = busy_scene(), []
+    for parity in (False, True):
+        with subject.world(scene, fresh=True, parity=parity) as world:
+            runs.append(swing_and_wait(world, scene, subject.timestep))
+    require_same("read back and not", runs[1], runs[0])
+
+
+@check()
+def planted_faults_are_seen(subject: Subject) -> None:
+    """Parity sees each fault of `testing.faults.FAULTS` that the adapter does not declare as not
+    told; also when the adapter is made to remember the true scene, so that it must ask the engine.
+    """
+    missed = []
+    for name, fault in FAULTS.items():
+        found = planted(subject, fault)
+        if fault.quantity not in found.wrong and fault.quantity not in found.untold:
+            missed.append(f"{name} ({fault.what}): {fault.quantity} equals the true scene's")
+    require(not missed, f"parity does not see {'; '.join(missed)}")
+
+
+def planted(subject: Subject, fault: Fault) -> Comparison:
+    """A world with the fault, read back by an adapter that remembers the true scene."""
+    truth, process = true_scene(), subject.shared()
+    with tempfile.TemporaryDirectory() as folder:
+        faulty = fault.plant(truth, Path(folder)).to_wire()
+        subject.construct(process)
+        if process.launch.compile_timeout:
+            process.request("compile", timeout=process.launch.compile_timeout, scene=faulty)
+        process.request("load", timeout=600.0, scene=faulty, parity=False)
+        reported = process.request("read_back", remember=truth.to_wire())
+    return compare(
+        expected_quantities(truth, subject.settings),
+        reported,
+        subject.cls.info.deviations,
+        subject.name,
+    )

@@ -1,0 +1,184 @@
+"""What DART says that it built, for the parity check.
+
+DART tells no corners of a mesh, so each mesh is measured: by its distance from a large box, found
+with a collision detector (FCL, exact) that the world does not use.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.simulator import PreparedRobot, lazy_import, one_value
+from pytest_simbench.simulator.quantities import touches
+from pytest_simbench.simulator.shapes import DIRECTIONS, box_corners, outlines, reach
+
+dartpy = lazy_import("dartpy")
+
+_PROBE, _AWAY = 2.0, 3.0
+"""Edge of the box that measures, and how far from a mesh's origin its face stands [m]."""
+
+
+class ReadBack:
+    """Reads the quantities of `simulator.quantities` that DART tells.
+
+    Args:
+        world: of DART.
+        ground: its body.
+        bodies: DART's body of each box.
+        robot: the skeleton, or None.
+        scene, prepared: names of what was built; no value is taken from them.
+    """
+
+    def __init__(
+        self,
+        world: Any,
+        ground: Any,
+        bodies: Mapping[str, Any],
+        robot: Any,
+        scene: Scene,
+        prepared: PreparedRobot | None,
+    ) -> None:
+        self.world, self.ground, self.bodies, self.robot = world, ground, bodies, robot
+        self.scene, self.prepared = scene, prepared
+        self.detector = dartpy.collision.FCLCollisionDetector()
+        self.probe = dartpy.dynamics.SimpleFrame(dartpy.dynamics.Frame.World(), "probe")
+        self.probe.setShape(dartpy.dynamics.BoxShape(np.full(3, _PROBE)))
+
+    def all(self) -> dict[str, Any]:
+        """Every quantity that DART tells, by its name."""
+        plane = self.ground.getShapeNode(0)
+        surface = plane.getDynamicsAspect()
+        height = plane.getShape().getOffset() + plane.getWorldTransform().translation()[2]
+        reported: dict[str, Any] = {
+            "gravity": self.world.getGravity(),
+            "timestep": self.world.getTimeStep(),
+            "ground/friction": surface.getFrictionCoeff(),
+            "ground/restitution": surface.getRestitutionCoeff(),
+            "ground/height": height,
+        }
+        for name, body in self.bodies.items():
+            reported |= self._box(f"body/{name}", body)
+        if self.prepared is not None:
+            for name in self.prepared.links:
+                body = self.robot.getBodyNode(name)
+                reported |= self._part(f"link/{name}", body, body.getWorldTransform())
+            for link in self.prepared.moving_links:
+                body = self.robot.getBodyNode(link.name)
+                reported |= _inertial(f"link/{link.name}", body)
+            for name in self.prepared.robot.joint_names:
+                reported |= _joint(f"joint/{name}", self.robot.getJoint(name))
+            second = self.robot.getJoint(self.prepared.robot.gripper.joints[1])
+            mimic = dartpy.dynamics.ActuatorType.MIMIC
+            reported["gripper/coupled"] = float(second.getActuatorType() == mimic)
+        return reported | touches(self.scene, self.prepared, self._can_touch)
+
+    def _box(self, prefix: str, body: Any) -> dict[str, Any]:
+        """A box; its frame is its body's."""
+        joint = body.getParentJoint()
+        found = self._part(prefix, body, body.getWorldTransform())
+        mobile = body.getSkeleton().isMobile() and joint.getNumDofs() == 6
+        driven = {dartpy.dynamics.ActuatorType.FORCE, dartpy.dynamics.ActuatorType.PASSIVE}
+        found[f"{prefix}/dynamic"] = float(mobile and joint.getActuatorType() in driven)
+        if joint.getNumDofs():
+            found |= _inertial(prefix, body)
+            passive = np.array([joint.getDampingCoefficient(k) for k in range(6)])
+            largest = np.array([passive[3:].max(), passive[:3].max()])
+            inertia = body.getInertia()
+            found[f"{prefix}/damping"] = largest / [inertia.getMass(), inertia.getMoment().max()]
+        return found
+
+    def _part(self, prefix: str, body: Any, place: Any) -> dict[str, Any]:
+        """Pose, shapes and surface of a body."""
+        shapes = _colliding(body)
+        position, turn = place.translation(), place.quaternion().wxyz()
+        found = {
+            f"{prefix}/pose": np.concatenate([position, turn]),
+        }
+        boxes = [self._reach(shape, place) for shape in shapes if _is_box(shape)]
+        meshes = [self._reach(shape, place) for shape in shapes if not _is_box(shape)]
+        found |= outlines(prefix, boxes, meshes)
+        if shapes:
+            surfaces = [shape.getDynamicsAspect() for shape in shapes]
+            found[f"{prefix}/friction"] = one_value([s.getFrictionCoeff() for s in surfaces])
+            found[f"{prefix}/restitution"] = one_value([s.getRestitutionCoeff() for s in surfaces])
+        return found
+
+    def _reach(self, shape: Any, place: Any) -> FloatArray:
+        """The reach of a shape in the frame at `place`."""
+        if _is_box(shape):
+            own = shape.getWorldTransform()
+            corners = box_corners(shape.getShape().getSize()) @ own.rotation().T
+            return reach((corners + own.translation() - place.translation()) @ place.rotation())
+        group = self.detector.createCollisionGroup()
+        group.addShapeFrame(shape)
+        group.addShapeFrame(self.probe)
+        option = dartpy.collision.DistanceOption(False, -1.0)
+        centre, reaches = shape.getWorldTransform().translation(), []
+        directions = DIRECTIONS @ place.rotation().T
+        for direction in directions:
+            self.probe.setRelativeTransform(_facing(direction, centre))
+            reaches.append(_AWAY - group.distance(option))
+        return np.array(reaches) + directions @ (centre - place.translation())
+
+    def _can_touch(self, a: str, b: str) -> bool:
+        first, second = self._body(a), self._body(b)
+        if not (first.isCollidable() and second.isCollidable()):
+            return False
+        shapes = [*_colliding(first), *_colliding(second)]
+        if not all(shape.getCollisionAspect().isCollidable() for shape in shapes):
+            return False
+        if first.getSkeleton() is second.getSkeleton() or a[:4] == b[:4] == "link":
+            return bool(first.getSkeleton().isEnabledSelfCollisionCheck())
+        return True
+
+    def _body(self, name: str) -> Any:
+        kind, _, rest = name.partition("/")
+        if kind == "ground":
+            return self.ground
+        return self.bodies[rest] if kind == "body" else self.robot.getBodyNode(rest)
+
+
+def _colliding(body: Any) -> list[Any]:
+    return [shape for shape in body.getShapeNodes() if shape.hasCollisionAspect()]
+
+
+def _is_box(shape: Any) -> bool:
+    return isinstance(shape.getShape(), dartpy.dynamics.BoxShape)
+
+
+def _inertial(prefix: str, body: Any) -> dict[str, Any]:
+    inertia = body.getInertia()
+    return {
+        f"{prefix}/mass": inertia.getMass(),
+        f"{prefix}/com": inertia.getLocalCOM(),
+        f"{prefix}/inertia": inertia.getMoment(),
+        f"{prefix}/gravity": float(body.getGravityMode()),
+    }
+
+
+def _joint(prefix: str, joint: Any) -> dict[str, Any]:
+    forces = [-joint.getForceLowerLimit(0), joint.getForceUpperLimit(0)]
+    passive = joint.getCoulombFriction(0) + joint.getDampingCoefficient(0)
+    limits = [joint.getPositionLowerLimit(0), joint.getPositionUpperLimit(0)]
+    return {
+        f"{prefix}/axis": np.ravel(joint.getRelativeJacobian()),
+        f"{prefix}/limits": limits if joint.areLimitsEnforced() else [-np.inf, np.inf],
+        f"{prefix}/effort_limit": one_value(forces),
+        f"{prefix}/friction": passive + joint.getSpringStiffness(0),  # all that is not the servo's
+        f"{prefix}/initial_position": joint.getPosition(0),
+    }
+
+
+def _facing(direction: FloatArray, origin: FloatArray) -> Any:
+    """Pose of the probe whose face is `_AWAY` from `origin` along `direction`, and looks back."""
+    other = np.eye(3)[np.argmin(np.abs(direction))]
+    x = np.cross(direction, other)
+    x /= np.linalg.norm(x)
+    pose = dartpy.math.Isometry3()
+    pose.set_rotation(np.column_stack([x, np.cross(direction, x), direction]))
+    pose.set_translation(origin + direction * (_AWAY + _PROBE / 2))
+    return pose

@@ -1,0 +1,243 @@
+"""What MuJoCo says that it built, for the parity check; MuJoCo's adapter and Newton's share it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.simulator import PreparedRobot, lazy_import, one_value
+from pytest_simbench.simulator.quantities import touches
+from pytest_simbench.simulator.shapes import box_corners, outlines, reach
+
+mujoco = lazy_import("mujoco")
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """MuJoCo's numbers of what a scene names.
+
+    Attributes:
+        ground: of its geom.
+        boxes: geom of each body.
+        links: body of each link.
+        joints: joint of each driven joint.
+    """
+
+    ground: int
+    boxes: Mapping[str, int]
+    links: Mapping[str, int]
+    joints: Mapping[str, int]
+
+
+class ReadBack:
+    """Reads the quantities of `simulator.quantities` from a model and the state of `data`.
+
+    The scene and the robot give names, never values.
+    """
+
+    def __init__(
+        self, model: Any, data: Any, scene: Scene, prepared: PreparedRobot | None, at: Numbers
+    ) -> None:
+        self.model, self.scene, self.prepared, self.at = model, scene, prepared, at
+        self.active = np.array(data.eq_active, dtype=bool)
+        self.data = mujoco.MjData(model)  # of its own: what is read must not change the world
+        self.data.qpos[:] = data.qpos
+        mujoco.mj_kinematics(model, self.data)
+        mujoco.mj_comPos(model, self.data)
+
+    def all(self) -> dict[str, Any]:
+        """Every quantity by its name."""
+        model, at = self.model, self.at
+        weightless = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
+        reported: dict[str, Any] = {
+            "gravity": np.zeros(3) if weightless else model.opt.gravity,
+            "timestep": model.opt.timestep,
+            "ground/height": self.data.geom_xpos[at.ground, 2],
+            "ground/friction": self._friction([at.ground]),
+            "ground/restitution": self._restitution([at.ground]),
+        }
+        for name, geom in at.boxes.items():
+            reported |= self._box(f"body/{name}", geom)
+        for name, body in at.links.items():
+            reported |= self._link(f"link/{name}", body)
+        for name, joint in at.joints.items():
+            reported |= self._joint(f"joint/{name}", joint)
+        if self.prepared is not None:
+            reported["gripper/coupled"] = self._coupled(self.prepared.robot.gripper.joints)
+        return reported | touches(self.scene, self.prepared, self._can_touch)
+
+    def _box(self, prefix: str, geom: int) -> dict[str, Any]:
+        """A box, whose frame is its shape's: a fixed one may have no body of its own."""
+        model, body = self.model, int(self.model.geom_bodyid[geom])
+        place, turn = self.data.geom_xpos[geom], self.data.geom_xmat[geom].reshape(3, 3)
+        free = self._can_move(body)
+        found = self._surface(prefix, [geom], place, turn)
+        found[f"{prefix}/dynamic"] = float(free)
+        if model.body_dofnum[body]:
+            found |= self._inertial(prefix, body, place, turn)
+            dof = model.body_dofadr[body] + np.arange(6)
+            passive = np.ravel(model.dof_damping[dof])[:6]
+            found[f"{prefix}/damping"] += [
+                passive[:3].max() / model.body_mass[body],
+                passive[3:].max() / model.body_inertia[body].max(),
+            ]
+        return found
+
+    def _link(self, prefix: str, body: int) -> dict[str, Any]:
+        place, turn = self.data.xpos[body], self.data.xmat[body].reshape(3, 3)
+        geoms = np.flatnonzero(self.model.geom_bodyid == body).tolist()
+        found = self._surface(prefix, geoms, place, turn)
+        if self.model.body_dofnum[body]:
+            found |= self._inertial(prefix, body, place, turn)
+        return found
+
+    def _surface(
+        self, prefix: str, geoms: list[int], place: FloatArray, turn: FloatArray
+    ) -> dict[str, Any]:
+        """Pose, shapes and surface of what `geoms` belong to, whose frame is at place and turn."""
+        model, quaternion = self.model, np.empty(4)
+        mujoco.mju_mat2Quat(quaternion, turn.ravel())
+        found: dict[str, Any] = {f"{prefix}/pose": np.concatenate([place, quaternion])}
+        kinds: tuple[list[FloatArray], list[FloatArray]] = ([], [])
+        for geom in geoms:
+            mesh = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH
+            kinds[int(mesh)].append(reach((self._corners(geom) - place) @ turn))
+        found |= outlines(prefix, *kinds)
+        if geoms:
+            found[f"{prefix}/friction"] = self._friction(geoms)
+            found[f"{prefix}/restitution"] = self._restitution(geoms)
+            found[f"{prefix}/margin"] = one_value(model.geom_margin[geoms])
+        return found
+
+    def _corners(self, geom: int) -> FloatArray:
+        """Corners of a box or a mesh in the world, (n, 3)."""
+        model = self.model
+        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
+            mesh = model.geom_dataid[geom]
+            first = model.mesh_vertadr[mesh]
+            points = model.mesh_vert[first : first + model.mesh_vertnum[mesh]].astype(float)
+        elif model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX:
+            points = box_corners(2 * model.geom_size[geom])
+        else:
+            points = np.full((1, 3), np.nan)  # no scene has such a shape
+        return points @ self.data.geom_xmat[geom].reshape(3, 3).T + self.data.geom_xpos[geom]
+
+    def _inertial(
+        self, prefix: str, body: int, place: FloatArray, turn: FloatArray
+    ) -> dict[str, Any]:
+        model = self.model
+        axes = turn.T @ self.data.ximat[body].reshape(3, 3)
+        medium = model.opt.viscosity + model.opt.density + np.abs(model.opt.wind).sum()
+        return {
+            f"{prefix}/mass": model.body_mass[body],
+            f"{prefix}/com": turn.T @ (self.data.xipos[body] - place),
+            f"{prefix}/inertia": axes @ np.diag(model.body_inertia[body]) @ axes.T,
+            f"{prefix}/damping": np.full(2, medium),
+            f"{prefix}/gravity": 1.0 - model.body_gravcomp[body],
+        }
+
+    def _friction(self, geoms: list[int]) -> Any:
+        """Sliding friction of geoms, and of pairs with an own one that they are part of."""
+        model = self.model
+        pairs = np.isin(model.pair_geom1, geoms) | np.isin(model.pair_geom2, geoms)
+        own = model.pair_friction[pairs, :2].ravel()
+        return one_value(np.concatenate([model.geom_friction[geoms, 0], own]))
+
+    def _restitution(self, geoms: list[int]) -> Any:
+        """Speed after a bounce over that before it, of the contacts' springs and dampers."""
+        return one_value([bounce(*self.model.geom_solref[geom]) for geom in geoms])
+
+    def _can_move(self, body: int) -> bool:
+        """Whether the body has six degrees of freedom and nothing holds it."""
+        model = self.model
+        holding = [mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_CONNECT]
+        held = np.isin(model.eq_type, holding) & self.active
+        ends = {*model.eq_obj1id[held], *model.eq_obj2id[held]}
+        return bool(model.body_dofnum[body] == 6 and body not in ends)
+
+    def _can_touch(self, a: str, b: str) -> bool:
+        """Whether every shape of the one can collide with every shape of the other.
+
+        Of two links: whether any can, which none shall.
+        """
+        model = self.model
+        first, second = self._geoms(a), self._geoms(b)
+        if not (first and second):
+            return False
+        kinds = model.geom_contype[first][:, None] & model.geom_conaffinity[second]
+        kinds |= model.geom_conaffinity[first][:, None] & model.geom_contype[second]
+        low, high = sorted(int(model.geom_bodyid[geoms[0]]) for geoms in (first, second))
+        excluded = (low << 16) + high in model.exclude_signature
+        if excluded or model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT:
+            return False
+        links = a.startswith("link/") and b.startswith("link/")
+        return bool(kinds.any() if links else kinds.all())
+
+    def _geoms(self, name: str) -> list[int]:
+        kind, _, rest = name.partition("/")
+        if kind == "ground":
+            return [self.at.ground]
+        if kind == "body":
+            return [self.at.boxes[rest]]
+        return np.flatnonzero(self.model.geom_bodyid == self.at.links[rest]).tolist()
+
+    def _joint(self, prefix: str, joint: int) -> dict[str, Any]:
+        model, dof = self.model, self.model.jnt_dofadr[joint]
+        axis, still = model.jnt_axis[joint], np.zeros(3)
+        turning = [axis, np.cross(model.jnt_pos[joint], axis)]
+        slides = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE
+        drive = int(np.flatnonzero(model.actuator_trnid[:, 0] == joint)[0])
+        gear = model.actuator_gear[drive, 0]
+        gain, bias = model.actuator_gainprm[drive], model.actuator_biasprm[drive]
+        limits = model.jnt_range[joint] if model.jnt_limited[joint] else [-np.inf, np.inf]
+        ranges = [
+            (model.actuator_forcerange[drive] * gear, model.actuator_forcelimited[drive]),
+            (model.jnt_actfrcrange[joint], model.jnt_actfrclimited[joint]),
+        ]
+        ends = [abs(end) for range_, limited in ranges if limited for end in range_]
+        spring = np.ravel(model.jnt_stiffness[joint])[0]
+        return {
+            f"{prefix}/axis": np.concatenate([still, axis] if slides else turning),
+            f"{prefix}/limits": limits,
+            f"{prefix}/effort_limit": one_value(ends or np.inf),
+            f"{prefix}/stiffness": one_value([gain[0] * gear, -bias[1] * gear**2]) + spring,
+            f"{prefix}/damping": np.ravel(model.dof_damping[dof])[0] - bias[2] * gear**2,
+            f"{prefix}/friction": model.dof_frictionloss[dof],
+            f"{prefix}/armature": model.dof_armature[dof],
+            f"{prefix}/initial_position": self.data.qpos[model.jnt_qposadr[joint]],
+        }
+
+    def _coupled(self, fingers: tuple[str, ...]) -> float:
+        """Whether an active constraint holds the fingers at equal positions."""
+        model, joints = self.model, {self.at.joints[name] for name in fingers}
+        return float(
+            any(
+                {a, b} == joints
+                and kind == mujoco.mjtEq.mjEQ_JOINT
+                and active
+                and list(data[:5]) == [0, 1, 0, 0, 0]
+                for a, b, kind, active, data in zip(
+                    model.eq_obj1id,
+                    model.eq_obj2id,
+                    model.eq_type,
+                    self.active,
+                    model.eq_data,
+                    strict=True,
+                )
+            )
+        )
+
+
+def bounce(first: float, second: float) -> float:
+    """Restitution of a contact's linear spring and damper, from MuJoCo's `solref`.
+
+    That is (time constant, damping ratio z), or minus stiffness and damping per mass. An
+    oscillator with z < 1 leaves after half a period with exp(-pi z / sqrt(1 - z^2)) of its speed.
+    """
+    ratio = second if first > 0 else -second / (2 * math.sqrt(-first)) if first < 0 else 0.0
+    return math.exp(-math.pi * ratio / math.sqrt(1 - ratio**2)) if ratio < 1 else 0.0

@@ -1,0 +1,181 @@
+"""What Bullet says that it built, for the parity check.
+
+Bullet keeps links and bodies in their inertial frames: poses, shapes and inertias are given there,
+and led back to the frames of the description here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Pose, Robot
+from pytest_simbench.simulator import PreparedRobot, lazy_import
+from pytest_simbench.simulator.shapes import box_corners, outlines, placed, reach
+
+pybullet = lazy_import("pybullet")
+
+
+class ReadBack:
+    """Reads the quantities of `simulator.quantities` that Bullet tells.
+
+    Args:
+        client: of PyBullet.
+        ground: its body.
+        bodies: body of each box.
+        robot: body of the robot.
+        links: number of each link; -1 is the base.
+        joints: numbers of the driven joints.
+        coupling: constraint between the fingers.
+        prepared: names of links and joints; no value is taken from it.
+    """
+
+    def __init__(
+        self,
+        client: int,
+        ground: int,
+        bodies: Mapping[str, int],
+        robot: int,
+        links: Mapping[str, int],
+        joints: Sequence[int],
+        coupling: int,
+        prepared: PreparedRobot | None,
+    ) -> None:
+        self.c, self.ground, self.bodies = client, ground, bodies
+        self.robot, self.links, self.joints = robot, links, joints
+        self.coupling, self.prepared = coupling, prepared
+
+    def all(self) -> dict[str, Any]:
+        """Every quantity that Bullet tells, by its name."""
+        engine = pybullet.getPhysicsEngineParameters(physicsClientId=self.c)
+        ground = self._dynamics(self.ground)
+        place, _ = pybullet.getBasePositionAndOrientation(self.ground, physicsClientId=self.c)
+        reported: dict[str, Any] = {
+            "gravity": [engine[f"gravityAcceleration{axis}"] for axis in "XYZ"],
+            "timestep": engine["fixedTimeStep"],
+            "ground/height": place[2],
+            "ground/friction": ground[1] ** 2,
+            "ground/restitution": ground[5],
+        }
+        held = self._held()
+        for name, body in self.bodies.items():
+            free = self._dynamics(body)[0] > 0
+            reported |= self._part(f"body/{name}", body, -1)
+            if free:
+                reported |= self._inertial(f"body/{name}", body, -1)
+            reported[f"body/{name}/dynamic"] = float(free and body not in held)
+        if self.prepared is not None:
+            reported |= self._robot_quantities(self.prepared.robot)
+        return reported
+
+    def _robot_quantities(self, robot: Robot) -> dict[str, Any]:
+        found: dict[str, Any] = {"gripper/coupled": self._coupled(robot)}
+        for name, link in self.links.items():
+            found |= self._part(f"link/{name}", self.robot, link)
+            if link >= 0:
+                found |= self._inertial(f"link/{name}", self.robot, link)
+        for name, joint in zip(robot.joint_names, self.joints, strict=True):
+            info = pybullet.getJointInfo(self.robot, joint, physicsClientId=self.c)
+            state = pybullet.getJointState(self.robot, joint, physicsClientId=self.c)
+            found[f"joint/{name}/limits"] = info[8:10]
+            found[f"joint/{name}/friction"] = info[6] + info[7]  # a motor has no damping besides
+            found[f"joint/{name}/initial_position"] = state[0]
+            found[f"joint/{name}/axis"] = self._axis(joint)
+        return found
+
+    def _part(self, prefix: str, body: int, link: int) -> dict[str, Any]:
+        """Pose, shapes and surface of a body or link."""
+        dynamics, inertial = self._dynamics(body, link), self._inertial_frame(body, link)
+        boxes, meshes = self._shapes(body, link)
+        found: dict[str, Any] = {
+            f"{prefix}/pose": (self._centre(body, link) * inertial.inverse()).as_array(),
+        }
+        kinds = ([reach(placed(points, inertial)) for points in kind] for kind in (boxes, meshes))
+        found |= outlines(prefix, *kinds)
+        if boxes or meshes:
+            found[f"{prefix}/friction"] = dynamics[1] ** 2
+            found[f"{prefix}/restitution"] = dynamics[5]
+            found[f"{prefix}/margin"] = dynamics[11]
+        return found
+
+    def _inertial(self, prefix: str, body: int, link: int) -> dict[str, Any]:
+        dynamics, inertial = self._dynamics(body, link), self._inertial_frame(body, link)
+        axes = inertial.rotation()
+        return {
+            f"{prefix}/mass": dynamics[0],
+            f"{prefix}/com": inertial.position,
+            f"{prefix}/inertia": axes @ np.diag(dynamics[2]) @ axes.T,
+        }
+
+    def _shapes(self, body: int, link: int) -> tuple[list[FloatArray], list[FloatArray]]:
+        """Corners (n, 3) of each box and of each mesh, in the inertial frame."""
+        boxes: list[FloatArray] = []
+        meshes: list[FloatArray] = []
+        data = pybullet.getCollisionShapeData(body, link, physicsClientId=self.c)
+        for k, (_, _, kind, size, _, place, turn) in enumerate(data):
+            if kind == pybullet.GEOM_BOX:
+                boxes.append(placed(box_corners(size), _pose(place, turn)))
+            else:  # Bullet's own corners, already in the inertial frame
+                mesh = pybullet.getMeshData(
+                    body, link, collisionShapeIndex=k, physicsClientId=self.c
+                )
+                meshes.append(np.reshape(mesh[1], (-1, 3)) if mesh[0] else np.full((1, 3), np.nan))
+        return boxes, meshes
+
+    def _axis(self, joint: int) -> FloatArray:
+        """Motion subspace of a joint, from Bullet's Jacobian at the present state.
+
+        It is that of the point of the joint's child where the joint is.
+        """
+        states = pybullet.getJointStates(self.robot, self.joints, physicsClientId=self.c)
+        order = np.argsort(self.joints)
+        positions = [states[i][0] for i in order]
+        rest, column = [0.0] * len(positions), list(np.sort(self.joints)).index(joint)
+        linear, angular = pybullet.calculateJacobian(
+            self.robot, joint, [0.0] * 3, positions, rest, rest, physicsClientId=self.c
+        )
+        frame = self._centre(self.robot, joint) * self._inertial_frame(self.robot, joint).inverse()
+        turn = frame.rotation().T
+        return np.concatenate(
+            [turn @ np.array(angular)[:, column], turn @ np.array(linear)[:, column]]
+        )
+
+    def _coupled(self, robot: Robot) -> float:
+        """Whether the constraint is a gear between the fingers."""
+        info = pybullet.getConstraintInfo(self.coupling, physicsClientId=self.c)
+        fingers = {self.joints[robot.joint_names.index(name)] for name in robot.gripper.joints}
+        ends = info[0] == info[2] == self.robot and {info[1], info[3]} == fingers
+        return float(ends and info[4] == pybullet.JOINT_GEAR)
+
+    def _held(self) -> set[int]:
+        """Bodies that a constraint holds."""
+        held = set()
+        for k in range(pybullet.getNumConstraints(physicsClientId=self.c)):
+            constraint = pybullet.getConstraintUniqueId(k, physicsClientId=self.c)
+            info = pybullet.getConstraintInfo(constraint, physicsClientId=self.c)
+            held |= {info[0], info[2]}
+        return held
+
+    def _dynamics(self, body: int, link: int = -1) -> Any:
+        return pybullet.getDynamicsInfo(body, link, physicsClientId=self.c)
+
+    def _inertial_frame(self, body: int, link: int) -> Pose:
+        """In the frame of the body or link."""
+        dynamics = self._dynamics(body, link)
+        return _pose(dynamics[3], dynamics[4])
+
+    def _centre(self, body: int, link: int) -> Pose:
+        """The inertial frame in the world."""
+        c = self.c
+        if link < 0:
+            return _pose(*pybullet.getBasePositionAndOrientation(body, physicsClientId=c))
+        state = pybullet.getLinkState(body, link, computeForwardKinematics=1, physicsClientId=c)
+        return _pose(state[0], state[1])
+
+
+def _pose(position: Sequence[float], quaternion: Sequence[float]) -> Pose:
+    """Of Bullet's quaternions, which end with w."""
+    x, y, z, w = quaternion
+    return Pose.from_array([*position, w, x, y, z])

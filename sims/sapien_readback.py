@@ -1,0 +1,164 @@
+"""What PhysX says through SAPIEN that it built, for the parity check."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Pose, Scene
+from pytest_simbench.simulator import PreparedRobot, lazy_import, one_value
+from pytest_simbench.simulator.quantities import touches
+from pytest_simbench.simulator.shapes import box_corners, outlines, placed, reach
+
+physx = lazy_import("sapien.physx")
+
+
+class ReadBack:
+    """Reads the quantities of `simulator.quantities` that SAPIEN tells.
+
+    Args:
+        system: of PhysX.
+        ground: its component.
+        bodies, links: components by the scene's names.
+        joints: of the driven joints.
+        positions: of those joints [rad or m].
+        scene, prepared: names of what was built; no value is taken from them.
+    """
+
+    def __init__(
+        self,
+        system: Any,
+        ground: Any,
+        bodies: Mapping[str, Any],
+        links: Mapping[str, Any],
+        joints: Sequence[Any],
+        positions: Sequence[float],
+        scene: Scene,
+        prepared: PreparedRobot | None,
+    ) -> None:
+        self.system, self.ground, self.bodies, self.links = system, ground, bodies, links
+        self.joints, self.positions = joints, positions
+        self.scene, self.prepared = scene, prepared
+
+    def all(self) -> dict[str, Any]:
+        """Every quantity that SAPIEN tells, by its name."""
+        plane = self.ground.entity.pose * self.ground.collision_shapes[0].local_pose
+        reported: dict[str, Any] = {
+            "gravity": self.system.config.gravity,
+            "timestep": self.system.timestep,
+            "ground/height": plane.p[2],
+            "ground/friction": _friction(self.ground),
+            "ground/restitution": _restitution(self.ground),
+        }
+        for name, body in self.bodies.items():
+            reported |= _part(f"body/{name}", body)
+            static = isinstance(body, physx.PhysxRigidStaticComponent)
+            reported[f"body/{name}/dynamic"] = float(not static and _free(body))
+            if not static:
+                reported |= _inertial(f"body/{name}", body)
+        if self.prepared is not None:
+            for name in self.prepared.links:
+                reported |= _part(f"link/{name}", self.links[name])
+            for link in self.prepared.moving_links:
+                reported |= _inertial(f"link/{link.name}", self.links[link.name])
+            names = self.prepared.robot.joint_names
+            for name, joint, at in zip(names, self.joints, self.positions, strict=True):
+                reported |= _joint(f"joint/{name}", joint, at)
+        return reported | touches(self.scene, self.prepared, self._can_touch)
+
+    def _can_touch(self, a: str, b: str) -> bool:
+        """By PhysX's filter as SAPIEN sets it: groups of 0, 1 name classes, of 2 exceptions."""
+        links = a.startswith("link/") and b.startswith("link/")
+        found = [_compatible(x, y) for x in self._groups(a) for y in self._groups(b)]
+        return any(found) if links else bool(found) and all(found)
+
+    def _groups(self, name: str) -> list[Sequence[int]]:
+        kind, _, rest = name.partition("/")
+        component = {"ground": self.ground}.get(kind) or (
+            self.bodies[rest] if kind == "body" else self.links[rest]
+        )
+        return [shape.collision_groups for shape in component.collision_shapes]
+
+
+def _compatible(a: Sequence[int], b: Sequence[int]) -> bool:
+    """SAPIEN's filter shader: class of one in the mask of the other, no shared exception."""
+    excepted = a[2] & b[2] and (a[3] & 0xFFFF) == (b[3] & 0xFFFF)
+    return bool((a[0] & b[1]) or (a[1] & b[0])) and not excepted
+
+
+def _part(prefix: str, component: Any) -> dict[str, Any]:
+    """Pose, shapes and surface of a body or link."""
+    shapes = component.collision_shapes
+    found = {
+        f"{prefix}/pose": np.concatenate([component.entity.pose.p, component.entity.pose.q]),
+    }
+    boxes = [s for s in shapes if isinstance(s, physx.PhysxCollisionShapeBox)]
+    meshes = [s for s in shapes if not isinstance(s, physx.PhysxCollisionShapeBox)]
+    found |= outlines(prefix, map(_reach, boxes), map(_reach, meshes))
+    if shapes:
+        found[f"{prefix}/friction"] = _friction(component)
+        found[f"{prefix}/restitution"] = _restitution(component)
+        found[f"{prefix}/margin"] = one_value([shape.rest_offset for shape in shapes])
+    return found
+
+
+def _reach(shape: Any) -> FloatArray:
+    """The reach of a shape in the frame of its body."""
+    if isinstance(shape, physx.PhysxCollisionShapeBox):
+        corners = box_corners(2 * shape.half_size)
+    elif isinstance(shape, physx.PhysxCollisionShapeConvexMesh):
+        corners = np.asarray(shape.vertices, dtype=float) * shape.scale
+    else:
+        corners = np.full((1, 3), np.nan)  # no scene has such a shape
+    return reach(placed(corners, _pose(shape.local_pose)))
+
+
+def _inertial(prefix: str, body: Any) -> dict[str, Any]:
+    centre = _pose(body.cmass_local_pose)
+    axes = centre.rotation()
+    return {
+        f"{prefix}/mass": body.mass,
+        f"{prefix}/com": centre.position,
+        f"{prefix}/inertia": axes @ np.diag(body.inertia) @ axes.T,
+        f"{prefix}/damping": [body.linear_damping, body.angular_damping],
+        f"{prefix}/gravity": float(not body.disable_gravity),
+    }
+
+
+def _free(body: Any) -> bool:
+    return not body.kinematic and not any(body.locked_motion_axes)
+
+
+def _joint(prefix: str, joint: Any, position: float) -> dict[str, Any]:
+    frame = _pose(joint.pose_in_child)  # which turns about, or moves along, its x axis
+    axis, still = frame.rotation()[:, 0], np.zeros(3)
+    turning = [axis, np.cross(frame.position, axis)]
+    return {
+        f"{prefix}/axis": np.concatenate([still, axis] if "prism" in joint.type else turning),
+        f"{prefix}/limits": joint.limits[0],
+        f"{prefix}/effort_limit": joint.force_limit,
+        f"{prefix}/stiffness": joint.stiffness,
+        f"{prefix}/damping": joint.damping,
+        f"{prefix}/friction": joint.friction,
+        f"{prefix}/armature": joint.armature[0],
+        f"{prefix}/initial_position": position,
+    }
+
+
+def _pose(pose: Any) -> Pose:
+    return Pose.from_array([*pose.p, *pose.q])
+
+
+def _materials(component: Any) -> Iterable[Any]:
+    return (shape.physical_material for shape in component.collision_shapes)
+
+
+def _friction(component: Any) -> Any:
+    """The friction of all shapes of a body, static and dynamic; one number when they agree."""
+    return one_value([[m.static_friction, m.dynamic_friction] for m in _materials(component)])
+
+
+def _restitution(component: Any) -> Any:
+    return one_value([m.restitution for m in _materials(component)])
