@@ -29,14 +29,15 @@ def checked_task(value: Any, fixture: str) -> Task:
     _refuse(f"{fixture}({shown(repr(value))}) takes a task, for instance {fixture}(Throwing())")
 
 
-def once(task: Task, done: set[str]) -> None:
-    """Fail a test that repeats two tasks of one name: their repetitions would be mixed up."""
-    if task.name in done:
+def once(task: Task, done: list[Task]) -> None:
+    """Fail a test that repeats a task twice: the repetitions could not be told apart. The same task
+    with other parameters is another one."""
+    if task in done:
         _refuse(
             f"repeat() is called for the task {task.name!r} a second time in one test, and its "
             "repetitions could not be told apart: write a second test, or parametrize this one"
         )
-    done.add(task.name)
+    done.append(task)
 
 
 def checked_settings(value: Any, simulator: str, profile: str) -> dict[str, Any]:

@@ -198,7 +198,7 @@ def repeat(
     from pytest_simbench.repeating import Repeating
 
     repeating = Repeating(request.node, simbench_case, run(request.config))
-    done: set[str] = set()
+    done: list[Task] = []
 
     def perform(task: Task) -> ResultSet:
         arguments.once(arguments.checked_task(task, "repeat"), done)

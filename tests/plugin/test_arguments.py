@@ -56,7 +56,7 @@ def test_one_task_twice_in_a_test(pytester: pytest.Pytester) -> None:
         HEAD
         + """
 def test_twice(repeat):
-    repeat(Falling())
+    repeat(Falling(duration=0.1))
     repeat(Falling(duration=0.1))
 
 def test_two_tasks(repeat):
@@ -76,7 +76,7 @@ SETTINGS = {
     "{'timestep': 'fast'}": "mujoco.timestep=fast: give a finite number",
     "{'timestep': None}": "mujoco.timestep=None: give a finite number",
     "{'timestep': float('inf')}": "mujoco.timestep=inf: give a finite number",
-    "{'timestep': 5}": "mujoco.timestep=5: give a number of seconds from 1e-06 to 0.1",
+    "{'timestep': 5}": "mujoco.timestep=5: give a number of seconds from 1e-06 to 0.01667",
     "{'noslip_iterations': 1.5}": "mujoco.noslip_iterations=1.5: give a whole number",
     "{'solref': 3}": "mujoco.solref=3: give 2 numbers, separated by '/'",
     "{'cone': 3}": "mujoco.cone=3: choose from pyramidal, elliptic",
