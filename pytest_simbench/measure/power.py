@@ -60,19 +60,6 @@ def repetitions_for_proportion(
     return high
 
 
-def repetitions_for_mean(std: float, half_width: float, confidence: float = CONFIDENCE) -> int:
-    """Repetitions that make a mean's interval `half_width` on each side, for values of that spread.
-
-    Args:
-        std: standard deviation between repetitions.
-        half_width: wanted, in the same unit; above 0.
-        confidence: of the interval.
-    """
-    from scipy.stats import norm
-
-    return max(2, math.ceil((float(norm.ppf((1 + confidence) / 2)) * std / half_width) ** 2))
-
-
 def repetitions_to_detect(
     difference: float, std: float, *, power: float = 0.8, alpha: float = 0.05, paired: bool = False
 ) -> int:

@@ -129,3 +129,32 @@ def test_a_difference_below_the_resolution_is_no_win() -> None:
     for gap, won in ((0.0005, False), (0.0020, True)):
         sides = planted({"a": first, "b": [x + gap for x in first]}, "landing_error")
         assert bool(wins(sides, METRICS)) is won
+
+
+def test_comparable_is_asked_about_both_sides() -> None:
+    rng = np.random.default_rng(8)
+    sides = {"a": side(rng, 0.95), "b": side(rng, 0.5), "c": side(rng, 0.1)}
+    asked: list[tuple[str, str]] = []
+
+    def ask(first: str, second: str) -> bool:
+        asked.append((first, second))
+        return {first, second} == {"a", "c"}
+
+    found = wins(sides, METRICS, ask)
+    assert {(w.winner, w.loser) for w in found} == {("a", "c")}
+    assert set(asked) == {("a", "b"), ("a", "c"), ("b", "c")}
+
+
+def test_a_win_carries_its_test() -> None:
+    rng = np.random.default_rng(1)
+    (win,) = wins({"good": side(rng, 0.95), "poor": side(rng, 0.6)}, METRICS)
+    assert win.comparison.n == (20, 20)
+    assert abs(win.comparison.difference) > 0.2
+    assert win.comparison.p_value <= win.p_value <= 0.05
+
+
+def test_five_repetitions_may_win() -> None:
+    good = [record(k, metrics={"placed": 1.0}) for k in range(5)]
+    poor = [record(50 + k, metrics={"placed": 0.0}) for k in range(5)]
+    placed_only = [m for m in METRICS if m.name == "placed"]
+    assert [w.winner for w in wins({"good": good, "poor": poor}, placed_only)] == ["good"]

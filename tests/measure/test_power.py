@@ -16,7 +16,6 @@ from pytest_simbench.measure.power import (
     least_supported,
     main,
     passing_rate,
-    repetitions_for_mean,
     repetitions_for_proportion,
     repetitions_to_detect,
 )
@@ -80,10 +79,6 @@ def test_further_repetitions_decide_in_simulation() -> None:
     n = 20 + more
     lows = [interval(list(sample), COUNT).low for sample in rng.normal(1.0, 1.0, (40, n))]
     assert 0.3 <= np.mean(np.array(lows) >= 0.7) <= 0.75
-
-
-def test_repetitions_for_mean_is_the_textbook_number() -> None:
-    assert repetitions_for_mean(std=10, half_width=2) == 97  # (1.96 * 10 / 2)^2 = 96.04
 
 
 @pytest.mark.parametrize("paired", [True, False])
@@ -159,3 +154,34 @@ def test_the_table_of_the_docs_is_what_is_printed(
     printed = capsys.readouterr().out
     assert "| failures at most 15 % | 20 | 0 failures | 33 % | 51 % |  |" in printed
     assert printed in (pytestconfig.rootpath / "docs" / "gate.md").read_text()
+
+
+def test_further_repetitions_are_counted_at_the_interval_s_own_confidence() -> None:
+    """At least 0.9 of successes takes 29 repetitions one-sided (90 %), 36 at 95 %, 44 at 98 %."""
+    for confidence, total in ((0.9, 29), (0.95, 36), (0.98, 44)):
+        assert further_repetitions(proportion(20, 20, confidence), 0.9) == total - 20
+        assert repetitions_for_proportion(1.0, 0.9, confidence) == total
+        assert repetitions_for_proportion(1.0, 0.9, confidence) == repetitions_for_proportion(
+            0.0, 0.1, confidence
+        )
+
+
+def test_nothing_known_needs_an_unknown_number() -> None:
+    assert further_repetitions(Interval(0.5, 0.4, 0.6, 0, "t"), 0.5) is None
+    assert further_repetitions(interval([1.0, 2.0, 3.0], COUNT), 2.0) is None
+    assert further_repetitions(Interval(0.5, 0.4, 0.6, 1, "t"), 0.45) == 3  # (0.1 / 0.05)^2 - 1
+
+
+def test_there_is_always_one_more_and_never_more_than_the_most() -> None:
+    assert further_repetitions(Interval(0.5, 0.4, 0.6, 20, "t"), 0.4) == 1
+    assert further_repetitions(Interval(0.5, 0.4, 0.6, 100, "t"), 0.49) == 9900  # 10 000 in all
+    assert further_repetitions(Interval(0.5, 0.4, 0.6, 101, "t"), 0.49) is None
+
+
+def test_a_detectable_difference_takes_two_repetitions_at_least() -> None:
+    """By default 80 % power at 5 %, one-sided, not paired: 2 (2.486 s / d)^2."""
+    assert repetitions_to_detect(100.0, 1.0) == 2
+    assert repetitions_to_detect(1.0, 1.0) == 13
+    assert repetitions_to_detect(1.0, 1.0, paired=True) == 7
+    assert repetitions_to_detect(1.0, 1.0, power=0.9) == 18
+    assert repetitions_to_detect(1.0, 1.0, alpha=0.01) == 21

@@ -6,8 +6,10 @@ import warnings
 
 import pytest
 
+from pytest_simbench.measure.intervals import interval, proportion
 from pytest_simbench.measure.metrics import UnknownMetric
 from pytest_simbench.measure.results import InconclusiveWarning, ResultSet
+from pytest_simbench.measure.verdicts import at_least
 
 from .build import METRICS, failed, record, records
 
@@ -196,7 +198,7 @@ def test_failures_at_most_is_judged_by_its_interval() -> None:
         placed(*GOOD, also=20).assert_failures_at_most(0.1)
     with pytest.warns(InconclusiveWarning, match="inconclusive whether at most 10 %"):
         placed(*GOOD, also=1).assert_failures_at_most(0.1)
-    with pytest.raises(ValueError, match=r"lies in 0\.\.1, not 5"):
+    with pytest.raises(ValueError, match="between 0 and 1, not at 5; did you mean 0.05?"):
         placed(*GOOD).assert_failures_at_most(5)
 
 
@@ -212,3 +214,51 @@ def test_the_summary_is_readable() -> None:
     assert repr(placed(1.0, also=2)) == (
         "<ResultSet stacking on engine headless (tuned): 1 ok, 2 failed>"
     )
+
+
+def test_an_interval_has_the_confidence_asked_for() -> None:
+    result = placed(*GOOD, also=5)
+    for level in (0.8, 0.95, 0.99):
+        assert result.interval("placed", level) == interval(GOOD, METRICS[0], level)
+        assert result.failure_interval(level) == proportion(5, 25, level)
+    assert result.interval("placed") == result.interval("placed", 0.95)
+
+
+def test_a_claim_is_judged_with_the_error_of_the_set() -> None:
+    result = placed(*GOOD)
+    result.error = 0.2
+    assert result.judge("placed", at_least(0.9)).interval.confidence == pytest.approx(0.6)
+    with pytest.raises(AssertionError, match="80 % bounds 86.86 % and 98.36 %"):
+        result.assert_at_least("placed", 0.999)
+
+
+def test_an_unknown_metric_is_told_with_where_it_is_missing() -> None:
+    with pytest.raises(UnknownMetric, match="'place' in stacking on engine headless"):
+        placed(1.0).metric("place")
+    with pytest.raises(UnknownMetric, match="'place'; did you mean"):
+        ResultSet([], METRICS).metric("place")
+
+
+def test_a_failure_without_a_cause_is_counted_and_told() -> None:
+    result = ResultSet([*records("placed", GOOD), record(20, status="failed")], METRICS)
+    assert list(result.causes()) == ["unknown cause"]
+    with pytest.raises(AssertionError) as caught:
+        result.assert_no_failures()
+    assert str(caught.value).endswith("failed: 1 x unknown cause (repetition 20, seed 1020)")
+
+
+def test_no_failure_is_told_without_reasons() -> None:
+    with pytest.warns(
+        InconclusiveWarning, match=r"0 of 20 repetitions failed \(95 % bounds 0 % and"
+    ):
+        placed(*GOOD).assert_failures_at_most(0.1)
+
+
+def test_a_range_may_be_a_point_and_failures_any_share() -> None:
+    with pytest.raises(AssertionError, match="above 0 %"):
+        placed(*GOOD).assert_between("placed", 0.0, 0.0)
+    placed(*GOOD).assert_failures_at_most(1.0)
+    with pytest.warns(InconclusiveWarning):
+        placed(*GOOD).assert_failures_at_most(0.0)
+    with pytest.raises(ValueError, match="not at 1.5"):
+        placed(*GOOD).assert_failures_at_most(1.5)

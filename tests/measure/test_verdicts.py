@@ -90,3 +90,11 @@ def test_no_failure_of_twenty_supports_at_most_15_percent() -> None:
     assert judge(at_most(0.15), proportion(0, 20, 0.9)).verdict is Verdict.SUPPORTED
     assert judge(at_most(0.13), proportion(0, 20, 0.9)).verdict is Verdict.INCONCLUSIVE
     assert judge(at_most(0.15), proportion(7, 20, 0.9)).verdict is Verdict.REFUTED
+
+
+def test_a_claim_reads_as_it_is_said() -> None:
+    assert str(at_least(0.8)) == "at least 0.8"
+    assert str(at_most(12.0)) == "at most 12"
+    for value, claim in ((1.0, at_least(0.3)), (0.0, at_most(0.7))):
+        found = judge(claim, interval([value] * 5, SHARE))
+        assert (found.verdict, found.claim, found.further) == (Verdict.SUPPORTED, claim, 0)
