@@ -95,7 +95,7 @@ def started(folder: Path, adapter: str) -> tuple[subprocess.Popen[bytes], list[p
 def test_a_killed_run_leaves_nothing(tmp_path: Path, adapter: str, number: int) -> None:
     program, family = started(tmp_path, adapter)
     assert len(family) >= 2  # worker and reaper
-    os.killpg(program.pid, number)
+    program.send_signal(number)
     assert program.wait(10) == -number
     assert gone([process.pid for process in family])
     if (tmp_path / "ids").exists():
