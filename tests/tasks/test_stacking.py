@@ -116,6 +116,13 @@ def test_a_cube_that_comes_back_is_counted_where_it_was_and_where_it_is() -> Non
     assert [found[name] for name in SCORES[:5]] == [0.0, 1.0, 0.0, 1.0, 1.0]
 
 
+def test_errors_are_in_x_y_z_and_tilt() -> None:
+    lean = move(stacked(1), x=0.001, y=-0.002, z=0.003, tilt=0.05)
+    outcome, _ = perform(ONE, Mishap("settle", 1.0, lean))
+    (pick,) = outcome.details["picks"]
+    assert pick["end_error"] == pytest.approx([0.001, -0.002, 0.003, 0.05], abs=2e-6)
+
+
 def test_the_shares_are_of_all_places_also_of_those_never_filled() -> None:
     """With 19 of 21 cubes out of reach, two are stacked and two places stay empty."""
     away = [
