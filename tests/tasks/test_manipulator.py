@@ -190,6 +190,20 @@ def test_a_cube_beside_another_is_grasped_across() -> None:
     assert np.abs(opening) == pytest.approx([1.0, 0.0, 0.0], abs=1e-3)
 
 
+def test_the_fingers_may_touch_the_cube_that_they_grasp() -> None:
+    """It stands almost on an edge, as wide as the open hand; two neighbours leave one way to it."""
+    arm = Arm()
+    x, y, _ = arm.process.scene.body(CUBE).pose.position
+    half = 0.7 / 2
+    standing = Pose((x, y, 0.3355), (np.cos(half), np.sin(half), 0.0, 0.0))
+    arm.process.poses[CUBE] = standing
+    arm.process.poses["cube_01"] = Pose.at(x + 0.051, y, 0.325)
+    arm.process.poses["cube_02"] = Pose.at(x - 0.051, y, 0.325)
+    arm.world.wait(0.1)
+    arm.manipulator.pick(CUBE)
+    assert np.abs(arm.tools[1].rotation()[:, 1]) == pytest.approx([0.0, 1.0, 0.0], abs=1e-3)
+
+
 def test_what_cannot_be_grasped_says_why() -> None:
     walled = Arm()
     x, y, z = walled.process.scene.body(CUBE).pose.position

@@ -59,6 +59,7 @@ def test_every_score_of_a_world_with_one_of_everything() -> None:
         Mishap("settle", 30.0, move(stacked(6), x=0.1, z=-0.025)),  # fallen later
         Mishap("settle", 59.9, move(untouched(1), x=-0.008, y=-0.008)),  # knocked by 11 mm
         Mishap("settle", 59.9, move(untouched(2), x=-0.009)),
+        Mishap("settle", 59.9, move(untouched(3), z=0.0105)),
     )
     assert outcome.metrics == {
         "placed": 5 / 6,
@@ -66,7 +67,7 @@ def test_every_score_of_a_world_with_one_of_everything() -> None:
         "placed_strict": 4 / 6,
         "at_end_strict": 3 / 6,
         "towers": 1 / 2,
-        "untouched_moved": 1.0,
+        "untouched_moved": 2.0,
         "failed_picks": 1.0,
     }
     order = [name for name, _ in process.released]
@@ -84,8 +85,10 @@ def test_every_score_of_a_world_with_one_of_everything() -> None:
     assert outcome.details["failed_picks"] == [
         {"cube": lost, "tower": 0, "level": 1, "reason": f"{lost} is not in the hand"}
     ]
-    knocked = untouched(1)(process)
-    assert outcome.details["untouched_moved"] == pytest.approx({knocked: 0.008 * math.sqrt(2)})
+    knocked, lifted = untouched(1)(process), untouched(3)(process)
+    assert outcome.details["untouched_moved"] == pytest.approx(
+        {knocked: 0.008 * math.sqrt(2), lifted: 0.0105}
+    )
     assert outcome.details["notes"] == []
     assert process.counts == [(number, 6) for number in range(1, 7)]
 
@@ -114,6 +117,13 @@ def test_a_cube_that_comes_back_is_counted_where_it_was_and_where_it_is() -> Non
         Mishap("settle", 1.0, move(stacked(1), x=-0.2)),
     )
     assert [found[name] for name in SCORES[:5]] == [0.0, 1.0, 0.0, 1.0, 1.0]
+
+
+def test_errors_are_in_x_y_z_and_tilt() -> None:
+    lean = move(stacked(1), x=0.001, y=-0.002, z=0.003, tilt=0.05)
+    outcome, _ = perform(ONE, Mishap("settle", 1.0, lean))
+    (pick,) = outcome.details["picks"]
+    assert pick["end_error"] == pytest.approx([0.001, -0.002, 0.003, 0.05], abs=2e-6)
 
 
 def test_the_shares_are_of_all_places_also_of_those_never_filled() -> None:
@@ -419,6 +429,13 @@ def test_the_scene_is_the_studys() -> None:
     assert scene.robot is not None
     assert scene.robot.base == Pose()
     assert (scene.robot.gripper.opened, scene.robot.gripper.closed) == (0.035, 0.0)
+
+
+def test_the_start_is_disturbed_by_the_first_generator_of_the_seed() -> None:
+    """Published seeds have their starts."""
+    rng = generators(2022)[0]
+    expected = [Jitter().disturbed(Pose.at(x, y, 0.325), rng) for x, y in GRID]
+    assert [body.pose for body in Stacking().scene(2022, Jitter()).free_bodies] == expected
 
 
 def test_the_places_in_their_order() -> None:
