@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.scene import FloatArray, Pose, Scene
+from pytest_simbench.scene import Box, FloatArray, Pose, Scene
 
 MARGIN = 0.012
 """Distance kept from obstacles in free motions [m]; straight approaches may touch."""
@@ -51,6 +51,7 @@ class PlanningScene:
         geometry.addAllCollisionPairs()
         pin.removeCollisionPairs(model.pin, geometry, robot.srdf)
         inverse = model.base.inverse()
+        self._free = {body.name: body for body in scene.free_bodies}
         self._bodies: dict[str, int] = {}
         for body in scene.bodies:
             shape = coal.Box(*body.size)
@@ -114,6 +115,11 @@ class PlanningScene:
         """The hand is empty again."""
         self.held = None
         self._activate()
+
+    @property
+    def held_body(self) -> Box | None:
+        """What is in the hand."""
+        return None if self.held is None else self._free[self.held]
 
     def _activate(self, ignored: Iterable[str] = ()) -> None:
         """Switch off the pairs of ignored bodies, of the held cube's place, of cubes not held."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from pytest_simbench.scene import FloatArray, Pose, Robot
+from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Vector3
 from pytest_simbench.simulator import DescriptionError
 
 
@@ -16,6 +16,7 @@ class RobotModel:
         robot: as described in the scene.
         arm: number of arm joints.
         lower, upper: position limits of the arm joints [rad], (arm,).
+        effort_limits: of the arm joints [N m], (arm,).
 
     Raises:
         DescriptionError: the URDF cannot be read.
@@ -42,6 +43,8 @@ class RobotModel:
         self.tool = self.pin.getFrameId(robot.tool_frame)
         self.base = pin.SE3(robot.base.matrix())
         self.pin.armature = robot.column("armature")
+        self._loaded: dict[tuple[float, Vector3], pin.Model] = {}
+        self.effort_limits = robot.column("effort_limit")[: self.arm]
         self._fingers = np.array([joint.initial_position for joint in robot.joints[self.arm :]])
 
     def full(self, arm: FloatArray) -> FloatArray:
@@ -73,11 +76,48 @@ class RobotModel:
         return np.asarray(rotation @ (self.tool_jacobian(arm)[:3] @ arm_velocity))
 
     def inverse_dynamics(
-        self, gravity: FloatArray, q: FloatArray, v: FloatArray, a: FloatArray
+        self,
+        gravity: FloatArray,
+        q: FloatArray,
+        v: FloatArray,
+        a: FloatArray,
+        held: Box | None = None,
     ) -> FloatArray:
-        """Joint efforts of a motion, rows of (n, n_joints), rotor inertia included [N m, N]."""
-        self.pin.gravity.linear = self.base.rotation.T @ np.asarray(gravity, dtype=float)
-        data = self.data
-        return np.array(
-            [pin.rnea(self.pin, data, *row).copy() for row in zip(q, v, a, strict=True)]
-        )
+        """Joint efforts of a motion, rows of (n, n_joints), rotor inertia included [N m, N].
+
+        Args:
+            gravity: in the world [m/s^2], (3,).
+            q, v, a: positions, velocities and accelerations of all joints, each (n, n_joints).
+            held: a body that the hand carries, its centre at the tool centre point.
+        """
+        model = self.pin if held is None else self._carrying(held)
+        model.gravity.linear = self.base.rotation.T @ np.asarray(gravity, dtype=float)
+        data = self.data if held is None else model.createData()
+        return np.array([pin.rnea(model, data, *row).copy() for row in zip(q, v, a, strict=True)])
+
+    def effort_shares(
+        self,
+        gravity: FloatArray,
+        arm: FloatArray,
+        velocity: FloatArray,
+        acceleration: FloatArray,
+        held: Box | None = None,
+    ) -> FloatArray:
+        """What an arm motion asks of the motors, as signed shares of their limits, (n, arm); the
+        fingers at rest."""
+        still = np.zeros((len(arm), len(self._fingers)))
+        q = np.hstack([arm, still + self._fingers])
+        v, a = np.hstack([velocity, still]), np.hstack([acceleration, still])
+        efforts = self.inverse_dynamics(gravity, q, v, a, held)
+        return np.asarray(efforts[:, : self.arm] / self.effort_limits)
+
+    def _carrying(self, body: Box) -> pin.Model:
+        """The model with a body fixed in the hand."""
+        key = body.mass, body.size
+        if key not in self._loaded:
+            model = self.pin.copy()
+            tool = model.frames[self.tool]
+            inertia = pin.Inertia.FromBox(body.mass, *body.size)
+            model.appendBodyToJoint(tool.parentJoint, inertia, tool.placement)
+            self._loaded[key] = model
+        return self._loaded[key]

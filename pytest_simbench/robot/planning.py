@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterable
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -22,16 +21,16 @@ from pytest_simbench.robot.errors import InCollision, NoPath, PlanningError
 from pytest_simbench.robot.kinematics import straight_line
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import FINGER_SPEED
-from pytest_simbench.robot.timing import (
-    TICK,
-    Timed,
-    along_path,
-    straight_move,
-    synchronised_move,
+from pytest_simbench.robot.throw import (
+    Throw,
+    feasible_swing,
+    released,
+    study_swing,
 )
+from pytest_simbench.robot.timing import TICK, Timed, along_path, straight_move
 from pytest_simbench.scene import FloatArray, Pose, Trajectory
 
-__all__ = ["MotionPlanner", "PlanningError", "Release"]
+__all__ = ["MotionPlanner", "PlanningError"]
 
 LEVERS = np.array([0.85, 0.85, 0.65, 0.65, 0.30, 0.30, 0.15])
 """Largest distance of the fingertips from each arm joint's axis [m], rounded up: a turn of joint i
@@ -46,16 +45,6 @@ MAX_CHECKS = 20_000
 
 _OMPL = threading.Lock()
 """OMPL's seed is global: one search at a time."""
-
-
-@dataclass(frozen=True)
-class Release:
-    """Where and how a perfect follower releases the throw: time since its start [s], position [m]
-    and velocity [m/s] of the tool centre point in the world."""
-
-    time: float
-    position: FloatArray
-    velocity: FloatArray
 
 
 class MotionPlanner:
@@ -140,25 +129,28 @@ class MotionPlanner:
         return self._trajectory(timed, ramp)
 
     def throw(
-        self, start: FloatArray, goal: FloatArray, closed: float, opened: float, fraction: float
-    ) -> tuple[Trajectory, Release]:
-        """Full speed from start to goal, the fingers opened at `fraction` of its duration.
+        self,
+        start: FloatArray,
+        goal: FloatArray,
+        closed: float,
+        opened: float,
+        fraction: float,
+        *,
+        feasible: bool = True,
+    ) -> tuple[Trajectory, Throw]:
+        """A swing from start to goal, the fingers opened at `fraction` of its duration.
 
-        The joints start and end together but each on its own profile. Also returns how a
-        perfect follower would release.
+        Args:
+            feasible: within the limits of the motors; else as the reference study swings.
         """
-        timed, duration = synchronised_move(start, goal)
-        release = fraction * duration
-        fingers = np.where(TICK * np.arange(len(timed.position)) >= release, opened, closed)
-        row = min(int(release / TICK), len(timed.position) - 2)
-        share = release / TICK - row
-        arm, velocity = (
-            rows[row] * (1 - share) + rows[row + 1] * share
-            for rows in (timed.position, timed.velocity)
+        timed, duration = (
+            feasible_swing(self.model, start, goal, self.gravity, self.scene.held_body)
+            if feasible
+            else study_swing(start, goal)
         )
-        position = np.array(self.model.tool_pose(arm).position)
-        speed = self.model.tool_velocity(arm, velocity)
-        return self._trajectory(timed, fingers), Release(release, position, speed)
+        throw = released(self.model, timed, duration, fraction)
+        fingers = np.where(np.arange(len(timed.position)) >= throw.row, opened, closed)
+        return self._trajectory(timed, fingers), throw
 
     def _trajectory(self, timed: Timed, fingers: float | FloatArray) -> Trajectory:
         """Set points of all joints with feed-forward efforts."""

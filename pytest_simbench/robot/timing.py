@@ -32,23 +32,35 @@ class Timed:
 def straight_move(start: FloatArray, goal: FloatArray, *, speed: float = 1.0) -> Timed:
     """From rest to rest on the straight line in joint space; its last row is the goal.
 
-    One Ruckig profile runs along the line with the bounds that hold every joint's limits. Ruckig's
-    own phase synchronisation falls back to another path where it finds none; a quarter of random
-    moves then left the line by up to 0.04 rad, enough to knock over a tower.
-
     Args:
         start, goal: arm joints, (arm,) [rad].
         speed: share of the velocity limits; acceleration scales with its square, jerk with its
             cube, which stretches time by 1 / speed.
     """
+    return line_move(start, goal, (speed, speed**2, speed**3))[0]
+
+
+def line_move(
+    start: FloatArray, goal: FloatArray, shares: tuple[float, float, float]
+) -> tuple[Timed, float]:
+    """The same with shares of the velocity, acceleration and jerk limits; also the exact duration
+    [s], which the rows round up to a whole number of ticks.
+
+    One Ruckig profile runs along the line with the bounds that hold every joint's limits. Ruckig's
+    own phase synchronisation falls back to another path where it finds none; a quarter of random
+    moves then left the line by up to 0.04 rad, enough to knock over a tower.
+    """
     way = np.asarray(goal) - np.asarray(start)
     reach = np.maximum(np.abs(way), 1e-9)
     limits = [
-        np.array([(bound / reach).min() * speed**power])
-        for power, bound in enumerate((VELOCITY_LIMITS, ACCELERATION_LIMITS, JERK_LIMITS), start=1)
+        np.array([(bound / reach).min() * share])
+        for bound, share in zip(
+            (VELOCITY_LIMITS, ACCELERATION_LIMITS, JERK_LIMITS), shares, strict=True
+        )
     ]
-    s, ds, dds = _sampled(_plan(np.zeros(1), np.ones(1), *limits))
-    return Timed(np.asarray(start) + s * way, ds * way, dds * way)
+    profile = _plan(np.zeros(1), np.ones(1), *limits)
+    s, ds, dds = _sampled(profile)
+    return Timed(np.asarray(start) + s * way, ds * way, dds * way), float(profile.duration)
 
 
 def synchronised_move(start: FloatArray, goal: FloatArray) -> tuple[Timed, float]:

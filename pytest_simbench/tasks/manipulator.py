@@ -13,7 +13,8 @@ from pytest_simbench.robot.collision import PlanningScene
 from pytest_simbench.robot.errors import PlanningError, Unreachable
 from pytest_simbench.robot.kinematics import inverse_kinematics, tool_over, top_down_grasps
 from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.planning import MotionPlanner, Release
+from pytest_simbench.robot.planning import MotionPlanner
+from pytest_simbench.robot.throw import Throw
 from pytest_simbench.scene import FloatArray, Pose, Trajectory
 from pytest_simbench.tasks.base import CUBE_SIZE
 
@@ -143,11 +144,19 @@ class Manipulator:
             self._planned(lambda: self.planner.move_to(self.arm, goal, self.fingers, speed=speed))
         )
 
-    def plan_throw(self, goal: FloatArray, fraction: float) -> tuple[Trajectory, Release]:
-        """Full-speed motion to `goal`, fingers open at `fraction` of it; not yet followed."""
+    def plan_throw(
+        self, goal: FloatArray, fraction: float, *, feasible: bool
+    ) -> tuple[Trajectory, Throw]:
+        """A swing to `goal`, fingers open at `fraction` of it; not yet followed.
+
+        Args:
+            feasible: within the limits of the motors; else as the reference study swings.
+        """
         gripper = self.gripper
         planned = self._planned(
-            lambda: self.planner.throw(self.arm, goal, gripper.closed, gripper.opened, fraction)
+            lambda: self.planner.throw(
+                self.arm, goal, gripper.closed, gripper.opened, fraction, feasible=feasible
+            )
         )
         self._note_end(planned[0])
         self.held = None

@@ -1,12 +1,26 @@
-"""What became of a thrown cube: when it left the hand, how, and where it was going."""
+"""What became of a thrown cube: when it left the hand, how, and where it was going.
+
+How the hand let it go is told apart from how it flew. The landing is computed from the state at
+the release, so a late release shows; what the simulated flight adds to that is the integrator's
+part. (One that falls too fast, as semi-implicit Euler does by g dt per second, lands short, and
+so hid a release that was late.)
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pytest_simbench.scene import FloatArray
+from pytest_simbench.client.world import Motion
+from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.robot.strain import strain
+from pytest_simbench.robot.throw import Throw, landing_x
+from pytest_simbench.scene import Box, FloatArray
+
+BoolArray = NDArray[np.bool_]
 
 FREE_FALL_TOLERANCE = 2.0
 """A released cube whose acceleration is within this of gravity flies freely [m/s^2]; engines' air
@@ -33,12 +47,20 @@ class Flight:
     last: int
 
 
+def unclenched(fingers: FloatArray) -> BoolArray:
+    """At which samples the fingers do not press any more, (n,).
+
+    Args:
+        fingers: positions of the finger joints [m], (n, 2); in the first sample they hold the cube.
+    """
+    return np.asarray((fingers - fingers[0] > UNCLENCHED).all(axis=1))
+
+
 def free_flight(
     time: FloatArray,
     position: FloatArray,
     velocity: FloatArray,
-    tool: FloatArray,
-    fingers: FloatArray,
+    gone: BoolArray,
     gravity: FloatArray,
 ) -> Flight | None:
     """The cube's first free flight after the hand let it go or lost it, or None.
@@ -47,14 +69,11 @@ def free_flight(
         time: of each sample [s], (n,), evenly spaced.
         position: of the cube [m], (n, 3).
         velocity: of the cube [m/s], (n, 3).
-        tool: position of the tool centre point [m], (n, 3).
-        fingers: positions of the finger joints [m], (n, 2).
+        gone: whether it is out of the hand, (n,).
         gravity: [m/s^2], (3,).
     """
     if len(time) < 3:
         return None
-    gone = np.linalg.norm(position - tool, axis=1) > OUT_OF_HAND
-    gone |= (fingers - fingers[0] > UNCLENCHED).all(axis=1)
     acceleration = np.diff(velocity, axis=0) / np.diff(time)[:, None]
     flying = np.linalg.norm(acceleration - gravity, axis=1) < FREE_FALL_TOLERANCE
     starts = np.flatnonzero(flying & gone[:-1])
@@ -67,20 +86,100 @@ def free_flight(
     return Flight(first, last + 1)
 
 
-def landing_x(
-    position: FloatArray, velocity: FloatArray, gravity: FloatArray, height: float
-) -> float:
-    """Where a free body crosses `height` on its way down, in x [m]: z + v t - g t^2 / 2 = height.
+class Thrown:
+    """A throw as it was executed, held against a perfect follower's.
 
     Args:
-        position: [m], (3,).
-        velocity: [m/s], (3,).
-        gravity: [m/s^2], (3,), pointing down.
-        height: [m]; the body must be able to reach it.
+        model: of the robot.
+        motion: samples of the swing and after it, at every step.
+        cube: which of the bodies is thrown,
+        held: and what it is.
+        started: simulated time at which the swing began [s].
+        perfect: swing and release of a perfect follower.
+        gravity: [m/s^2], (3,).
+
+    Attributes:
+        motion: the same.
+        free: index of the first sample at which the cube was out of the hand; len(motion) if never.
+        lost: a sentence when it left the hand before its release, else None.
+        flight: its first free flight, or None.
+        strain: how hard the throw was on the arm.
     """
-    g = -float(gravity[2])
-    root = float(velocity[2]) ** 2 + 2 * g * (float(position[2]) - height)
-    if root < 0:
-        return float("nan")
-    t = (float(velocity[2]) + np.sqrt(root)) / g
-    return float(position[0] + velocity[0] * t + 0.5 * float(gravity[0]) * t * t)
+
+    def __init__(
+        self,
+        model: RobotModel,
+        motion: Motion,
+        cube: int,
+        held: Box,
+        started: float,
+        perfect: Throw,
+        gravity: FloatArray,
+    ) -> None:
+        self.motion = motion
+        self._perfect, self._gravity = perfect, gravity
+        self._time = motion.time - started
+        states = motion.bodies[:, cube]
+        self._position, self._velocity = states[:, :3], states[:, 7:10]
+        joints = motion.joints[:, 0]
+        tool = np.array([model.tool_pose(row).position for row in joints])
+        apart = np.linalg.norm(self._position - tool, axis=1) > OUT_OF_HAND
+        gone = apart | unclenched(joints[:, model.robot.finger_indices])
+        self.free = int(np.argmax(gone)) if gone.any() else len(motion)
+        early = apart & (self._time < perfect.time)
+        self.lost: str | None = None
+        if early.any():
+            self.lost = f"left the hand {self._time[np.argmax(early)]:.3f} s into the throw"
+        self.flight = free_flight(self._time, self._position, self._velocity, gone, gravity)
+        self.strain = strain(model, gravity, motion.time, motion.joints, held, self.free)
+
+    def metrics(self) -> dict[str, float | None]:
+        """How the cube left the hand, where that sent it, and what the flight made of it."""
+        found: dict[str, float | None] = {"lost_in_transit": float(self.lost is not None)}
+        if self.strain is not None:
+            found["limits"] = 100.0 * self.strain.largest
+        if self.flight is None:
+            return found
+        first, last, perfect = self.flight.first, self.flight.last, self._perfect
+        position, velocity = self._position[first], self._velocity[first]
+        landing = landing_x(position, velocity, self._gravity)
+        flown = landing_x(self._position[last], self._velocity[last], self._gravity)
+        return found | {
+            "landing_x": landing,
+            "landing_error": _apart(landing, perfect.landing(self._gravity)),
+            "flight_error": _apart(flown, landing),
+            "release_speed": float(np.linalg.norm(velocity)),
+            "release_velocity_error": float(np.linalg.norm(velocity - perfect.velocity)),
+            "release_position_error": float(np.linalg.norm(position - perfect.position)),
+            "release_time_error": float(self._time[first] - perfect.time),
+        }
+
+    def details(self) -> dict[str, Any]:
+        """What explains them."""
+        perfect = self._perfect
+        found: dict[str, Any] = {}
+        if self.lost is not None:
+            found["lost"] = self.lost
+        if self.free == len(self.motion):
+            found["kept"] = "the cube never left the hand"
+        if self.strain is not None:
+            found["limits"] = self.strain.to_wire()
+        if self.flight is not None:
+            first, last = self.flight.first, self.flight.last
+            found["release"] = {
+                "time": float(self._time[first]),
+                "position": self._position[first],
+                "velocity": self._velocity[first],
+                "reference_time": perfect.time,
+                "reference_position": perfect.position,
+                "reference_velocity": perfect.velocity,
+                "reference_landing_x": perfect.landing(self._gravity),
+            }
+            found["flight_landing_x"] = landing_x(
+                self._position[last], self._velocity[last], self._gravity
+            )
+        return found
+
+
+def _apart(a: float | None, b: float | None) -> float | None:
+    return None if a is None or b is None else abs(a - b)

@@ -1,0 +1,116 @@
+"""Which cubes a thrown cube moved, and which moved for another reason.
+
+A cube is moved by the throw when its first motion began while the flying cube touched it, or
+while a cube touched it that the throw had moved before; and when that motion carried it
+away. A pyramid that falls by itself, creeps, or is knocked by the arm is moved otherwise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import coal
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Pose
+
+WINDOW = 0.05
+"""Motion is judged over this time, and causes are sought within it [s]."""
+
+MOTION = 0.002
+"""A body moves when its centre has gone farther than this within `WINDOW` [m]: faster than
+40 mm/s. Creep is slower; a cube knocked over is not."""
+
+TOUCH = 0.005
+"""Bodies nearer than this touch [m]; what they move between two samples is added."""
+
+CALM = 0.5
+"""The throw's motion is over when nothing has moved for this long [s]."""
+
+
+@dataclass(frozen=True)
+class Impact:
+    """What a throw did to the cubes.
+
+    Attributes:
+        caused: indices of the cubes whose first motion the throw caused, in the order of motion.
+        rest: index of the sample at which the motion that the throw caused was over.
+    """
+
+    caused: tuple[int, ...]
+    rest: int
+
+
+def impact(
+    time: FloatArray, thrown: FloatArray, cubes: FloatArray, edge: float, free: int
+) -> Impact:
+    """Follow the chain of contacts from a thrown cube.
+
+    Args:
+        time: of each sample [s], (n,).
+        thrown: poses of the thrown cube, (n, 7): position [m], quaternion w, x, y, z.
+        cubes: poses of the others, (n, m, 7).
+        edge: of every cube [m].
+        free: index of the first sample at which the thrown cube was out of the hand.
+    """
+    chain = _Chain(time, np.concatenate([thrown[:, None], cubes], axis=1), edge)
+    moving = chain.moving
+    onsets = {
+        i: int(np.argmax(moving[:, i + 1])) for i in range(cubes.shape[1]) if moving[:, i + 1].any()
+    }
+    caused: list[int] = []
+    waiting = sorted(onsets, key=lambda i: onsets[i])
+    while True:
+        for i in waiting:
+            k = onsets[i]
+            flown = k >= free and moving[k, 0] and chain.touched(i + 1, 0, k, since=free)
+            if flown or any(onsets[j] <= k and chain.touched(i + 1, j + 1, k) for j in caused):
+                caused.append(i)
+                waiting.remove(i)
+                break
+        else:
+            break
+    began = min((onsets[i] for i in caused), default=len(time) - 1)
+    return Impact(tuple(caused), chain.calm_after(began))
+
+
+class _Chain:
+    """Motion and contact of the bodies of a log, body 0 the thrown cube."""
+
+    def __init__(self, time: FloatArray, poses: FloatArray, edge: float) -> None:
+        self.time = time
+        self.poses = poses
+        self.earlier = np.maximum(np.searchsorted(time, time - WINDOW, side="right") - 1, 0)
+        centres = poses[:, :, :3]
+        self.moving = np.linalg.norm(centres - centres[self.earlier], axis=2) > MOTION
+        self.strides = np.linalg.norm(np.diff(centres, axis=0, prepend=centres[:1]), axis=2)
+        self._box = coal.Box(edge, edge, edge)
+
+    def touched(self, a: int, b: int, k: int, since: int = 0) -> bool:
+        """Whether two bodies touched within `WINDOW` before sample k."""
+        return any(
+            self._distance(row, a, b) <= TOUCH + self.strides[row, a] + self.strides[row, b]
+            for row in range(max(int(self.earlier[k]), since), k + 1)
+        )
+
+    def _distance(self, row: int, a: int, b: int) -> float:
+        """Between their surfaces [m], negative where they overlap."""
+        places = [_placed(self.poses[row, body]) for body in (a, b)]
+        result = coal.DistanceResult()
+        coal.distance(self._box, places[0], self._box, places[1], coal.DistanceRequest(), result)
+        return float(result.min_distance)
+
+    def calm_after(self, began: int) -> int:
+        """The first sample after `began` that ends `CALM` without motion, or the last."""
+        still_since = self.time[began]
+        for k in range(began, len(self.time)):
+            if self.moving[k].any():
+                still_since = self.time[k]
+            elif self.time[k] - still_since >= CALM:
+                return k
+        return len(self.time) - 1
+
+
+def _placed(row: FloatArray) -> coal.Transform3s:
+    pose = Pose.from_array(row)
+    return coal.Transform3s(pose.rotation(), np.array(pose.position))

@@ -1,0 +1,342 @@
+"""Throws whose right score is known, and is neither nothing nor everything."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.tasks import Jitter, Outcome, Throwing
+from pytest_simbench.tasks.throwing import PYRAMID, perfect_throw
+from tests.tasks.flying import GRAVITY, PROJECTILE, FlyingProcess
+from tests.tasks.scripted import Mishap, drop, move, perform
+
+EXACT = Jitter(0.0, 0.0)
+TASK = Throwing(settle=3.0)
+PERFECT = perfect_throw(0.5, True)
+NOTHING_MOVED = {"moved": 0.0, "hit": 0.0, "moved_otherwise": 0.0}
+
+
+def thrown(
+    *script: Mishap, task: Throwing = TASK, jitter: Jitter = EXACT, **world: object
+) -> tuple[Outcome, FlyingProcess]:
+    process = FlyingProcess(**world)  # type: ignore[arg-type]
+    return perform(task, *script, jitter=jitter, process=process)[0], process
+
+
+def parabola(position: FloatArray, velocity: FloatArray) -> float:
+    """Where a flight crosses z = 0.05, by small steps of Heun's method."""
+    p, v, dt = np.array(position, float), np.array(velocity, float), 1e-4
+    while True:
+        q, w = p + v * dt + GRAVITY * dt * dt / 2, v + GRAVITY * dt
+        if q[2] <= 0.05:
+            return float(p[0] + (q[0] - p[0]) * (p[2] - 0.05) / (p[2] - q[2]))
+        p, v = q, w
+
+
+def values(outcome: Outcome, *names: str) -> dict[str, float | None]:
+    return {name: outcome.metrics[name] for name in names or NOTHING_MOVED}
+
+
+def test_a_perfect_throw() -> None:
+    """Two of six are pushed away, two by less than 5 cm: every metric of it."""
+    outcome, process = thrown(
+        pushed={
+            "pyramid_4": (0.0, -0.051, 0.0),
+            "pyramid_6": (0.10, 0.0, -0.05),
+            "pyramid_5": (0.049, 0.049, 0.0),
+            "pyramid_2": (-0.049, 0.0, 0.2),
+        }
+    )
+    assert process.touched_at is not None
+    assert values(outcome) == {"moved": 2 / 6, "hit": 1.0, "moved_otherwise": 0.0}
+    assert outcome.details["moved"] == ["pyramid_4", "pyramid_6"]
+    assert process.counts == [(2, 6)]
+    metrics = outcome.metrics
+    assert metrics["lost_in_transit"] == 0.0
+    landing = parabola(PERFECT.position, PERFECT.velocity)
+    assert metrics["landing_x"] == pytest.approx(landing, abs=1e-3)
+    assert metrics["landing_error"] == pytest.approx(0.0, abs=1e-3)
+    assert metrics["flight_error"] == pytest.approx(0.0, abs=1e-9)
+    assert metrics["release_speed"] == pytest.approx(np.linalg.norm(PERFECT.velocity), abs=0.01)
+    assert metrics["release_velocity_error"] == pytest.approx(0.0, abs=1e-3)
+    assert metrics["release_position_error"] == pytest.approx(0.0, abs=2e-3)
+    assert metrics["release_time_error"] == pytest.approx(0.0, abs=0.004)
+    assert metrics["limits"] == pytest.approx(96.5, abs=0.1)
+    assert set(metrics) == {metric.name for metric in TASK.metrics}
+
+
+def test_one_cube_is_a_hit() -> None:
+    outcome, _ = thrown(pushed={"pyramid_6": (0.0, 0.06, 0.0)})
+    assert values(outcome) == {"moved": 1 / 6, "hit": 1.0, "moved_otherwise": 0.0}
+
+
+def test_a_graze_is_none() -> None:
+    """The thrown cube pushes three by less than 5 cm."""
+    outcome, process = thrown(pushed={f"pyramid_{n}": (0.049, 0.0, -0.05) for n in (4, 5, 6)})
+    assert process.touched_at is not None
+    assert values(outcome) == NOTHING_MOVED
+
+
+def test_a_throw_that_falls_short() -> None:
+    outcome, process = thrown(velocity=lambda velocity: 0.8 * velocity)
+    assert process.touched_at is None
+    assert values(outcome) == NOTHING_MOVED
+    short = parabola(PERFECT.position, 0.8 * PERFECT.velocity)
+    full = parabola(PERFECT.position, PERFECT.velocity)
+    assert outcome.metrics["landing_x"] == pytest.approx(short, abs=2e-3)
+    assert outcome.metrics["landing_error"] == pytest.approx(full - short, abs=2e-3)
+    assert outcome.metrics["release_velocity_error"] == pytest.approx(
+        0.2 * np.linalg.norm(PERFECT.velocity), abs=0.01
+    )
+
+
+def test_the_velocity_error_is_one_of_vectors() -> None:
+    """Thrown aside by 30 degrees at the same speed: 2 v sin 15 degrees."""
+    c, s = math.cos(math.pi / 6), math.sin(math.pi / 6)
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    outcome, _ = thrown(velocity=lambda velocity: turn @ velocity)
+    speed = np.linalg.norm(PERFECT.velocity)
+    assert outcome.metrics["release_speed"] == pytest.approx(speed, abs=0.01)
+    error = 2 * math.hypot(*PERFECT.velocity[:2]) * math.sin(math.pi / 12)
+    assert outcome.metrics["release_velocity_error"] == pytest.approx(error, abs=0.01)
+
+
+@pytest.mark.parametrize("late", [0.02, 0.1])
+def test_a_late_release(late: float) -> None:
+    outcome, _ = thrown(late=late)
+    assert outcome.metrics["release_time_error"] == pytest.approx(late, abs=0.003)
+    timed = PERFECT.timed
+    row = PERFECT.row + round(late / 0.004)
+    from pytest_simbench.robot.model import RobotModel
+    from pytest_simbench.robot.panda import panda
+
+    model = RobotModel(panda())
+    position = np.array(model.tool_pose(timed.position[row]).position)
+    velocity = model.tool_velocity(timed.position[row], timed.velocity[row])
+    landing = parabola(position, velocity)
+    assert outcome.metrics["landing_x"] == pytest.approx(landing, abs=3e-3)
+    assert outcome.metrics["landing_error"] == pytest.approx(
+        abs(landing - parabola(PERFECT.position, PERFECT.velocity)), abs=3e-3
+    )
+    assert outcome.metrics["release_position_error"] == pytest.approx(
+        np.linalg.norm(position - PERFECT.position), abs=8e-3
+    )
+    assert outcome.metrics["lost_in_transit"] == 0.0
+
+
+def test_an_early_release_is_early() -> None:
+    """By 20 ms, too little to be lost in transit: the cube is still between the fingers."""
+    outcome, _ = thrown(Mishap("throw", PERFECT.time - 0.02, drop))
+    assert outcome.metrics["lost_in_transit"] == 0.0
+    assert outcome.metrics["landing_error"] > 0.0
+
+
+def test_lost_in_the_swing() -> None:
+    """0.3 s before its release; it flies somewhere and hits nothing."""
+    outcome, _ = thrown(Mishap("throw", PERFECT.time - 0.3, drop))
+    assert outcome.metrics["lost_in_transit"] == 1.0
+    assert outcome.details["lost"].startswith("left the hand 0.")
+    assert outcome.metrics["release_time_error"] < -0.1
+    assert values(outcome) == NOTHING_MOVED
+
+
+def test_lost_while_winding_up() -> None:
+    outcome, _ = thrown(Mishap("wind up", 0.5, drop))
+    assert outcome.metrics["lost_in_transit"] == 1.0
+    assert outcome.metrics["landing_x"] is None or outcome.metrics["release_time_error"] < 0
+    assert values(outcome) == NOTHING_MOVED
+
+
+def test_lost_while_picking() -> None:
+    outcome, _ = thrown(Mishap("pick", 0.0, move(PROJECTILE, x=0.2)))
+    assert outcome.details["lost"] == "projectile is not in the hand"
+    assert values(outcome, "lost_in_transit", "hit", "landing_x") == {
+        "lost_in_transit": 1.0,
+        "hit": 0.0,
+        "landing_x": None,
+    }
+
+
+def test_never_released() -> None:
+    outcome, _ = thrown(late=math.inf)
+    assert outcome.details["kept"] == "the cube never left the hand"
+    assert values(outcome) == NOTHING_MOVED
+    expected = {"lost_in_transit": 0.0, "landing_x": None, "release_time_error": None}
+    assert values(outcome, *expected) == expected
+    assert outcome.metrics["limits"] == pytest.approx(96.5, abs=0.1)
+
+
+def collapse(*numbers: int) -> list[Mishap]:
+    return [Mishap("throw", 0.3, move(f"pyramid_{n}", y=0.1)) for n in numbers]
+
+
+def test_a_pyramid_that_falls_by_itself_is_no_hit() -> None:
+    """Half a second before the thrown cube arrives; then that lands among the rest."""
+    outcome, process = thrown(*collapse(6, 5, 3))
+    assert process.touched_at is not None
+    assert values(outcome) == {"moved": 0.0, "hit": 0.0, "moved_otherwise": 3.0}
+    assert outcome.details["moved_otherwise"] == ["pyramid_3", "pyramid_5", "pyramid_6"]
+
+
+def test_the_study_counts_it_all_the_same() -> None:
+    task = replace(TASK.study(), feasible=True)
+    outcome, _ = thrown(*collapse(6, 5, 3), task=task)
+    assert values(outcome) == {"moved": 0.5, "hit": 1.0, "moved_otherwise": 3.0}
+
+
+def test_both_are_told_apart() -> None:
+    """One falls by itself, one is pushed by the thrown cube."""
+    outcome, _ = thrown(*collapse(3), pushed={"pyramid_6": (0.08, 0.0, 0.0)})
+    assert values(outcome) == {"moved": 1 / 6, "hit": 1.0, "moved_otherwise": 1.0}
+
+
+@pytest.mark.parametrize("phase", ["pick", "wind up", "settle"])
+def test_knocked_before_or_after_the_throw_is_no_hit(phase: str) -> None:
+    """By the arm, or because the ground shakes."""
+    outcome, _ = thrown(Mishap(phase, 0.1, move("pyramid_1", y=-0.1)))
+    assert values(outcome) == {"moved": 0.0, "hit": 0.0, "moved_otherwise": 1.0}
+
+
+@pytest.mark.parametrize(("push", "moved"), [(0.02, 0), (0.028, 0), (0.032, 1), (0.049, 1)])
+def test_creep_is_no_hit(push: float, moved: int) -> None:
+    """The thrown cube pushes one a little; within the next minute it creeps on to 6 cm. It is the
+    throw's doing where that carried it most of the way."""
+    creep = [
+        Mishap("settle", k / 10, move("pyramid_6", y=(0.06 - push) / 399)) for k in range(1, 400)
+    ]
+    outcome, _ = thrown(*creep, task=Throwing(settle=40.0), pushed={"pyramid_6": (0.0, push, 0.0)})
+    assert values(outcome) == {"moved": moved / 6, "hit": moved, "moved_otherwise": 1 - moved}
+
+
+def test_what_is_pushed_away_may_creep_on() -> None:
+    creep = [Mishap("settle", k / 10, move("pyramid_6", y=0.0005)) for k in range(1, 400)]
+    outcome, _ = thrown(*creep, task=Throwing(settle=40.0), pushed={"pyramid_6": (0.0, 0.06, 0.0)})
+    assert values(outcome) == {"moved": 1 / 6, "hit": 1.0, "moved_otherwise": 0.0}
+
+
+def test_pushed_away_and_back_is_not_moved() -> None:
+    back = Mishap("settle", 2.0, move("pyramid_6", x=-0.08))
+    outcome, _ = thrown(back, pushed={"pyramid_6": (0.08, 0.0, 0.0)})
+    assert values(outcome) == NOTHING_MOVED
+
+
+def test_it_is_counted_a_minute_after() -> None:
+    outcome, process = thrown(Mishap("settle", 59.9, move("pyramid_1", y=-0.1)), task=Throwing())
+    assert outcome.metrics["moved_otherwise"] == 1.0
+    settle = [asked for asked in process.asked if asked.phase == "settle"]
+    assert [asked.duration for asked in settle] == [60.0]
+
+
+def test_places_are_taken_when_the_start_has_settled() -> None:
+    """Within the first second the pyramid may move."""
+    outcome, _ = thrown(Mishap("settle start", 0.9, move("pyramid_1", y=-0.2)))
+    assert values(outcome) == NOTHING_MOVED
+
+
+def test_the_integrators_part_is_apart() -> None:
+    """Euler's steps make a flight fall g dt / 2 per second too far; the release is as it was."""
+    exact, _ = thrown(late=0.04)
+    outcome, _ = thrown(late=0.04, drop=9.80665 * 0.004 / 2)
+    for name in ("landing_x", "landing_error"):
+        assert outcome.metrics[name] == pytest.approx(exact.metrics[name], abs=1e-9)
+    flown = outcome.details["flight_landing_x"]
+    assert outcome.metrics["flight_error"] == pytest.approx(
+        abs(flown - outcome.metrics["landing_x"]), abs=1e-12
+    )
+    # 0.46 s of flight: 9 mm too low, at 4.9 m/s down and 2.7 m/s forwards 5 mm too short
+    assert flown - outcome.metrics["landing_x"] == pytest.approx(-0.0051, abs=0.0006)
+
+
+def test_references_are_the_trajectorys() -> None:
+    """Not constants: another release lands elsewhere."""
+    for fraction in (0.4, 0.5, 0.55):
+        task = Throwing(release_fraction=fraction)
+        throw = perfect_throw(fraction, True)
+        landing = parabola(throw.position, throw.velocity)
+        assert task.references["landing_x"] == pytest.approx(landing, abs=1e-4)
+        assert task.references["release_speed"] == pytest.approx(np.linalg.norm(throw.velocity))
+    study = Throwing().study()
+    throw = perfect_throw(0.5, False)
+    assert study.references["landing_x"] == pytest.approx(
+        parabola(throw.position, throw.velocity), abs=1e-4
+    )
+    assert study.references["landing_x"] == pytest.approx(1.352, abs=0.001)  # REFERENCE_STUDY
+
+
+def test_what_is_planned_is_the_reference() -> None:
+    """The throw that a world is asked for is the one that it is held against."""
+    for task in (TASK, replace(TASK, feasible=False)):
+        outcome, process = thrown(task=task, jitter=Jitter())
+        swing = next(a for a in process.asked if a.phase == "throw" and a.kind == "follow")
+        timed = perfect_throw(0.5, task.feasible).timed
+        assert np.allclose(swing.arguments["position"][:, :7], timed.position, atol=1e-9)
+        assert np.allclose(swing.arguments["velocity"][:, :7], timed.velocity, atol=1e-9)
+        release = outcome.details["release"]
+        assert release["reference_landing_x"] == pytest.approx(task.references["landing_x"])
+
+
+def test_the_studys_throw() -> None:
+    """Each constant with its source in docs/study.md; it asks for more than the motors give."""
+    study = Throwing(settle=1.0).study()
+    assert study == Throwing(settle=1.0).study().study()
+    assert study.settle == 1.0
+    outcome, process = thrown(task=study)
+    follows = [asked for asked in process.asked if asked.kind == "follow"]
+    wind_up = next(asked for asked in follows if asked.phase == "wind up")
+    speeds = np.abs(wind_up.arguments["velocity"][:, :7])
+    limits = np.array([2.175] * 4 + [2.61] * 3)
+    assert 0.4 < (speeds / limits).max() <= 0.5 + 1e-6
+    swing = next(asked for asked in follows if asked.phase == "throw")
+    assert swing.duration == pytest.approx(1.464, abs=0.0041)
+    assert outcome.metrics["limits"] > 115.0
+    assert outcome.details["limits"]["torque"] == pytest.approx(1.2, abs=0.05)
+
+
+def test_the_jitter_moves_and_turns_every_cube_both_ways() -> None:
+    scenes = [Throwing().scene(seed, Jitter()) for seed in range(200)]
+    nominal = Throwing().scene(0, EXACT)
+    for number, body in enumerate(nominal.free_bodies):
+        places = np.array(
+            [
+                [*np.subtract(pose.position, body.pose.position)[:2], pose.yaw]
+                for pose in (scene.free_bodies[number].pose for scene in scenes)
+            ]
+        )
+        largest = np.array([0.001, 0.001, math.radians(1.0)])
+        assert (np.abs(places) <= largest).all()
+        assert (places.max(axis=0) > 0.9 * largest).all()
+        assert (places.min(axis=0) < -0.9 * largest).all()
+        assert np.abs(places.mean(axis=0) / largest).max() < 0.15
+    assert len(nominal.free_bodies) == 1 + len(PYRAMID)
+
+
+def test_the_projectile_may_be_anywhere_within_the_jitter() -> None:
+    outcome, _ = thrown(jitter=Jitter(), pushed={"pyramid_6": (0.1, 0.0, 0.0)})
+    assert outcome.metrics["hit"] == 1.0
+    assert outcome.metrics["landing_error"] < 0.003
+    assert isinstance(outcome.details["projectile_end"][0], float)
+    assert Pose(tuple(outcome.details["projectile_end"])).position[2] < 0.05
+
+
+@pytest.mark.parametrize("seed", [3, 500001])
+def test_all_its_motions_are_feasible(seed: int) -> None:
+    """With the cube in the hand; the study's swing alone is not."""
+    shares = {}
+    for task in (TASK, TASK.study()):
+        _, process = perform(task, seed=seed, process=FlyingProcess())
+        model, cube = process.model, process.scene.body(PROJECTILE)
+        assert model is not None
+        for asked in process.asked:
+            if asked.kind == "follow":
+                position, velocity = (asked.arguments[k][:, :7] for k in ("position", "velocity"))
+                change = np.gradient(velocity, 0.004, axis=0)
+                share = np.abs(model.effort_shares(GRAVITY, position, velocity, change, cube))
+                key = task.feasible, asked.phase
+                shares[key] = max(shares.get(key, 0.0), float(share.max()))
+    assert shares.pop((False, "throw")) > 1.1
+    assert max(shares.values()) <= 0.905
+    assert shares[True, "throw"] == pytest.approx(0.90, abs=0.01)
