@@ -203,6 +203,9 @@ class DART(Simulator):
                 joint.setActuatorType(dynamics.ActuatorType.SERVO)
             joint.setForceUpperLimit(0, limit)
             joint.setForceLowerLimit(0, -limit)
+            # a servo keeps its velocity limit; the scene's drive law has none, no other engine does
+            joint.setVelocityUpperLimit(0, np.inf)
+            joint.setVelocityLowerLimit(0, -np.inf)
         names = [skeleton.getDof(i).getName() for i in range(skeleton.getNumDofs())]
         self._index = np.array([names.index(name) for name in robot.joint_names])
         driven = np.array([name != follower for name in robot.joint_names])

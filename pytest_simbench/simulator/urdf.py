@@ -77,6 +77,7 @@ class PreparedRobot:
         joints: the moving joints, parents first.
         links: all links by name.
         limits: lower and upper position of each joint [rad or m], (2,).
+        velocity_limits: of each joint [rad/s or m/s].
 
     Raises:
         DescriptionError: the file cannot be read, or lacks a driven joint.
@@ -95,6 +96,7 @@ class PreparedRobot:
         self.links: dict[str, Link] = {self.root: Link(self.root)}
         self.joints: list[MovingJoint] = []
         self.limits: dict[str, FloatArray] = {}
+        self.velocity_limits: dict[str, float] = {}
         self.links[self.root].absorb(raw[roots[0]], robot.base)
         self._descend(roots[0], self.root, robot.base, joints, raw)
         missing = set(robot.joint_names) ^ {joint.name for joint in self.joints}
@@ -140,6 +142,7 @@ class PreparedRobot:
             self.limits[joint.attrib["name"]] = np.array(
                 [float(limit.attrib["lower"]), float(limit.attrib["upper"])]
             )
+            self.velocity_limits[joint.attrib["name"]] = float(limit.attrib["velocity"])
             self.links[child] = raw[child]
             self._descend(child, child, Pose(), joints, raw)
 
@@ -210,7 +213,7 @@ class PreparedRobot:
                 lower=repr(float(lower)),
                 upper=repr(float(upper)),
                 effort=repr(drive.effort_limit),
-                velocity="100",
+                velocity=repr(self.velocity_limits[joint.name]),
             )
         # Bullet reads files in pieces of 1024 bytes a line and may cut an attribute in two.
         ET.indent(root)

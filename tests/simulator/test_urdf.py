@@ -70,3 +70,13 @@ def test_a_drive_for_a_joint_that_is_not_there() -> None:
 def test_unknown_package() -> None:
     with pytest.raises(DescriptionError, match="unknown package 'example-robot-data'"):
         PreparedRobot(replace(panda(), packages={}))
+
+
+def test_limits_are_those_of_the_original(tmp_path: Path) -> None:
+    """Positions and velocities from the description, efforts from the drives."""
+    robot = panda(squeeze=12.0)
+    original = RobotModel(robot).pin
+    reduced = pin.buildModelFromUrdf(str(PreparedRobot(robot).write_urdf(tmp_path)))
+    for name in ("lowerPositionLimit", "upperPositionLimit", "velocityLimit"):
+        assert np.array_equal(getattr(reduced, name), getattr(original, name))
+    assert np.array_equal(reduced.effortLimit, [87.0] * 4 + [12.0] * 5)
