@@ -100,7 +100,8 @@ class Thrown:
 
     Attributes:
         motion: the same.
-        free: index of the first sample at which the cube was out of the hand; len(motion) if never.
+        free: index of the first sample at which the thrown cube was out of the hand; len(motion) if
+            it was never thrown.
         lost: a sentence when it left the hand before its release, else None.
         flight: its first free flight, or None.
         strain: how hard the throw was on the arm.
@@ -125,13 +126,17 @@ class Thrown:
         tool = np.array([model.tool_pose(row).position for row in joints])
         apart = np.linalg.norm(self._position - tool, axis=1) > OUT_OF_HAND
         gone = apart | unclenched(joints[:, model.robot.finger_indices])
-        self.free = int(np.argmax(gone)) if gone.any() else len(motion)
         early = apart & (self._time < perfect.time)
         self.lost: str | None = None
+        self.free = int(np.argmax(gone)) if gone.any() else len(motion)
+        self.flight: Flight | None = None
+        self.strain = strain(model, gravity, motion.time, motion.joints, held, self.free)
+        if apart[0]:
+            self.lost, self.free = "was not in the hand when the swing began", len(motion)
+            return
         if early.any():
             self.lost = f"left the hand {self._time[np.argmax(early)]:.3f} s into the throw"
         self.flight = free_flight(self._time, self._position, self._velocity, gone, gravity)
-        self.strain = strain(model, gravity, motion.time, motion.joints, held, self.free)
 
     def metrics(self) -> dict[str, float | None]:
         """How the cube left the hand, where that sent it, and what the flight made of it."""
@@ -160,7 +165,7 @@ class Thrown:
         found: dict[str, Any] = {}
         if self.lost is not None:
             found["lost"] = self.lost
-        if self.free == len(self.motion):
+        elif self.free == len(self.motion):
             found["kept"] = "the cube never left the hand"
         if self.strain is not None:
             found["limits"] = self.strain.to_wire()

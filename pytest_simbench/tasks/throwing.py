@@ -170,7 +170,8 @@ class Throwing(Task):
         with world.phase("settle"):
             settling = world.wait(self.settle, log_period=SETTLE_PERIOD)
         off = [n for n in before if n != "projectile" and _moved(before[n], world.pose(n))]
-        hit = [] if thrown is None else [n for n in off if n in _moved_by(thrown, settling, world)]
+        pushed = set() if thrown is None else _moved_by(thrown, settling, world.scene)
+        hit = [name for name in off if name in pushed]
         moved = hit if self.by_throw else off
         count(len(moved), len(PYRAMID))
         metrics["moved"], metrics["hit"] = len(moved) / len(PYRAMID), float(bool(moved))
@@ -218,10 +219,10 @@ def _moved(before: Pose, after: Pose) -> bool:
     return bool(x > STUDY_TOLERANCE or y > STUDY_TOLERANCE)
 
 
-def _moved_by(thrown: Thrown, settling: Motion | None, world: World) -> set[str]:
+def _moved_by(thrown: Thrown, settling: Motion | None, scene: Scene) -> set[str]:
     """The bodies that the thrown cube moved out of their places; see `impact`."""
     log = Motion.joined([thrown.motion] if settling is None else [thrown.motion, settling])
-    names = [body.name for body in world.scene.free_bodies]
+    names = [body.name for body in scene.free_bodies]
     own = names.index("projectile")
     others = [index for index in range(len(names)) if index != own]
     found = impact(

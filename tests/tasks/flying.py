@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks.base import CUBE_SIZE
@@ -89,9 +90,12 @@ class FlyingProcess(ScriptedProcess):
         if name != PROJECTILE or self.where.phase != "throw":
             super().fall(name)
             return
-        start = np.array(self.poses[name].position)
-        velocity = self.change(self._tool_velocity())
-        self.flying = self.time, start, velocity
+        self.throw(name, self.change(self._tool_velocity()))
+
+    def throw(self, name: str, velocity: ArrayLike) -> None:
+        """From where it is a cube flies off with `velocity` [m/s], (3,)."""
+        velocity = np.asarray(velocity, dtype=float)
+        self.flying = self.time, np.array(self.poses[name].position), velocity
         self.velocities[name] = np.concatenate([velocity, np.zeros(3)])
 
     def _grasp(self) -> None:

@@ -12,7 +12,7 @@ from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks import Jitter, Outcome, Throwing
 from pytest_simbench.tasks.throwing import PYRAMID, perfect_throw
 from tests.tasks.flying import GRAVITY, PROJECTILE, FlyingProcess
-from tests.tasks.scripted import Mishap, drop, move, perform
+from tests.tasks.scripted import Mishap, drop, move, perform, put
 
 EXACT = Jitter(0.0, 0.0)
 TASK = Throwing(settle=3.0)
@@ -145,10 +145,39 @@ def test_lost_in_the_swing() -> None:
 
 
 def test_lost_while_winding_up() -> None:
-    outcome, _ = thrown(Mishap("wind up", 0.5, drop))
+    """Whatever then pushes it into the pyramid, the arm for instance, it was not thrown."""
+    swept = Mishap("throw", 0.5, lambda process: process.throw(PROJECTILE, [2.66, 0.0, 2.09]))
+    pushed = {"pyramid_6": (0.1, 0.0, 0.0)}
+    outcome, process = thrown(
+        Mishap("wind up", 0.5, drop),
+        Mishap("throw", 0.4, put(PROJECTILE, Pose.at(0.0, 0.0, 0.3))),
+        swept,
+        pushed=pushed,
+    )
+    assert process.touched_at is not None
+    assert outcome.details["lost"] == "was not in the hand when the swing began"
+    assert values(outcome) == {"moved": 0.0, "hit": 0.0, "moved_otherwise": 1.0}
+    expected = {"lost_in_transit": 1.0, "landing_x": None, "release_time_error": None}
+    assert values(outcome, *expected) == expected
+    assert "kept" not in outcome.details
+    assert outcome.metrics["limits"] == pytest.approx(96.5, abs=0.1)
+
+
+def test_lost_in_the_swing_and_there_all_the_same() -> None:
+    """The cube slips out 0.3 s early but flies to the pyramid: it did hit it."""
+    target = np.array([1.33, 0.0, 0.12])
+
+    def aimed(velocity: FloatArray) -> FloatArray:
+        start, t = np.array(process.poses[PROJECTILE].position), 0.5
+        return (target - start) / t - GRAVITY * t / 2
+
+    process = FlyingProcess(velocity=aimed, pushed={"pyramid_6": (0.1, 0.0, 0.0)})
+    slip = Mishap("throw", PERFECT.time - 0.3, drop)
+    outcome, _ = perform(TASK, slip, jitter=EXACT, process=process)
+    assert process.touched_at is not None
     assert outcome.metrics["lost_in_transit"] == 1.0
-    assert outcome.metrics["landing_x"] is None or outcome.metrics["release_time_error"] < 0
-    assert values(outcome) == NOTHING_MOVED
+    assert values(outcome) == {"moved": 1 / 6, "hit": 1.0, "moved_otherwise": 0.0}
+    assert outcome.metrics["release_time_error"] == pytest.approx(-0.3, abs=0.08)
 
 
 def test_lost_while_picking() -> None:
