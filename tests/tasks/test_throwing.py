@@ -28,8 +28,8 @@ def thrown(
 
 
 def parabola(position: FloatArray, velocity: FloatArray) -> float:
-    """Where a flight crosses z = 0.05, by small steps of Heun's method."""
-    p, v, dt = np.array(position, float), np.array(velocity, float), 1e-4
+    """Where a flight crosses z = 0.05, by small steps of Heun's method, linear in the last one."""
+    p, v, dt = np.array(position, float), np.array(velocity, float), 1e-3
     while True:
         q, w = p + v * dt + GRAVITY * dt * dt / 2, v + GRAVITY * dt
         if q[2] <= 0.05:
@@ -369,3 +369,36 @@ def test_all_its_motions_are_feasible(seed: int) -> None:
     assert shares.pop((False, "throw")) > 1.1
     assert max(shares.values()) <= 0.905
     assert shares[True, "throw"] == pytest.approx(0.90, abs=0.01)
+
+
+def test_what_the_metrics_say() -> None:
+    """Name, unit, direction and kind are what records, tables and gates go by."""
+    assert [(m.name, m.unit, m.better, m.kind, m.of, m.study) for m in TASK.metrics] == [
+        ("moved", "", "higher", "share", 6, True),
+        ("hit", "", "higher", "yes_no", None, False),
+        ("moved_otherwise", "cubes", "lower", "value", None, False),
+        ("lost_in_transit", "", "lower", "yes_no", None, False),
+        ("landing_x", "m", None, "value", None, False),
+        ("landing_error", "m", "lower", "value", None, False),
+        ("flight_error", "m", "lower", "value", None, False),
+        ("release_speed", "m/s", None, "value", None, False),
+        ("release_velocity_error", "m/s", "lower", "value", None, False),
+        ("release_position_error", "m", "lower", "value", None, False),
+        ("release_time_error", "s", "lower", "value", None, False),
+        ("limits", "%", None, "value", None, False),
+    ]
+    docs = {m.name: m.doc for m in TASK.metrics}
+    assert docs["moved"] == (
+        "cubes of the pyramid off by more than 5 cm, 3 s after, by the thrown cube"
+    )
+    assert TASK.study().metrics[0].doc == "cubes of the pyramid off by more than 5 cm, 3 s after"
+    assert TASK.smoke() == replace(TASK, settle=2.0)
+
+
+def test_phases_are_named() -> None:
+    """Errors, progress and resource samples go by them, and times by the marks."""
+    _, process = thrown()
+    phases = list(dict.fromkeys(asked.phase for asked in process.asked))
+    assert phases == ["settle start", "pick", "wind up", "throw", "settle"]
+    assert TASK.name == "throwing"
+    assert TASK.study_timeout == 600.0
