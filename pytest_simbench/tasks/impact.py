@@ -63,7 +63,7 @@ def impact(
     while True:
         for i in waiting:
             k = onsets[i]
-            flown = k >= free and moving[k, 0] and chain.touched(i + 1, 0, k, since=free)
+            flown = moving[k, 0] and chain.touched(i + 1, 0, k, since=free)
             if flown or any(onsets[j] <= k and chain.touched(i + 1, j + 1, k) for j in caused):
                 caused.append(i)
                 waiting.remove(i)

@@ -56,7 +56,7 @@ def efforts(timed: Timed) -> FloatArray:
 
 def test_the_swing_is_feasible_with_margins() -> None:
     timed, duration = feasible_swing(MODEL, START, GOAL, GRAVITY, CUBE)
-    assert np.abs(efforts(timed) / EFFORT_LIMITS).max() == pytest.approx(0.90, abs=0.006)
+    assert np.abs(efforts(timed) / EFFORT_LIMITS).max() == pytest.approx(0.90, abs=0.002)
     velocity = np.abs(timed.velocity / VELOCITY_LIMITS).max()
     assert velocity == pytest.approx(0.965, abs=1e-6)
     assert (np.abs(timed.acceleration) <= ACCELERATION_LIMITS).all()

@@ -71,8 +71,8 @@ def test_a_chain() -> None:
 
 
 def test_a_chain_has_a_direction() -> None:
-    """0 falls by itself and reaches 1, which the thrown cube hits later."""
-    first = going(1.10, -1.0, 0.2, 0.24)
+    """0 leaves 1 by itself, which the thrown cube hits later."""
+    first = going(1.051, 1.0, 0.2, 0.3)
     assert caused(THROWN, first, going(1.0, 1.0, 0.475, 0.52)) == (1,)
 
 
