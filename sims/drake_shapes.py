@@ -1,4 +1,4 @@
-"""Collision shapes that Drake's adapter adds or reads: spheres in corners, points of STL files.
+"""Collision shapes that Drake's adapter adds: spheres in corners.
 
 Nothing here needs the engine.
 """
@@ -7,16 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 
 from pytest_simbench.scene import FloatArray
-from pytest_simbench.simulator import DescriptionError, PreparedRobot
+from pytest_simbench.simulator import PreparedRobot
 from pytest_simbench.simulator.urdf import MovingJoint
-
-_HEADER, _TRIANGLE = 84, np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("_", "<u2")])
-"""Layout of a binary STL file: header and count [bytes], then one record a triangle."""
 
 
 def corner_centres(size: Sequence[float], radius: float) -> FloatArray:
@@ -46,17 +42,3 @@ def pad_centres(prepared: PreparedRobot, finger: MovingJoint, radius: float) -> 
     )
     depth = centres @ np.asarray(finger.axis)
     return np.asarray(centres[depth < depth.min() + 1e-5])
-
-
-def stl_points(path: str) -> FloatArray:
-    """The distinct corners (n, 3) of the triangles in a binary STL file.
-
-    Raises:
-        DescriptionError: the file is no binary STL file.
-    """
-    data = Path(path).read_bytes()
-    count = int.from_bytes(data[80:_HEADER], "little")
-    if len(data) < _HEADER or len(data) != _HEADER + count * _TRIANGLE.itemsize:
-        raise DescriptionError(f"{path} is no binary STL file")
-    triangles = np.frombuffer(data, _TRIANGLE, count, _HEADER)
-    return np.unique(triangles["corners"].reshape(-1, 3).astype(float), axis=0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -11,11 +10,11 @@ from pytest_simbench.sims.drake_shapes import (
     corner_centres,
     fitting_radius,
     pad_centres,
-    stl_points,
 )
 
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene
 from pytest_simbench.simulator import PreparedRobot, Settings, lazy_import
+from pytest_simbench.simulator.shapes import mesh_points
 from pytest_simbench.simulator.urdf import Link, Shape
 
 eigen = lazy_import("pydrake.common.eigen_geometry")
@@ -227,9 +226,7 @@ def _inertia(link: Link) -> Any:
 
 
 def _robot_shape(shape: Shape, label: str) -> Any:
-    """A box, or the convex hull of a mesh; Drake reads no STL files."""
+    """A box, or the convex hull of a mesh; Drake itself reads no STL files."""
     if shape.size is not None:
         return geometry.Box(*shape.size)
-    if Path(shape.mesh or "").suffix.lower() == ".stl":
-        return geometry.Convex(points=stl_points(shape.mesh or "").T, label=label)
-    return geometry.Convex(shape.mesh)
+    return geometry.Convex(points=mesh_points(shape.mesh or "").T, label=label)

@@ -206,7 +206,7 @@ FAULTS: dict[str, Fault] = {
         of_robot(base=Pose.at(0.0, 0.01, 0.0)),
     ),
     "finger_friction": Fault(
-        "the robot's friction is 20", "link/panda_leftfinger/friction", of_robot(friction=20.0)
+        "the robot's friction is 4", "link/panda_leftfinger/friction", of_robot(friction=4.0)
     ),
     "stiffness": Fault(
         "the drive of joint 4 is 10 % stiffer",
@@ -240,7 +240,7 @@ FAULTS: dict[str, Fault] = {
         "joint/panda_joint4/initial_position",
         of_joint("panda_joint4", initial_position=0.99),
     ),
-    "body_mass": Fault("the cube weighs 1 kg", "body/cube/mass", of_body("cube", mass=1.0)),
+    "body_mass": Fault("the brick weighs 1 kg", "body/brick/mass", of_body("brick", mass=1.0)),
     "body_size": Fault(
         "the brick is 2 mm thinner",
         "body/brick/boxes",
@@ -270,3 +270,19 @@ FAULTS: dict[str, Fault] = {
     ),
 }
 """By short names."""
+
+
+def rounds() -> list[dict[str, Fault]]:
+    """`FAULTS` in as few worlds as there are faults of one quantity: worlds may be dear to build.
+
+    No two of a round concern one quantity, so each must be seen beside the others.
+    """
+    found: list[dict[str, Fault]] = []
+    for name, fault in FAULTS.items():
+        for group in found:
+            if fault.quantity not in {other.quantity for other in group.values()}:
+                group[name] = fault
+                break
+        else:
+            found.append({name: fault})
+    return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from pytest_simbench.simulator.parity import Comparison, compare
 from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
-from pytest_simbench.testing.faults import FAULTS, Fault, true_scene
+from pytest_simbench.testing.faults import Fault, rounds, true_scene
 from pytest_simbench.testing.state import busy_scene, require_same, swing_and_wait
 from pytest_simbench.testing.subject import Subject, require
 
@@ -73,22 +74,26 @@ def planted_faults_are_seen(subject: Subject) -> None:
     told; also when the adapter is made to remember the true scene, so that it must ask the engine.
     """
     missed = []
-    for name, fault in FAULTS.items():
-        found = planted(subject, fault)
-        if fault.quantity not in found.wrong and fault.quantity not in found.untold:
-            missed.append(f"{name} ({fault.what}): {fault.quantity} equals the true scene's")
+    for faults in rounds():
+        found = planted(subject, faults.values())
+        for name, fault in faults.items():
+            if fault.quantity not in found.wrong and fault.quantity not in found.untold:
+                missed.append(f"{name} ({fault.what}): {fault.quantity} equals the true scene's")
     require(not missed, f"parity does not see {'; '.join(missed)}")
 
 
-def planted(subject: Subject, fault: Fault) -> Comparison:
-    """A world with the fault, read back by an adapter that remembers the true scene."""
+def planted(subject: Subject, faults: Iterable[Fault]) -> Comparison:
+    """A world with the faults, read back by an adapter that remembers the true scene."""
     truth, process = true_scene(), subject.shared()
+    faulty = truth
     with tempfile.TemporaryDirectory() as folder:
-        faulty = fault.plant(truth, Path(folder)).to_wire()
+        for fault in faults:
+            faulty = fault.plant(faulty, Path(folder))
+        wire = faulty.to_wire()
         subject.construct(process)
         if process.launch.compile_timeout:
-            process.request("compile", timeout=process.launch.compile_timeout, scene=faulty)
-        process.request("load", timeout=600.0, scene=faulty, parity=False)
+            process.request("compile", timeout=process.launch.compile_timeout, scene=wire)
+        process.request("load", timeout=600.0, scene=wire, parity=False)
         reported = process.request("read_back", remember=truth.to_wire())
     return compare(
         expected_quantities(truth, subject.settings),
