@@ -125,3 +125,24 @@ def _gives_way(subject: Subject, robot: Robot, gravity: tuple[float, float, floa
         world.wait(0.3)
         moved = np.abs(world.joints[0] - start)[: len(robot.arm_joints)]
     return np.asarray(moved)
+
+
+@check()
+def joints_stop_at_their_limits(subject: Subject) -> None:
+    """Led 0.2 rad beyond each of its limits within 2 s, every arm joint stops within 0.1 rad of
+    it, on the way up and on the way down."""
+    robot = replace(scenes.arm(), base=Pose.at(0.0, 0.0, 2.0))
+    limits = PreparedRobot(robot).limits
+    low, high = np.array([limits[joint.name] for joint in robot.arm_joints]).T
+    for name, end, beyond in (("upper", high, 0.2), ("lower", low, -0.2)):
+        with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), f"{name} limits")) as world:
+            start = robot.column("initial_position")
+            goal = start.copy()
+            goal[: len(end)] = end + beyond
+            ramp = np.linspace(0.0, 1.0, 501)[:, None]
+            path = start + ramp * (goal - start)
+            still = np.zeros_like(path)
+            world.follow(Trajectory(0.004, path, still, still))
+            world.wait(0.3)
+            for joint, value, stop in zip(robot.arm_joints, world.joints[0], end, strict=False):
+                require_close(f"{joint.name} at its {name} limit", value, stop, 0.1, "rad")

@@ -51,6 +51,7 @@ FAULTS: list[tuple[type[Simulator], str]] = [
     (wrong.WrongCentre, "limp_arm_falls"),
     (wrong.StiffJoint, "limp_arm_falls"),
     (wrong.WeightlessLink, "limp_arm_falls"),
+    (wrong.NoLimits, "joints_stop_at_their_limits"),
     (wrong.StrongWrist, "every_effort_limit_counts"),
     (wrong.Meddler, "reading_changes_nothing"),
     (wrong.TiltedAxis, "parity_in_any_posture"),

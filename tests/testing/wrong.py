@@ -319,6 +319,11 @@ class WeightlessLink(Robotic):
         self.data.xfrc_applied[link, 2] = self.model.body_mass[link] * -self.model.opt.gravity[2]
 
 
+class NoLimits(Robotic):
+    def tamper(self) -> None:
+        self.model.jnt_limited[:] = 0
+
+
 class StrongWrist(Robotic):
     """Joint 7 has twice its effort limit."""
 
