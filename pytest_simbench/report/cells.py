@@ -16,9 +16,14 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def metric_value(value: float, metric: Metric) -> str:
-    """Without its unit: percent for shares and yes-or-no, else to the millimetre of a metre."""
+    """Without its unit: percent for shares and yes-or-no, else to the millimetre of a metre.
+
+    What is a thousand times smaller than the metric's resolution is rounding, and nothing.
+    """
     if metric.bounded:
         return f"{100 * value:.0f}"
+    if abs(value) < metric.smallest_difference / 1000:
+        return "0"
     return significant(value, 4 if abs(value) >= 1 else 2)
 
 

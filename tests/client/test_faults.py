@@ -87,7 +87,10 @@ def test_a_worker_that_eats_memory_is_killed(engine: Case) -> None:
 def test_a_repetition_times_out(engine: Case) -> None:
     record = run(replace(engine, timeout=2.0), "Hung")
     assert record.error is not None
-    assert record.error.type == "RepetitionTimeout"
+    assert (record.status, record.error.type) == ("failed", "RepetitionTimeout")
+    assert "--sim-timeout" in record.error.message
+    # Its own time-out ended it, neither the task's (60 s) nor the limit of silence (20 s).
+    assert 2.0 <= record.seconds["total"] < engine.stall_timeout
 
 
 def test_garbage_on_stdout_harms_nothing(engine: Case) -> None:
