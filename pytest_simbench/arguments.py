@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import pytest
@@ -52,10 +53,13 @@ def checked_settings(value: Any, simulator: str, profile: str) -> dict[str, Any]
             f"the fixture sim_settings gives {shown(repr(value))}; it must give a dict of settings "
             "by name, {'timestep': 0.001} for instance"
         )
+    problem = ""  # refused outside of `except`, else pytest shows both exceptions
     try:
         changed(named(adapter(simulator).profiles, profile, simulator), value, simulator)
     except SettingsError as error:
-        _refuse(f"the fixture sim_settings: {error}")
+        problem = str(error)
+    if problem:
+        _refuse(f"the fixture sim_settings: {problem}")
     return dict(value)
 
 
@@ -63,7 +67,6 @@ def checked_threshold(metric: Any, default: Any) -> float:
     """The suite's own threshold of a metric, if both are what they must be; else the test fails."""
     if not isinstance(metric, str) or not metric:
         _refuse(f"threshold({shown(repr(metric))}, ...) takes the name of a metric as a text")
-    try:
+    with suppress(BadValue):
         return float(ANY_NUMBER.check(default))
-    except BadValue:
-        _refuse(f"threshold({metric!r}, {shown(repr(default))}) takes a finite number")
+    _refuse(f"threshold({metric!r}, {shown(repr(default))}) takes a finite number")

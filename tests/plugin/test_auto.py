@@ -32,7 +32,7 @@ def test_it_repeats_until_the_claims_are_decided(pytester: pytest.Pytester) -> N
     tests = [json.loads(line)["test"].split("::")[1].split("[")[0] for line in lines]
     wanted = {"test_decided": 10, "test_undecided": 12, "test_without_a_claim": 10}
     assert {name: tests.count(name) for name in wanted} == wanted
-    result.stdout.fnmatch_lines(["*97.5 % interval*12 repetitions*: inconclusive whether*90 %*"])
+    result.stdout.fnmatch_lines(["*97.5 % bounds*12 repetitions*: inconclusive whether*90 %*"])
     # What pytest-benchmark and JUnit are told is known when the test has ended only.
     saved = json.loads((pytester.path / "b.json").read_text())["benchmarks"]
     assert [b["stats"]["rounds"] for b in saved] == [10, 12, 10]
