@@ -212,8 +212,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     config = session.config
     if hasattr(config, "workerinput") or config.option.collectonly:
         return
-    needs = {"sim_case", "output_path"}
-    if any(needs.intersection(getattr(item, "fixturenames", ())) for item in session.items):
+    if any("sim_case" in _fixtures(item) for item in session.items):
         run(config).claim()
 
 

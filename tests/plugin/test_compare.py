@@ -77,8 +77,8 @@ def test_a_worse_run_fails_with_one_sentence(
     assert output.index("settings.task.duration was 0.6, is 0.05") < output.index("landed fell")
     written = summary.read_text()
     assert written.startswith("before\n## Compared with ")
-    assert "- FAILED test\\_falling[mujoco-headless]: landed fell from 100 % to 0 %" in written
-    assert "| test\\_falling[mujoco-headless] | landed | 100 % | 0 % |" in written
+    assert "- FAILED test\\_falling\\[mujoco-headless\\]: landed fell from 100 % to 0 %" in written
+    assert "| test\\_falling\\[mujoco-headless\\] | landed | 100 % | 0 % |" in written
     assert written.count("## falling: 5 repetitions") == 1
 
 
@@ -113,9 +113,9 @@ def test_limits_in_the_ini_file_wait_for_a_baseline_which_alone_fails_nothing(
             ["--sim-compare-fail=placed:5"],
             "placed:5 can never be exceeded: placed lies between 0 and 100 %; *placed:5%?",
         ),
-        (["--sim-compare-fail=landed"], "'landed' is not a limit like placed:5% or *"),
-        (["--sim-compare-fail=landed:-5%"], "'landed:-5%' is not a limit like *"),
-        (["--sim-compare-fail="], "'' is not a limit like placed:5% or *"),
+        (["--sim-compare-fail=landed"], "--sim-compare-fail=landed: write it as placed:5%,*"),
+        (["--sim-compare-fail=landed:-5%"], "landed:-5%: write it as placed:5%,*"),
+        (["--sim-compare-fail="], "--sim-compare-fail='': write it as placed:5%,*"),
         (["--sim-compare-fail=ram:5%,ram:6%"], "ram has two limits; give it one"),
         (
             ["--sim-compare-fail=lended:5%"],
@@ -179,5 +179,5 @@ def test_junit_has_a_property_for_each_metric(
     assert found["repetitions"] == "2"
     assert found["failures"] == "0"
     assert found["landed"] == "1.0"
-    assert 0.3 < float(found["landed.low"] or "nan") < 0.4
+    assert 0.1 < float(found["landed.low"] or "nan") < 0.2  # 2 of 2 prove little
     assert {"rtf", "ram", "cpu", "start", "end"} <= found.keys()

@@ -164,7 +164,7 @@ def test_a_threshold_of_a_third_party_s_metric_is_known_by_its_test(
 ) -> None:
     pytester.makepyfile(THRESHOLD)
     result = pytester.runpytest_subprocess(
-        "--sim=mujoco", "--reps=1", "--sim-threshold=landed=0.9,own_metric=2"
+        "--sim=mujoco", "--reps=5", "--sim-threshold=landed=0.9,own_metric=2"
     )
     result.assert_outcomes(passed=2)
     result.stdout.fnmatch_lines(["*inconclusive whether at least 90 %*"])
