@@ -38,7 +38,7 @@ class Scene:
         gravity: [m/s^2].
         ground_friction: Coulomb coefficient of the ground plane.
         room: how far it goes from the origin to each side in x and in y, and up [m]. A free body
-            that leaves it has diverged (`plausibility`); `math.inf` for a side without a wall.
+            that leaves it has diverged (`plausibility`); 1e6 for a side without a wall.
 
     Raises:
         SceneError: two bodies share a name or overlap, one has the name of what is in every
@@ -56,6 +56,7 @@ class Scene:
         check_name(self.name, "a scene")
         check_numbers(self.gravity, 3, f"the gravity [m/s^2] of scene {self.name!r}")
         check_number(self.ground_friction, f"the ground's friction in scene {self.name!r}", 0.0)
+        check_numbers(self.room, 3, f"the room [m] of scene {self.name!r}", 0.0, above=True)
         names = [body.name for body in self.bodies]
         for name in names:
             if name.lower() in RESERVED:

@@ -107,7 +107,7 @@ def _without_shapes(link: ET.Element, robot: Robot, folder: Path) -> None:
 
 
 def _scaled(mesh: ET.Element, robot: Robot, folder: Path) -> None:
-    """A mesh 1.3 times as large, as an OBJ or STL file of its own."""
+    """A mesh 1.3 times as large, as an STL file of its own beside the description."""
     package, _, rest = mesh.attrib["filename"].removeprefix("package://").partition("/")
     points = 1.3 * mesh_points(str(Path(robot.packages[package]) / rest))
     corners = np.resize(points, (3 * math.ceil(len(points) / 3), 3)).reshape(-1, 3, 3)
@@ -117,7 +117,7 @@ def _scaled(mesh: ET.Element, robot: Robot, folder: Path) -> None:
     record["corners"] = corners
     path = folder / "scaled.stl"
     path.write_bytes(bytes(80) + len(corners).to_bytes(4, "little") + record.tobytes())
-    mesh.attrib["filename"] = str(path)
+    mesh.attrib["filename"] = path.name
 
 
 def _moved(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Callable[..., None]:

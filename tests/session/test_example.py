@@ -113,7 +113,7 @@ def test_a_robot_of_unknown_files_needs_a_word(
     assert main([str(path)]) == 2
     assert "robot 'mine' is not known here (known: panda)" in capsys.readouterr().err
     assert read_example(path, tmp_path, trust_robot=True).scene == scene
-    assert replay_command(path, case, scene).endswith("robot.json --trust-robot")
+    assert replay_command(path, case, scene).endswith(f"{path.name} --trust-robot")
     assert main([str(path), "--trust-robot"]) == 0
 
 
