@@ -36,7 +36,7 @@ def test_smallest_perturbation(perturb, threshold):
 
 
 def test_sensitivity(perturb, threshold):
-    """A throw whose cube lies a tenth of a millimetre off stays the same until the cube flies."""
+    """A cube that lies a tenth of a millimetre off is held at most 10 mm off."""
     result = perturb(Throwing(settle=22.0)).sensitivity("projectile")
 
-    result.assert_below(threshold("growth", 100.0), until="in flight")
+    result.assert_below(threshold("growth", 100.0), until="in the grip")

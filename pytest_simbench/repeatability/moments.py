@@ -27,6 +27,6 @@ class Moment:
         return numbers[self.operation] if self.operation < len(numbers) else None
 
 
-THROWING_MOMENTS = (Moment("in the grip", "wind up"), Moment("in flight", "throw", 1))
+THROWING_MOMENTS = (Moment("in the grip", "wind up"), Moment("after the swing", "throw", 1))
 """Of `tasks.Throwing`: before winding up with the cube between the fingers, and when the swing has
-ended, by when the cube is on its way."""
+ended, by when the cube has flown and hit."""

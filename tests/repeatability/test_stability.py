@@ -107,7 +107,8 @@ class Late(Tumbling):
     """The cubes rest for a while before anything is done to them."""
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
-        return Scene("late", super().scene(seed, jitter).bodies, panda())
+        bodies = super().scene(seed, jitter).bodies
+        return Scene("late", bodies, panda(), room=(100.0, 100.0, 100.0))
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         with world.phase("settle start"):
