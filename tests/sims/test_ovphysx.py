@@ -42,9 +42,15 @@ def test_an_honest_world_passes(task: Any, profile: str) -> None:
         assert world.time == 0
 
 
+AT_THE_START = ("body/brick/pose", "joint/panda_joint4/initial_position")
+"""Seen in the state that the engine starts with, before anything is read back."""
+
+
 @pytest.mark.parametrize("quantity", FAULTS)
 def test_fault_is_caught(quantity: str) -> None:
     wrong = rf"{quantity}: scene .*, ovphysx "
+    if quantity in AT_THE_START:
+        wrong = r"starts at \(.*\), where the scene has"
     with (
         pytest.raises(WorkerError, match=wrong),
         Subject(faulty(quantity)).world(SCENE, fresh=True),

@@ -19,6 +19,7 @@ from pytest_simbench.sims.sapien import SAPIEN, SAPIENSettings
 
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene
 from pytest_simbench.simulator import ParityError, PreparedRobot
+from pytest_simbench.simulator.errors import DescriptionError
 from pytest_simbench.simulator.parity import check
 from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.tasks import Jitter, Stacking
@@ -266,17 +267,17 @@ def test_what_was_before_a_restore_leaves_no_trace(
     assert np.array_equal(futures[0][1], futures[1][1])
 
 
-def test_a_mesh_that_sapien_cannot_read_is_an_error(tmp_path: Path) -> None:
+def test_a_mesh_that_is_none_is_an_error(tmp_path: Path) -> None:
     robot = scenes.arm()
     tree = ElementTree.parse(robot.urdf)
     broken = tmp_path / "broken.stl"
     broken.write_bytes(b"")
     mesh = next(mesh for mesh in tree.iter("mesh") if mesh.get("filename", "").endswith(".stl"))
-    mesh.set("filename", str(broken))
+    mesh.set("filename", broken.name)
     description = tmp_path / "robot.urdf"
     tree.write(description)
     scene = scenes.arm_alone(replace(robot, urdf=str(description)))
-    with pytest.raises(RuntimeError), world(scene):
+    with pytest.raises(DescriptionError, match="mesh that cannot be used"), world(scene):
         pass
 
 

@@ -60,7 +60,10 @@ def test_bad_changes(changes: dict[str, Any], message: str) -> None:
 @pytest.mark.parametrize("timestep", [1e9, 0.05, 0.0167, math.inf, math.nan, 0.0, -0.001])
 def test_a_time_step_too_coarse_for_the_tasks_is_refused(timestep: float) -> None:
     """Two steps of 1e9 s once made a throw that hit."""
-    with pytest.raises(SettingsError, match="timestep must be above 0 and at most 0.01667 s"):
+    with pytest.raises(
+        SettingsError,
+        match="timestep=.*: give a (number of seconds from 1e-06 to 0.01667|finite number)",
+    ):
         changed(MuJoCoSettings(), {"timestep": str(timestep)}, "mujoco")
 
 
