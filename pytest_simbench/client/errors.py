@@ -88,6 +88,10 @@ class Unavailable(WorkerError):
     """This machine lacks what was asked for, a driver for instance; such a test is skipped."""
 
 
+class BadState(WorkerError):
+    """An adapter returned what is no state of the scene: its shape, type or order is wrong."""
+
+
 class EngineFailed(WorkerError):
     """The engine or its adapter raised an exception, or rejected the scene or settings."""
 
@@ -99,6 +103,7 @@ class DisplayError(Exception):
 REMOTE_ERRORS: dict[str, type[WorkerError]] = {
     "ParityError": WorldParityError,
     "DivergedError": Diverged,
+    "StateError": BadState,
     "MemoryError": OutOfMemory,
     "UnavailableError": Unavailable,
     "SystemExit": WorkerExited,

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_simbench.client.environments import Environment, interpreter
-from pytest_simbench.client.errors import Diverged, Where, WorkerError
+from pytest_simbench.client.errors import BadState, Diverged, Where, WorkerError
 from pytest_simbench.client.process import Launch, WorkerProcess
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.scene import Scene
@@ -142,8 +142,8 @@ class Subject:
             yield World(process, scene, parity=parity)
         except WorkerError as error:
             process.kill()
-            if isinstance(error, Diverged):  # a law is broken, whichever the check looks at
-                raise ConformanceFailure(f"the world diverged: {error.what}") from error
+            if isinstance(error, Diverged | BadState):  # a law is broken, whichever is looked at
+                raise ConformanceFailure(error.what) from error
             raise
         finally:
             if alone:

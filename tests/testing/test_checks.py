@@ -22,7 +22,6 @@ FAULTS: list[tuple[type[Simulator], str]] = [
     (wrong.LongQuaternion, "quaternions_are_unit"),
     (wrong.OneShot, "commands_persist"),
     (wrong.Echo, "read_back_is_the_engines"),
-    (wrong.AnyRobot, "bad_description_rejected"),
     (wrong.DoubleGravity, "free_fall"),
     (wrong.Air, "free_fall"),
     (wrong.DeepGround, "rest_on_plane"),

@@ -52,14 +52,15 @@ def test_third_partys_test_file(pytester: pytest.Pytester) -> None:
         mysim="""
 from dataclasses import replace
 from pytest_simbench.sims.mujoco import MuJoCo
+from pytest_simbench.simulator import Capability
 
 class MySim(MuJoCo):
-    info = replace(MuJoCo.info, name="mysim", capabilities=frozenset())
+    info = replace(
+        MuJoCo.info, name="mysim", capabilities=frozenset({Capability.SAVE_RESTORE})
+    )
 
-    def body_state(self):
-        state = super().body_state()
-        state[:, 3:7] *= 1.1
-        return state
+    def restore(self, state):
+        pass
 """,
         test_mysim="""
 from mysim import MySim
@@ -67,8 +68,8 @@ from pytest_simbench.testing import conformance_checks
 
 @conformance_checks(
     MySim,
-    only=["quaternions_are_unit", "free_fall", "contacts_counted", "state_as_loaded"],
-    expected_failures={"quaternions_are_unit": "known", "mysim-tuned-free_fall": "no more"},
+    only=["restore_repeats", "free_fall", "contacts_counted", "restore_in_the_grip"],
+    expected_failures={"restore_repeats": "known", "mysim-tuned-free_fall": "no more"},
 )
 def test_conformance(check):
     check()
@@ -77,10 +78,10 @@ def test_conformance(check):
     result = pytester.runpytest_subprocess("-v", "-rA")
     result.stdout.fnmatch_lines_random(
         [
-            "XFAIL *test_conformance?mysim-tuned-quaternions_are_unit? - known (*",
+            "XFAIL *test_conformance?mysim-tuned-restore_repeats? - known (*",
             "PASSED *test_conformance?mysim-tuned-free_fall?",
             "SKIPPED *mysim does not claim contact_count",
-            "FAILED *test_conformance?mysim-tuned-state_as_loaded?*",
+            "FAILED *test_conformance?mysim-tuned-restore_in_the_grip?*",
             "*ConformanceWarning: mysim-tuned-free_fall is listed as an expected failure*",
         ]
     )

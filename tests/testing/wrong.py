@@ -124,16 +124,6 @@ class WrongMass(Lying):
         self.model.dof_M0[-6:] *= 1.5  # which the engine takes for bodies that nothing hangs on
 
 
-class AnyRobot(MuJoCo):
-    """Accepts a description that does not exist."""
-
-    def load(self, scene: Scene) -> None:
-        robot = scene.robot
-        if robot is not None and robot.urdf.startswith("/nowhere"):
-            scene = replace(scene, robot=None)
-        super().load(scene)
-
-
 class HalfFriction(Lying):
     def tamper(self) -> None:
         self.model.geom_friction[:, 0] *= 0.9

@@ -94,23 +94,27 @@ def test_found_when_the_world_is_loaded(case: Case, fault: str) -> None:
         message = message.replace(f"({text},", f"({number},")
     record, _ = Repetition(misshapen(case, fault), Turning(), 1).run()
     assert record.error is not None
-    assert (record.error.type, record.error.phase) == ("EngineFailed", "load")
+    assert (record.error.type, record.error.phase) == ("BadState", "load")
     assert message in record.error.message
     assert "mujoco" in record.error.message
 
 
 @pytest.mark.parametrize(
-    ("fault", "message"),
+    ("fault", "kind", "message"),
     [
-        ("later float32", "must be an array of float64 (2, 9), not float32 (2, 9)"),
-        ("later too few", ""),  # numpy cannot even stack such samples
-        ("joints 1 and 3 exchanged", "the joints panda_joint1, panda_joint3 stand at each other's"),
+        ("later float32", "BadState", "must be an array of float64 (2, 9), not float32 (2, 9)"),
+        ("later too few", "EngineFailed", "ValueError"),  # numpy cannot even stack such samples
+        (
+            "joints 1 and 3 exchanged",
+            "BadState",
+            "panda_joint1, panda_joint3 stand at each other's",
+        ),
     ],
 )
-def test_found_after_a_motion(case: Case, fault: str, message: str) -> None:
+def test_found_after_a_motion(case: Case, fault: str, kind: str, message: str) -> None:
     record, _ = Repetition(misshapen(case, fault), Turning(), 1).run()
     assert record.error is not None
-    assert (record.error.type, record.error.phase) == ("EngineFailed", "turn")
+    assert (record.error.type, record.error.phase) == (kind, "turn")
     assert message in record.error.message
     assert fault in LATER or "exchanged" in fault
 
