@@ -19,7 +19,7 @@ from pytest_simbench.scene.scene import Scene
 
 DEEPEST = 1 / 3
 """Share of the thinner body's shortest edge to which two bodies, or a body and the ground, may
-overlap. The softest contacts here (SAPIEN's and Genesis' defaults) give way by 1 mm of 50."""
+overlap. The softest contacts of any engine's defaults give way by 1 mm of 50."""
 
 FASTEST = 30.0
 """No point of a body is faster [m/s]: ten times what the arm can throw, and twice a fall from the

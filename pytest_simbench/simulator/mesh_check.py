@@ -13,7 +13,7 @@ LARGEST_MESH = 16 * 2**20
 """[bytes]"""
 
 MOST_TRIANGLES = 200_000
-"""As many as MuJoCo takes of an STL (its XML reference, asset/mesh)."""
+"""The least that an engine takes of an STL (docs/decisions.md)."""
 
 FARTHEST = 1e6
 """No vertex is farther from its origin, in the file's unit."""
