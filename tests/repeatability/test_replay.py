@@ -152,7 +152,7 @@ def test_what_cannot_be_done_is_told(
     assert run(EVERYTHING, Moment("x", "swim")).text == "the task never came to swim"
 
 
-def test_a_throw_with_the_cube_in_the_grip_and_in_flight(
+def test_a_throw_with_the_cube_in_the_grip_and_after_the_swing(
     handle_of: Callable[..., SimulatorHandle],
 ) -> None:
     experiment = Experiment(handle_of(), replace(Throwing(), settle=0.5), 2022, Jitter())
@@ -166,7 +166,7 @@ def test_a_throw_with_the_cube_in_the_grip_and_in_flight(
     result.assert_as_claimed()
     assert [again.way for again in result.again if again.identical][2:4] == [
         "restored in the grip",
-        "restored in flight",
+        "restored after the swing",
     ]
 
 

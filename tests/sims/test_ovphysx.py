@@ -16,7 +16,7 @@ from pytest_simbench.client.environments import missing
 from pytest_simbench.client.errors import WorkerError
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Trajectory
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
-from pytest_simbench.testing import Subject, scenes
+from pytest_simbench.testing import ConformanceFailure, Subject, scenes
 
 from .coverage import uncovered
 from .ovphysx_faults import FAULTS, faulty
@@ -48,11 +48,12 @@ AT_THE_START = ("body/brick/pose", "joint/panda_joint4/initial_position")
 
 @pytest.mark.parametrize("quantity", FAULTS)
 def test_fault_is_caught(quantity: str) -> None:
+    error: type[Exception] = WorkerError
     wrong = rf"{quantity}: scene .*, ovphysx "
     if quantity in AT_THE_START:
-        wrong = r"starts at \(.*\), where the scene has"
+        error, wrong = ConformanceFailure, r"starts at \(.*\), where the scene has"
     with (
-        pytest.raises(WorkerError, match=wrong),
+        pytest.raises(error, match=wrong),
         Subject(faulty(quantity)).world(SCENE, fresh=True),
     ):
         pass
