@@ -33,16 +33,16 @@ import psutil
 from chaos_faults import ADAPTERS, LATER
 
 from pytest_simbench.client import reaper
+from pytest_simbench.client.display import Displays
 from pytest_simbench.client.world import World
-from pytest_simbench.display import Displays
-from pytest_simbench.measure.metrics import Metric
-from pytest_simbench.measure.record import Record
-from pytest_simbench.measure.records import RecordFile, read_records
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.repeater import Repeater
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.record_file import RecordFile, read_records
 from pytest_simbench.report.summary import summarise
 from pytest_simbench.scene import Pose, Scene
-from pytest_simbench.session.case import Case
-from pytest_simbench.session.repeat import Repeater
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, cube
+from pytest_simbench.tasks.metrics import Metric
 
 STALL, TIMEOUT, MEMORY = 5.0, 15.0, 200.0
 """Limits of every repetition: silence [s], time from launch [s], memory [MB]."""

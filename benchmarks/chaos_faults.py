@@ -25,10 +25,10 @@ from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import Simulator
 
 ADAPTERS = {
-    "mujoco": "mujoco:MuJoCo",
-    "pybullet": "pybullet:PyBullet",
-    "sapien": "sapien:SAPIEN",
-    "dart": "dart:DART",
+    "mujoco": "mujoco.adapter:MuJoCo",
+    "pybullet": "pybullet.adapter:PyBullet",
+    "sapien": "sapien.adapter:SAPIEN",
+    "dart": "dart.adapter:DART",
 }
 
 SLEEPER = [sys.executable, "-c", "import time; time.sleep(600)"]

@@ -15,12 +15,12 @@ from typing import ClassVar
 import psutil
 
 from pytest_simbench.client.world import World
-from pytest_simbench.measure.metrics import Metric
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.scene import Pose, Scene
-from pytest_simbench.session.case import Case
-from pytest_simbench.session.repetition import Repetition
 from pytest_simbench.simulator.registry import registered
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, cube
+from pytest_simbench.tasks.metrics import Metric
 
 
 @dataclass(frozen=True)

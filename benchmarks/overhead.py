@@ -9,8 +9,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from pytest_simbench.session.case import Case
-from pytest_simbench.session.repetition import Repetition
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.simulator.registry import registered
 from pytest_simbench.tasks import Stacking
 

@@ -12,7 +12,7 @@ from hypothesis import settings
 
 from pytest_simbench.client import reaper
 from pytest_simbench.client.environments import Environment, interpreter, missing
-from pytest_simbench.session.case import Case
+from pytest_simbench.experiment.case import Case
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter, registered
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import mujoco
-from pytest_simbench.sims.mujoco import MuJoCo
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 from pytest_simbench.scene import Scene
 

@@ -26,13 +26,13 @@ from pytest_simbench.measure.comparison import (
     compare_by_seed,
     holm,
 )
-from pytest_simbench.measure.differences import differences
 from pytest_simbench.measure.limits import FAILURES, Limit
-from pytest_simbench.measure.metrics import Metric
-from pytest_simbench.measure.record import Record
 from pytest_simbench.measure.results import ResultSet
-from pytest_simbench.measure.series import by_test
 from pytest_simbench.measure.speed import without_speed
+from pytest_simbench.records.differences import differences
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.series import by_test
+from pytest_simbench.tasks.metrics import Metric
 
 
 @dataclass(frozen=True)

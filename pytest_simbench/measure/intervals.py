@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.measure.metrics import Metric
+from pytest_simbench.tasks.metrics import Metric
 
 CONFIDENCE = 0.95
 """Confidence of every interval unless said otherwise."""

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from pytest_simbench.measure.comparison import ALPHA, Equivalence, equivalence
-from pytest_simbench.measure.configuration import text
-from pytest_simbench.measure.metrics import Metric
-from pytest_simbench.measure.record import Record
-from pytest_simbench.measure.series import series, told
+from pytest_simbench.records.configuration import text
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.series import series, told
+from pytest_simbench.tasks.metrics import Metric
 
 MARGIN = 0.05
 """Shares that differ by less than this count as the same: not a whole cube of 15."""

@@ -8,8 +8,6 @@ from math import isfinite
 
 from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval, proportion
 from pytest_simbench.measure.limits import FAILURES, check_threshold
-from pytest_simbench.measure.metrics import COSTS, Metric, UnknownMetric
-from pytest_simbench.measure.record import Record
 from pytest_simbench.measure.verdicts import (
     ERROR,
     Claim,
@@ -20,6 +18,8 @@ from pytest_simbench.measure.verdicts import (
     confidence,
     judge,
 )
+from pytest_simbench.records.record import Record
+from pytest_simbench.tasks.metrics import COSTS, Metric, UnknownMetric
 
 
 class InconclusiveWarning(UserWarning):

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
-from pytest_simbench.measure.record import Record
 from pytest_simbench.measure.results import ResultSet
+from pytest_simbench.records.record import Record
 
 Values = dict[int, float]
 """A value for each seed."""

@@ -8,9 +8,9 @@ from typing import Any
 
 from pytest_simbench.client.tape import Operation, Tape, TapedWorld
 from pytest_simbench.client.world import Motion
+from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.repeatability.perturbation import Perturbation, controller_delay, perturbed
 from pytest_simbench.scene import Scene
-from pytest_simbench.session.handle import SimulatorHandle
 from pytest_simbench.tasks.base import Jitter, Outcome, Task
 
 PERIOD = 0.02

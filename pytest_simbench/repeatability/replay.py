@@ -14,11 +14,11 @@ from functools import partial
 
 from pytest_simbench.client.errors import Unavailable, WorkerError
 from pytest_simbench.client.tape import Operation, TapedWorld
+from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.repeatability.episode import Episode, Experiment, changed
 from pytest_simbench.repeatability.moments import THROWING_MOMENTS, Moment
 from pytest_simbench.repeatability.motions import difference
 from pytest_simbench.repeatability.replay_result import Again, Replay
-from pytest_simbench.session.handle import SimulatorHandle
 from pytest_simbench.simulator.info import Capability
 from pytest_simbench.tasks import Jitter, LeaningTowers
 

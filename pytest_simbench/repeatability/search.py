@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hypothesis.strategies import SearchStrategy
 
+from pytest_simbench.experiment.example import replay_command, write_example
 from pytest_simbench.repeatability.attack import Attack, Perturbations
 from pytest_simbench.repeatability.episode import Episode, Experiment
 from pytest_simbench.repeatability.perturbation import Perturbation, described, perturbations
 from pytest_simbench.repeatability.perturbation import perturbed as perturbed_scene
-from pytest_simbench.session.example import replay_command, write_example
 
 EXAMPLES = 60
 """Runs of the simulator until a search gives up."""

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from pytest_simbench.measure.intervals import Interval, interval, proportion
-from pytest_simbench.measure.metrics import Metric, significant
 from pytest_simbench.measure.results import InconclusiveWarning
 from pytest_simbench.measure.verdicts import Verdict, at_least, confidence, judge
 from pytest_simbench.repeatability.attack import Attack, Perturbations
@@ -22,6 +21,7 @@ from pytest_simbench.repeatability.perturbation import (
     perturbations,
 )
 from pytest_simbench.repeatability.search import bounds_in_words
+from pytest_simbench.tasks.metrics import Metric, significant
 
 SENSITIVITY_TIMES = (0.1, 1.0, 5.0, 20.0)
 """Seconds after the task began at which sensitivity is told."""

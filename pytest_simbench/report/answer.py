@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pytest_simbench.measure.intervals import FEWEST
-from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.report import cells
 from pytest_simbench.report.pooling import Spread
 from pytest_simbench.report.summary import Row, TaskSummary
+from pytest_simbench.tasks.metrics import Metric
 
 NAMED = 3
 """How many simulators a sentence names; the table below has them all."""

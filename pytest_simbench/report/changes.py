@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from pytest_simbench.measure.gate import Change, GateReport
+from pytest_simbench.records.text import for_markdown, for_terminal
 from pytest_simbench.report import markdown
 from pytest_simbench.report.grid import Column, fill, render
-from pytest_simbench.text import for_markdown, for_terminal
 
 ALWAYS = ("rtf", "cpu_cost", "ram")
 """Costs that are shown although they may not have changed, as the study's metrics are."""

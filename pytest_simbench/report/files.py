@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
-from pytest_simbench.measure.metrics import COSTS
-from pytest_simbench.measure.record import Record
-from pytest_simbench.measure.run_folder import write_whole
+from pytest_simbench.records.folder import write_whole
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.text import for_csv
 from pytest_simbench.report import markdown
 from pytest_simbench.report.figures import FiguresUnavailable, write_figures
 from pytest_simbench.report.summary import PHASES, TaskSummary
-from pytest_simbench.text import for_csv
+from pytest_simbench.tasks.metrics import COSTS
 
 MARKDOWN_NAME = "report.md"
 CSV_NAME = "report.csv"
@@ -77,7 +77,7 @@ def csv_of(records: Sequence[Record]) -> str:
     """One line for each repetition; an empty cell where a record has no value.
 
     Columns: what identifies it, its error, `metrics.<name>`, `cost.<name>` (see
-    `measure.metrics.COSTS`) and `seconds.<phase>`.
+    `tasks.metrics.COSTS`) and `seconds.<phase>`.
     """
     metrics = list(dict.fromkeys(name for record in records for name in record.metrics))
     file = io.StringIO(newline="")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pytest_simbench.records.text import for_markdown
 from pytest_simbench.report import columns
 from pytest_simbench.report.answer import sentences
 from pytest_simbench.report.grid import Column
 from pytest_simbench.report.summary import TaskSummary
-from pytest_simbench.text import for_markdown
 
 
 def render_run(summaries: Sequence[TaskSummary], pictures: Sequence[str] = ()) -> str:

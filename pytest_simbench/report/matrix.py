@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from pytest_simbench.measure.contest import wins
 from pytest_simbench.measure.modes import compare_modes
-from pytest_simbench.measure.record import Record
-from pytest_simbench.measure.series import comparable, series
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.series import comparable, series
 from pytest_simbench.report.summary import TaskSummary
 
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-from pytest_simbench.text import for_terminal
+from pytest_simbench.records.text import for_terminal
 
 if TYPE_CHECKING:
-    from pytest_simbench.selection import Selection
+    from pytest_simbench.plugin.selection import Selection
     from pytest_simbench.simulator.info import SimulatorInfo
 
 

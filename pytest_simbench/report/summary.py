@@ -12,9 +12,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from pytest_simbench.measure.contest import Win
-from pytest_simbench.measure.metrics import Metric
-from pytest_simbench.measure.record import Record
-from pytest_simbench.measure.series import series
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.series import series
 from pytest_simbench.report.pooling import (
     AMOUNT,
     Ends,
@@ -26,6 +25,7 @@ from pytest_simbench.report.pooling import (
     spread,
 )
 from pytest_simbench.simulator.choices import published_again
+from pytest_simbench.tasks.metrics import Metric
 
 PHASES = ("launch", "compile", "load", "plan", "step", "other")
 """Where the wall time of a repetition goes, in order."""

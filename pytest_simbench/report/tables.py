@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from pytest_simbench.records.text import for_terminal, in_one_line
 from pytest_simbench.report import columns
 from pytest_simbench.report.answer import sentences
 from pytest_simbench.report.grid import fill, render
 from pytest_simbench.report.summary import TaskSummary
-from pytest_simbench.text import for_terminal, in_one_line
 
 NARROWEST = 40
 """Tables are laid out for at least so many columns; in fewer, lines run over."""

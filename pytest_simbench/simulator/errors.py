@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from pytest_simbench.text import for_terminal
-
 
 class SimulatorError(Exception):
-    """Base of every error raised on behalf of a simulator. Its message is printable, whatever file
-    or log it quotes."""
-
-    def __init__(self, *arguments: object) -> None:
-        shown = (for_terminal(item) if isinstance(item, str) else item for item in arguments)
-        super().__init__(*shown)
+    """Base of every error raised on behalf of a simulator. Its message may quote any file or log:
+    whoever shows it makes it harmless (`records.text`)."""
 
 
 class SettingsError(SimulatorError):

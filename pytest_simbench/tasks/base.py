@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import World
-from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.tasks.metrics import Metric
 
 CUBE_SIZE = 0.05
 """Edge of every cube [m] (the study)."""

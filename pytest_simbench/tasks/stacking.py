@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import World
-from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.robot.panda import FINGER_CLOSED, panda
 from pytest_simbench.robot.planning import PlanningError
 from pytest_simbench.scene import Box, Pose, Scene
@@ -26,6 +25,7 @@ from pytest_simbench.tasks.base import (
     generators,
 )
 from pytest_simbench.tasks.manipulator import FULL_SPEED, LostCube, Manipulator, Speeds
+from pytest_simbench.tasks.metrics import Metric
 
 TABLE_TOP = 0.30
 """Height of the table top [m] (study code, Webots)."""

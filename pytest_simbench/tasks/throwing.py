@@ -16,7 +16,6 @@ from typing import ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import Motion, World
-from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.robot.errors import PlanningError
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import panda
@@ -34,6 +33,7 @@ from pytest_simbench.tasks.base import (
 )
 from pytest_simbench.tasks.impact import impact
 from pytest_simbench.tasks.manipulator import LostCube, Manipulator, Speeds
+from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.throw_analysis import Thrown
 
 PROJECTILE = Pose.at(0.5, 0.0, CUBE_SIZE / 2)

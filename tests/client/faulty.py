@@ -14,8 +14,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from pytest_simbench.sims.mujoco import MuJoCo
-from pytest_simbench.sims.pybullet import PyBullet
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
+from pytest_simbench.sims.pybullet.adapter import PyBullet
 
 from pytest_simbench.scene import Scene
 from pytest_simbench.simulator import Simulator

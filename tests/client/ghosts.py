@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pytest_simbench.sims.mujoco import MuJoCo
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 AFTER = 0.5
 """Simulated time at which it begins [s]."""

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from pytest_simbench.session.case import Case
-from pytest_simbench.session.repetition import Repetition
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.tasks import LeaningTowers
 
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.measure.record import Record
-from pytest_simbench.session.case import Case
-from pytest_simbench.session.repeat import Repeater
-from pytest_simbench.session.repetition import Repetition
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.repeater import Repeater
+from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.records.record import Record
 from tests.conftest import ADAPTERS, workers
 from tests.tiny import Falling
 

@@ -15,12 +15,12 @@ import pytest
 
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
-from pytest_simbench.measure.record import Record
-from pytest_simbench.session.case import Case
-from pytest_simbench.session.handle import SimulatorHandle
-from pytest_simbench.session.interrupts import Interrupts
-from pytest_simbench.session.repeat import Repeater
-from pytest_simbench.session.repetition import Repetition
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.handle import SimulatorHandle
+from pytest_simbench.experiment.interrupts import Interrupts
+from pytest_simbench.experiment.repeater import Repeater
+from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.records.record import Record
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
 from tests.client.test_faults import Silent
 from tests.conftest import workers

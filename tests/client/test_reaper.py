@@ -14,8 +14,8 @@ import psutil
 import pytest
 
 from pytest_simbench.client import reaper
-from pytest_simbench.session.case import Case
-from pytest_simbench.session.repetition import Repetition
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.repetition import Repetition
 from tests.client.test_limits import unruly
 from tests.conftest import workers
 from tests.tiny import Falling
@@ -57,8 +57,8 @@ SCRIPT = """
 import sys, time
 from dataclasses import replace
 from pathlib import Path
-from pytest_simbench.session.case import Case
-from pytest_simbench.session.repetition import Repetition
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.repetition import Repetition
 from tests.conftest import ADAPTERS
 from tests.tiny import Falling
 folder = Path(sys.argv[1])
@@ -89,7 +89,7 @@ def started(folder: Path, adapter: str) -> tuple[subprocess.Popen[bytes], list[p
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize(
     "adapter",
-    ["pytest_simbench.sims.mujoco:MuJoCo", "tests.client.faulty:MuJoCo_Hung",
+    ["pytest_simbench.sims.mujoco.adapter:MuJoCo", "tests.client.faulty:MuJoCo_Hung",
      "tests.client.faulty:MuJoCo_Stopped", "tests.client.unruly:Parent"],
 )  # fmt: skip
 def test_a_killed_run_leaves_nothing(tmp_path: Path, adapter: str, number: int) -> None:
@@ -106,7 +106,13 @@ def test_a_killed_run_leaves_nothing(tmp_path: Path, adapter: str, number: int) 
 
 def test_a_run_that_ends_well_leaves_nothing(tmp_path: Path) -> None:
     script = SCRIPT.replace("1e6", "0.1")
-    command = [sys.executable, "-c", script, str(tmp_path), "pytest_simbench.sims.mujoco:MuJoCo"]
+    command = [
+        sys.executable,
+        "-c",
+        script,
+        str(tmp_path),
+        "pytest_simbench.sims.mujoco.adapter:MuJoCo",
+    ]
     program = subprocess.Popen(command)
     family: set[psutil.Process] = set()
     while program.poll() is None:

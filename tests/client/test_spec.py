@@ -17,8 +17,8 @@ import pytest
 
 from pytest_simbench.client.errors import Where
 from pytest_simbench.client.process import Launch, WorkerProcess
-from pytest_simbench.session.case import Case
-from pytest_simbench.session.repetition import Repetition
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.repetition import Repetition
 from tests.tiny import Falling
 
 SSHD = shutil.which("sshd") or "/usr/sbin/sshd"

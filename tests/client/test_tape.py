@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.client.tape import ARRAYS, Latency, Operation
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.scene import Pose, Scene
-from pytest_simbench.session.case import Case
-from pytest_simbench.session.handle import SimulatorHandle
 from pytest_simbench.tasks.base import cube
 
 WHITE = (1.0, 1.0, 1.0, 1.0)

@@ -12,8 +12,8 @@ import pytest
 
 from pytest_simbench.client.errors import Unavailable, exit_text
 from pytest_simbench.client.world import World
-from pytest_simbench.session.case import Case
-from pytest_simbench.session.repetition import Repetition
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.tasks.base import Count, Outcome
 from pytest_simbench.worker.text import LONGEST, LONGEST_LOGGED, named, readable
 from tests.client.test_limits import unruly

@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from pytest_simbench.sims.mujoco import MuJoCo
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 from pytest_simbench.scene import Scene
 from pytest_simbench.simulator import ParityError, UnavailableError

@@ -9,9 +9,8 @@ import pytest
 
 from pytest_simbench.measure import comparison
 from pytest_simbench.measure.contest import wins
-from pytest_simbench.measure.record import Record
-
-from .build import METRICS, failed, record
+from pytest_simbench.records.record import Record
+from tests.records.build import METRICS, failed, record
 
 
 def side(rng: np.random.Generator, placed: float, **changes: object) -> list[Record]:

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from pytest_simbench.measure.intervals import FEWEST, interval, proportion
-from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.measure.verdicts import Verdict, at_least, at_most, confidence, judge
+from pytest_simbench.tasks.metrics import Metric
 
 Draw = Callable[[np.random.Generator, int], NDArray[np.float64]]
 SHARE = Metric("placed", "placed", kind="share", of=15)

@@ -13,10 +13,9 @@ import pytest
 from pytest_simbench.measure import comparison, gate
 from pytest_simbench.measure.gate import GateReport, run_gate
 from pytest_simbench.measure.limits import parse_limits
-from pytest_simbench.measure.record import Record
-from pytest_simbench.measure.records import read_records
-
-from .build import METRICS, failed, record
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.record_file import read_records
+from tests.records.build import METRICS, failed, record
 
 REAL = read_records(Path(__file__).with_name("stacking_records.jsonl")).records
 """20 stacking repetitions of MuJoCo and 21 of PyBullet, as recorded, without their details."""

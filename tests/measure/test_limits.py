@@ -16,9 +16,8 @@ from pytest_simbench.measure.limits import (
     check_threshold,
     parse_limits,
 )
-from pytest_simbench.measure.metrics import COSTS, Metric, UnknownMetric
-
-from .build import METRICS
+from pytest_simbench.tasks.metrics import COSTS, Metric, UnknownMetric
+from tests.records.build import METRICS
 
 PLACED, _, ERROR, _ = METRICS
 RTF = COSTS[0]

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from scipy.stats import ttest_ind
 
 from pytest_simbench.measure.intervals import Interval, interval, proportion
-from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.measure.power import (
     alike_rate,
     further_repetitions,
@@ -19,6 +18,7 @@ from pytest_simbench.measure.power import (
     repetitions_for_proportion,
     repetitions_to_detect,
 )
+from pytest_simbench.tasks.metrics import Metric
 
 COUNT = Metric("picks", "picks")
 HIT = Metric("hit", "hit", kind="yes_no")

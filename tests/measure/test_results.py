@@ -7,11 +7,10 @@ import warnings
 import pytest
 
 from pytest_simbench.measure.intervals import interval, proportion
-from pytest_simbench.measure.metrics import UnknownMetric
 from pytest_simbench.measure.results import InconclusiveWarning, ResultSet
 from pytest_simbench.measure.verdicts import at_least
-
-from .build import METRICS, failed, record, records
+from pytest_simbench.tasks.metrics import UnknownMetric
+from tests.records.build import METRICS, failed, record, records
 
 
 def placed(*values: float, also: int = 0) -> ResultSet:

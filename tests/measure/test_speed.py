@@ -6,11 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.measure.record import Record
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.speed import POWER, without_speed
-
-from .build import METRICS, record
+from pytest_simbench.records.record import Record
+from tests.records.build import METRICS, record
 
 TIMES = {"wall": 8.0, "waited": 0.0, "cpu": 7.5, "simulated": 140.0}
 CONTROL = {"control_wall": 2e-4, "control_waited": 0.0, "control_cpu": 1.9e-4}

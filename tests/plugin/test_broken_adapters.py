@@ -10,7 +10,7 @@ import pytest
 
 GOOD = """
 from dataclasses import replace
-from pytest_simbench.sims.mujoco import MuJoCo
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 class Good(MuJoCo):
     info = replace(MuJoCo.info, name="good", title="Good")

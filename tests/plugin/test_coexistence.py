@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.options import OPTIONS
+from pytest_simbench.plugin.options import OPTIONS
 
 FLAGS = [flag for option in OPTIONS for flag in option.flags]
 INI = [flag.lstrip("-").replace("-", "_") for o in OPTIONS if o.ini for flag in o.flags]
@@ -100,7 +100,7 @@ def test_a_flag_of_a_conftest_before_a_path(pytester: pytest.Pytester) -> None:
 def test_loaded_by_a_conftest(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     pytester.makeconftest(
-        "pytest_plugins = ['pytest_simbench.plugin']\n" + OWN.format(flags=["--gui"], ini=[])
+        "pytest_plugins = ['pytest_simbench.plugin.hooks']\n" + OWN.format(flags=["--gui"], ini=[])
     )
     pytester.makepyfile(FALLING)
     result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=2", "--gui")
@@ -151,7 +151,7 @@ def test_fixtures_of_our_names(pytester: pytest.Pytester, place: str) -> None:
 
 def test_ours_under_another_name(pytester: pytest.Pytester) -> None:
     pytester.makeconftest(
-        WITH_FIXTURES + "from pytest_simbench.fixtures import repeat as sim_repeat\n"
+        WITH_FIXTURES + "from pytest_simbench.plugin.fixtures import repeat as sim_repeat\n"
     )
     pytester.makepyfile(FALLING.replace("repeat", "sim_repeat"))
     pytester.runpytest_subprocess("--sim=mujoco", "--reps=2").assert_outcomes(passed=1)

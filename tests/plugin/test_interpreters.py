@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.interpreters import checked_specification, interpreter_path
+from pytest_simbench.plugin.interpreters import checked_specification, interpreter_path
 
 
 @pytest.fixture

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 import pytest_simbench.tasks  # noqa: F401 - pytester would import native modules a second time
-from pytest_simbench.measure.record import Record
-from pytest_simbench.measure.records import RecordFile, read_records
-from pytest_simbench.merge import merge_runs
-from pytest_simbench.session.identity import file_stem_of
-from tests.measure.build import record
+from pytest_simbench.experiment.identity import file_stem_of
+from pytest_simbench.plugin.merge import merge_runs
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.record_file import RecordFile, read_records
+from tests.records.build import record
 
 
 def saved(folder: Path, seed: int, log: str, **changes: object) -> Record:
@@ -94,7 +94,7 @@ def test_nothing_is_written_out_of_the_destination(pytester: pytest.Pytester, li
 
 
 def test_a_run_that_is_written_to_is_no_destination(pytester: pytest.Pytester) -> None:
-    from pytest_simbench.measure.run_folder import Claim
+    from pytest_simbench.records.folder import Claim
 
     saved(pytester.path / "a", 1, "")
     claim = Claim(pytester.path / "whole")

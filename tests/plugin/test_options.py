@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench import options
-from pytest_simbench.options import OPTIONS, Option
-from pytest_simbench.selection import select
+from pytest_simbench.plugin import options
+from pytest_simbench.plugin.options import OPTIONS, Option
+from pytest_simbench.plugin.selection import select
 
 NAMES = [option.name for option in OPTIONS]
 
@@ -173,7 +173,7 @@ def test_any_help_text_renders(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, text: str
 ) -> None:
     """argparse expands %, in whichever text it stands."""
-    from pytest_simbench import spellings
+    from pytest_simbench.plugin import spellings
 
     changed = [Option(o.flag, o.kind, text, metavar=o.metavar, ini=False) for o in OPTIONS]
     monkeypatch.setattr(spellings, "OPTIONS", changed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pytest_simbench.measure.records import read_records
+from pytest_simbench.records.record_file import read_records
 
 SUITE = """
 from dataclasses import dataclass, replace

@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
-from pytest_simbench.measure.record import Record
-from pytest_simbench.measure.records import RecordFile
-from pytest_simbench.resume import NotResumed, Resumed
-from pytest_simbench.session.case import Case
-from pytest_simbench.session.identity import expected
-from pytest_simbench.session.protocol import PROTOCOLS
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.identity import expected
+from pytest_simbench.experiment.protocol import PROTOCOLS
+from pytest_simbench.plugin.resume import NotResumed, Resumed
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.record_file import RecordFile
 from tests.tiny import Falling
 
 Save = Callable[..., Resumed]
@@ -141,7 +141,7 @@ def test_records_of_before_scene_and_limits_were_kept_go_on(case: Case, save: Sa
 
 
 def test_expected_is_what_the_worker_reports(case: Case) -> None:
-    from pytest_simbench.session.repetition import Repetition
+    from pytest_simbench.experiment.repetition import Repetition
 
     case = replace(case, changes={"timestep": "0.002"})
     record, error = Repetition(case, Falling(duration=0.01), 1).run()
@@ -152,7 +152,7 @@ def test_expected_is_what_the_worker_reports(case: Case) -> None:
 
 
 def test_a_start_that_fails_still_records_its_settings(case: Case) -> None:
-    from pytest_simbench.session.repetition import Repetition
+    from pytest_simbench.experiment.repetition import Repetition
 
     record, error = Repetition(replace(case, python="/nowhere/python"), Falling(), 1).run()
     assert error is not None
@@ -161,7 +161,7 @@ def test_a_start_that_fails_still_records_its_settings(case: Case) -> None:
 
 
 def test_a_time_out_failed_and_is_not_run_again(case: Case, save: Save) -> None:
-    from pytest_simbench.session.repetition import Repetition
+    from pytest_simbench.experiment.repetition import Repetition
 
     case = replace(case, timeout=3.0)
     record, error = Repetition(case, Falling(duration=1e5), 1).run()

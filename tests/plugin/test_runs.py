@@ -244,7 +244,7 @@ def test_plugin_load_is_light(pytester: pytest.Pytester) -> None:
         def test_light():
             heavy = {"numpy", "scipy", "psutil", "execnet", "pinocchio", "mujoco", "pybullet",
                      "rich.console", "ruckig", "ompl", "matplotlib", "hypothesis.strategies"}
-            assert "pytest_simbench.plugin" in sys.modules
+            assert "pytest_simbench.plugin.hooks" in sys.modules
             assert not heavy & set(sys.modules)
         """
     )

@@ -53,7 +53,7 @@ def test_an_untested_version_runs_and_is_named(pytester: pytest.Pytester) -> Non
     pytester.makepyfile(
         newer="""
 from dataclasses import replace
-from pytest_simbench.sims.mujoco import MuJoCo
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 class Newer(MuJoCo):
     info = replace(MuJoCo.info, name="newer", tested_version="3.9.0")

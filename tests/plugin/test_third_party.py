@@ -13,7 +13,7 @@ ADAPTER = '''
 
 from dataclasses import replace
 
-from pytest_simbench.sims.mujoco import MuJoCo, MuJoCoSettings
+from pytest_simbench.sims.mujoco.adapter import MuJoCo, MuJoCoSettings
 
 
 class Elsewhere(MuJoCo):

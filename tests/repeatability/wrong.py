@@ -7,7 +7,7 @@ import signal
 from typing import Any, ClassVar
 
 import numpy as np
-from pytest_simbench.sims.mujoco import MuJoCo
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 from pytest_simbench.scene import FloatArray, Scene
 

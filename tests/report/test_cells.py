@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.report.cells import metric_value, number
+from pytest_simbench.tasks.metrics import Metric
 
 LATE = Metric("late", "late", unit="s")
 CUBES = Metric("moved", "moved", unit="cubes")

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from pytest_simbench.measure.gate import GateReport, run_gate
 from pytest_simbench.measure.limits import parse_limits
-from pytest_simbench.measure.record import Record
+from pytest_simbench.records.record import Record
 from pytest_simbench.report.changes import render_markdown, render_terminal
 
 from .samples import METRICS, STACKING, THROWING, record

@@ -8,19 +8,19 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.measure.gate import run_gate
-from pytest_simbench.measure.metrics import Metric
-from pytest_simbench.measure.record import Failure, Record
-from pytest_simbench.repeatability.store import Line
-from pytest_simbench.repeatability.tables import render_markdown, render_terminal
-from pytest_simbench.repeatability.tables import tables as repeatability_tables
+from pytest_simbench.records.record import Failure, Record
+from pytest_simbench.records.repeatability import Line
 from pytest_simbench.report import changes, markdown, tables
 from pytest_simbench.report.capabilities import capability_markdown, capability_table
 from pytest_simbench.report.files import csv_of, write_report
 from pytest_simbench.report.github import VARIABLE, append_summary
 from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.progress import Progress
+from pytest_simbench.report.repeatability import render_markdown, render_terminal
+from pytest_simbench.report.repeatability import tables as repeatability_tables
 from pytest_simbench.report.summary import summarise
 from pytest_simbench.simulator.registry import adapter
+from pytest_simbench.tasks.metrics import Metric
 from tests.hostile import (
     HOSTILE,
     assert_harmless_csv,

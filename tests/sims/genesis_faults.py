@@ -9,9 +9,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
-from pytest_simbench.sims.genesis import Genesis
-from pytest_simbench.sims.genesis_engine import array_of
-from pytest_simbench.sims.genesis_world import GenesisSettings
+from pytest_simbench.sims.genesis.adapter import Genesis
+from pytest_simbench.sims.genesis.engine import array_of
+from pytest_simbench.sims.genesis.world import GenesisSettings
 
 from pytest_simbench.scene import Scene
 from pytest_simbench.simulator import Settings

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from typing import Any, ClassVar
 
-import pytest_simbench.sims.ovphysx as adapter
+import pytest_simbench.sims.ovphysx.adapter as adapter
 
 from pytest_simbench.scene import Scene
 

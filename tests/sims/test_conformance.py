@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.display import Displays
+from pytest_simbench.client.display import Displays
 from pytest_simbench.simulator.registry import registered
 from pytest_simbench.testing import ConformanceTest, conformance_checks
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pytest_simbench.sims.dart import DART
+from pytest_simbench.sims.dart.adapter import DART
 
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import ParityError

@@ -10,7 +10,7 @@ from urllib.error import URLError
 
 import numpy as np
 import pytest
-from pytest_simbench.sims.drake import Drake
+from pytest_simbench.sims.drake.adapter import Drake
 
 from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.simulator import ParityError

@@ -10,8 +10,8 @@ import pytest
 from pytest_simbench.client.errors import Where
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
+from pytest_simbench.experiment.case import Case
 from pytest_simbench.scene import FloatArray, Scene
-from pytest_simbench.session.case import Case
 from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks import Jitter, Throwing
 from pytest_simbench.tasks.manipulator import Manipulator

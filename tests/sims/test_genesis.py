@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pytest_simbench.sims.genesis import Genesis
-from pytest_simbench.sims.genesis_engine import quick_inspection
+from pytest_simbench.sims.genesis.adapter import Genesis
+from pytest_simbench.sims.genesis.engine import quick_inspection
 
 from pytest_simbench.client.environments import Environment, interpreter, missing
 from pytest_simbench.client.errors import EngineFailed, Where, WorldParityError

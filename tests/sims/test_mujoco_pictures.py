@@ -7,13 +7,13 @@ import subprocess
 import sys
 
 import pytest
-from pytest_simbench.sims.mujoco import MuJoCo
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 from pytest_simbench.simulator.registry import adapter
 
 CODE = """
 from pytest_simbench.scene import Box, Pose, Scene
-from pytest_simbench.sims.mujoco import MuJoCo
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 def driver():
     with open("/proc/self/maps") as maps:

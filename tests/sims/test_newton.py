@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from pytest_simbench.sims.newton import Newton
+from pytest_simbench.sims.newton.adapter import Newton
 
 from pytest_simbench.client.environments import Environment, interpreter, missing
 from pytest_simbench.client.errors import Where, WorldParityError

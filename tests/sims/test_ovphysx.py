@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pytest_simbench.sims.ovphysx import OvPhysX
+from pytest_simbench.sims.ovphysx.adapter import OvPhysX
 
 from pytest_simbench.client.environments import missing
 from pytest_simbench.client.errors import WorkerError

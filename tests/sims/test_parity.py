@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pytest_simbench.sims.mujoco import MuJoCo
-from pytest_simbench.sims.pybullet import PyBullet
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
+from pytest_simbench.sims.pybullet.adapter import PyBullet
 
 from pytest_simbench.simulator import ParityError, Simulator
 from pytest_simbench.simulator.parity import check

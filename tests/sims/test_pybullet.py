@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pytest_simbench.sims.pybullet import PyBullet
+from pytest_simbench.sims.pybullet.adapter import PyBullet
 
 from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.simulator import ParityError

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pytest_simbench.sims.sapien import SAPIEN
-from pytest_simbench.sims.sapien_drawing import EYE, FIELD_OF_VIEW, TARGET
+from pytest_simbench.sims.sapien.adapter import SAPIEN
+from pytest_simbench.sims.sapien.drawing import EYE, FIELD_OF_VIEW, TARGET
 
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import UnavailableError

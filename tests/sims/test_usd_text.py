@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pytest_simbench.sims.usd_text import (
+from pytest_simbench.sims.ovphysx.usd_text import (
     attributes,
     mass_lines,
     prim,

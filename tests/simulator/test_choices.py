@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import pytest
 
-from pytest_simbench.measure.record import Record
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.records.record import Record
 from pytest_simbench.report.markdown import render_task as written
 from pytest_simbench.report.summary import summarise
 from pytest_simbench.report.tables import render_task
-from pytest_simbench.session.case import Case
-from pytest_simbench.session.repetition import Repetition
 from pytest_simbench.simulator.choices import SeedsSeen, published_again, seeds_seen
 from pytest_simbench.simulator.registry import adapter, registered
 from tests.report.samples import METRICS, record
@@ -67,9 +67,9 @@ def test_only_repetitions_that_count_are_counted() -> None:
 def test_nothing_declared_is_nothing_said() -> None:
     assert published_again([("throwing", 2022, [])]) == ""
     assert published_again([]) == ""
-    assert seeds_seen("pytest_simbench.sims.pybullet:PyBullet", "default") == ()
+    assert seeds_seen("pytest_simbench.sims.pybullet.adapter:PyBullet", "default") == ()
     assert seeds_seen("no.such.module:Adapter", "tuned") == ()
-    assert seeds_seen("pytest_simbench.sims.pybullet:Missing", "tuned") == ()
+    assert seeds_seen("pytest_simbench.sims.pybullet.adapter:Missing", "tuned") == ()
 
 
 def test_a_record_says_on_what_its_profile_was_chosen(case: Case) -> None:

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import pytest
-from pytest_simbench.sims.mujoco import MuJoCo, MuJoCoSettings
+from pytest_simbench.sims.mujoco.adapter import MuJoCo, MuJoCoSettings
 
 from pytest_simbench.simulator import SettingsError
 from pytest_simbench.simulator.registry import adapter, registered

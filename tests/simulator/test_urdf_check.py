@@ -13,11 +13,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pytest_simbench.client.errors import EngineFailed
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import panda
 from pytest_simbench.scene import Box, Gripper, Joint, Pose, Robot, Scene, SceneError
-from pytest_simbench.session.case import Case
-from pytest_simbench.session.handle import SimulatorHandle
 from pytest_simbench.simulator import DescriptionError, PreparedRobot
 from pytest_simbench.simulator.mesh_check import LARGEST_MESH, TRIANGLE
 from pytest_simbench.simulator.robot_check import check_names, check_robot

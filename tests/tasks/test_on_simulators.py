@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 import pytest
 
+from pytest_simbench.client.display import Displays
 from pytest_simbench.client.errors import Unavailable
-from pytest_simbench.display import Displays
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.scene import Pose, Scene
-from pytest_simbench.session.case import Case
-from pytest_simbench.session.repetition import Repetition
 from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
 from tests.conftest import ADAPTERS, able_to, case_of

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from pytest_simbench.client.errors import Diverged, RepetitionTimeout
-from pytest_simbench.measure.metrics import Metric
 from pytest_simbench.robot.panda import READY
 from pytest_simbench.scene import Box, Pose
 from pytest_simbench.tasks import Jitter, Stacking, stacking
 from pytest_simbench.tasks.base import generators
 from pytest_simbench.tasks.manipulator import Manipulator, Speeds
+from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.stacking import GRID, TABLE, TOWERS, Place, _placed, _strict
 from tests.tasks.scripted import (
     Asked,

@@ -51,7 +51,7 @@ def test_third_partys_test_file(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(
         mysim="""
 from dataclasses import replace
-from pytest_simbench.sims.mujoco import MuJoCo
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
 from pytest_simbench.simulator import Capability
 
 class MySim(MuJoCo):
@@ -92,7 +92,7 @@ def test_missing_engine_is_skipped(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(
         """
 from dataclasses import replace
-from pytest_simbench.sims.mujoco import MuJoCo
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
 from pytest_simbench.testing import conformance_checks
 
 class Gone(MuJoCo):

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import mujoco  # on purpose: this module does not import without its engine
 import numpy as np
-from pytest_simbench.sims.mujoco import MuJoCo
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import SimulatorInfo

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from pytest_simbench.client.world import World
-from pytest_simbench.measure.record import Record
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.repeater import Repeater
+from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.records.record import Record
 from pytest_simbench.scene import Scene, Trajectory
-from pytest_simbench.session.case import Case
-from pytest_simbench.session.repeat import Repeater
-from pytest_simbench.session.repetition import Repetition
 from pytest_simbench.tasks import Stacking
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
 from tests.client.test_faults import Silent

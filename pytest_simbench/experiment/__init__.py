@@ -1,0 +1,1 @@
+"""An experiment: a case and a task, its repetitions, and how many are needed."""

@@ -1,0 +1,116 @@
+"""A case: one simulator in one mode with its settings, and how its repetitions are to be run."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from typing import Protocol as Interface
+
+from pytest_simbench.client.process import Launch
+from pytest_simbench.experiment.protocol import PROTOCOLS, Protocol
+from pytest_simbench.records.names import file_name
+
+
+class Display(Interface):
+    """What opens a display for windows, and knows what became of it; `display.Displays` is one."""
+
+    def environment(self) -> dict[str, str]:
+        """Variables that a worker with a window needs.
+
+        Raises:
+            DisplayError: there is no display to be had.
+        """
+
+    def problem(self, environment: Mapping[str, str]) -> str:
+        """Why the display of this environment is no longer there, or nothing."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """What a test's repetitions have in common.
+
+    Attributes:
+        test: id of the test, for records.
+        simulator, mode, profile: which simulator, `headless` or `gui`, which settings profile.
+        adapter: `module:Class` of the simulator's adapter.
+        changes: single settings changed by the user, by name.
+        python, spec: interpreter or execnet specification of the worker.
+        environment: of the worker.
+        display: adds to the environment what a window needs, for each worker anew.
+        protocol: how repetitions are run.
+        timeout: of a repetition from launch [s]; None for the task's own.
+        stall_timeout: longest silence of a worker [s].
+        memory_limit: of a worker and its children [MB]; None for no limit.
+        seed: base seed; repetition k has seed + k - 1.
+        jitter: scale of the start jitter; 1 is 1 mm and 1 degree.
+        trace: `off`, `on` or `retain-on-failure`: write the motion of every repetition.
+        costly_start: the engine compiles when it starts; one worker serves several repetitions.
+        compile_timeout: of the compiling [s].
+        fresh: start a new worker for each repetition all the same.
+        contended: repetitions run side by side, so their times are not comparable.
+        folder: the run folder.
+        attempt: of the same repetitions in this process, see `records.record`.
+    """
+
+    test: str
+    simulator: str
+    mode: str
+    profile: str
+    adapter: str
+    folder: Path
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    python: str | None = None
+    spec: str | None = None
+    environment: Mapping[str, str] = field(default_factory=dict)
+    display: Display | None = None
+    protocol: Protocol = PROTOCOLS["fast"]
+    timeout: float | None = None
+    stall_timeout: float = 60.0
+    memory_limit: float | None = None
+    seed: int = 2022
+    jitter: float = 1.0
+    trace: str = "off"
+    costly_start: bool = False
+    compile_timeout: float = 0.0
+    fresh: bool = False
+    contended: bool = False
+    attempt: int = 1
+
+    @property
+    def reuses_worker(self) -> bool:
+        """Whether one worker serves several repetitions."""
+        return self.costly_start and not self.fresh
+
+    @property
+    def short_name(self) -> str:
+        """The test's name without its file, fit for a file name; no other test has it."""
+        return file_name(self.test.rpartition("::")[2], self.test)
+
+    def launch(self, name: str) -> Launch:
+        """How to start a worker of this case; its log is `logs/NAME.log` in the run folder.
+
+        Raises:
+            DisplayError: there is no display for its window.
+        """
+        log = self.folder / "logs" / f"{name}.log"
+        try:
+            log.parent.mkdir(parents=True, exist_ok=True)
+            log.unlink(missing_ok=True)
+        except OSError:  # a full disk must not stop the worker
+            log = Path(os.devnull)
+        return Launch(
+            adapter=self.adapter,
+            python=self.python,
+            spec=self.spec,
+            environment={
+                **self.environment,
+                **(self.display.environment() if self.display else {}),
+            },
+            log=log,
+            start_timeout=max(self.stall_timeout, 1.0),
+            stall_timeout=self.stall_timeout,
+            compile_timeout=self.compile_timeout if self.costly_start else 0.0,
+        )

@@ -1,0 +1,126 @@
+"""A simulator for interactive tests: one worker, many worlds."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from itertools import count
+from typing import Any
+
+from pytest_simbench.client.errors import DisplayError, DisplayLost, Where, WorkerError
+from pytest_simbench.client.process import WorkerProcess
+from pytest_simbench.client.tape import TapedWorld
+from pytest_simbench.client.world import World
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.example import replay_command, write_example
+from pytest_simbench.scene import Scene
+
+EPISODE_TIMEOUT = 3600.0
+"""Wall time of an episode [s], unless `--sim-timeout` gives another; silence ends it sooner."""
+
+_numbers = count(1)
+"""Of the workers that handles of this process started: their logs have names of their own."""
+
+
+class SimulatorHandle:
+    """Starts worlds of one simulator. Its worker is reused between episodes, each of which builds
+    the simulator and the scene anew; a worker that died is replaced.
+
+    Safe in a Hypothesis test: a crash inside an example is an ordinary exception of that
+    example, and the next one gets a fresh worker. What was done to the world of a failing
+    example is written to a file, and a note on the exception says how to replay it.
+
+    Attributes:
+        case: simulator, settings and limits.
+        constructed: settings and versions that the worker reported last.
+    """
+
+    def __init__(self, case: Case) -> None:
+        self.case = case
+        self.constructed: dict[str, Any] = {}
+        self._process: WorkerProcess | None = None
+        self._open = False
+
+    @contextmanager
+    def episode(self, scene: Scene, *, parity: bool = True, **options: Any) -> Iterator[TapedWorld]:
+        """A freshly loaded world, for as long as the `with` block lasts.
+
+        Args:
+            scene: to be loaded.
+            parity: whether to check that the engine built this scene.
+            options: of `TapedWorld`: a tape to be played, a period of samples.
+
+        Raises:
+            WorkerError: of whatever kind happens to the worker.
+            RuntimeError: another episode is still open; they share one worker.
+        """
+        if self._open:
+            raise RuntimeError(
+                f"an episode of {self.case.simulator} is still open, and there is one worker: "
+                "leave its `with` block first"
+            )
+        self._open = True
+        tape: list[Any] = []
+        try:
+            world = self._start(scene, parity, options)
+            tape = world.tape
+            yield world
+        except BaseException as error:
+            if isinstance(error, WorkerError) or (self._process and self._process.busy):
+                self.close()  # dead, or with an answer under way that nobody waits for
+            if isinstance(error, Exception) and not _of_hypothesis(error):
+                self._keep_example(error, scene, tape)
+            raise
+        finally:
+            self._open = False
+
+    @contextmanager
+    def episodes(self) -> Iterator[Callable[[Scene], World]]:
+        """A function that starts worlds, one at a time."""
+        yield lambda scene: self._start(scene, True, {})
+
+    def _start(self, scene: Scene, parity: bool, options: dict[str, Any]) -> TapedWorld:
+        case = self.case
+        if self._process is None or not self._process.alive:
+            # The process id keeps the workers of pytest-xdist apart, which share a run folder.
+            name = f"{case.short_name}-{case.simulator}-{os.getpid()}-{next(_numbers)}"
+            where = Where(case.simulator, case.mode)
+            try:
+                self._process = WorkerProcess(case.launch(name), where)
+            except DisplayError as error:
+                raise DisplayLost(str(error), where) from None
+        self._process.deadline = time.monotonic() + (case.timeout or EPISODE_TIMEOUT)
+        self.constructed = self._process.request(
+            "construct",
+            adapter=case.adapter,
+            profile=case.profile,
+            changes=dict(case.changes),
+            gui=case.mode == "gui",
+            real_time=False,
+        )
+        return TapedWorld(self._process, scene, parity=parity, **options)
+
+    def _keep_example(self, error: Exception, scene: Scene, tape: list[Any]) -> None:
+        """Write the failing episode to the run folder."""
+        case = self.case
+        test = os.environ.get("PYTEST_CURRENT_TEST", case.short_name).rpartition(" ")[0]
+        name = f"{test.rpartition('::')[2] or 'episode'}-{case.simulator}-{case.mode}"
+        with suppress(OSError):  # a full disk must not hide the failure itself
+            path = write_example(case, name, scene, tape, self.constructed.get("versions"))
+            error.add_note(f"replay this episode: {replay_command(path, case, scene)}")
+
+    def close(self) -> None:
+        """End the worker, if there is one; also from another thread than the one that uses it."""
+        process, self._process = self._process, None
+        if process is not None:
+            if process.busy:
+                process.kill()
+            with suppress(WorkerError):
+                process.close(timeout=5.0)
+
+
+def _of_hypothesis(error: Exception) -> bool:
+    """Whether Hypothesis only gives an example up, as `assume` does."""
+    return type(error).__module__.partition(".")[0] == "hypothesis"

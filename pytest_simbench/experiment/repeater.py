@@ -1,0 +1,128 @@
+"""All repetitions of a case, one after the other or side by side."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import replace
+from typing import Protocol as Interface
+
+from pytest_simbench.client.errors import Unavailable, WorkerError, WorldParityError
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.interrupts import Interrupts
+from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.experiment.workers import IdleWorkers
+from pytest_simbench.measure.results import ResultSet
+from pytest_simbench.records.record import Record
+from pytest_simbench.tasks.base import Task
+
+
+class ProgressLine(Interface):
+    """What the live line is told; `report.progress.Progress` is one."""
+
+    def start_test(self, test_id: str, repetitions: int) -> None: ...
+    def repetition(self, number: int, seed: int) -> None: ...
+    def phase(self, name: str) -> None: ...
+    def count(self, done: int, total: int, noun: str = "") -> None: ...
+    def end_repetition(self, status: str, seconds: float) -> None: ...
+    def end_test(self) -> None: ...
+
+
+class Repeater:
+    """Runs a task's repetitions and hands each record over as it is made.
+
+    Args:
+        case: simulator, settings and limits.
+        jobs: how many workers run side by side.
+        progress: the live line.
+        keep: takes every record at once, before anything else can go wrong.
+    """
+
+    def __init__(
+        self, case: Case, jobs: int, progress: ProgressLine, keep: Callable[[Record], None]
+    ) -> None:
+        self.case = replace(case, contended=True) if jobs > 1 else case
+        self.jobs = jobs
+        self.progress = progress
+        self.keep = keep
+        self._idle = IdleWorkers()
+        self._active: set[Repetition] = set()
+        self._stopping = threading.Event()
+
+    def run(self, task: Task, numbers: Iterable[int]) -> ResultSet:
+        """Run the repetitions of these numbers.
+
+        Raises:
+            Unavailable: the machine lacks what it takes, in this mode at least.
+            WorldParityError: the engine builds another world; more repetitions would not help.
+            KeyboardInterrupt: after the records of what was running are kept.
+        """
+        numbers = list(numbers)
+        self.progress.start_test(self.case.test.rpartition("::")[2], len(numbers))
+        try:
+            if self.jobs > 1 and len(numbers) > 1:
+                records = self._side_by_side(task, numbers)
+            else:
+                records = [self._one(task, number) for number in numbers]
+        finally:
+            self._idle.close()
+            self.progress.end_test()
+        return ResultSet(records, task.metrics)
+
+    def _one(self, task: Task, number: int) -> Record:
+        with Interrupts() as interrupts:
+            record, error = self._kept(task, number, interrupts)
+        if error is not None and (
+            isinstance(error, WorldParityError) or not isinstance(error, WorkerError)
+        ):
+            raise error
+        return record
+
+    def _kept(
+        self, task: Task, number: int, interrupts: Interrupts
+    ) -> tuple[Record, BaseException | None]:
+        """Run one repetition and keep its record."""
+        progress = self.progress
+        repetition = Repetition(
+            self.case,
+            task,
+            number,
+            idle=self._idle,
+            interrupts=interrupts,
+            on_phase=progress.phase,
+            on_count=lambda done, total: progress.count(done, total, "cubes"),
+        )
+        self._active.add(repetition)
+        if self._stopping.is_set():  # this thread took it up just before it could be cancelled
+            repetition.kill()
+        progress.repetition(number, repetition.seed)
+        record, error = repetition.run()
+        self._active.discard(repetition)
+        if isinstance(error, Unavailable):  # nothing was simulated: there is nothing to record
+            raise error
+        self.keep(record)
+        progress.end_repetition(record.status, record.seconds["total"])
+        return record, error
+
+    def _side_by_side(self, task: Task, numbers: list[int]) -> list[Record]:
+        with (
+            Interrupts() as interrupts,
+            ThreadPoolExecutor(self.jobs, thread_name_prefix="simbench") as pool,
+        ):
+            pending: set[Future[Record]] = {pool.submit(self._one, task, k) for k in numbers}
+            done: list[Record] = []
+            try:
+                while pending:
+                    finished, pending = wait(pending, timeout=0.5, return_when=FIRST_COMPLETED)
+                    done += [future.result() for future in finished]
+                interrupts.hold()
+            except BaseException:
+                interrupts.hold()
+                self._stopping.set()
+                for future in pending:
+                    future.cancel()
+                for repetition in list(self._active):
+                    repetition.kill()
+                raise
+        return sorted(done, key=lambda record: record.repetition)

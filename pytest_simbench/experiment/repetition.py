@@ -1,0 +1,348 @@
+"""One repetition, from launching a worker to its record."""
+
+from __future__ import annotations
+
+import os
+import platform
+import threading
+import time
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench import __version__
+from pytest_simbench.client.errors import (
+    DisplayError,
+    DisplayLost,
+    Interrupted,
+    Where,
+    WorkerError,
+)
+from pytest_simbench.client.process import WorkerProcess
+from pytest_simbench.client.resources import ResourceSampler
+from pytest_simbench.client.stopwatch import Stopwatch
+from pytest_simbench.client.world import Motion, World
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.identity import (
+    file_stem,
+    limits,
+    scene_digest,
+    settings,
+)
+from pytest_simbench.experiment.interrupts import Interrupts
+from pytest_simbench.experiment.workers import IdleWorkers
+from pytest_simbench.records.record import Failure, Record
+from pytest_simbench.simulator.choices import seeds_seen
+from pytest_simbench.tasks.base import Jitter, Outcome, Task
+from pytest_simbench.worker.text import LONGEST, named, readable, told
+
+TRACE_PERIOD = 0.02
+"""Sampling of `--sim-trace` [s]: 50 Hz."""
+
+
+class Repetition:
+    """One repetition of a task. `run` once; `kill` from any thread.
+
+    Its worker is fresh, unless the case reuses workers and one is idle.
+
+    Args:
+        case: simulator, settings and limits.
+        task: what to do, as it is: `Protocol.version_of` has been asked before.
+        number: of the repetition, from 1.
+        idle: where workers come from and go to, if the case reuses them.
+        interrupts: held from the moment that the task has ended or failed, so that the record
+            is made; the caller ends the block when it has kept it.
+        on_phase, on_count: progress, see `tasks.base`.
+    """
+
+    def __init__(
+        self,
+        case: Case,
+        task: Task,
+        number: int,
+        *,
+        idle: IdleWorkers | None = None,
+        interrupts: Interrupts | None = None,
+        on_phase: Callable[[str], None] = lambda name: None,
+        on_count: Callable[[int, int], None] = lambda done, total: None,
+    ) -> None:
+        self.case = case
+        self.task = task
+        self.number = number
+        self.seed = case.seed + number - 1
+        self.where = Where(case.simulator, case.mode, number, self.seed)
+        self.stopwatch = Stopwatch()
+        self._idle = idle if idle is not None and case.reuses_worker else None
+        self._reused = False
+        self._on_phase = on_phase
+        self._on_count = on_count
+        self._interrupts = interrupts or Interrupts()
+        self._killed = threading.Event()
+        self._process: WorkerProcess | None = None
+        self._sampler: ResourceSampler | None = None
+        self._world: World | None = None
+        self._constructed: dict[str, Any] = {}
+        self._stats: dict[str, Any] = {}
+        self._closing: str | None = None
+
+    def kill(self) -> None:
+        """End the worker at once; `run` then returns the record of an interrupted repetition."""
+        self._killed.set()  # before the look at the process: it may just be starting
+        if self._process is not None:
+            self._process.interrupt()
+
+    def run(self) -> tuple[Record, BaseException | None]:
+        """Carry it out; the record, and what ended it early if anything did."""
+        found, error = self._ended(self._perform)
+        outcome = found if error is None else Outcome()
+        resources = self._finish(error)
+        problem = self._write_trace(failed=error is not None)
+        if problem:
+            outcome.details["trace"] = problem
+        return self._record(outcome, error, resources), error
+
+    def probe(self) -> tuple[Record, BaseException | None]:
+        """Start and end the simulator alone: the record's settings and versions are what counts."""
+        _, error = self._ended(self._construct)
+        self._finish(error)
+        return self._record(Outcome(), error, {}), error
+
+    def _ended(self, do: Callable[[], Any]) -> tuple[Any, BaseException | None]:
+        """What `do` returned, or what it raised; nothing interrupts from here on."""
+        result, error = None, None
+        try:
+            result = do()
+            self._interrupts.hold()
+        except BaseException as raised:
+            self._interrupts.hold()
+            error = raised
+        return result, self._because_of_display(error)
+
+    def _because_of_display(self, error: BaseException | None) -> BaseException | None:
+        """The error, unless the display of the window has ended: then that is the cause."""
+        if self._process is None or self.case.display is None:
+            return error
+        lost = self.case.display.problem(self._process.launch.environment)
+        if not lost or not isinstance(error, WorkerError | None):
+            return error
+        what = f"{lost}; {error.what}" if error else lost
+        return DisplayLost(what, self.where, error.log_tail if error else "")
+
+    def _perform(self) -> Outcome:
+        case, process = self.case, self._construct()
+        scene = self.task.scene(self.seed, _scaled(case.jitter))
+        world = self._world = World(
+            process,
+            scene,
+            stopwatch=self.stopwatch,
+            on_phase=self._enter,
+            trace_period=None if case.trace == "off" else TRACE_PERIOD,
+        )
+        outcome = self.task.perform(world, self.seed, self._on_count)
+        self._stats = world.stats()
+        return outcome
+
+    def _construct(self) -> WorkerProcess:
+        """Launch the worker and give the simulator its settings."""
+        case = self.case
+        deadline = time.monotonic() + (case.timeout or self.task.study_timeout)
+        self._enter("launch")
+        with self.stopwatch.measuring("launch"):
+            process = self._worker(deadline)
+            self._sample(process)
+            if case.protocol.before:
+                self._enter("before")
+                self._killed.wait(case.protocol.before)
+                self._enter("launch")
+            self._constructed = process.request(
+                "construct",
+                adapter=case.adapter,
+                profile=case.profile,
+                changes=dict(case.changes),
+                gui=case.mode == "gui",
+                real_time=case.protocol.real_time,
+            )
+        return process
+
+    def _worker(self, deadline: float) -> WorkerProcess:
+        process = self._idle.take() if self._idle is not None else None
+        if process is not None:
+            self._reused = True
+            process.where = self.where
+            process.deadline = deadline
+            self._made(process)
+            return process
+        try:
+            launch = self.case.launch(file_stem(self.case, self.task, self.number))
+        except DisplayError as error:
+            raise DisplayLost(str(error), self.where) from None
+        return WorkerProcess(launch, self.where, deadline=deadline, made=self._made)
+
+    def _made(self, process: WorkerProcess) -> None:
+        self._process = process
+        if self._killed.is_set():
+            process.interrupt()
+
+    def _sample(self, process: WorkerProcess) -> None:
+        limit = self.case.memory_limit
+        if process.pid is not None and (self.case.spec or "popen").startswith("popen"):
+            self._sampler = ResourceSampler(
+                process.pid,
+                limit_mb=limit,
+                on_limit=lambda used: process.kill_for_memory(used, limit or 0.0),
+            )
+
+    def _enter(self, phase: str) -> None:
+        self.where.phase = phase
+        if self._sampler is not None:
+            self._sampler.phase = group(phase)
+        self._on_phase(phase)
+
+    def _finish(self, error: BaseException | None) -> dict[str, Any]:
+        """End sampling and worker; resource use for the record."""
+        use: dict[str, Any] = {}
+        if self._sampler is not None:
+            use = self._sampler.stop(self._stats.get("peak_rss_mb")).to_wire()
+        if self._process is not None:
+            if error is None and self._idle is not None:
+                self._idle.give(self._process)
+            elif error is None:
+                self._closing = self._process.close()
+            else:
+                self._process.kill()
+        return use
+
+    def _record(
+        self, outcome: Outcome, error: BaseException | None, resources: dict[str, Any]
+    ) -> Record:
+        case, total = self.case, self.stopwatch.elapsed()
+        stepping = self._stats.get("stepping", {})
+        seconds = {
+            k: self.stopwatch.seconds.get(k, 0.0) for k in ("launch", "compile", "load", "plan")
+        }
+        seconds["step"] = stepping.get("wall", 0.0)
+        seconds["other"] = max(0.0, total - sum(seconds.values()))
+        seconds["total"] = total
+        details = {**outcome.details, "log": self._log_name()}
+        if seen := seeds_seen(case.adapter, case.profile):
+            details["chosen_on"] = [seeds.to_wire() for seeds in seen]
+        if self._constructed.get("untested"):
+            details["untested"] = self._constructed["untested"]
+        if self._closing:
+            details["closing"] = self._closing
+        return Record(
+            test=case.test,
+            task=self.task.name,
+            simulator=case.simulator,
+            mode=case.mode,
+            profile=case.profile,
+            repetition=self.number,
+            seed=self.seed,
+            status=_status(error),
+            protocol=case.protocol.name,
+            jitter=case.jitter,
+            error=None if error is None else _failure(error, self.where),
+            metrics=outcome.metrics,
+            details=details,
+            seconds=seconds,
+            stepping=stepping,
+            timeline={} if self._world is None else self._world.timeline,
+            resources=resources,
+            settings={
+                **(self._constructed.get("settings") or settings(case)),
+                **self.task.parameters(),
+            },
+            scene=scene_digest(self.task),
+            limits=limits(case, self.task),
+            attempt=case.attempt,
+            versions={
+                "pytest-simbench": __version__,
+                **({"python": self._process.python_version} if self._process else {}),
+                **self._constructed.get("versions", {}),
+            },
+            host=host(),
+            deviations=tuple(self._world.excused if self._world else ()),
+            contended=case.contended,
+            reused_worker=self._reused,
+        )
+
+    def _log_name(self) -> str:
+        log = self._process.launch.log if self._process else None
+        return (
+            str(log.relative_to(self.case.folder))
+            if log and self.case.folder in log.parents
+            else ""
+        )
+
+    def _write_trace(self, *, failed: bool) -> str:
+        """Joint and body states over time, as arrays of a .npz file in the run folder.
+
+        Returns:
+            why it could not be written; the repetition counts all the same.
+        """
+        world, case = self._world, self.case
+        if world is None or not world.trace or (case.trace == "retain-on-failure" and not failed):
+            return ""
+        motion = Motion.joined(world.trace)
+        name = file_stem(case, self.task, self.number)
+        folder = case.folder / "traces"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            np.savez_compressed(
+                folder / f"{name}.npz",
+                time=motion.time,
+                joints=motion.joints,
+                bodies=motion.bodies,
+                joint_names=list(world.scene.robot.joint_names if world.scene.robot else ()),
+                body_names=[body.name for body in world.scene.free_bodies],
+            )
+        except OSError as error:
+            return f"the trace could not be written: {named(error)}"
+        return ""
+
+
+def group(phase: str) -> str:
+    """Phases whose resources are told together: `pick cube 3 of 15` is a `pick`.
+
+    What counts on is left out, from `cube` or a number on; `settle start` and `settle` differ.
+    """
+    words = phase.split(" ")
+    counted = (k for k, word in enumerate(words) if word == "cube" or word[:1].isdigit())
+    return " ".join(words[: next(counted, len(words))]) or phase
+
+
+def _scaled(jitter: float) -> Jitter:
+    one = Jitter()
+    return Jitter(one.distance * jitter, one.angle * jitter)
+
+
+def _status(error: BaseException | None) -> Any:
+    """`interrupted` is what somebody ended from outside, and only that: it may be run again."""
+    if error is None:
+        return "ok"
+    outside = isinstance(error, Interrupted) or not isinstance(error, Exception)
+    return "interrupted" if outside else "failed"
+
+
+def _failure(error: BaseException, where: Where) -> Failure:
+    if isinstance(error, WorkerError):
+        message = readable(error.what, 2 * LONGEST)  # shortened where it arose
+        return Failure(type(error).__name__, message, error.phase, error.log_tail)
+    return Failure(readable(type(error).__name__), told(error), where.phase)
+
+
+@cache
+def host() -> dict[str, Any]:
+    """The machine, as far as it bears on times."""
+    model = platform.processor() or platform.machine()
+    try:
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                model = line.partition(":")[2].strip()
+                break
+    except OSError:
+        pass
+    return {"system": platform.system(), "cpu": model, "cores": os.cpu_count() or 0}

@@ -1,0 +1,72 @@
+"""What a test gives our fixtures, checked before anything runs: one sentence, and no traceback."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import pytest
+
+from pytest_simbench.plugin.values import ANY_NUMBER, BadValue, shown
+
+if TYPE_CHECKING:
+    from pytest_simbench.tasks.base import Task
+
+
+def _refuse(sentence: str) -> NoReturn:
+    pytest.fail(sentence, pytrace=False)
+
+
+def checked_task(value: Any, fixture: str) -> Task:
+    """`value` if it is a task; else the test fails. `fixture` is the one that it was given."""
+    from pytest_simbench.tasks.base import Task
+
+    if isinstance(value, Task):
+        return value
+    if isinstance(value, type) and issubclass(value, Task):
+        name = value.__name__
+        _refuse(f"{fixture}({name}) got a class instead of a task: write {fixture}({name}())")
+    _refuse(f"{fixture}({shown(repr(value))}) takes a task, for instance {fixture}(Throwing())")
+
+
+def once(task: Task, done: list[Task]) -> None:
+    """Fail a test that repeats a task twice: the repetitions could not be told apart. The same task
+    with other parameters is another one."""
+    if task in done:
+        _refuse(
+            f"repeat() is called for the task {task.name!r} a second time in one test, and its "
+            "repetitions could not be told apart: write a second test, or parametrize this one"
+        )
+    done.append(task)
+
+
+def checked_settings(value: Any, simulator: str, profile: str) -> dict[str, Any]:
+    """What the fixture `sim_settings` gives, if the simulator can take it; else the test fails."""
+    from pytest_simbench.simulator.errors import SettingsError
+    from pytest_simbench.simulator.registry import adapter
+    from pytest_simbench.simulator.settings import changed
+    from pytest_simbench.simulator.settings import profile as named
+
+    if not isinstance(value, Mapping):
+        _refuse(
+            f"the fixture sim_settings gives {shown(repr(value))}; it must give a dict of settings "
+            "by name, {'timestep': 0.001} for instance"
+        )
+    problem = ""  # refused outside of `except`, else pytest shows both exceptions
+    try:
+        changed(named(adapter(simulator).profiles, profile, simulator), value, simulator)
+    except SettingsError as error:
+        problem = str(error)
+    if problem:
+        _refuse(f"the fixture sim_settings: {problem}")
+    return dict(value)
+
+
+def checked_threshold(metric: Any, default: Any) -> float:
+    """The suite's own threshold of a metric, if both are what they must be; else the test fails."""
+    if not isinstance(metric, str) or not metric:
+        _refuse(f"threshold({shown(repr(metric))}, ...) takes the name of a metric as a text")
+    with suppress(BadValue):
+        return float(ANY_NUMBER.check(default))
+    _refuse(f"threshold({metric!r}, {shown(repr(default))}) takes a finite number")

@@ -1,0 +1,129 @@
+"""The comparison with a baseline: `--sim-baseline`, `--benchmark-compare`, `--sim-compare-fail`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_simbench.measure.limits import Limit, LimitError, parse_limits
+from pytest_simbench.plugin import options
+from pytest_simbench.records.baseline import (
+    FORMS,
+    Baseline,
+    BaselineError,
+    from_benchmarks,
+    read_baseline,
+)
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.text import for_terminal
+from pytest_simbench.tasks.metrics import Metric, UnknownMetric
+
+
+class Comparison:
+    """This run against a baseline: made when all tests have ended, shown in the summary.
+
+    Args:
+        baseline: the run to compare with.
+        limits: how much worse each metric may get; none: a table and no failures.
+    """
+
+    def __init__(self, baseline: Baseline, limits: Sequence[Limit] = ()) -> None:
+        self.baseline = baseline
+        self.limits = tuple(limits)
+        self._report: Any = None
+
+    def make(self, records: Iterable[Record], metrics: Mapping[str, Sequence[Metric]]) -> None:
+        """Compare; `metrics` are those of each task, by its name."""
+        from pytest_simbench.measure.gate import run_gate
+
+        self._report = run_gate(self.baseline.records, records, self.limits, metrics)
+
+    @property
+    def failed(self) -> bool:
+        """Whether limits were given and one was exceeded, or a test gives nothing any more."""
+        return bool(self.limits and self._report and self._report.failures)
+
+    def text(self, width: int) -> str:
+        """For the terminal."""
+        from pytest_simbench.report.changes import render_terminal
+
+        parts = [f"baseline: {self.baseline.name}", *self.baseline.problems]
+        if self._report is None:
+            parts.append("nothing was compared: no repetition was recorded")
+        else:
+            parts.append(render_terminal(self._report, width, bool(self.limits)))
+        return for_terminal("\n".join(parts))
+
+    def markdown(self) -> str:
+        """For the page of a CI job."""
+        from pytest_simbench.report.changes import render_markdown
+
+        if self._report is None:
+            return ""
+        return render_markdown(self._report, self.baseline.name, bool(self.limits))
+
+
+def prepare(config: pytest.Config, saved: list[dict[str, Any]]) -> Comparison | None:
+    """The comparison that the options ask for; None when nothing is to be compared with.
+
+    Limits in the ini file hold whenever there is a baseline and wait for one otherwise; limits on
+    the command line need one.
+
+    Args:
+        config: of the run.
+        saved: contents of the pytest-benchmark files that `--benchmark-compare` chose.
+
+    Raises:
+        pytest.UsageError: no baseline, a malformed one, a malformed limit, an unknown metric.
+    """
+    text = options.value(config, "sim_compare_fail")
+    try:
+        baseline = _baseline(config, saved, needed=config.getoption("sim_compare_fail") is not None)
+        if baseline is None:
+            return None
+        return Comparison(baseline, _limits(text, baseline) if text is not None else ())
+    except BaselineError as error:
+        raise pytest.UsageError(str(error)) from None
+    except (LimitError, UnknownMetric) as error:
+        raise pytest.UsageError(f"--sim-compare-fail: {error}") from None
+
+
+def _baseline(config: pytest.Config, saved: list[dict[str, Any]], needed: bool) -> Baseline | None:
+    given = options.value(config, "sim_baseline")
+    if given:
+        return read_baseline(Path(config.invocation_params.dir, given))
+    if saved:
+        try:
+            return from_benchmarks(saved[-1], _name(saved[-1]))
+        except BaselineError:
+            if needed:
+                raise
+            return None  # a run of other benchmarks: pytest-benchmark compares them
+    if needed:
+        raise BaselineError(
+            "--sim-compare-fail needs a run to compare with: give --sim-baseline PATH "
+            f"({FORMS}), or --benchmark-compare with a run that was saved"
+        )
+    return None
+
+
+def _name(saved: Mapping[str, Any]) -> str:
+    """A saved run, as the user reads it: when it was made and of which commit."""
+    when = str(saved.get("datetime", ""))[:19].replace("T", " ")
+    info = saved.get("commit_info")
+    commit = str(info.get("id") or "")[:10] if isinstance(info, Mapping) else ""
+    commit = "" if commit == "unversioned"[:10] else commit
+    return f"the run saved {when} UTC" + (f", commit {commit}" if commit else "")
+
+
+def _limits(text: str, baseline: Baseline) -> tuple[Limit, ...]:
+    """The limits, on metrics of our own tasks or of any other that the baseline has."""
+    from pytest_simbench.tasks import Stacking, Throwing
+
+    metrics = {metric.name: metric for task in (Stacking(), Throwing()) for metric in task.metrics}
+    for name in baseline.metric_names:  # a task of another package: its kind is known later
+        metrics.setdefault(name, Metric(name, name, better="lower"))
+    return parse_limits(text, metrics.values())

@@ -1,0 +1,277 @@
+"""The fixtures: `repeat`, `sim`, `simulator` and their parts. Heavy imports happen late."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from pytest_simbench.plugin import arguments, options
+from pytest_simbench.plugin.hooks import is_conftest, run, selection
+
+if TYPE_CHECKING:
+    from pytest_simbench.client.display import Displays
+    from pytest_simbench.client.resources import ResourceSampler
+    from pytest_simbench.client.world import World
+    from pytest_simbench.experiment.case import Case
+    from pytest_simbench.experiment.handle import SimulatorHandle
+    from pytest_simbench.measure.results import ResultSet
+    from pytest_simbench.plugin.run import Run
+    from pytest_simbench.scene import Scene
+    from pytest_simbench.tasks.base import Task
+
+
+SHARED = (
+    "output_path",
+    "repeat",
+    "resources",
+    "sim",
+    "simulator",
+    "threshold",
+    "replay",
+    "perturb",
+)
+"""Names that other plugins use too (pytest-playwright has an `output_path`)."""
+
+OWN = ("sim_case", "sim_name", "sim_mode", "sim_settings", "simbench_case", "simbench_handle")
+
+
+def beside(plugins: pytest.PytestPluginManager) -> ModuleType:
+    """A plugin with all fixtures but those whose name another plugin has.
+
+    A conftest's fixture hides ours where it holds, as always. Ours can be had under any name by
+    an import in a conftest: `from pytest_simbench.plugin.fixtures import repeat as sim_repeat`.
+    """
+    from pytest_simbench.plugin import repeatability
+
+    found = {**vars(repeatability), **globals()}
+    module = ModuleType("pytest_simbench.plugin.fixtures_here", __doc__)
+    others = [plugin for plugin in plugins.get_plugins() if not is_conftest(plugin)]
+    for name in (*OWN, *SHARED):
+        if name in OWN or not any(_is_fixture(getattr(other, name, None)) for other in others):
+            setattr(module, name, found[name])
+    rounds = benchmark_rounds if has_benchmark(plugins) else no_rounds
+    vars(module).update(
+        simbench_rounds=rounds, pytest_terminal_summary=repeatability.pytest_terminal_summary
+    )
+    return module
+
+
+def _is_fixture(thing: object) -> bool:
+    return type(thing).__name__ == "FixtureFunctionDefinition" or hasattr(
+        thing,
+        "_pytestfixturefunction",  # pytest before 8.4
+    )
+
+
+def has_benchmark(plugins: pytest.PytestPluginManager) -> bool:
+    """Whether pytest-benchmark is at work (it is not under `-p no:benchmark`)."""
+    module = sys.modules.get("pytest_benchmark.plugin")
+    return module is not None and plugins.is_registered(module)
+
+
+@pytest.fixture
+def benchmark_rounds(request: pytest.FixtureRequest, benchmark: Any) -> Any:
+    """What takes the repetitions as rounds: pytest-benchmark's fixture.
+
+    A test that is run again (pytest-rerunfailures) replaces the rounds of its first attempt, which
+    would else be in the saved file a second time. A conftest's own `benchmark` takes no rounds.
+    """
+    from pytest_benchmark.fixture import BenchmarkFixture
+
+    if not isinstance(benchmark, BenchmarkFixture):
+        return None
+    saved = getattr(getattr(request.config, "_benchmarksession", None), "benchmarks", [])
+    saved[:] = [rounds for rounds in saved if rounds.fullname != benchmark.fullname]
+    return benchmark
+
+
+@pytest.fixture
+def no_rounds() -> None:
+    """Nothing takes the repetitions as rounds."""
+
+
+@pytest.fixture(scope="session")
+def sim_case(request: pytest.FixtureRequest) -> tuple[str, str]:
+    """Name and mode of the parametrised simulator."""
+    name, mode = request.param
+    return name, mode
+
+
+@pytest.fixture(scope="session")
+def sim_name(sim_case: tuple[str, str]) -> str:
+    """Name of the simulator under test."""
+    return sim_case[0]
+
+
+@pytest.fixture(scope="session")
+def sim_mode(sim_case: tuple[str, str]) -> str:
+    """`headless` or `gui`."""
+    return sim_case[1]
+
+
+@pytest.fixture
+def sim_settings() -> dict[str, Any]:
+    """Settings to change, by name; override it in a module or class. `--sim-set` goes on top."""
+    return {}
+
+
+@pytest.fixture
+def output_path(request: pytest.FixtureRequest) -> Path:
+    """The run folder; it exists when the fixture is used."""
+    return run(request.config).use()
+
+
+def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: Any) -> Case:
+    """What the options say of a simulator's repetitions."""
+    from pytest_simbench.experiment.case import Case
+    from pytest_simbench.experiment.protocol import PROTOCOLS
+    from pytest_simbench.simulator.registry import adapter, registered
+
+    name, mode = sim_case
+    info = adapter(name).info
+    chosen, this = selection(config), run(config)
+    settings = more.pop("settings", {})
+    return Case(
+        test=test,
+        simulator=name,
+        mode=mode,
+        profile=chosen.profile,
+        adapter=registered()[name].value,
+        folder=this.use(),
+        changes={**settings, **chosen.changes.get(name, {})},
+        python=chosen.python(name),
+        spec=chosen.specs.get(name),
+        environment=chosen.environment(name).variables(),
+        display=_display(this) if mode == "gui" else None,
+        costly_start=info.costly_start,
+        compile_timeout=info.compile_timeout,
+        fresh=options.value(config, "sim_fresh"),
+        protocol=PROTOCOLS[options.value(config, "sim_protocol")],
+        stall_timeout=options.value(config, "sim_stall_timeout"),
+        memory_limit=options.value(config, "sim_memory_limit"),
+        seed=options.value(config, "sim_seed"),
+        jitter=options.value(config, "sim_jitter"),
+        trace=options.value(config, "sim_trace"),
+        **more,
+    )
+
+
+def _display(this: Run) -> Displays:
+    """The displays of a run, if there are any; skips the test where there are none."""
+    from pytest_simbench.client.errors import DisplayError
+
+    try:
+        this.displays.environment()
+    except DisplayError as error:
+        pytest.skip(str(error))
+    return this.displays
+
+
+@pytest.fixture
+def simbench_case(
+    request: pytest.FixtureRequest, sim_case: tuple[str, str], sim_settings: dict[str, Any]
+) -> Case:
+    """Everything that the repetitions of this test have in common."""
+    from pytest_simbench.plugin.selection import number_mark
+
+    given = options.value(request.config, "sim_timeout")
+    profile = selection(request.config).profile
+    return _case(
+        request.config,
+        sim_case,
+        request.node.nodeid,
+        settings=arguments.checked_settings(sim_settings, sim_case[0], profile),
+        timeout=given if given is not None else number_mark(request.node, "sim_timeout"),
+    )
+
+
+@pytest.fixture
+def repeat(
+    request: pytest.FixtureRequest, simbench_case: Case, simbench_rounds: Any
+) -> Iterator[Callable[[Task], ResultSet]]:
+    """Runs a task `--reps` times: `result = repeat(Stacking())`; each task once in a test."""
+    from pytest_simbench.plugin.repeating import Repeating
+
+    repeating = Repeating(request.node, simbench_case, run(request.config))
+    done: list[Task] = []
+
+    def perform(task: Task) -> ResultSet:
+        arguments.once(arguments.checked_task(task, "repeat"), done)
+        return repeating(task)
+
+    yield perform
+    repeating.finish(simbench_rounds)
+
+
+@pytest.fixture
+def threshold(request: pytest.FixtureRequest) -> Callable[[str, float], float]:
+    """`threshold("placed", 0.9)`: the suite's value, unless `--sim-threshold` changes it."""
+    if hasattr(request.config, "workerinput"):  # an xdist worker must not fail while collecting
+        from pytest_simbench.plugin.thresholds import problem
+
+        found = problem(request.config, request.session.items)
+        if found:
+            pytest.fail(found, pytrace=False)
+    given = options.value(request.config, "sim_threshold")
+
+    def choose(metric: str, default: float) -> float:
+        return float(given.get(metric, arguments.checked_threshold(metric, default)))
+
+    return choose
+
+
+@pytest.fixture(scope="session")
+def simulator(simbench_handle: SimulatorHandle) -> SimulatorHandle:
+    """Handle of the simulator: `with simulator.episode(scene) as world`.
+
+    One for the whole session, so that every example of Hypothesis may use it; the `sim_settings`
+    of a test do not reach it.
+    """
+    return simbench_handle
+
+
+@pytest.fixture(scope="session")
+def simbench_handle(
+    request: pytest.FixtureRequest, sim_case: tuple[str, str]
+) -> Iterator[SimulatorHandle]:
+    """The session's handle, whatever is named `simulator` here."""
+    from pytest_simbench.experiment.handle import SimulatorHandle
+
+    timeout = options.value(request.config, "sim_timeout")
+    handle = SimulatorHandle(_case(request.config, sim_case, "simulator", timeout=timeout))
+    yield handle
+    handle.close()
+
+
+@pytest.fixture
+def sim(simbench_case: Case) -> Iterator[Callable[[Scene], World]]:
+    """Loads a scene into a fresh world of the simulator: `world = sim(scene)`."""
+    from pytest_simbench.experiment.handle import SimulatorHandle
+
+    handle = SimulatorHandle(simbench_case)
+    with handle.episodes() as start:
+        yield start
+    handle.close()
+
+
+@pytest.fixture
+def resources() -> Iterator[Callable[[World], ResourceSampler]]:
+    """Samples CPU and memory of a world's worker: `use = resources(world)`, later `use.stop()`."""
+    from pytest_simbench.client.resources import ResourceSampler
+
+    started: list[ResourceSampler] = []
+
+    def sample(world: World) -> ResourceSampler:
+        if world.process.pid is None:
+            raise ValueError("the worker has no process on this machine to sample")
+        started.append(ResourceSampler(world.process.pid))
+        return started[-1]
+
+    yield sample
+    for sampler in started:
+        sampler.stop()

@@ -1,0 +1,161 @@
+"""The repetitions of one test: those recorded, those to run, and what pytest is told of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.repeater import Repeater
+from pytest_simbench.experiment.sequential import Plan, SequentialResultSet
+from pytest_simbench.measure.results import ResultSet
+from pytest_simbench.plugin import options
+from pytest_simbench.plugin.selection import number_mark
+from pytest_simbench.plugin.worker_clock import worker_clock
+from pytest_simbench.records import saved
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.text import in_one_line
+
+if TYPE_CHECKING:
+    from pytest_simbench.plugin.run import Run
+    from pytest_simbench.tasks.base import Task
+
+SAVED_COSTS = ("rtf", "cpu", "ram", "ram_peak", "cpu_cost", "start", "end", "total")
+
+
+class Repeating:
+    """What the fixture `repeat` does.
+
+    Args:
+        node: the test.
+        case: simulator and settings.
+        run: takes the records.
+    """
+
+    def __init__(self, node: pytest.Item, case: Case, run: Run) -> None:
+        self.node = node
+        self.case = case
+        self.this = run
+        self.results: list[ResultSet] = []
+        self._may_resume = False
+
+    def __call__(self, task: Task) -> ResultSet:
+        """Run a task's repetitions, as many as options and marks say."""
+        task = self.case.protocol.version_of(task)
+        self.this.declare(task)
+        wanted = options.repetitions(self.node.config)
+        fixed = wanted if isinstance(wanted, int) else None
+        case = replace(self.case, attempt=self.this.begin(self.case, task))
+        found = self._recorded(case, task, fixed)
+        if isinstance(wanted, options.Auto):
+            plan = Plan.up_to(wanted.limit)
+            first = self._up_to(plan.looks[0], case, task, found)
+            result: ResultSet = SequentialResultSet(
+                first,
+                task.metrics,
+                plan,
+                lambda number: self._up_to(number, case, task, found),
+            )
+        else:
+            number = wanted or number_mark(self.node, "reps") or case.protocol.repetitions
+            result = ResultSet(self._up_to(int(number), case, task, found), task.metrics)
+        result.strict = options.value(self.node.config, "sim_strict")
+        self.results.append(result)
+        return result
+
+    def _recorded(self, case: Case, task: Task, wanted: int | None) -> dict[int, Record]:
+        """By repetition what the run that is completed has of these; now of this run."""
+        from pytest_simbench.plugin.resume import NotResumed
+
+        try:
+            return self.this.take(case, task, wanted)
+        except NotResumed as refusal:
+            pytest.fail(str(refusal), pytrace=False)
+
+    def _up_to(self, number: int, case: Case, task: Task, found: dict[int, Record]) -> list[Record]:
+        """Records of all repetitions from 1 to `number`, and of what a resumed run has beyond.
+
+        Args:
+            number: of repetitions wanted.
+            case: with its attempt.
+            task: to perform where one is missing.
+            found: the records so far, by repetition; takes the new ones.
+        """
+        missing = [k for k in range(1, number + 1) if k not in found]
+        if missing:
+            if self.this.resumed is not None and not self._may_resume:
+                self._check_versions(case, task)
+            self.this.begin_lines()
+            jobs = options.value(self.node.config, "sim_jobs")
+            repeater = Repeater(case, jobs, self.this.progress, self.this.keep)
+            found |= {r.repetition: r for r in repeater.run(task, missing).records}
+        return [found[k] for k in sorted(found)]
+
+    def _check_versions(self, case: Case, task: Task) -> None:
+        from pytest_simbench.plugin.resume import NotResumed
+
+        assert self.this.resumed is not None
+        try:
+            self.this.resumed.check_versions(case, task)
+        except NotResumed as refusal:
+            pytest.fail(str(refusal), pytrace=False)
+        self._may_resume = True
+
+    def finish(self, benchmark: Any) -> None:
+        """Tell pytest-benchmark, where there is one, and JUnit; called when the test has ended."""
+        for result in self.results:
+            self.node.user_properties.extend(_properties(result))
+        if self.results and benchmark is not None:
+            _benchmark(benchmark, self.results)
+
+
+def _properties(result: ResultSet) -> Iterator[tuple[str, float]]:
+    """For JUnit: the mean of each metric and cost and the ends of its 95 % interval."""
+    yield "repetitions", len(result.ok) + len(result.failures)
+    yield "failures", len(result.failures)
+    for known in result.known:
+        found = result.interval(known)
+        name = in_one_line(known)
+        if found.n:
+            yield name, found.mean
+            if isfinite(found.half_width):
+                yield f"{name}.low", found.low
+                yield f"{name}.high", found.high
+
+
+def _benchmark(benchmark: Any, results: list[ResultSet]) -> None:
+    """Hand the finished repetitions to pytest-benchmark as rounds of worker seconds.
+
+    pytest-benchmark has one result for a test: rounds are those of its first task. The records are
+    of all its tasks.
+    """
+    result = results[0]
+    if not result.ok:
+        return
+    seconds = iter([record.stepping["wall"] for record in result.ok])
+
+    def advance() -> None:
+        worker_clock.seconds += next(seconds, 0.0)
+
+    first = result.ok[0]
+    benchmark.extra_info.update(
+        {
+            "simulator": first.simulator,
+            "mode": first.mode,
+            "profile": first.profile,
+            "protocol": first.protocol,
+            "settings": dict(first.settings),
+            "versions": dict(first.versions),
+            "host": dict(first.host),
+            "failures": len(result.failures),
+            "metrics": {name: result.values(name) for name in result.metrics},
+            "seeds": [record.seed for record in result.ok],
+            "costs": {name: [record.cost(name) for record in result.ok] for name in SAVED_COSTS},
+            saved.KEY: saved.to_extra_info(r for found in results for r in found.records),
+        }
+    )
+    benchmark.pedantic(advance, rounds=len(result.ok), iterations=1, warmup_rounds=0)

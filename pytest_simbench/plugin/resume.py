@@ -1,0 +1,179 @@
+"""`--sim-resume [RUN]`: complete an interrupted run without repeating what is recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from pytest_simbench.plugin import options
+from pytest_simbench.records.configuration import agree, task_parameters
+from pytest_simbench.records.differences import differences
+from pytest_simbench.records.record import Record, RecordError
+from pytest_simbench.records.record_file import RECORDS_NAME, read_records, repair
+from pytest_simbench.records.series import configurations, short
+
+if TYPE_CHECKING:
+    from pytest_simbench.experiment.case import Case
+    from pytest_simbench.tasks.base import Task
+
+
+def folder_to_resume(config: pytest.Config) -> Path | None:
+    """The run folder that `--sim-resume` means; None without that option.
+
+    Raises:
+        pytest.UsageError: there is no such run, or none at all.
+    """
+    given = config.getoption("sim_resume")
+    if given is None:
+        return None
+    given = "" if given is True else given  # the option without a value
+    output = options.value(config, "sim_output")
+    if given and output and given != output:
+        raise pytest.UsageError(
+            f"--sim-resume {given} and --sim-output {output}: a run is completed in its own "
+            "folder, so leave out --sim-output"
+        )
+    if given or output:
+        folder = Path(config.invocation_params.dir, given or output)
+        if not (folder / RECORDS_NAME).is_file():
+            raise pytest.UsageError(
+                f"there is no run to resume in {folder} (it has no {RECORDS_NAME}); write "
+                "--sim-resume=RUN with the folder of a run"
+            )
+        return folder
+    runs = sorted(config.rootpath.glob(f".simbench/*/{RECORDS_NAME}"), key=_begun)
+    if not runs:
+        raise pytest.UsageError(
+            f"there is no run to resume in {config.rootpath / '.simbench'}; write "
+            "--sim-resume=RUN with the folder of a run"
+        )
+    return runs[-1].parent
+
+
+def _begun(records: Path) -> tuple[str, float]:
+    """When a run began, by its folder's name; of one second, the one written to last."""
+    return records.parent.name[: len("2026-07-01_12-00-00")], records.stat().st_mtime
+
+
+class NotResumed(Exception):
+    """A test that cannot go on in this run; the message is one sentence."""
+
+
+class Resumed:
+    """What an interrupted run has recorded.
+
+    Args:
+        folder: of the run.
+
+    Attributes:
+        records: all of them, interrupted ones too.
+        problems: damaged lines, one sentence each: those repetitions are run again.
+
+    Raises:
+        pytest.UsageError: its records cannot be read.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        try:
+            reading = read_records(folder)
+        except RecordError as error:
+            raise pytest.UsageError(f"--sim-resume: {error}") from None
+        self.records = reading.every
+        self.problems = reading.problems
+        self._taken: set[int] = set()
+
+    def repair(self) -> None:
+        """Write the records anew without damaged lines; for one process alone."""
+        try:
+            kept = repair(self.folder)
+        except OSError as error:  # the lines are left out by every reader
+            self.problems += (f"{self.folder} could not be repaired ({error.strerror})",)
+        else:
+            if kept is not None:
+                self.problems += (f"the damaged records are kept in {kept}",)
+
+    def take(self, case: Case, task: Task, wanted: int | None) -> dict[int, Record]:
+        """By repetition what came to an end of these repetitions; interrupted ones are run again.
+
+        Settings, seeds, versions and whatever else `records.configuration` lists are held against
+        what the options say now, without starting a worker.
+
+        Args:
+            case: as asked for now.
+            task: as it will be performed.
+            wanted: repetitions that the user asked for by number; None: as many as it takes.
+
+        Raises:
+            NotResumed: the records are of another configuration.
+        """
+        from pytest_simbench.experiment.identity import expected
+
+        now = expected(case, task)
+        of_test = [
+            record
+            for record in self.records
+            if (record.test, record.task, record.attempt) == (case.test, task.name, case.attempt)
+        ]
+        same = [record for record in of_test if task_parameters(record) == task_parameters(now)]
+        if not same:  # a task that this test repeats besides, or one that was changed
+            same = [record for record in of_test if id(record) not in self._taken]
+        self._taken |= {id(record) for record in same}
+        found = [] if all(agree(r, now, "resume") for r in same) else self._differences(same, now)
+        found += _seeds(same, case.seed)
+        if wanted is not None and any(record.repetition > wanted for record in same):
+            most = max(record.repetition for record in same)
+            found.append(f"--reps was {most} or more, is {wanted}")
+        if found:
+            raise NotResumed(self._sentence(case, found))
+        return {r.repetition: r for r in same if r.status != "interrupted"}
+
+    def check_versions(self, case: Case, task: Task) -> None:
+        """Before repetitions are added: ask a worker for what only it can tell.
+
+        Args:
+            case: as asked for now.
+            task: to be performed.
+
+        Raises:
+            NotResumed: the versions are not those of the run.
+        """
+        # A repetition that failed at its start knows neither settings nor versions.
+        ended = [r for r in self.records if r.ok]
+        of_test = [r for r in ended if (r.test, r.task) == (case.test, task.name)]
+        others = [r for r in ended if (r.simulator, r.mode) == (case.simulator, case.mode)]
+        if not of_test and not others:
+            return
+        from pytest_simbench.experiment.repetition import Repetition
+
+        now, error = Repetition(case, task, 0).probe()
+        if error is not None:
+            raise error
+        # Another test of the same simulator has a task and settings of its own.
+        found = self._differences(of_test or others, now, ("versions",))
+        if found:
+            raise NotResumed(self._sentence(case, found))
+
+    def _differences(
+        self, before: Sequence[Record], now: Record, fields: Sequence[str] | None = None
+    ) -> list[str]:
+        found = []
+        for group in configurations(before):
+            found += differences({now.test: (group, [now])}, "resume", fields)
+        return [text.rpartition(" (")[0] for text in dict.fromkeys(found)]
+
+    def _sentence(self, case: Case, found: list[str]) -> str:
+        return (
+            f"{short(case.test)} of the run {self.folder} is not resumed, since its repetitions "
+            f"would not be comparable: {'; '.join(found)}"
+        )
+
+
+def _seeds(records: Iterable[Record], base: int) -> list[str]:
+    for record in records:
+        if record.seed != base + record.repetition - 1:
+            return [f"--sim-seed was {record.seed - record.repetition + 1}, is {base}"]
+    return []

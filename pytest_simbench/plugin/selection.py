@@ -1,0 +1,280 @@
+"""Which simulators and modes a run covers, from options and marks; all checks of user input."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from pytest_simbench.plugin import options
+from pytest_simbench.plugin.interpreters import checked_specification, interpreter_path
+from pytest_simbench.plugin.values import BadValue, shown
+
+if TYPE_CHECKING:
+    from pytest_simbench.client.environments import Environment
+    from pytest_simbench.simulator.info import SimulatorInfo
+
+MODES = ("headless", "gui")
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What the user asked for, checked.
+
+    Attributes:
+        simulators: names, in order.
+        explicit: the names that were asked for one by one; a missing one is an error.
+        modes: `headless`, `gui`.
+        profile: settings profile.
+        changes: simulator name to changed settings, as texts.
+        pythons, specs: simulator name to interpreter or execnet specification.
+    """
+
+    simulators: tuple[str, ...]
+    explicit: frozenset[str]
+    modes: tuple[str, ...]
+    profile: str
+    changes: dict[str, dict[str, str]] = field(default_factory=dict)
+    pythons: dict[str, str] = field(default_factory=dict)
+    specs: dict[str, str] = field(default_factory=dict)
+
+    def missing(self, name: str) -> str | None:
+        """Why a simulator cannot run here, with what mends it; None when it can."""
+        from pytest_simbench.client.environments import missing
+        from pytest_simbench.simulator.registry import problem
+
+        found = problem(name) or self._settings_problem(name)
+        if found or name in self.pythons or name in self.specs:
+            return found
+        return missing(_info(name))
+
+    def _settings_problem(self, name: str) -> str | None:
+        from pytest_simbench.simulator.errors import SettingsError
+        from pytest_simbench.simulator.registry import adapter
+        from pytest_simbench.simulator.settings import changed, profile
+
+        try:
+            settings = profile(adapter(name).profiles, self.profile, name)
+            changed(settings, self.changes.get(name, {}), name)
+        except SettingsError as error:
+            return str(error)
+        return None
+
+    def environment(self, name: str) -> Environment:
+        """The place of a simulator's own environment."""
+        from pytest_simbench.client.environments import Environment
+
+        return Environment.of(_info(name))
+
+    def python(self, name: str) -> str | None:
+        """Interpreter of a simulator's workers; None for this one."""
+        from pytest_simbench.client.environments import interpreter
+
+        return self.pythons.get(name) or interpreter(_info(name))
+
+
+def _info(name: str) -> SimulatorInfo:
+    from pytest_simbench.simulator.registry import adapter
+
+    return adapter(name).info
+
+
+def select(config: pytest.Config) -> Selection:
+    """The checked selection.
+
+    Raises:
+        pytest.UsageError: an unknown or broken simulator, an unknown setting or profile, an
+            interpreter or specification that cannot be one; one sentence.
+    """
+    from pytest_simbench.simulator.errors import SimulatorError
+
+    try:
+        return _select(config)
+    except SimulatorError as error:
+        raise pytest.UsageError(str(error)) from None
+
+
+def _select(config: pytest.Config) -> Selection:
+    from pytest_simbench.simulator.registry import adapter, check_names, known
+
+    _check_profile(options.value(config, "sim_profile"))
+    asked = options.value(config, "sim_name")
+    names = [name for name in asked if name != "all"]
+    changes: dict[str, dict[str, str]] = {}
+    for key, text in options.value(config, "sim_set").items():
+        name, _, setting = key.partition(".")
+        if not setting:
+            raise pytest.UsageError(f"--sim-set={key}={text}: write it as SIM.SETTING=VALUE")
+        changes.setdefault(name, {})[setting] = text
+    pythons = {
+        name: interpreter_path(path, f"--sim-python={name}={shown(path)}", config)
+        for name, path in options.value(config, "sim_python").items()
+    }
+    specs = {
+        name: checked_specification(text, f"--sim-spec={name}={shown(text)}")
+        for name, text in options.value(config, "sim_spec").items()
+    }
+    named = [*names, *changes, *pythons, *specs]
+    check_names(named)
+    for name in named:
+        adapter(name)  # complains of a broken one
+    for name in pythons.keys() & specs.keys():
+        raise pytest.UsageError(
+            f"{name} has both --sim-python and --sim-spec; a specification names its own "
+            "interpreter (python=...), so give one of them"
+        )
+    selection = Selection(
+        tuple(known() if not names or "all" in asked else dict.fromkeys(names)),
+        frozenset(names),
+        _modes(config),
+        options.value(config, "sim_profile"),
+        changes,
+        pythons,
+        specs,
+    )
+    for name in changes:
+        problem = selection._settings_problem(name)
+        if problem:
+            raise pytest.UsageError(problem)
+    for name in names:
+        reason = selection.missing(name)
+        if reason:
+            raise pytest.UsageError(reason)
+    if asked:
+        return selection
+    return replace(
+        selection, simulators=tuple(n for n in selection.simulators if not selection.missing(n))
+    )
+
+
+def _check_profile(name: str) -> None:
+    from pytest_simbench.simulator.registry import adapter, registered
+
+    valid = dict.fromkeys(found for sim in registered() for found in adapter(sim).profiles)
+    if name not in valid:
+        raise pytest.UsageError(
+            f"no simulator has a settings profile {name!r}; choose from {', '.join(valid)}"
+        )
+
+
+def _modes(config: pytest.Config) -> tuple[str, ...]:
+    gui, headless = options.value(config, "sim_gui"), options.value(config, "sim_headless")
+    if gui:
+        return MODES if headless else ("gui",)
+    return ("headless",)
+
+
+NOTHING = pytest.param(
+    ("none", "headless"),
+    id="none",
+    marks=[pytest.mark.skip(reason="no selected simulator fits the only_sim mark")],
+)
+"""The parameter of a test that runs on no simulator."""
+
+
+def parameters(metafunc: pytest.Metafunc, selection: Selection) -> list[Any]:
+    """Parameters `(simulator, mode)` of a test, with what its marks say of each.
+
+    Raises:
+        pytest.UsageError: a mark with an unknown simulator or capability.
+    """
+    node = metafunc.definition
+    names = [name for name in selection.simulators if _wanted(node, name)]
+    result = []
+    for name in names:
+        for mode in selection.modes:
+            marks = _marks(node, name, mode, selection)
+            result.append(pytest.param((name, mode), id=f"{name}-{mode}", marks=marks))
+    return result or [NOTHING]
+
+
+def _wanted(node: Any, name: str) -> bool:
+    chosen: list[str] = []
+    for mark in node.iter_markers("only_sim"):
+        chosen += _names(mark, node)
+    return not chosen or name in chosen
+
+
+def _marks(node: Any, name: str, mode: str, selection: Selection) -> list[pytest.MarkDecorator]:
+    from pytest_simbench.simulator.info import Capability
+    from pytest_simbench.simulator.registry import problem
+
+    marks = []
+    reason = selection.missing(name)
+    if reason:
+        marks.append(pytest.mark.skip(reason=reason))
+    if problem(name):
+        return marks  # nothing else is known of it
+    info = _info(name)
+    if mode not in info.modes:
+        marks.append(pytest.mark.skip(reason=f"{name} has no window"))
+    for mark in node.iter_markers("skip_sim"):
+        if name in _names(mark, node):
+            marks.append(pytest.mark.skip(reason=mark.kwargs.get("reason", f"skip_sim({name})")))
+    for mark in node.iter_markers("xfail_sim"):
+        if name in _names(mark, node):
+            marks.append(pytest.mark.xfail(reason=mark.kwargs.get("reason", "")))
+    for mark in node.iter_markers("needs"):
+        _check_keywords(mark, node)
+        if not mark.args:
+            raise pytest.UsageError(
+                f"{node.nodeid}: needs() without a capability: choose from {', '.join(Capability)}"
+            )
+        for capability in mark.args:
+            if capability not in list(Capability):
+                raise pytest.UsageError(
+                    f"{node.nodeid}: needs({capability!r}): choose from {', '.join(Capability)}"
+                )
+            if capability not in info.capabilities:
+                marks.append(pytest.mark.skip(reason=f"{name} has no {capability}"))
+    return marks
+
+
+def _names(mark: pytest.Mark, node: Any) -> list[str]:
+    from pytest_simbench.simulator.registry import UnknownSimulatorError, check_names
+
+    _check_keywords(mark, node)
+    if not mark.args:
+        raise pytest.UsageError(f"{node.nodeid}: {mark.name} needs the name of a simulator")
+    try:
+        check_names(map(str, mark.args))
+    except UnknownSimulatorError as error:
+        raise pytest.UsageError(f"{node.nodeid}: {mark.name}: {error}") from None
+    return list(mark.args)
+
+
+KEYWORDS = {"skip_sim": ("reason",), "xfail_sim": ("reason",)}
+"""Keyword arguments of the marks that take any."""
+
+
+def _check_keywords(mark: pytest.Mark, node: Any) -> None:
+    valid = KEYWORDS.get(mark.name, ())
+    for key, value in mark.kwargs.items():
+        if key not in valid:
+            allowed = f"it takes {', '.join(valid)}" if valid else "it takes none"
+            raise pytest.UsageError(
+                f"{node.nodeid}: {mark.name} has no keyword argument {key!r}; {allowed}"
+            )
+        if not isinstance(value, str):
+            raise pytest.UsageError(f"{node.nodeid}: {mark.name}: {key} must be a text")
+
+
+def number_mark(node: Any, name: str) -> Any:
+    """The number in a mark such as `reps(5)`, or None without the mark.
+
+    Raises:
+        pytest.UsageError: no argument, or no number that the option could have.
+    """
+    mark = node.get_closest_marker(name)
+    if mark is None:
+        return None
+    _check_keywords(mark, node)
+    if len(mark.args) > 1:
+        raise pytest.UsageError(f"{node.nodeid}: {name}{shown(mark.args)}: give one number")
+    try:
+        return options.number(f"sim_{name.removeprefix('sim_')}", *(mark.args or [None]))
+    except BadValue as error:
+        raise pytest.UsageError(
+            f"{node.nodeid}: {name}({shown(repr(error.text))}): {error.advice}"
+        ) from None

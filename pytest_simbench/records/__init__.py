@@ -1,0 +1,1 @@
+"""The run folder: what is recorded, read back, merged, resumed and compared."""

@@ -1,0 +1,170 @@
+"""What must be equal: the one table of what records share when they are pooled, resumed, merged or
+compared, each line with its reason.
+
+A score is the score of a configuration. Two repetitions belong to one configuration when nothing
+differs of what this table says of *pool*. Every field of a record has its line, so that a new field
+is a decision (`tests/records/test_configuration.py`).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+from pytest_simbench.records.record import Record, plain
+
+Use = Literal["pool", "resume", "merge", "compare"]
+"""`pool`: in one row of a table. `resume`: in a run that is gone on with. `merge`: in runs that are
+joined. `compare`: named before a comparison with a baseline."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One field of a record.
+
+    Attributes:
+        name: of the field.
+        equal_to: the uses in which it must be the same (in `compare`: is named when it is not).
+        reason: why there, and why not elsewhere.
+    """
+
+    name: str
+    equal_to: frozenset[Use]
+    reason: str
+
+
+def _part(name: str, uses: str, reason: str) -> Part:
+    return Part(name, frozenset(uses.split()), reason)  # type: ignore[arg-type]
+
+
+EVERYWHERE = "pool resume merge compare"
+
+PARTS: tuple[Part, ...] = (
+    # What is repeated: records are found by these, so they never differ within a group.
+    _part("test", "", "tells groups apart; joined runs may have it under another path"),
+    _part("task", "", "tells groups apart"),
+    _part("simulator", "", "tells groups apart"),
+    _part("mode", "", "tells groups apart; headless and GUI are compared by a test of their own"),
+    # The configuration.
+    _part("profile", EVERYWHERE, "names the settings"),
+    _part("settings", EVERYWHERE, "another time step or another tower is another experiment"),
+    _part("protocol", EVERYWHERE, "real time and smoke versions measure something else"),
+    _part("jitter", EVERYWHERE, "a larger disturbance is a harder task"),
+    _part("scene", EVERYWHERE, "a task whose code changed builds another world by the same name"),
+    _part("limits", EVERYWHERE, "a time-out decides which repetitions fail"),
+    _part("versions", EVERYWHERE, "another engine, adapter or Python is another simulator"),
+    # What the engine told of it.
+    _part(
+        "deviations",
+        "merge compare",
+        "machines that build other worlds are not joined; it is known only after loading, so a "
+        "row lists all of them and a resumed run cannot ask",
+    ),
+    # Circumstances: times may depend on them, scores do not.
+    _part("host", "compare", "several machines may share a run; a comparison of times says so"),
+    _part("contended", "compare", "a note under the table; a comparison of times says so"),
+    _part("reused_worker", "compare", "the first of a worker's repetitions is never a reused one"),
+    # Which repetition it is.
+    _part("repetition", "", "numbers the seeds of a run"),
+    _part("seed", "", "pairs repetitions; the first seed must be the same in a run resumed"),
+    _part("attempt", "", "the last of several attempts counts"),
+    # Results.
+    *(
+        _part(name, "", "a result")
+        for name in (
+            "status", "error", "metrics", "details", "seconds", "stepping", "timeline", "resources",
+        )
+    ),
+    _part("extra", "", "of a newer plugin: not known what it means"),
+)  # fmt: skip
+
+
+def equal_to(use: Use) -> tuple[str, ...]:
+    """Names of the fields that must be equal for a use."""
+    return tuple(part.name for part in PARTS if use in part.equal_to)
+
+
+LATE = frozenset({"versions", "deviations"})
+"""Told by the engine: a repetition that failed may have ended before it knew all of them."""
+
+NEW = frozenset({"scene", "limits"})
+"""Not in records of pytest-simbench before 0.1.0's release: what is not there is not known."""
+
+TASK = "task."
+"""Before a task's parameters among the settings: known before anything ran."""
+
+
+def values(record: Record, use: Use) -> dict[str, Any]:
+    """What a record says of everything that must be equal: `settings.timestep` to 0.002."""
+    return {
+        key: value
+        for name in equal_to(use)
+        for key, value in _flat(name, getattr(record, name))
+        if not (name in NEW and value == "")
+    }
+
+
+def task_parameters(record: Record) -> str:
+    """The parameters of a record's task, as JSON."""
+    return text({k: plain(v) for k, v in record.settings.items() if k.startswith(TASK)})
+
+
+def partial(record: Record) -> frozenset[str]:
+    """The fields of which a record may not know everything: absent means unknown there."""
+    if record.ok:
+        return NEW
+    told = any(not key.startswith(TASK) for key in record.settings)
+    return NEW | LATE if told else NEW | LATE | {"settings"}
+
+
+def field_of(key: str) -> str:
+    """The field that a key of `values` belongs to."""
+    return key.partition(".")[0]
+
+
+class Told(NamedTuple):
+    """What a record tells of its configuration.
+
+    Attributes:
+        values: of everything that must be equal, as JSON.
+        unknown: fields of which it may not tell everything.
+    """
+
+    values: dict[str, str]
+    unknown: frozenset[str]
+
+    @classmethod
+    def of(cls, record: Record, use: Use = "pool") -> Told:
+        found = {key: text(value) for key, value in values(record, use).items()}
+        return cls(found, partial(record))
+
+    def agrees(self, other: Told) -> bool:
+        """Whether nothing known contradicts that both are of one configuration."""
+        a, b = self.values, other.values
+        return all(
+            a[key] == b[key]
+            if key in a and key in b
+            else field_of(key) in (other.unknown if key in a else self.unknown)
+            for key in a.keys() | b.keys()
+        )
+
+
+def agree(first: Record, second: Record, use: Use = "pool") -> bool:
+    """Whether nothing known contradicts that both are of one configuration."""
+    return Told.of(first, use).agrees(Told.of(second, use))
+
+
+def text(value: Any) -> str:
+    """A value as JSON, for comparing and for messages."""
+    return json.dumps(value, sort_keys=True)
+
+
+def _flat(key: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Maps as keys with dots; tuples and numpy values as a record's file holds them."""
+    if isinstance(value, Mapping):
+        for name, item in value.items():
+            yield from _flat(f"{key}.{name}", item)
+    else:
+        yield key, plain(value)

@@ -1,0 +1,97 @@
+"""Several runs of the same tests with different seeds as one run: shards of several machines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+from pytest_simbench.records.configuration import task_parameters
+from pytest_simbench.records.differences import differences
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.series import by_test, configurations
+
+
+class JoinError(ValueError):
+    """Runs that make no single one; the message says why."""
+
+
+@dataclass(frozen=True)
+class Joined:
+    """A record of the joined run.
+
+    Attributes:
+        record: under its new number.
+        run: name of the run that it comes from.
+        was: the record as it stands there.
+    """
+
+    record: Record
+    run: str
+    was: Record
+
+
+def join(runs: Mapping[str, Sequence[Record]]) -> list[Joined]:
+    """The records of all runs as of one, by test and seed.
+
+    Repetition k of the whole has the k-th seed from the smallest of its test, as in a straight run.
+    Interrupted repetitions are left out. Tests are matched without the path of their file where
+    that leaves them apart: it depends on where pytest ran.
+
+    Args:
+        runs: records by the name of their run.
+
+    Raises:
+        JoinError: a seed is there twice, or settings or versions differ.
+    """
+    ended = [[r for r in run if r.status != "interrupted"] for run in runs.values()]
+    tests: dict[str, dict[str, list[Record]]] = {}
+    for name, groups in zip(runs, by_test(ended, apart=_task_parameters), strict=True):
+        for test, found in groups.items():
+            tests.setdefault(test, {})[name] = found
+    joined: list[Joined] = []
+    for test, parts in tests.items():
+        _check(test, parts)
+        every = [(record, name) for name, run in parts.items() for record in run]
+        first = min(record.seed for record, _ in every)
+        id_ = every[0][0].test
+        for record, name in sorted(every, key=lambda item: item[0].seed):
+            number = record.seed - first + 1
+            ours = replace(record, test=id_, repetition=number, attempt=1)
+            joined.append(Joined(ours, name, record))
+    return joined
+
+
+def _task_parameters(records: Sequence[Record]) -> list[list[Record]]:
+    """A test's records by the parameters of their task: it may repeat several."""
+    groups: dict[str, list[Record]] = {}
+    for record in records:
+        groups.setdefault(task_parameters(record), []).append(record)
+    return list(groups.values())
+
+
+def _check(test: str, parts: Mapping[str, Sequence[Record]]) -> None:
+    for name, run in parts.items():
+        groups = configurations(run)
+        if len(groups) > 1:
+            other = "; ".join(differences({test: (groups[0], groups[1])}, "merge"))
+            raise JoinError(f"{name} holds several configurations: {other}")
+        twice = len(run) - len({record.seed for record in run})
+        if twice:
+            raise JoinError(f"{name} has {twice} of its seeds of {test} twice")
+    for (a, first), (b, second) in combinations(parts.items(), 2):
+        shared = sorted({r.seed for r in first} & {r.seed for r in second})
+        if shared:
+            seeds = f"seed {shared[0]}" if len(shared) == 1 else f"{len(shared)} seeds"
+            span = "" if len(shared) == 1 else f" ({shared[0]} to {shared[-1]})"
+            raise JoinError(
+                f"{a} and {b} overlap: both have {seeds}{span} of {test}; give each machine seeds "
+                "of its own with --sim-seed"
+            )
+        # A repetition that failed at its start knows neither settings nor versions.
+        known = [r for r in first if r.ok] or first, [r for r in second if r.ok] or second
+        other_found = differences({test: known}, "merge")
+        if other_found:
+            raise JoinError(
+                f"{a} and {b} are not parts of one run: {'; '.join(other_found)} (the first is {a})"
+            )

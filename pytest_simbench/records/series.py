@@ -1,0 +1,221 @@
+"""Records sorted by what they are of: which count, which belong together, and what tells apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
+
+from pytest_simbench.records.configuration import (
+    TASK,
+    Told,
+    Use,
+    agree,
+    text,
+    values,
+)
+from pytest_simbench.records.record import Record
+
+
+def settled(records: Iterable[Record]) -> list[Record]:
+    """Of each repetition of one configuration the record that counts, in their order.
+
+    One that came to an end counts before one that was interrupted; of several that came to an end
+    the one of the last attempt, and of one attempt the one that was written last.
+    """
+    found: list[Record] = []
+    places: dict[tuple[object, ...], list[int]] = {}
+    for record in records:
+        key = (
+            record.test,
+            record.task,
+            record.simulator,
+            record.mode,
+            record.repetition,
+            record.seed,
+        )
+        twins = places.setdefault(key, [])
+        for place in twins:
+            if agree(found[place], record):
+                found[place] = _better(found[place], record)
+                break
+        else:
+            twins.append(len(found))
+            found.append(record)
+    return found
+
+
+def _better(first: Record, later: Record) -> Record:
+    """Which of two records of one repetition counts."""
+    ended = first.status != "interrupted", later.status != "interrupted"
+    if ended[0] != ended[1]:
+        return first if ended[0] else later
+    return first if first.attempt > later.attempt else later
+
+
+def configurations(records: Iterable[Record]) -> list[list[Record]]:
+    """The records by configuration, each group in their order.
+
+    One that failed before its engine told everything goes where nothing contradicts.
+    """
+    records = list(records)
+    groups: list[list[int]] = []
+    # Those that know everything come first: the others are compared with them.
+    facts = [Told.of(record) for record in records]
+    for place in sorted(range(len(records)), key=lambda k: not records[k].ok):
+        for group in groups:
+            if facts[group[0]].agrees(facts[place]):
+                group.append(place)
+                break
+        else:
+            groups.append([place])
+    return [[records[k] for k in sorted(group)] for group in sorted(groups, key=min)]
+
+
+class Subject(NamedTuple):
+    """What a row of a table is of, besides its configuration; rows are sorted by it.
+
+    Attributes:
+        function: id of the test without its parameters.
+        parameters: of the test, without simulator and mode.
+    """
+
+    simulator: str
+    mode: str
+    profile: str
+    function: str
+    parameters: str
+
+    @classmethod
+    def of(cls, record: Record) -> Subject:
+        function, _, parameters = record.test.partition("[")
+        inside = "-" + parameters.removesuffix("]") + "-"
+        inside = inside.replace(f"-{record.simulator}-{record.mode}-", "-", 1).strip("-")
+        return cls(record.simulator, record.mode, record.profile, function, inside)
+
+    @property
+    def order(self) -> tuple[object, ...]:
+        """Headless before GUI, as in the study's table."""
+        return (self.simulator, self.mode == "gui", *self[1:])
+
+
+class Series(NamedTuple):
+    """The repetitions of one row.
+
+    Attributes:
+        subject: what they are of.
+        records: one configuration, by repetition.
+        label: what tells the row from others of its simulator, mode and profile; may be empty.
+    """
+
+    subject: Subject
+    records: list[Record]
+    label: str
+
+
+def series(records: Iterable[Record]) -> list[Series]:
+    """The records of one task as rows, sorted: a row is one test and one configuration."""
+    by_subject: dict[Subject, list[Record]] = {}
+    for record in sorted(records, key=lambda r: (Subject.of(r).order, r.repetition)):
+        by_subject.setdefault(Subject.of(record), []).append(record)
+    rows = [(s, group) for s, found in by_subject.items() for group in configurations(found)]
+    return [
+        Series(subject, group, _label(subject, group, [r for r in rows if r[0][:3] == subject[:3]]))
+        for subject, group in rows
+    ]
+
+
+def _label(
+    subject: Subject, group: Sequence[Record], rows: Sequence[tuple[Subject, Sequence[Record]]]
+) -> str:
+    """The test's function where the rows differ in it, then in what its rows differ."""
+    parts = [subject.function] if len({s.function for s, _ in rows}) > 1 else []
+    same = [(s, found) for s, found in rows if s.function == subject.function]
+    if len(same) > 1:
+        known = [told(found) for _, found in same]
+        every = dict.fromkeys(key for other in known for key in other)
+        keys = [k for k in every if len({text(other.get(k)) for other in known}) > 1]
+        apart = len({tuple(text(other.get(k)) for k in keys) for other in known}) == len(same)
+        if not apart and subject.parameters:
+            parts.append(f"[{subject.parameters}]")
+        mine = told(group)
+        differences = [f"{k.removeprefix('settings.')}={_shown(mine.get(k))}" for k in keys]
+        parts += differences[:MOST] + ["..."] * (len(differences) > MOST)
+    return " ".join(parts)
+
+
+MOST = 3
+"""Differences that a row's name lists."""
+
+
+def _shown(value: object) -> str:
+    return value if isinstance(value, str) else text(value)
+
+
+CONDITIONS = ("protocol", "jitter", "scene", f"settings.{TASK}")
+"""What a task demands, beginnings of keys: the settings of two simulators always differ."""
+
+
+def comparable(a: Series, b: Series) -> bool:
+    """Whether one row may be said to beat the other: the same was asked of both."""
+    if a.subject[1:3] != b.subject[1:3]:
+        return False
+    if a.label != b.label and a.subject[3:] != b.subject[3:]:
+        return False
+    first, second = (
+        {k: text(v) for k, v in told(row.records).items() if k.startswith(CONDITIONS)}
+        for row in (a, b)
+    )
+    return all(second.get(key, value) == value for key, value in first.items())
+
+
+def told(records: Sequence[Record], use: Use = "pool") -> dict[str, object]:
+    """What the records of one configuration say of it together."""
+    found: dict[str, object] = {}
+    for record in sorted(records, key=lambda r: not r.ok):
+        for key, value in values(record, use).items():
+            found.setdefault(key, value)
+    return found
+
+
+def by_test(
+    runs: Sequence[Sequence[Record]],
+    apart: Callable[[Sequence[Record]], list[list[Record]]] = configurations,
+) -> list[dict[str, list[Record]]]:
+    """Each run's records by what is repeated in it, under names that match between the runs.
+
+    A name is the test's id, without its file where that leaves all apart: it depends on where
+    pytest ran. A test that repeats several tasks, or one with other parameters, has several: the
+    second is called `test_x[...] (stacking 2)`.
+
+    Args:
+        runs: records of each run, in the order in which they were made.
+        apart: splits the records of one test and task.
+    """
+    whole = any(len({r.test for r in run}) > len({short(r.test) for r in run}) for run in runs)
+    sides: list[dict[tuple[str, str, int], list[Record]]] = []
+    for run in runs:
+        groups: dict[tuple[str, str], list[Record]] = {}
+        for record in run:
+            key = (record.test if whole else short(record.test), record.task)
+            groups.setdefault(key, []).append(record)
+        sides.append(
+            {
+                (*key, number): group
+                for key, found in groups.items()
+                for number, group in enumerate(apart(found), start=1)
+            }
+        )
+    every = {key for side in sides for key in side}
+    return [{_name(key, every): group for key, group in side.items()} for side in sides]
+
+
+def _name(key: tuple[str, str, int], every: set[tuple[str, str, int]]) -> str:
+    test, task, number = key
+    if sum(other[0] == test for other in every) == 1:
+        return test
+    return f"{test} ({task})" if number == 1 else f"{test} ({task} {number})"
+
+
+def short(test: str) -> str:
+    """A test's id without file and class."""
+    return test.rpartition("::")[2]

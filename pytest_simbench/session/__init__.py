@@ -1,1 +1,0 @@
-"""Runs repetitions: launch, sample, perform, score, record. Knows every room but pytest's."""

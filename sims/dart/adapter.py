@@ -1,0 +1,318 @@
+"""DART (the physics engine inside Gazebo), through its Python bindings dartpy.
+
+Drives are DART's own servo motors: velocity constraints with the effort limit as largest force,
+solved together with the contacts. Each step they are told the velocity v* + `position_gain`
+(q* - timestep v* - q) / timestep, as Gazebo's ros2_control does it (its gain is 0.1). DART's
+other drive, spring and damper with a rest position, is implicit too but knows no effort limit,
+and contact impulses do not feel its damping: at rest against a contact only m / (m + timestep d)
+of the spring's force arrives, a quarter for a finger. So it is not used.
+
+What was learnt stands in docs/engines/dart.md.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from pytest_simbench.scene import Box, FloatArray, Scene
+from pytest_simbench.simulator import (
+    Capability,
+    Deviation,
+    PreparedRobot,
+    SeedsSeen,
+    Settings,
+    Simulator,
+    SimulatorInfo,
+    lazy_import,
+)
+
+from .readback import ReadBack
+
+dartpy = lazy_import("dartpy")
+
+State = tuple[float, list[tuple[FloatArray, FloatArray, FloatArray]], FloatArray]
+"""Time, positions, velocities and accelerations of each skeleton, the command."""
+
+
+@dataclass(frozen=True)
+class DARTSettings(Settings):
+    """DART's options; defaults are the engine's own.
+
+    Attributes:
+        timestep: [s]; DART's default.
+        detector: collision detector; DART's default is `fcl`, Gazebo's is `ode`.
+        solver: `dantzig` (pivoting, friction pyramid), `pgs` (projected Gauss-Seidel, friction
+            pyramid) or `nsgs` (block Gauss-Seidel, Coulomb's cone).
+        sweeps: largest number of passes of `pgs` and `nsgs`, DART's default for `nsgs`.
+        tolerance: where they stop earlier; for `nsgs` the violation of the law of contact [m/s].
+        position_gain: share of the position error that the drives correct in a step; the default
+            is that of gz_ros2_control, DART has none.
+        sleeping: whether bodies at rest are frozen.
+        split_impulse: correct penetrations by a velocity of their own.
+    """
+
+    timestep: float = 0.001
+    detector: Literal["fcl", "ode", "bullet", "dart"] = "fcl"
+    solver: Literal["dantzig", "pgs", "nsgs"] = "dantzig"
+    sweeps: int = 100
+    tolerance: float = 1e-5
+    position_gain: float = 0.1
+    sleeping: bool = True
+    split_impulse: bool = False
+
+
+class DART(Simulator):
+    """Adapter of DART."""
+
+    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+        name="dart",
+        title="DART",
+        distribution="dartpy",
+        modules=("dartpy",),
+        install="pip install 'pytest-simbench[dart]'",
+        licence="BSD-2-Clause",
+        engine="DART",
+        language="C++",
+        tested_version="6.20.0",
+        capabilities=frozenset(
+            {
+                Capability.WINDOW,
+                Capability.SAVE_RESTORE,
+                Capability.CONTACT_COUNT,
+                Capability.DETERMINISTIC,
+            }
+        ),
+        deviations=(
+            Deviation("joint/*/armature", "DART has no rotor inertia"),
+            Deviation(
+                "joint/*/stiffness joint/*/damping",
+                "servo motors are velocity constraints, neither springs nor dampers",
+            ),
+            Deviation("link/*/damping", "DART has no damping of links"),
+            Deviation("body/*/margin link/*/margin", "DART's shapes have no margin"),
+            Deviation(
+                "joint/*finger_joint2/effort_limit",
+                "the second finger has no drive: it follows the first, by up to both their limits",
+            ),
+            Deviation(
+                "", "the coupling is one-way: the first finger does not feel the second's load"
+            ),
+        ),
+        install_size_mb=80,
+    )
+    profiles: ClassVar[Mapping[str, Settings]] = {
+        "default": DARTSettings(),
+        "tuned": DARTSettings(detector="ode", solver="nsgs", tolerance=1e-4, position_gain=0.5),
+    }
+    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+        "tuned": (SeedsSeen("throwing", 100, 100), SeedsSeen("stacking", 100, 100)),
+    }
+    settings: DARTSettings
+
+    def load(self, scene: Scene) -> None:
+        self.scene = scene
+        self.world = world = dartpy.simulation.World()
+        self._set_options(world, scene)
+        self._ground = self._add_ground(scene.ground_friction)
+        self._bodies = {box.name: self._add_box(box) for box in scene.bodies}
+        self._free = [self._bodies[box.name] for box in scene.free_bodies]
+        self._robot: Any = None
+        self.prepared = None
+        self._base = np.empty(0)
+        if scene.robot is not None:
+            self.prepared = PreparedRobot(scene.robot)
+            self._load_robot(self.prepared)
+        self._viewer = self._open_window() if self.gui else None
+
+    def _set_options(self, world: Any, scene: Scene) -> None:
+        s, constraint = self.settings, dartpy.constraint
+        world.setTimeStep(s.timestep)
+        world.setGravity(np.array(scene.gravity))
+        kinds = dartpy.simulation.CollisionDetectorType
+        world.setCollisionDetector(getattr(kinds, s.detector.upper()))
+        sleep = world.getDeactivationOptions()
+        sleep.mEnabled = s.sleeping
+        world.setDeactivationOptions(sleep)
+        solver = world.getConstraintSolver()
+        solver.setSplitImpulseEnabled(s.split_impulse)
+        if s.solver == "pgs":  # dartpy makes none, but DART keeps one to fall back on
+            pgs = solver.getSecondaryBoxedLcpSolver()
+            options = constraint.PgsBoxedLcpSolverOption()
+            options.mMaxIteration = s.sweeps
+            options.mDeltaXThreshold = options.mRelativeDeltaXTolerance = s.tolerance
+            pgs.setOption(options)
+            solver.setSecondaryBoxedLcpSolver(None)
+            solver.setBoxedLcpSolver(pgs)
+        elif s.solver == "nsgs":
+            options = constraint.NsgsFrictionSolver.Options()
+            options.maxSweeps, options.tolerance = s.sweeps, s.tolerance
+            solver.setBoxedLcpSolver(constraint.NsgsFrictionSolver(options))
+
+    def _add_ground(self, friction: float) -> Any:
+        skeleton = dartpy.dynamics.Skeleton("ground")
+        _, body = skeleton.createWeldJointAndBodyNodePair()
+        shape = body.createShapeNode(dartpy.dynamics.PlaneShape([0.0, 0.0, 1.0], 0.0))
+        _set_surface(shape, friction)
+        skeleton.setMobile(False)
+        self.world.addSkeleton(skeleton)
+        return body
+
+    def _add_box(self, box: Box) -> Any:
+        dynamics = dartpy.dynamics
+        skeleton = dynamics.Skeleton(box.name)
+        place = dartpy.math.Isometry3()
+        place.set_translation(np.array(box.pose.position))
+        place.set_rotation(box.pose.rotation())
+        if box.fixed:
+            joint, body = skeleton.createWeldJointAndBodyNodePair()
+            joint.setTransformFromParentBodyNode(place)
+            skeleton.setMobile(False)
+        else:
+            joint, body = skeleton.createFreeJointAndBodyNodePair()
+            inertia = dynamics.Inertia()
+            inertia.setMass(box.mass)
+            inertia.setMoment(np.diag(box.inertia()))
+            body.setInertia(inertia)
+            joint.setPositions(dynamics.FreeJoint.convertToPositions(place))
+        shape = body.createShapeNode(dynamics.BoxShape(np.array(box.size)))
+        shape.createVisualAspect().setColor(list(box.colour))
+        _set_surface(shape, box.friction)
+        self.world.addSkeleton(skeleton)
+        return body
+
+    def _load_robot(self, prepared: PreparedRobot) -> None:
+        robot, dynamics, utils = prepared.robot, dartpy.dynamics, dartpy.utils
+        loader = utils.DartLoader()
+        options = utils.DartLoaderOptions()
+        options.mDefaultRootJointType = utils.DartLoaderRootJointType.FIXED
+        loader.setOptions(options)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "robot.urdf"
+            path.write_text(_with_mimic(prepared), encoding="utf-8")
+            self._robot = skeleton = loader.parseSkeleton(str(path))
+        for body in skeleton.getBodyNodes():
+            for shape in body.getShapeNodes():
+                if shape.hasCollisionAspect():
+                    _set_surface(shape, robot.friction)
+        follower = robot.gripper.joints[1]
+        for drive in robot.joints:
+            joint = skeleton.getJoint(drive.name)
+            joint.setLimitEnforcement(True)
+            limit = drive.effort_limit
+            if drive.name == follower:
+                limit *= 2
+            else:
+                joint.setActuatorType(dynamics.ActuatorType.SERVO)
+            joint.setForceUpperLimit(0, limit)
+            joint.setForceLowerLimit(0, -limit)
+            # a servo keeps its velocity limit; the scene's drive law has none, no other engine does
+            joint.setVelocityUpperLimit(0, np.inf)
+            joint.setVelocityLowerLimit(0, -np.inf)
+        names = [skeleton.getDof(i).getName() for i in range(skeleton.getNumDofs())]
+        self._index = np.array([names.index(name) for name in robot.joint_names])
+        driven = np.array([name != follower for name in robot.joint_names])
+        self._gain = driven * (self.settings.position_gain / self.settings.timestep)
+        self._share = driven * (1 - self.settings.position_gain)
+        initial = robot.column("initial_position")
+        skeleton.setPositions(list(self._index), initial)
+        self.world.addSkeleton(skeleton)
+        self._error_gain = np.zeros(len(names))
+        self._error_gain[self._index] = self._gain
+        self.command(initial, 0 * initial, 0 * initial)
+
+    def read_back(self) -> dict[str, Any]:
+        return ReadBack(
+            self.world, self._ground, self._bodies, self._robot, self.scene, self.prepared
+        ).all()
+
+    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        # Servo motors find the effort themselves, so there is nothing to feed forward.
+        base = np.zeros(len(self._index))
+        base[self._index] = self._gain * position + self._share * velocity
+        self._base = base
+
+    def step(self) -> None:
+        if self._robot is not None:
+            self._robot.setCommands(self._base - self._error_gain * self._robot.getPositions())
+        self.world.step(False)
+
+    @property
+    def time(self) -> float:
+        return float(self.world.getTime())
+
+    def body_state(self) -> FloatArray:
+        state = np.empty((len(self._free), 13))
+        for row, body in zip(state, self._free, strict=True):
+            place = body.getWorldTransform()
+            row[:3], row[3:7] = place.translation(), place.quaternion().wxyz()
+            row[7:10], row[10:] = body.getCOMLinearVelocity(), body.getAngularVelocity()
+        return state
+
+    def joint_state(self) -> FloatArray:
+        if self._robot is None:
+            return np.empty((2, 0))
+        q, v = self._robot.getPositions(), self._robot.getVelocities()
+        return np.stack([q[self._index], v[self._index]])
+
+    def save(self) -> State:
+        # DART's solver starts from the last contacts; both futures must start without them.
+        self.world.getConstraintSolver().clearLastCollisionResult()
+        states = [(s.getPositions(), s.getVelocities(), s.getAccelerations()) for s in self._all()]
+        return self.time, states, self._base
+
+    def restore(self, state: State) -> None:
+        time, states, self._base = state
+        self.world.setTime(time)
+        for skeleton, (q, v, a) in zip(self._all(), states, strict=True):
+            skeleton.setPositions(q)
+            skeleton.setVelocities(v)
+            skeleton.setAccelerations(a)
+        self.world.getConstraintSolver().clearLastCollisionResult()
+
+    def _all(self) -> list[Any]:
+        return [self.world.getSkeleton(i) for i in range(self.world.getNumSkeletons())]
+
+    def contact_count(self) -> int:
+        return int(self.world.getLastCollisionResult().getNumContacts())
+
+    def _open_window(self) -> Any:
+        osg = dartpy.gui.osg
+        viewer = osg.Viewer()
+        self._node = osg.WorldNode(self.world)  # the viewer does not keep it alive
+        viewer.addWorldNode(self._node, False)  # not active: it must not step the world
+        viewer.setUpViewInWindow(0, 0, 1024, 768)
+        viewer.setCameraHomePosition([2.6, -2.2, 1.6], [0.6, 0.0, 0.3], [0.0, 0.0, 1.0])
+        return viewer
+
+    def refresh_window(self) -> None:
+        if self._viewer is not None:
+            self._viewer.frame()
+
+    def close(self) -> None:
+        self._viewer = self._node = None
+
+
+def _set_surface(shape: Any, friction: float) -> None:
+    """Friction of a shape; of a pair, DART takes the smaller one."""
+    if not shape.hasCollisionAspect():
+        shape.createCollisionAspect()
+    if not shape.hasDynamicsAspect():
+        shape.createDynamicsAspect()
+    shape.getDynamicsAspect().setFrictionCoeff(friction)
+
+
+def _with_mimic(prepared: PreparedRobot) -> str:
+    """The reduced URDF, its second finger following the first: dartpy cannot set that itself."""
+    first, second = prepared.robot.gripper.joints
+    root = ET.fromstring(prepared.to_urdf())
+    for joint in root.findall("joint"):
+        if joint.attrib["name"] == second:
+            ET.SubElement(joint, "mimic", joint=first, multiplier="1", offset="0")
+    return ET.tostring(root, encoding="unicode")

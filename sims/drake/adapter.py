@@ -1,0 +1,265 @@
+"""Drake (Toyota Research Institute), through pydrake.
+
+Drives are Drake's own: actuators with `PdControllerGains`, which the contact solver SAP treats
+implicitly, with effort feed-forward; the effort limit bounds their whole sum. The robot is built
+from the reduced description, link by link: Drake's parser wants a file, reads no STL, and makes
+no actuators with gains.
+
+What was learnt (1.51, tuned settings but for the one named, seed 100):
+- point contact gives one point for a pair of shapes, at the deepest place. A plain box rests on
+  one point that jumps from corner to corner: with the engine's defaults the cubes of the grid
+  never come to rest (up to 0.12 m/s or rad/s), and a held one turns in the hand. `tuned` gives
+  each free box eight spheres in its corners, and each finger four behind its gripping face, that
+  reach the true faces, while the box itself is 0.1 mm smaller a face: four points a face
+- spheres may not touch spheres: stacked cubes then stand sphere on sphere and creep (0.3 mm
+  between release and the end of the task, 5 micrometres without)
+- SAP's `relaxation_time` decides how far a grip sinks in: contacts get at most the
+  stiffness that the step resolves, and then sink (relaxation time + step) / step times deeper. At
+  4 ms and Drake's 0.1 s a squeeze of 25 N sinks 1.4 mm into a cube (5 mm with plain boxes), with
+  0.01 s 0.2 mm
+- nothing but the step changes where the throw lands (stiffness 1e5 to 1e7, relaxation 0 to 0.1,
+  `lagged`: equal within 0.3 mm). Contact velocities are made equal at the
+  start of a step and kept for its length, so a cube leaves a turning hand by v^2 / r dt / 2 a
+  second: 4 ms lands at 1.399, 2 ms at 1.377, 1 ms at 1.366, where a perfect follower's does at
+  1.352. `tuned` takes 2 ms: half of 1 ms's cost
+- quaternions are not kept at length 1; `body_state` normalises, as Drake does where it reads them
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_simbench.scene import FloatArray, Robot, Scene
+from pytest_simbench.simulator import (
+    Capability,
+    Deviation,
+    SeedsSeen,
+    Settings,
+    Simulator,
+    SimulatorInfo,
+    lazy_import,
+)
+
+from .readback import ReadBack
+from .world import DrakeSettings, World, transform
+
+analysis = lazy_import("pydrake.systems.analysis")
+framework = lazy_import("pydrake.systems.framework")
+geometry = lazy_import("pydrake.geometry")
+math = lazy_import("pydrake.math")
+sensors = lazy_import("pydrake.systems.sensors")
+
+
+class Drake(Simulator):
+    """Adapter of Drake."""
+
+    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+        name="drake",
+        title="Drake",
+        distribution="drake",
+        modules=("pydrake",),
+        install="pip install 'pytest-simbench[drake]'",
+        licence="BSD-3-Clause",
+        engine="Drake SAP",
+        language="C++",
+        tested_version="1.51.1",
+        capabilities=frozenset(
+            {
+                Capability.WINDOW,
+                Capability.OFFSCREEN,
+                Capability.SAVE_RESTORE,
+                Capability.EXACT_RESTORE,
+                Capability.CONTACT_COUNT,
+                Capability.DETERMINISTIC,
+            }
+        ),
+        deviations=(
+            Deviation(
+                "*/restitution",
+                "Drake has no restitution; its contacts dissipate",
+            ),
+            Deviation("joint/*/friction", "Drake's joints have no friction"),
+            Deviation("link/*/damping", "Drake has no damping of links"),
+            Deviation(
+                "body/*/boxes",
+                "tuned: corners of free boxes are cut by 0.1 mm a face and rounded by a sphere",
+                within=2e-4,
+            ),
+            Deviation(
+                "",
+                "tuned: free boxes are 0.1 mm a face smaller, with spheres in their corners that "
+                "reach the true faces, and finger pads have spheres too: Drake's point contact "
+                "gives one point a pair of shapes, on which plain boxes rock and slide",
+            ),
+            Deviation(
+                "",
+                "the window is Meshcat, a page that a browser shows: http://localhost:7000, or "
+                "the next free port, which the worker's log names",
+            ),
+        ),
+        install_size_mb=310,
+    )
+    profiles: ClassVar[Mapping[str, Settings]] = {
+        "default": DrakeSettings(),
+        "tuned": DrakeSettings(
+            timestep=0.002,
+            contact_model="point",
+            approximation="sap",
+            relaxation_time=0.01,
+            corner_radius=0.001,
+            pad_radius=0.003,
+            shrink=1e-4,
+        ),
+    }
+    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+        "tuned": (SeedsSeen("throwing", 2121, 2130), SeedsSeen("stacking", 100, 100)),
+    }
+    settings: DrakeSettings
+
+    def load(self, scene: Scene) -> None:
+        self.close()
+        builder = framework.DiagramBuilder()
+        self.world = World(scene, self.settings, builder)
+        self.plant, self.scene_graph = self.world.plant, self.world.scene_graph
+        self._meshcat = self._open_window(builder) if self.gui else None
+        self.simulator = analysis.Simulator(builder.Build())
+        self.root = self.simulator.get_mutable_context()
+        self.context = self.plant.GetMyMutableContextFromRoot(self.root)
+        free = [self.world.bodies[box.name] for box in scene.free_bodies]
+        for box, body in zip(scene.free_bodies, free, strict=True):
+            self.plant.SetFreeBodyPose(self.context, body, transform(box.pose))
+        self._joints_at = np.empty((2, 0), dtype=int)
+        if scene.robot is not None:
+            self._start_drives(scene.robot)
+        nq = self.plant.num_positions()
+        q = np.array([body.floating_positions_start() for body in free], int).reshape(-1, 1)
+        v = np.array([body.floating_velocities_start_in_v() for body in free], int).reshape(-1, 1)
+        # Drake has rotation before translation; the contract has it after.
+        self._bodies_at = np.hstack(
+            [q + np.array([4, 5, 6, 0, 1, 2, 3]), nq + v + np.array([3, 4, 5, 0, 1, 2])]
+        )
+        self._steps = 0
+        self._has_camera = False
+        self.simulator.Initialize()
+
+    def _start_drives(self, robot: Robot) -> None:
+        joints = [self.world.joints[name] for name in robot.joint_names]
+        initial, rest = robot.column("initial_position"), np.zeros(len(joints))
+        nq = self.plant.num_positions()
+        self._joints_at = np.array(
+            [[j.position_start() for j in joints], [nq + j.velocity_start() for j in joints]]
+        )
+        state = self.plant.GetPositionsAndVelocities(self.context).copy()
+        state[self._joints_at[0]] = initial
+        self.plant.SetPositionsAndVelocities(self.context, state)
+        targets = self.plant.get_desired_state_input_port(self.world.model)
+        efforts = self.plant.get_actuation_input_port(self.world.model)
+        self._targets = targets.FixValue(self.context, np.concatenate([initial, rest]))
+        self._efforts = efforts.FixValue(self.context, rest)
+        self._commanded = (initial, rest, rest)
+
+    def read_back(self) -> dict[str, Any]:
+        return ReadBack(self.world, self.context).all()
+
+    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        self._commanded = (position, velocity, effort)
+        self._targets.GetMutableData().get_mutable_value().SetFromVector(
+            np.concatenate([position, velocity])
+        )
+        self._efforts.GetMutableData().get_mutable_value().SetFromVector(effort)
+
+    def step(self) -> None:
+        self._steps += 1
+        self.simulator.AdvanceTo(self._steps * self.settings.timestep)
+
+    @property
+    def time(self) -> float:
+        return float(self.root.get_time())
+
+    def body_state(self) -> FloatArray:
+        state = np.asarray(self.plant.GetPositionsAndVelocities(self.context)[self._bodies_at])
+        # Drake integrates quaternions without normalising them; it does so where it reads them.
+        state[:, 3:7] /= np.linalg.norm(state[:, 3:7], axis=1, keepdims=True)
+        return state
+
+    def joint_state(self) -> FloatArray:
+        return np.asarray(self.plant.GetPositionsAndVelocities(self.context)[self._joints_at])
+
+    def save(self) -> tuple[int, FloatArray, Any]:
+        state = self.plant.GetPositionsAndVelocities(self.context).copy()
+        return self._steps, state, getattr(self, "_commanded", None)
+
+    def restore(self, state: tuple[int, FloatArray, Any]) -> None:
+        self._steps, values, commanded = state
+        self.root.SetTime(self._steps * self.settings.timestep)
+        self.plant.SetPositionsAndVelocities(self.context, values)
+        if commanded is not None:
+            self.command(*commanded)
+        self.simulator.Initialize()
+
+    def contact_count(self) -> int:
+        results = self.plant.get_contact_results_output_port().Eval(self.context)
+        return int(results.num_point_pair_contacts() + results.num_hydroelastic_contacts())
+
+    def _query(self) -> Any:
+        return self.plant.get_geometry_query_input_port().Eval(self.context)
+
+    def render(self, width: int, height: int) -> NDArray[np.uint8]:
+        if not self._has_camera:
+            context = self.scene_graph.GetMyMutableContextFromRoot(self.root)
+            light = geometry.LightParameter(
+                type="directional", frame="world", direction=[0.5, 0.4, -1.0], intensity=0.8
+            )
+            fill = geometry.LightParameter(type="directional", frame="camera", intensity=0.6)
+            look = geometry.RenderEngineVtkParams(lights=[light, fill])
+            engine = geometry.MakeRenderEngineVtk(look)
+            self.scene_graph.AddRenderer(context, "vtk", engine)
+            self._has_camera = True
+        lens = sensors.CameraInfo(width, height, np.pi / 4)
+        core = geometry.RenderCameraCore(
+            "vtk", lens, geometry.ClippingRange(0.05, 20.0), math.RigidTransform()
+        )
+        image = self._query().RenderColorImage(
+            geometry.ColorRenderCamera(core), self.scene_graph.world_frame_id(), _camera()
+        )
+        return np.array(image.data[:, :, :3])
+
+    def _open_window(self, builder: Any) -> Any:
+        """A Meshcat server, fed when `refresh_window` says so."""
+        server = geometry.MeshcatParams(host="localhost", show_stats_plot=False)
+        meshcat = geometry.Meshcat(server)
+        never = geometry.MeshcatVisualizerParams(publish_period=1e6)  # but when told to
+        self._visualizer = geometry.MeshcatVisualizer.AddToBuilder(
+            builder, self.scene_graph, meshcat, never
+        )
+        meshcat.SetCameraPose(EYE, LOOK_AT)
+        return meshcat
+
+    def refresh_window(self) -> None:
+        if self._meshcat is not None:
+            self._visualizer.ForcedPublish(self._visualizer.GetMyContextFromRoot(self.root))
+
+    def close(self) -> None:
+        for name in list(vars(self)):
+            if name not in ("settings", "gui"):
+                delattr(self, name)
+        gc.collect()  # pydrake's parts keep each other alive; Meshcat would keep its port
+
+
+EYE, LOOK_AT = (2.0, -1.4, 1.3), (0.5, 0.0, 0.35)
+"""Of the camera, in the world [m]."""
+
+
+def _camera() -> Any:
+    """Pose of the camera, whose z looks ahead and whose y looks down."""
+    ahead = np.subtract(LOOK_AT, EYE)
+    ahead = ahead / np.linalg.norm(ahead)
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    turn = np.column_stack([right, np.cross(ahead, right), ahead])
+    return math.RigidTransform(math.RotationMatrix(turn), EYE)

@@ -1,0 +1,180 @@
+"""What Drake says of the world that was built, for the parity check."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.simulator import PreparedRobot, lazy_import, one_value
+from pytest_simbench.simulator.quantities import touches
+from pytest_simbench.simulator.shapes import DIRECTIONS, box_corners, outlines, placed, reach
+
+from .world import World
+
+geometry = lazy_import("pydrake.geometry")
+math = lazy_import("pydrake.math")
+trees = lazy_import("pydrake.multibody.tree")
+
+
+class ReadBack:
+    """Reads the quantities of `simulator.quantities` from plant, shapes and `context`."""
+
+    def __init__(self, world: World, context: Any) -> None:
+        self.world = world
+        self.context = context
+        shapes = world.plant.get_geometry_query_input_port().Eval(context)
+        self.inspector = shapes.inspector()
+
+    def all(self) -> dict[str, Any]:
+        """Every quantity by its name."""
+        world = self.world
+        ground = self.inspector.GetPoseInFrame(world.shapes["ground"][0])
+        reported: dict[str, Any] = {
+            "gravity": world.plant.gravity_field().gravity_vector(),
+            "timestep": world.plant.time_step(),
+            "ground/height": ground.translation()[2],
+            "ground/friction": self._friction("ground"),
+        }
+        for name, body in world.bodies.items():
+            reported |= self._box(name, body)
+        if world.prepared is not None:
+            reported |= self._robot(world.prepared)
+        return reported | touches(world.scene, world.prepared, self._can_touch)
+
+    def _box(self, name: str, body: Any) -> dict[str, Any]:
+        """A box; a fixed one is a shape of the world, whose frame is the shape's own."""
+        world, prefix = self.world, f"body/{name}"
+        free = body.is_floating_base_body()
+        frame = math.RigidTransform()
+        if not free:
+            frame = self.inspector.GetPoseInFrame(world.shapes[name][0])
+        found = self._part(prefix, name, world.plant.EvalBodyPoseInWorld(self.context, body), frame)
+        found[f"{prefix}/dynamic"] = float(free and not body.is_locked(self.context))
+        if free:
+            found |= self._inertial(prefix, body)
+            joint = world.plant.get_joint(self._floating_joint(body))
+            found[f"{prefix}/damping"] = [
+                joint.default_translational_damping() / found[f"{prefix}/mass"],
+                joint.default_angular_damping() / np.max(found[f"{prefix}/inertia"]),
+            ]
+        return found
+
+    def _floating_joint(self, body: Any) -> Any:
+        plant = self.world.plant
+        return next(
+            index
+            for index in plant.GetJointIndices()
+            if plant.get_joint(index).child_body().index() == body.index()
+        )
+
+    def _part(self, prefix: str, owner: str, pose: Any, frame: Any) -> dict[str, Any]:
+        """Pose, shapes and surface of what is in `frame` of a body at `pose` in the world."""
+        place = pose @ frame
+        shapes = self.world.shapes.get(owner, [])
+        found: dict[str, Any] = {
+            f"{prefix}/pose": [*place.translation(), *place.rotation().ToQuaternion().wxyz()],
+        }
+        kinds: dict[Any, list[FloatArray]] = {}
+        for made in shapes:
+            kind = type(self.inspector.GetShape(made))
+            kinds.setdefault(kind, []).append(self._reach(made, frame))
+        boxes, spheres = kinds.pop(geometry.Box, []), kinds.pop(geometry.Sphere, [])
+        found |= outlines(prefix, _merged(boxes, spheres), chain(*kinds.values()))
+        if shapes:
+            found[f"{prefix}/friction"] = self._friction(owner)
+            found[f"{prefix}/margin"] = self._margin(owner)
+        return found
+
+    def _reach(self, made: Any, frame: Any) -> FloatArray:
+        """The reach of a shape in `frame`."""
+        shape = self.inspector.GetShape(made)
+        place = frame.inverse() @ self.inspector.GetPoseInFrame(made)
+        pose = Pose.from_array([*place.translation(), *place.rotation().ToQuaternion().wxyz()])
+        if isinstance(shape, geometry.Sphere):
+            return DIRECTIONS @ place.translation() + shape.radius()
+        if isinstance(shape, geometry.Box):
+            return reach(placed(box_corners(shape.size()), pose))
+        hull = self.inspector.GetConvexHull(made)
+        corners = [hull.vertex(k) for k in range(hull.num_vertices())]
+        return reach(placed(np.array(corners), pose))
+
+    def _inertial(self, prefix: str, body: Any) -> dict[str, Any]:
+        inertia = body.CalcSpatialInertiaInBodyFrame(self.context)
+        com = inertia.get_com()
+        central = inertia.Shift(com).CalcRotationalInertia()
+        enabled = self.world.plant.gravity_field().is_enabled(body.model_instance())
+        return {
+            f"{prefix}/mass": inertia.get_mass(),
+            f"{prefix}/com": com,
+            f"{prefix}/inertia": central.CopyToFullMatrix3(),
+            f"{prefix}/gravity": float(enabled),
+        }
+
+    def _friction(self, name: str) -> Any:
+        """The one friction coefficient of all shapes of a body; all of them if they differ."""
+        values = []
+        for made in self.world.shapes[name]:
+            surface = self.inspector.GetProximityProperties(made)
+            friction = surface.GetProperty("material", "coulomb_friction")
+            values += [friction.static_friction(), friction.dynamic_friction()]
+        return one_value(values)
+
+    def _margin(self, name: str) -> Any:
+        surfaces = (self.inspector.GetProximityProperties(m) for m in self.world.shapes[name])
+        return one_value([s.GetPropertyOrDefault("hydroelastic", "margin", 0.0) for s in surfaces])
+
+    def _can_touch(self, a: str, b: str) -> bool:
+        """Whether the main shapes of two can collide; of two links, whether any can."""
+        pairs = [(x, y) for x in self._shapes(a) for y in self._shapes(b)]
+        found = (not self.inspector.CollisionFiltered(x, y) for x, y in pairs)
+        return any(found) if a[:4] == b[:4] == "link" else bool(pairs) and all(found)
+
+    def _shapes(self, name: str) -> Sequence[Any]:
+        """All but the spheres, which do not collide with each other."""
+        made = self.world.shapes.get(name.partition("/")[2] or name, [])
+        return [m for m in made if not isinstance(self.inspector.GetShape(m), geometry.Sphere)]
+
+    def _robot(self, prepared: PreparedRobot) -> dict[str, Any]:
+        world, context = self.world, self.context
+        coupled = world.plant.GetConstraintActiveStatus(context, world.coupling)
+        reported: dict[str, Any] = {"gripper/coupled": float(coupled)}
+        for name in prepared.robot.joint_names:
+            joint, drive = world.joints[name], world.drives[name]
+            gains = drive.get_controller_gains()
+            limits = [joint.position_lower_limits()[0], joint.position_upper_limits()[0]]
+            reported[f"joint/{name}/axis"] = _axis(joint)
+            reported[f"joint/{name}/limits"] = limits
+            reported[f"joint/{name}/effort_limit"] = drive.effort_limit()
+            reported[f"joint/{name}/stiffness"] = gains.p
+            reported[f"joint/{name}/damping"] = gains.d + joint.GetDampingVector(context)[0]
+            reported[f"joint/{name}/armature"] = drive.calc_reflected_inertia(context)
+            reported[f"joint/{name}/initial_position"] = joint.GetOnePosition(context)
+        for name in prepared.links:
+            pose = world.plant.EvalBodyPoseInWorld(context, world.links[name])
+            reported |= self._part(f"link/{name}", name, pose, math.RigidTransform())
+        for link in prepared.moving_links:
+            reported |= self._inertial(f"link/{link.name}", world.links[link.name])
+        return reported
+
+
+def _merged(boxes: Sequence[FloatArray], spheres: Sequence[FloatArray]) -> list[FloatArray]:
+    """Reaches of the boxes, each sphere made one with the box that it sticks out of least."""
+    merged = list(boxes)
+    for sphere in spheres:  # which the adapter adds, see `drake_world`
+        k = int(np.argmin([np.max(sphere - box) for box in boxes]))
+        merged[k] = np.maximum(merged[k], sphere)
+    return merged
+
+
+def _axis(joint: Any) -> FloatArray:
+    """Motion subspace of a joint in the frame of its child."""
+    frame = joint.frame_on_child().GetFixedPoseInBodyFrame()
+    still = np.zeros(3)
+    if isinstance(joint, trees.PrismaticJoint):
+        return np.concatenate([still, frame.rotation() @ joint.translation_axis()])
+    axis = frame.rotation() @ joint.revolute_axis()
+    return np.concatenate([axis, np.cross(frame.translation(), axis)])

@@ -1,0 +1,233 @@
+"""Drake's settings, and the world that its adapter builds: plant, shapes, robot, drives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from pytest_simbench.scene import Box, FloatArray, Pose, Scene
+from pytest_simbench.simulator import PreparedRobot, Settings, lazy_import
+from pytest_simbench.simulator.shapes import mesh_points
+from pytest_simbench.simulator.urdf import Link, Shape
+
+from .shapes import (
+    corner_centres,
+    fitting_radius,
+    pad_centres,
+)
+
+eigen = lazy_import("pydrake.common.eigen_geometry")
+geometry = lazy_import("pydrake.geometry")
+math = lazy_import("pydrake.math")
+plants = lazy_import("pydrake.multibody.plant")
+trees = lazy_import("pydrake.multibody.tree")
+
+GREY = (0.5, 0.5, 0.5, 1.0)
+LIGHT = (0.85, 0.85, 0.85, 1.0)
+
+
+@dataclass(frozen=True)
+class DrakeSettings(Settings):
+    """Drake's options; defaults are those of its MultibodyPlantConfig and SceneGraphConfig.
+
+    Attributes:
+        timestep: of the discrete update [s].
+        contact_model: points, or hydroelastic surfaces where both shapes have a compliance.
+        approximation: of the discrete contact problem, each solved by SAP.
+        near_rigid_threshold: SAP softens contacts stiffer than this allows, for conditioning.
+        stiction_tolerance: slip below which `lagged` and `similar` regularise friction [m/s].
+        compliance: of every surface; `undefined` leaves the pair to point contact.
+        hydroelastic_modulus: [Pa].
+        point_stiffness: of a contact point [N/m].
+        hunt_crossley_dissipation: of `lagged` and `similar` [s/m].
+        relaxation_time: of `sap`'s linear dissipation [s].
+        corner_radius: of the spheres in the corners of free boxes [m]; 0: none, plain boxes.
+        pad_radius: of the spheres behind the fingers' gripping faces [m]; 0: none.
+        shrink: what a free box with corner spheres loses on each face [m].
+    """
+
+    timestep: float = 0.001
+    contact_model: Literal["point", "hydroelastic", "hydroelastic_with_fallback"] = (
+        "hydroelastic_with_fallback"
+    )
+    approximation: Literal["sap", "similar", "lagged"] = "lagged"
+    near_rigid_threshold: float = 1.0
+    stiction_tolerance: float = 1e-4
+    compliance: Literal["undefined", "rigid", "compliant"] = "undefined"
+    hydroelastic_modulus: float = 1e7
+    point_stiffness: float = 1e6
+    hunt_crossley_dissipation: float = 50.0
+    relaxation_time: float = 0.1
+    corner_radius: float = 0.0
+    pad_radius: float = 0.0
+    shrink: float = 0.0
+
+
+class World:
+    """A scene in a plant that is added to `builder` and finalised.
+
+    Attributes:
+        plant, scene_graph: Drake's bodies and joints, and their shapes.
+        scene: what was built.
+        prepared: the reduced robot, or None.
+        bodies, links, joints, drives: Drake's objects by the scene's names; a fixed box is part of
+            the world body.
+        shapes: geometry ids by name of the box or link that they belong to, or "ground".
+        model: the robot's model instance.
+        coupling: id of the constraint between the fingers.
+    """
+
+    def __init__(self, scene: Scene, settings: DrakeSettings, builder: Any) -> None:
+        self.settings, self.scene = settings, scene
+        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
+        self.plant, self.scene_graph = plants.AddMultibodyPlant(self._options(), builder)
+        self.scene_graph.set_config(self._surfaces())
+        self.plant.mutable_gravity_field().set_gravity_vector(scene.gravity)
+        self.shapes: dict[str, list[Any]] = {}
+        self._spheres: list[Any] = []
+        world, plane = self.plant.world_body(), geometry.HalfSpace()
+        self._add_shape(world, "ground", "plane", plane, Pose(), scene.ground_friction)
+        slab = geometry.Box(10.0, 10.0, 0.02)
+        self._add_picture(world, "ground", slab, Pose((0.0, 0.0, -0.01)), GREY)
+        self.bodies = {box.name: self._add_box(box) for box in scene.bodies}
+        self.links: dict[str, Any] = {}
+        self.joints: dict[str, Any] = {}
+        self.drives: dict[str, Any] = {}
+        if self.prepared is not None:
+            self._add_links(self.prepared)
+            self._add_joints(self.prepared)
+        self.plant.Finalize()
+        self._filter_collisions()
+
+    def _options(self) -> Any:
+        s = self.settings
+        return plants.MultibodyPlantConfig(
+            time_step=s.timestep,
+            use_sampled_output_ports=False,  # they would add state, and only cost time here
+            contact_model=s.contact_model,
+            discrete_contact_approximation=s.approximation,
+            sap_near_rigid_threshold=s.near_rigid_threshold,
+            stiction_tolerance=s.stiction_tolerance,
+        )
+
+    def _surfaces(self) -> Any:
+        s, config = self.settings, geometry.SceneGraphConfig()
+        surface = config.default_proximity_properties
+        surface.compliance_type = s.compliance
+        surface.hydroelastic_modulus = s.hydroelastic_modulus
+        surface.point_stiffness = s.point_stiffness
+        surface.hunt_crossley_dissipation = s.hunt_crossley_dissipation
+        surface.relaxation_time = s.relaxation_time
+        return config
+
+    def _add_shape(
+        self, body: Any, owner: str, part: str, shape: Any, pose: Pose, friction: float
+    ) -> Any:
+        """A collision shape. Of two surfaces' friction Drake takes the harmonic mean."""
+        surface = geometry.ProximityProperties()
+        geometry.AddContactMaterial(
+            properties=surface, friction=plants.CoulombFriction(friction, friction)
+        )
+        made = self.plant.RegisterCollisionGeometry(
+            body, transform(pose), shape, f"{owner}/{part}", surface
+        )
+        self.shapes.setdefault(owner, []).append(made)
+        return made
+
+    def _add_picture(self, body: Any, name: str, shape: Any, pose: Pose, colour: Any) -> None:
+        self.plant.RegisterVisualGeometry(body, transform(pose), shape, name, np.array(colour))
+
+    def _add_spheres(
+        self, body: Any, name: str, centres: FloatArray, radius: float, friction: float
+    ) -> None:
+        for k, (x, y, z) in enumerate(centres):
+            pose = Pose((float(x), float(y), float(z)))
+            sphere = geometry.Sphere(radius)
+            made = self._add_shape(body, name, f"sphere{k}", sphere, pose, friction)
+            self._spheres.append(made)
+
+    def _add_box(self, box: Box) -> Any:
+        s = self.settings
+        if box.fixed:
+            body, pose, gone = self.plant.world_body(), box.pose, 0.0
+        else:
+            inertia = trees.SpatialInertia.SolidBoxWithMass(box.mass, *box.size)
+            body, pose = self.plant.AddRigidBody(box.name, inertia), Pose()
+            gone = s.shrink if s.corner_radius else 0.0
+            if s.corner_radius:
+                radius = fitting_radius(box.size, s.corner_radius)
+                centres = corner_centres(box.size, radius)
+                self._add_spheres(body, box.name, centres, radius, box.friction)
+        core = geometry.Box(*(np.asarray(box.size) - 2 * gone))
+        self._add_shape(body, box.name, "box", core, pose, box.friction)
+        self._add_picture(body, box.name, geometry.Box(*box.size), pose, box.colour)
+        return body
+
+    def _add_links(self, prepared: PreparedRobot) -> None:
+        plant, robot = self.plant, prepared.robot
+        self.model = plant.AddModelInstance(robot.name)
+        for link in prepared.links.values():
+            body = plant.AddRigidBody(link.name, self.model, _inertia(link))
+            self.links[link.name] = body
+            for k, shape in enumerate(link.shapes):
+                made = _robot_shape(shape, f"{link.name}_{k}")
+                self._add_shape(body, link.name, str(k), made, shape.pose, robot.friction)
+                self._add_picture(body, f"{link.name}/{k}", made, shape.pose, LIGHT)
+        plant.WeldFrames(plant.world_frame(), self.links[prepared.root].body_frame())
+
+    def _add_joints(self, prepared: PreparedRobot) -> None:
+        plant, robot, s = self.plant, prepared.robot, self.settings
+        for joint in prepared.joints:
+            kind = trees.RevoluteJoint if joint.kind == "revolute" else trees.PrismaticJoint
+            parent, child = self.links[joint.parent], self.links[joint.child]
+            offset = trees.FixedOffsetFrame(
+                f"{joint.name}/origin", parent.body_frame(), transform(joint.origin)
+            )
+            ends = plant.AddFrame(offset), child.body_frame()
+            limits = prepared.limits[joint.name]
+            made = plant.AddJoint(kind(joint.name, *ends, joint.axis, *limits))
+            self.joints[joint.name] = made
+            if s.pad_radius and joint.name in robot.gripper.joints:
+                centres = pad_centres(prepared, joint, s.pad_radius)
+                self._add_spheres(child, joint.child, centres, s.pad_radius, robot.friction)
+        for drive in robot.joints:
+            made = plant.AddJointActuator(drive.name, self.joints[drive.name], drive.effort_limit)
+            made.set_default_rotor_inertia(drive.armature)
+            made.set_controller_gains(trees.PdControllerGains(p=drive.stiffness, d=drive.damping))
+            self.drives[drive.name] = made
+        first, second = (self.joints[name] for name in robot.gripper.joints)
+        self.coupling = plant.AddCouplerConstraint(first, second, 1.0)
+
+    def _filter_collisions(self) -> None:
+        manager = self.scene_graph.collision_filter_manager()
+        apart = []
+        if self.prepared is not None:
+            frames = [self.plant.GetBodyFrameIdOrThrow(b.index()) for b in self.links.values()]
+            apart.append(geometry.GeometrySet(frames))
+        if self._spheres:  # they carry flat faces; one on top of another would roll off
+            apart.append(geometry.GeometrySet(self._spheres))
+        for group in apart:
+            manager.Apply(geometry.CollisionFilterDeclaration().ExcludeWithin(group))
+
+
+def transform(pose: Pose) -> Any:
+    """Drake's rigid transform of a pose."""
+    q = np.asarray(pose.quaternion)
+    return math.RigidTransform(eigen.Quaternion(q / np.linalg.norm(q)), pose.position)
+
+
+def _inertia(link: Link) -> Any:
+    if link.mass == 0:
+        return trees.SpatialInertia.Zero()
+    i = link.inertia
+    central = trees.RotationalInertia(i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2])
+    return trees.SpatialInertia.MakeFromCentralInertia(link.mass, link.centre, central)
+
+
+def _robot_shape(shape: Shape, label: str) -> Any:
+    """A box, or the convex hull of a mesh; Drake itself reads no STL files."""
+    if shape.size is not None:
+        return geometry.Box(*shape.size)
+    return geometry.Convex(points=mesh_points(shape.mesh or "").T, label=label)

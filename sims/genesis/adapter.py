@@ -1,0 +1,271 @@
+"""Genesis (Genesis AI), rigid-body solver on the CPU.
+
+Drives are Genesis' own position-velocity controllers: force = k (q* - q) + d (v* - v), cut at the
+effort limit. The feed-forward effort rides on the position: q* + tau_ff / k. The limit is symmetric
+and bounds the whole sum.
+
+The engine compiles its kernels (Quadrants, a fork of Taichi) when they are first called, for each
+combination of options; the machine code is kept on disk. See docs/engines/genesis.md for times.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import gc
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.simulator import (
+    Capability,
+    Deviation,
+    PreparedRobot,
+    SeedsSeen,
+    Settings,
+    Simulator,
+    SimulatorInfo,
+    lazy_import,
+)
+
+from .engine import (
+    array_of,
+    forget_worlds,
+    numbers,
+    start_engine,
+    tensors_in,
+)
+from .readback import ReadBack
+from .world import (
+    LEAST_FRICTION,
+    GenesisSettings,
+    add_box,
+    add_camera,
+    add_robot,
+    material,
+    new_world,
+)
+
+genesis = lazy_import("genesis")
+
+
+class Genesis(Simulator):
+    """Adapter of Genesis."""
+
+    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+        name="genesis",
+        title="Genesis",
+        distribution="genesis-world",
+        modules=("genesis",),
+        install="pytest --sim-install genesis",
+        licence="Apache-2.0",
+        engine="Genesis",
+        tested_version="1.2.3",
+        capabilities=frozenset(
+            {
+                Capability.WINDOW,
+                Capability.OFFSCREEN,
+                Capability.SAVE_RESTORE,
+                Capability.EXACT_RESTORE,
+                Capability.CONTACT_COUNT,
+                Capability.DETERMINISTIC,
+            }
+        ),
+        deviations=(
+            Deviation("link/*/damping", "Genesis has no damping of links"),
+            Deviation("body/*/margin link/*/margin", "Genesis' shapes have no margin"),
+            Deviation("", f"no contact has a friction coefficient below {LEAST_FRICTION}"),
+        ),
+        costly_start=True,
+        compile_timeout=1800.0,
+        requirements=("torch==2.13.0", "genesis-world==1.2.3"),
+        caches={"QD_OFFLINE_CACHE_FILE_PATH": "quadrants", "GS_CACHE_FILE_PATH": "genesis"},
+        install_size_mb=3700,
+        language="Python (Quadrants)",
+    )
+    profiles: ClassVar[Mapping[str, Settings]] = {
+        "default": GenesisSettings(),
+        "tuned": GenesisSettings(
+            timestep=0.002,
+            constraint_timeconst=0.004,
+            friction_cone="elliptic",
+            box_box_detection=True,
+        ),
+    }
+    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+        "tuned": (SeedsSeen("throwing", 100, 101),),
+    }
+    settings: GenesisSettings
+    world: Any = None
+    compiled: ClassVar[set[tuple[Any, ...]]] = set()
+    """What this process has kernels for, see `compile`."""
+
+    def compile(self, scene: Scene) -> None:
+        """Build and step such a world once; kernels depend on options and on the kinds of bodies.
+
+        The engine writes new machine code to disk when it is shut down, which is why that is done
+        here: the worker's end leaves it no time. Nothing less will do: writing it out meanwhile
+        (`dump_cache_data_to_disk`) makes kernels of later worlds crash.
+        """
+        several = len(scene.free_bodies) + (scene.robot is not None) > 1  # solved by islands
+        options = dataclasses.replace(  # what is data, not code
+            self.settings, timestep=1.0, substeps=1, constraint_timeconst=1.0, impedance=(0.9, 0.95)
+        )
+        kind = (options, several, scene.robot is not None, bool(scene.free_bodies))
+        if kind in self.compiled:
+            return
+        self.load(scene)
+        self.step()
+        self.body_state()
+        self.read_back()
+        self.restore(self.save())
+        self.close()
+        genesis.destroy()
+        self.compiled.add(kind)
+
+    def load(self, scene: Scene) -> None:
+        self.scene, self._steps = scene, 0
+        self._camera: Any = None
+        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
+        start_engine(self.settings.precision)
+        self.world = world = new_world(scene, self.settings, window=self.gui)
+        self._ground = world.add_entity(
+            genesis.morphs.Plane(), material=material(scene.ground_friction)
+        )
+        self._boxes = {box.name: add_box(world, box) for box in scene.bodies}
+        self._robot: Any = None if self.prepared is None else add_robot(world, self.prepared)
+        world.build()
+        self.solver = world.rigid_solver
+        self._set_contacts(scene)
+        self._free = [self._boxes[box.name].links[0].idx for box in scene.free_bodies]
+        self._dofs: list[int] = []
+        if scene.robot is not None:
+            self._set_drives(scene.robot)
+
+    def _set_contacts(self, scene: Scene) -> None:
+        """Impedance of contacts, and frictions that a material refuses."""
+        solver, geoms = self.solver, self.solver.geoms
+        parameters = np.array([geom.sol_params.cpu().numpy() for geom in geoms])
+        if (parameters[:, 2:4] != self.settings.impedance).any():
+            parameters[:, 2:4] = self.settings.impedance
+            for geom, values in zip(geoms, parameters, strict=True):
+                geom.set_sol_params(values)
+        frictions = {self._boxes[box.name]: box.friction for box in scene.bodies}
+        frictions[self._ground] = scene.ground_friction
+        for entity, friction in frictions.items():
+            if friction < LEAST_FRICTION:
+                for geom in entity.geoms:
+                    solver.set_geom_friction(friction, geom.idx)
+
+    def _set_drives(self, robot: Any) -> None:
+        entity = self._robot
+        joints = [entity.get_joint(name) for name in robot.joint_names]
+        self._dofs = dofs = [joint.dof_start for joint in joints]
+        solver = self.solver
+        self._stiffness = robot.column("stiffness")
+        limit = robot.column("effort_limit")
+        solver.set_dofs_armature(robot.column("armature"), dofs)
+        solver.set_dofs_kp(self._stiffness, dofs)
+        solver.set_dofs_kv(robot.column("damping"), dofs)
+        solver.set_dofs_damping(np.zeros(len(dofs)), dofs)
+        solver.set_dofs_frictionloss(np.zeros(len(dofs)), dofs)
+        solver.set_dofs_force_range(-limit, limit, dofs)
+        initial = robot.column("initial_position")
+        solver.set_dofs_position(initial, dofs)
+        self.command(initial, np.zeros(len(dofs)), np.zeros(len(dofs)))
+
+    def read_back(self) -> dict[str, Any]:
+        return ReadBack(
+            self.solver,
+            self.settings.substeps,
+            self._ground,
+            self._boxes,
+            self._robot,
+            self.scene,
+            self.prepared,
+        ).all()
+
+    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        self.solver.control_dofs_position_velocity(
+            position + effort / self._stiffness, velocity, self._dofs
+        )
+
+    def step(self) -> None:
+        self.world.step(update_visualizer=False)
+        self._steps += 1
+
+    @property
+    def time(self) -> float:
+        return self._steps * self.settings.timestep
+
+    def body_state(self) -> FloatArray:
+        state = np.empty((len(self._free), 13))
+        if self._free:
+            state[:, :7] = self._poses(self._free)
+            state[:, 7:10] = numbers(self.solver.get_links_vel(self._free, ref="link_com"))
+            state[:, 10:] = numbers(self.solver.get_links_ang(self._free))
+        return state
+
+    def _poses(self, links: list[int]) -> FloatArray:
+        """Positions and quaternions of links, (n, 7)."""
+        if not links:
+            return np.empty((0, 7))
+        position = numbers(self.solver.get_links_pos(links))
+        quaternion = numbers(self.solver.get_links_quat(links))
+        return np.hstack([position, quaternion / np.linalg.norm(quaternion, axis=1)[:, None]])
+
+    def joint_state(self) -> FloatArray:
+        if not self._dofs:
+            return np.empty((2, 0))
+        return np.stack(
+            [
+                numbers(self.solver.get_dofs_position(self._dofs)),
+                numbers(self.solver.get_dofs_velocity(self._dofs)),
+            ]
+        )
+
+    def save(self) -> tuple[int, list[NDArray[Any]]]:
+        return self._steps, [array_of(tensor) for tensor in self._tensors()]
+
+    def restore(self, state: tuple[int, list[NDArray[Any]]]) -> None:
+        self._steps = state[0]
+        for tensor, values in zip(self._tensors(), state[1], strict=True):
+            array_of(tensor, copy=False)[...] = values
+
+    def _tensors(self) -> Iterator[Any]:
+        """All that a step reads and writes: motion, targets, warm starts, cached contact normals.
+
+        The engine's own saved state has neither targets nor warm starts, nor the last contacts.
+        """
+        solver = self.solver
+        for part in (
+            solver.dyn_state,
+            solver.rigid_info,
+            solver.collider._collider_state,
+            solver.constraint_solver.constraint_state,
+        ):
+            yield from tensors_in(part)
+
+    def contact_count(self) -> int:
+        return int(array_of(self.solver.collider._collider_state.n_contacts)[0])
+
+    def render(self, width: int, height: int) -> NDArray[np.uint8]:
+        if self._camera is None or self._camera.res != (width, height):
+            self._camera = add_camera(self.world, width, height)
+        picture = self._camera.render(rgb=True, force_render=True)[0]
+        return np.array(numbers(picture)[..., :3], dtype=np.uint8)
+
+    def refresh_window(self) -> None:
+        if self.gui:
+            self.world.visualizer.update(force=True)
+
+    def close(self) -> None:
+        self._camera = self._robot = self._ground = self.solver = None
+        self._boxes = {}
+        if self.world is not None:
+            self.world.destroy()
+            self.world = None
+            forget_worlds()
+            gc.collect()  # scene, solver and entities refer to each other

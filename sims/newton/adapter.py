@@ -1,0 +1,283 @@
+"""Newton (NVIDIA, Google DeepMind, Disney Research), on the CPU.
+
+Newton is a builder of worlds and a set of solvers over them. The one here is SolverMuJoCo with
+MuJoCo's C implementation: Newton's model is converted once, and each step copies Newton's state
+(single precision) into MuJoCo, steps that, and copies back.
+
+Drives are the position actuators of SolverMuJoCo (`newton.solvers.mujoco`), force = k (ctrl - q) -
+d v within the effort limit, so velocity and effort feed-forward ride on the control: ctrl = q* +
+(d v* + tau_ff) / k. Newton's own joint targets obey the same law but when they saturate: they are
+clipped at the joint, where MuJoCo's implicit integrator does not see it and goes on damping the
+drive. Joint 1 of the Panda then gains 58 % of the momentum that its effort limit allows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.simulator import (
+    Capability,
+    Deviation,
+    PreparedRobot,
+    Settings,
+    Simulator,
+    SimulatorInfo,
+    lazy_import,
+)
+
+from ..mujoco.pictures import DISABLED, renderer
+from ..mujoco.readback import Numbers, ReadBack
+from .world import NewtonSettings, build_model, make_solver, names
+
+newton = lazy_import("newton")
+wp = lazy_import("warp")
+mujoco = lazy_import("mujoco")
+
+
+class Newton(Simulator):
+    """Adapter of Newton."""
+
+    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+        name="newton",
+        title="Newton",
+        distribution="newton",
+        modules=("newton", "mujoco_warp", "pyglet", "trimesh"),
+        install="pytest --sim-install newton",
+        licence="Apache-2.0",
+        engine="MuJoCo",
+        language="Python (Warp), C",
+        tested_version="1.8.0",
+        capabilities=frozenset(
+            {
+                Capability.WINDOW,
+                Capability.OFFSCREEN,
+                Capability.SAVE_RESTORE,
+                Capability.EXACT_RESTORE,
+                Capability.CONTACT_COUNT,
+                Capability.DETERMINISTIC,
+            }
+        ),
+        deviations=(
+            Deviation("", "contacts are soft by design: cubes sink in and creep a little"),
+            Deviation("", "the state is kept in single precision between steps"),
+        ),
+        costly_start=True,
+        compile_timeout=900.0,
+        requirements=(
+            "newton==1.8.0",
+            "warp-lang==1.19.0",
+            "mujoco==3.17.0",
+            "mujoco-warp==3.17.0",
+            "numpy==2.4.6",
+            "scipy==1.17.1",
+            "trimesh==5.2.0",
+            "pyglet==2.1.19",
+            "pillow==13.0.0",
+        ),
+        caches={"WARP_CACHE_PATH": "warp"},
+        install_size_mb=900,
+        environment=DISABLED,
+    )
+    profiles: ClassVar[Mapping[str, Settings]] = {
+        "default": NewtonSettings(),
+        "tuned": NewtonSettings(
+            timestep=0.001,
+            cone="elliptic",
+            condim=4,
+            ke=250000.0,
+            kd=1000.0,
+            solimp=(0.99, 0.9999, 0.001),
+            gap=0.0,
+        ),
+    }
+    settings: NewtonSettings
+
+    _compiled: ClassVar[set[bool]] = set()
+
+    def compile(self, scene: Scene) -> None:
+        """Load the world once and step it: Warp then has every kernel, on disk and in memory.
+
+        Scenes with a robot need more kernels than scenes without; a process does each kind once.
+        """
+        kind = scene.robot is not None
+        if kind not in Newton._compiled:
+            self.load(scene)
+            self.step()
+            self.close()
+            Newton._compiled.add(kind)
+
+    def load(self, scene: Scene) -> None:
+        wp.config.log_level = wp.LOG_WARNING
+        self.scene = scene
+        self._viewer: Any = None
+        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
+        self.model = build_model(scene, self.prepared, self.settings)
+        self._number(scene)
+        self.solver = make_solver(self.model, self.settings)
+        self._states = [self.model.state(), self.model.state()]
+        self._control = self.model.control()
+        ctrl = self._control.mujoco.ctrl if scene.robot is not None else None
+        self._ctrl: Any = None if ctrl is None else ctrl.numpy()  # a view: the device is the CPU
+        self._steps = 0
+        for state in self._states:
+            newton.eval_fk(self.model, self.model.joint_q, self.model.joint_qd, state)
+        self._show_mujoco_the_start()
+        if self.gui:
+            self._open_window()
+
+    def _show_mujoco_the_start(self) -> None:
+        """Newton hands its state to MuJoCo only in `step`; it may be looked at before."""
+        model, data = self.solver.mj_model, self.solver.mj_data
+        data.qpos[model.jnt_qposadr[self._mujoco_joints()]] = self.model.joint_q.numpy()[self._q]
+        mujoco.mj_forward(model, data)
+
+    def _mujoco_joints(self) -> list[int]:
+        """MuJoCo's numbers of the driven joints."""
+        numbers = self.solver.mjc_jnt_to_newton_jnt.numpy()[0].tolist()
+        return [numbers.index(joint) for joint in self._joints]
+
+    def _number(self, scene: Scene) -> None:
+        """Where Newton's arrays hold the driven joints and the free bodies."""
+        model = self.model
+        labels = names(model.joint_label)
+        driven = scene.robot.joint_names if scene.robot else ()
+        self._joints = joints = np.array([labels.index(name) for name in driven], dtype=int)
+        self._q = model.joint_q_start.numpy()[joints]
+        self._v = model.joint_qd_start.numpy()[joints]
+        self._free = [model.body_label.index(body.name) for body in scene.free_bodies]
+        if scene.robot is not None:
+            self._stiffness = scene.robot.column("stiffness")
+            self._damping = scene.robot.column("damping")
+
+    def read_back(self) -> dict[str, Any]:
+        """From MuJoCo's model, which is what is stepped."""
+        prepared = self.prepared
+        bodies = self.solver.mjc_body_to_newton.numpy()[0].tolist()
+        labels = names(self.model.body_label)
+        links = () if prepared is None else prepared.links
+        joints = () if prepared is None else prepared.robot.joint_names
+        numbers = Numbers(
+            self._geom("ground"),
+            {box.name: self._geom(box.name) for box in self.scene.bodies},
+            {name: bodies.index(labels.index(name)) for name in links},
+            dict(zip(joints, self._mujoco_joints(), strict=True)),
+        )
+        model, data = self.solver.mj_model, self.solver.mj_data
+        return ReadBack(model, data, self.scene, prepared, numbers).all()
+
+    def _geom(self, label: str) -> int:
+        """MuJoCo's number of Newton's shape with this label."""
+        return self._shapes().index(self.model.shape_label.index(label))
+
+    def _shapes(self) -> list[int]:
+        """Newton's number of each of MuJoCo's geoms."""
+        numbers: list[int] = self.solver.mjc_geom_to_newton_shape.numpy()[0].tolist()
+        return numbers
+
+    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        self._ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness
+
+    def step(self) -> None:
+        before, after = self._states
+        timestep = float(self.solver.mj_model.opt.timestep)
+        self.solver.step(before, after, self._control, None, timestep)
+        self._states = [after, before]
+        self._steps += 1
+
+    @property
+    def time(self) -> float:
+        return self._steps * self.settings.timestep
+
+    def body_state(self) -> FloatArray:
+        state = self._states[0]
+        rows = np.empty((len(self._free), 13))
+        if self._free:
+            poses, velocities = state.body_q.numpy(), state.body_qd.numpy()
+            rows[:, :3] = poses[self._free, :3]
+            rows[:, 3] = poses[self._free, 6]  # Newton's quaternions end with w
+            rows[:, 4:7] = poses[self._free, 3:6]
+            rows[:, 7:] = velocities[self._free]
+        return rows
+
+    def joint_state(self) -> FloatArray:
+        state = self._states[0]
+        if not len(self._q):
+            return np.empty((2, 0))
+        return np.stack([state.joint_q.numpy()[self._q], state.joint_qd.numpy()[self._v]]).astype(
+            float
+        )
+
+    def save(self) -> dict[str, Any]:
+        """Newton's state and command, and what MuJoCo remembers beyond them (warm starts)."""
+        model, data = self.solver.mj_model, self.solver.mj_data
+        kind = mujoco.mjtState.mjSTATE_INTEGRATION
+        memory = np.empty(mujoco.mj_stateSize(model, kind))
+        mujoco.mj_getState(model, data, memory, kind)
+        arrays = [getattr(self._states[0], name).numpy().copy() for name in _STATE]
+        command = self._ctrl.copy() if self._ctrl is not None else None
+        return {"arrays": arrays, "command": command, "memory": memory, "steps": self._steps}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        for name, values in zip(_STATE, state["arrays"], strict=True):
+            getattr(self._states[0], name).numpy()[:] = values
+        if self._ctrl is not None:
+            self._ctrl[:] = state["command"]
+        kind = mujoco.mjtState.mjSTATE_INTEGRATION
+        mujoco.mj_setState(self.solver.mj_model, self.solver.mj_data, state["memory"], kind)
+        mujoco.mj_forward(self.solver.mj_model, self.solver.mj_data)
+        self._steps = state["steps"]
+
+    def contact_count(self) -> int:
+        """Contacts that take part in the solution; MuJoCo also lists those within the gap."""
+        data = self.solver.mj_data
+        return int((data.contact.efc_address >= 0).sum())
+
+    def render(self, width: int, height: int) -> NDArray[np.uint8]:
+        """A picture by MuJoCo, whose renderer needs no display."""
+        model = self.solver.mj_model
+        model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+        model.vis.headlight.ambient[:] = 0.4
+        model.geom_rgba[:, :3] = self.model.shape_color.numpy()[self._shapes()]
+        camera = mujoco.MjvCamera()
+        camera.lookat[:] = _LOOK_AT
+        camera.distance, camera.azimuth, camera.elevation = 2.2, 140.0, -25.0
+        with renderer(mujoco, model, width, height) as drawing:
+            drawing.update_scene(self.solver.mj_data, camera)
+            return np.array(drawing.render())
+
+    def _open_window(self) -> None:
+        import newton.viewer
+
+        self._viewer = newton.viewer.ViewerGL(width=960, height=720)
+        self._viewer.set_model(self.model)
+        self._viewer.set_camera(pos=wp.vec3(2.0, -1.3, 1.3), pitch=-25.0, yaw=140.0)
+        self.refresh_window()
+
+    def refresh_window(self) -> None:
+        if self._viewer is not None:
+            self._viewer.begin_frame(self.time)
+            self._viewer.log_state(self._states[0])
+            self._viewer.end_frame()
+
+    def close(self) -> None:
+        if self.__dict__.get("_viewer") is not None:
+            self._viewer.close()
+        for name in ("_viewer", "solver", "model", "_states", "_control", "_ctrl"):
+            self.__dict__.pop(name, None)
+
+    def versions(self) -> dict[str, str]:
+        from importlib.metadata import version
+
+        return {name: version(name) for name in ("newton", "warp-lang", "mujoco", "mujoco-warp")}
+
+
+_LOOK_AT = (0.5, 0.0, 0.35)
+"""What the offscreen camera looks at [m]."""
+
+_STATE = ("joint_q", "joint_qd", "body_q", "body_qd")
+"""Arrays of Newton's state."""

@@ -1,0 +1,311 @@
+"""Omniverse PhysX (NVIDIA), the engine inside Isaac Sim, through the package ovphysx.
+
+The world is handed over as a USD stage, see `ovphysx_stage`. Drives are PhysX's own: implicit
+springs and dampers in reduced coordinates. Their largest force bounds the drive alone, so effort
+feed-forward rides on the position target, q* + tau_ff / k, and the limit bounds the whole sum.
+
+While stepping the engine is commanded and read through its tensor bindings: 0.01 ms each, where a
+session (`ovphysx_session`) takes 0.4 ms. They are deprecated; the version is pinned. The first
+touch of a binding runs a step of its own, so before the first step only sessions are used.
+
+It has no renderer: ovphysx is a headless library, and Isaac Sim's window is not part of it.
+Contacts could be counted, but their reports cost 15 % of stepping.
+
+The contacts' memory cannot be saved, so `restore` builds the world anew, runs the one step that
+bindings need, and writes the saved state: every restore has the same future, bit for bit, though
+not quite that of the uninterrupted run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_simbench.scene import FloatArray, Pose, Scene
+from pytest_simbench.simulator import (
+    Capability,
+    Deviation,
+    PreparedRobot,
+    SeedsSeen,
+    Settings,
+    Simulator,
+    SimulatorInfo,
+    lazy_import,
+)
+from pytest_simbench.simulator.kinematics import link_poses
+
+from . import stage as usd
+from .readback import read_back
+from .session import Session
+
+ovphysx_types = lazy_import("ovphysx.types")
+
+_Saved = tuple[int, dict[str, NDArray[np.float32]], tuple[FloatArray, FloatArray] | None]
+
+
+@dataclass(frozen=True)
+class OvPhysXSettings(Settings):
+    """PhysX's options; defaults are those of its USD schemas.
+
+    `tuned` takes a short step with few iterations, which lets an impact through: with many, a
+    pyramid takes it as one block. What that costs the drives is told in docs/engines/ovphysx.md.
+
+    Attributes:
+        timestep: [s]; 1/60 is what PhysxSceneAPI says.
+        solver: temporal or projected Gauss-Seidel.
+        body_iterations: position iterations of free bodies.
+        arm_iterations: those of the articulation. The largest number of all counts for the whole
+            scene: with 4 for the arm, 1, 2 and 4 for the bodies give the same bits.
+        velocity_iterations: of both.
+        linear_damping, angular_damping: of bodies and links [1/s].
+        sleeping: whether bodies at rest are frozen.
+        max_depenetration_velocity: with which bodies that overlap are pushed apart [m/s].
+        contact_offset: distance at which contacts are made [m]; None lets PhysX choose by size.
+        rest_offset: distance at which they rest [m]; None lets PhysX choose.
+        friction_offset_threshold: distance below which a contact has friction [m].
+        friction_correlation_distance: below which contacts share a friction anchor [m].
+        forces_every_iteration: apply gravity in each position iteration instead of once a step.
+        contact_last: solve the articulation's contacts after everything else.
+        threads: workers of PhysX; 0 computes in the calling thread. Its own default is 8, which
+            computes the same bits, five times as slowly in a scene this small.
+    """
+
+    timestep: float = 1.0 / 60.0
+    solver: Literal["TGS", "PGS"] = "TGS"
+    body_iterations: int = 16
+    arm_iterations: int = 32
+    velocity_iterations: int = 1
+    linear_damping: float = 0.0
+    angular_damping: float = 0.05
+    sleeping: bool = True
+    max_depenetration_velocity: float = 3.0
+    contact_offset: float | None = None
+    rest_offset: float | None = None
+    friction_offset_threshold: float = 0.04
+    friction_correlation_distance: float = 0.025
+    forces_every_iteration: bool = True
+    contact_last: bool = False
+    threads: int = 0
+
+
+class OvPhysX(Simulator):
+    """Adapter of Omniverse PhysX."""
+
+    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+        name="ovphysx",
+        title="Omniverse PhysX",
+        distribution="ovphysx",
+        modules=("ovphysx", "ovstage"),
+        install="pytest --sim-install ovphysx",
+        licence="NVIDIA Omniverse licence (proprietary)",
+        engine="PhysX 5",
+        language="C++",
+        tested_version="0.7.0.74035321",
+        capabilities=frozenset({Capability.DETERMINISTIC, Capability.SAVE_RESTORE}),
+        deviations=(
+            Deviation("timestep", "an argument of each step, which PhysX does not report"),
+            Deviation("gravity", "PhysX reports no gravity through this package"),
+            Deviation(
+                "ground/friction ground/restitution", "PhysX reports no material of a static plane"
+            ),
+            Deviation("gripper/coupled", "PhysX reports no mimic joints"),
+            Deviation("body/*/damping link/*/damping", "PhysX reports no damping of bodies"),
+            Deviation("body/*/dynamic", "PhysX does not report which bodies are kinematic"),
+            Deviation("body/*/touches link/*/touches", "PhysX does not report collision groups"),
+            Deviation(
+                "link/*/meshes",
+                "a convex hull that PhysX makes of a mesh has at most 64 corners",
+                within=4e-3,
+            ),
+            Deviation(
+                "link/*/boxes", "measured by sweeping a box, which PhysX rounds", within=1e-4
+            ),
+        ),
+        requirements=(
+            "ovphysx==0.7.0.74035321",
+            "ovstage==0.3.0.1791986420",
+            "physx-usd-schemas==25.11.2.72696984",
+            "warp-lang==1.19.0",
+            "packaging==23.2",
+            "numpy==2.4.6",
+        ),
+        caches={"WARP_CACHE_PATH": "warp"},
+        install_size_mb=1100,
+    )
+    profiles: ClassVar[Mapping[str, Settings]] = {
+        "default": OvPhysXSettings(),
+        "tuned": OvPhysXSettings(
+            timestep=0.002,
+            body_iterations=4,
+            arm_iterations=4,
+            angular_damping=0.0,
+            sleeping=False,
+        ),
+    }
+    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+        "tuned": (SeedsSeen("throwing", 100, 119),),
+    }
+    settings: OvPhysXSettings
+
+    def load(self, scene: Scene) -> None:
+        self.scene = scene
+        self.prepared = PreparedRobot(scene.robot) if scene.robot is not None else None
+        self._text = usd.Stage(scene, self.prepared, _attributes(self.settings)).text()
+        self._start()
+        self._free = [usd.body_path(i) for i, box in enumerate(scene.bodies) if not box.fixed]
+        self._joints: list[str] = []
+        self._unit = np.empty(0)
+        self._placed: dict[str, Pose] = {}
+        if self.prepared is not None:
+            robot = self.prepared.robot
+            self._joints = [usd.joint_path(i) for i in range(len(robot.joints))]
+            self._stiffness = robot.column("stiffness")
+            self._placed = link_poses(self.prepared, dict.fromkeys(robot.joint_names, 0.0))
+            kinds = {joint.name: joint.kind for joint in self.prepared.joints}
+            turning = [kinds[name] == "revolute" for name in robot.joint_names]
+            self._unit = np.where(turning, np.pi / 180, 1.0)  # of the sessions, which count degrees
+
+    def _start(self) -> None:
+        """Begin the world anew."""
+        self.close()
+        self._steps = 0
+        self._targets: tuple[FloatArray, FloatArray] | None = None
+        self._bindings: dict[str, tuple[Any, Any]] = {}
+        self.session = Session(self._text, self.settings.threads)
+
+    def _binding(self, kind: str) -> tuple[Any, Any]:
+        """A tensor binding of the robot or the free bodies, with a buffer of its shape."""
+        found = self._bindings.get(kind)
+        if found is None:
+            tensor = getattr(ovphysx_types.TensorType, kind)
+            prims = [usd.ROOT] if kind.startswith("ARTICULATION") else self._free
+            binding = self.session.physx.create_tensor_binding(
+                tensor_type=tensor, prim_paths=prims, raise_if_empty=True
+            )
+            found = self._bindings[kind] = binding, np.zeros(binding.shape, np.float32)
+        return found
+
+    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        self._targets = position + effort / self._stiffness, velocity
+        if self._steps > 0:
+            self._write_targets(self._targets)
+
+    def _write_targets(self, targets: tuple[FloatArray, FloatArray]) -> None:
+        for kind, values in zip(("POSITION", "VELOCITY"), targets, strict=True):
+            binding, buffer = self._binding(f"ARTICULATION_DOF_{kind}_TARGET")
+            buffer[0, self._columns] = values
+            binding.write(buffer)
+
+    def step(self) -> None:
+        if self._steps == 0 and self._targets is not None:
+            for kind, values in zip(("Position", "Velocity"), self._targets, strict=True):
+                given = zip(self._joints, values / self._unit, strict=True)
+                self.session.write_joints(f"joint{kind}Target", dict(given))
+        self.session.physx.step_sync(self.settings.timestep)
+        self._steps += 1
+        if self._steps == 1 and self._joints:
+            names = self._binding("ARTICULATION_DOF_POSITION")[0].dof_names
+            self._columns = [names.index(path.rpartition("/")[2]) for path in self._joints]
+
+    @property
+    def time(self) -> float:
+        return self._steps * self.settings.timestep
+
+    def body_state(self) -> FloatArray:
+        state = np.empty((len(self._free), 13))
+        if not self._free:
+            return state
+        if self._steps == 0:
+            names = ("position", "orientation", "linearVelocity", "angularVelocity")
+            values = self.session.read("RIGID_BODY", *names)
+            for row, path in zip(state, self._free, strict=True):
+                row[:] = np.concatenate([values[name][path] for name in names])
+        else:
+            for kind, columns in (("POSE", slice(0, 7)), ("VELOCITY", slice(7, 13))):
+                binding, buffer = self._binding(f"RIGID_BODY_{kind}")
+                binding.read(buffer)
+                state[:, columns] = buffer
+        state[:, 3:7] = state[:, [6, 3, 4, 5]]
+        return state
+
+    def joint_state(self) -> FloatArray:
+        state = np.empty((2, len(self._joints)))
+        if not self._joints:
+            return state
+        if self._steps == 0:
+            values = self.session.read("ARTICULATION_JOINT", "jointPosition", "jointVelocity")
+            for row, name in zip(state, ("jointPosition", "jointVelocity"), strict=True):
+                row[:] = [values[name][path][0] for path in self._joints] * self._unit
+            return state
+        for row, kind in zip(state, ("POSITION", "VELOCITY"), strict=True):
+            binding, buffer = self._binding(f"ARTICULATION_DOF_{kind}")
+            binding.read(buffer)
+            row[:] = buffer[0, self._columns]
+        return state
+
+    def read_back(self) -> dict[str, Any]:
+        return read_back(self.session, self.scene, self.prepared, self._unit, self._placed)
+
+    def save(self) -> _Saved:
+        values = {}
+        for kind in self._state_kinds() if self._steps > 0 else ():
+            binding, buffer = self._binding(kind)
+            binding.read(buffer)
+            values[kind] = buffer.copy()
+        return self._steps, values, self._targets
+
+    def restore(self, state: _Saved) -> None:
+        steps, values, targets = state
+        self._start()
+        if steps > 0:
+            self.step()
+        for kind, saved in values.items():
+            binding, buffer = self._binding(kind)
+            buffer[:] = saved
+            binding.write(buffer)
+        self._steps, self._targets = steps, targets
+        if targets is not None and steps > 0:
+            self._write_targets(targets)
+
+    def _state_kinds(self) -> list[str]:
+        """Bindings that hold the state; positions come first, since they reset velocities."""
+        bodies = ["RIGID_BODY_POSE", "RIGID_BODY_VELOCITY"] if self._free else []
+        joints = ["ARTICULATION_DOF_POSITION", "ARTICULATION_DOF_VELOCITY"] if self._joints else []
+        return bodies + joints
+
+    def close(self) -> None:
+        opened = self.__dict__  # in which either is missing, when loading failed before
+        for binding, _ in opened.pop("_bindings", {}).values():
+            binding.destroy()
+        session: Session | None = opened.pop("session", None)
+        if session is not None:
+            session.close()
+
+
+def _attributes(s: OvPhysXSettings) -> dict[str, dict[str, Any]]:
+    """The settings in the words of PhysX's schemas."""
+    iterations = {"solverVelocityIterationCount": s.velocity_iterations}
+    return {
+        "physxScene": {
+            "solverType": s.solver,
+            "enableGPUDynamics": False,
+            "disableSleeping": not s.sleeping,
+            "frictionOffsetThreshold": s.friction_offset_threshold,
+            "frictionCorrelationDistance": s.friction_correlation_distance,
+            "enableExternalForcesEveryIteration": s.forces_every_iteration,
+            "solveArticulationContactLast": s.contact_last,
+        },
+        "physxRigidBody": {
+            "solverPositionIterationCount": s.body_iterations,
+            **iterations,
+            "linearDamping": s.linear_damping,
+            "angularDamping": s.angular_damping,
+            "maxDepenetrationVelocity": s.max_depenetration_velocity,
+        },
+        "physxArticulation": {"solverPositionIterationCount": s.arm_iterations, **iterations},
+        "physxCollision": {"contactOffset": s.contact_offset, "restOffset": s.rest_offset},
+    }

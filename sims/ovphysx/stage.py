@@ -1,0 +1,222 @@
+"""The scene as a USD stage in text, in the schemas that Omniverse PhysX reads.
+
+USD counts angles in degrees: limits of revolute joints, and the gains of their drives per degree.
+A fixed base is a fixed joint to the world that carries the articulation's root. Prims are named by
+their index (`/World/body_3`, `/World/link_0`), so that any name of the scene is allowed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import Box, FloatArray, Joint, Pose, Scene
+from pytest_simbench.simulator import PreparedRobot
+from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
+
+from . import usd_text as usd
+
+GROUND, ROOT = "/World/ground", "/World/root_joint"
+
+_COLLIDER = ("PhysicsCollisionAPI", "PhysxCollisionAPI", "MaterialBindingAPI")
+_BODY = ("PhysicsRigidBodyAPI", "PhysxRigidBodyAPI", "PhysicsMassAPI")
+
+
+def body_path(index: int) -> str:
+    """Prim of the scene's body of that index."""
+    return f"/World/body_{index}"
+
+
+def link_path(index: int) -> str:
+    """Prim of the prepared robot's link of that index; 0 is the root."""
+    return f"/World/link_{index}"
+
+
+def joint_path(index: int) -> str:
+    """Prim of the robot's joint of that index."""
+    return f"/World/joint_{index}"
+
+
+class Stage:
+    """Writer of one scene.
+
+    Args:
+        scene: the world to write.
+        prepared: its robot.
+        attributes: of PhysX's schemas, by their prefix (`physxScene`, `physxRigidBody`,
+            `physxArticulation`, `physxCollision`) and name; None keeps the schema's default.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        prepared: PreparedRobot | None,
+        attributes: Mapping[str, Mapping[str, Any]],
+    ) -> None:
+        self.scene = scene
+        self.prepared = prepared
+        self._lines = {
+            prefix: usd.attributes(prefix, values) for prefix, values in attributes.items()
+        }
+
+    def text(self) -> str:
+        """The stage as `.usda` text."""
+        prims = [self._physics(), *self._materials(), self._ground()]
+        prims += [self._box(i, box) for i, box in enumerate(self.scene.bodies)]
+        if self.prepared is not None:
+            prims += self._robot(self.prepared)
+        units = "metersPerUnit = 1\n kilogramsPerUnit = 1"
+        header = f'(defaultPrim = "World"\n {units}\n upAxis = "Z")'
+        return f"#usda 1.0\n{header}\n\n{usd.prim('Xform', 'World', (), [], prims)}\n"
+
+    def _physics(self) -> str:
+        magnitude = float(np.linalg.norm(self.scene.gravity))
+        direction = np.asarray(self.scene.gravity) / magnitude if magnitude else (0, 0, -1)
+        lines = [
+            f"vector3f physics:gravityDirection = {usd.numbers(direction)}",
+            f"float physics:gravityMagnitude = {magnitude!r}",
+            *self._lines["physxScene"],
+        ]
+        return usd.prim("PhysicsScene", "physics", ("PhysxSceneAPI",), lines)
+
+    def _materials(self) -> list[str]:
+        """One material a coefficient, static and dynamic friction alike, no restitution.
+
+        PhysX combines two by their average, which is the scene's value for equal surfaces.
+        """
+        frictions = {self.scene.ground_friction, *(box.friction for box in self.scene.bodies)}
+        if self.scene.robot is not None:
+            frictions.add(self.scene.robot.friction)
+        return [
+            usd.prim(
+                "Material",
+                _material(friction),
+                ("PhysicsMaterialAPI",),
+                [
+                    f"float physics:staticFriction = {float(friction)!r}",
+                    f"float physics:dynamicFriction = {float(friction)!r}",
+                    "float physics:restitution = 0",
+                ],
+            )
+            for friction in sorted(frictions)
+        ]
+
+    def _surface(self, friction: float) -> list[str]:
+        bound = f"rel material:binding:physics = </World/{_material(friction)}>"
+        return [bound, *self._lines["physxCollision"]]
+
+    def _ground(self) -> str:
+        lines = ['uniform token axis = "Z"', *self._surface(self.scene.ground_friction)]
+        return usd.prim("Plane", "ground", _COLLIDER, lines)
+
+    def _box(self, index: int, box: Box) -> str:
+        """A rigid body; kinematic where it is fixed, since PhysX reports nothing of static ones."""
+        shape = usd.prim(
+            "Cube", "shape", _COLLIDER, [*usd.cube(box.size), *self._surface(box.friction)]
+        )
+        lines = [*usd.placed(box.pose), *self._lines["physxRigidBody"]]
+        if box.fixed:
+            lines.append("bool physics:kinematicEnabled = true")
+        else:
+            lines += usd.mass_lines(box.mass, np.zeros(3), np.diag(box.inertia()))
+        return usd.prim("Xform", f"body_{index}", _BODY, lines, [shape])
+
+    def _robot(self, prepared: PreparedRobot) -> list[str]:
+        robot, names = prepared.robot, list(prepared.links)
+        poses = {prepared.root: Pose()}
+        for joint in prepared.joints:
+            poses[joint.child] = poses[joint.parent] * joint.origin
+        prims = [
+            self._link(i, prepared.links[name], poses[name], robot.friction)
+            for i, name in enumerate(names)
+        ]
+        root = [
+            f"rel physics:body1 = <{link_path(names.index(prepared.root))}>",
+            "bool physxArticulation:enabledSelfCollisions = false",
+            *self._lines["physxArticulation"],
+        ]
+        schemas = ("PhysicsArticulationRootAPI", "PhysxArticulationAPI")
+        prims.append(usd.prim("PhysicsFixedJoint", ROOT.rpartition("/")[2], schemas, root))
+        first, second = robot.finger_indices
+        for joint in prepared.joints:
+            index = robot.joint_names.index(joint.name)
+            limits = prepared.limits[joint.name]
+            coupled_to = first if index == second else None
+            prims.append(_joint(index, joint, robot.joints[index], limits, names, coupled_to))
+        return prims
+
+    def _link(self, index: int, link: Link, pose: Pose, friction: float) -> str:
+        lines = [*usd.placed(pose), *self._lines["physxRigidBody"]]
+        if link.mass > 0:
+            lines += usd.mass_lines(link.mass, link.centre, link.inertia)
+        shapes = [self._shape(i, shape, friction) for i, shape in enumerate(link.shapes)]
+        return usd.prim("Xform", f"link_{index}", _BODY, lines, shapes)
+
+    def _shape(self, index: int, shape: Shape, friction: float) -> str:
+        """A box, or the convex hull of a mesh, which PhysX makes (at most 64 corners)."""
+        name, surface = f"shape_{index}", self._surface(friction)
+        if shape.size is not None:
+            return usd.prim("Cube", name, _COLLIDER, [*usd.cube(shape.size, shape.pose), *surface])
+        triangles = usd.read_stl(Path(str(shape.mesh)))
+        corners, faces = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+        lines = [
+            *usd.placed(shape.pose),
+            'uniform token physics:approximation = "convexHull"',
+            f"point3f[] points = [{', '.join(usd.numbers(point) for point in corners)}]",
+            f"int[] faceVertexCounts = [{', '.join(['3'] * len(triangles))}]",
+            f"int[] faceVertexIndices = [{', '.join(str(i) for i in faces.ravel())}]",
+        ]
+        return usd.prim("Mesh", name, (*_COLLIDER, "PhysicsMeshCollisionAPI"), [*lines, *surface])
+
+
+def _material(friction: float) -> str:
+    return "friction_" + repr(float(friction)).translate(str.maketrans(".-+", "pmp"))
+
+
+def _joint(
+    index: int,
+    joint: MovingJoint,
+    drive: Joint,
+    limits: FloatArray,
+    links: Sequence[str],
+    coupled_to: int | None,
+) -> str:
+    """A joint about or along the x axis of its frames, with drive, rotor and coupling."""
+    revolute = joint.kind == "revolute"
+    axis, unit = ("angular", math.pi / 180) if revolute else ("linear", 1.0)
+    start = drive.initial_position / unit
+    turned = Pose(quaternion=usd.turn_from_x(np.asarray(joint.axis)))
+    before = joint.origin * turned
+    lower, upper = (float(limit) / unit for limit in limits)
+    lines = [
+        f"rel physics:body0 = <{link_path(links.index(joint.parent))}>",
+        f"rel physics:body1 = <{link_path(links.index(joint.child))}>",
+        f"point3f physics:localPos0 = {usd.numbers(before.position)}",
+        f"quatf physics:localRot0 = {usd.numbers(before.quaternion)}",
+        f"quatf physics:localRot1 = {usd.numbers(turned.quaternion)}",
+        'uniform token physics:axis = "X"',
+        f"float physics:lowerLimit = {lower!r}",
+        f"float physics:upperLimit = {upper!r}",
+        f'uniform token drive:{axis}:physics:type = "force"',
+        f"float drive:{axis}:physics:stiffness = {drive.stiffness * unit!r}",
+        f"float drive:{axis}:physics:damping = {drive.damping * unit!r}",
+        f"float drive:{axis}:physics:maxForce = {drive.effort_limit!r}",
+        f"float drive:{axis}:physics:targetPosition = {start!r}",
+        f"float physxJointAxis:{axis}:armature = {drive.armature!r}",
+        f"float state:{axis}:physics:position = {start!r}",
+    ]
+    apis = ("PhysicsDriveAPI", "PhysxJointAxisAPI", "PhysicsJointStateAPI")
+    schemas = [f"{api}:{axis}" for api in apis]
+    if coupled_to is not None:
+        # q + gearing q_reference + offset = 0; the instance's name is idle at a linear joint.
+        schemas.append("PhysxMimicJointAPI:rotX")
+        lines += [
+            "float physxMimicJoint:rotX:gearing = -1",
+            f"rel physxMimicJoint:rotX:referenceJoint = <{joint_path(coupled_to)}>",
+        ]
+    kind = "PhysicsRevoluteJoint" if revolute else "PhysicsPrismaticJoint"
+    return usd.prim(kind, f"joint_{index}", schemas, lines)

@@ -1,0 +1,148 @@
+"""Protocols and the record of a repetition."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from pytest_simbench.client.world import World
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.protocol import PROTOCOLS
+from pytest_simbench.experiment.repetition import Repetition, group
+from pytest_simbench.tasks.base import Count, Outcome
+from tests.tiny import Falling
+
+
+@dataclass(frozen=True)
+class Versions(Falling):
+    """A task that says which version of it this is."""
+
+    version: str = "as asked for"
+
+    def smoke(self) -> Versions:
+        return replace(self, version="the smallest")
+
+    def study(self) -> Versions:
+        return replace(self, version="the study's")
+
+
+def test_paper_runs_in_real_time_and_records_before(case: Case) -> None:
+    paper = replace(PROTOCOLS["paper"], before=1.0)
+    record, error = Repetition(replace(case, protocol=paper), Falling(duration=1.5), 1).run()
+    assert error is None
+    began, ended = record.timeline["start"], record.timeline["end"]
+    assert began > 1.0
+    assert 1.45 < ended - began < 3.0
+    assert record.resources["phases"]["before"]["samples"] >= 7
+    assert record.stepping["wall"] < 0.5  # waiting for the clock is not the simulator's time
+
+
+def test_phases_follow_each_other(case: Case) -> None:
+    phases: list[str] = []
+    Repetition(case, Falling(), 1, on_phase=phases.append).run()
+    assert [name for k, name in enumerate(phases) if phases[k - 1 : k] != [name]] == [
+        *("launch", "load", "launch", "task", "fall", "task"),
+    ]
+
+
+def test_fast_does_not_wait(case: Case) -> None:
+    record, _ = Repetition(case, Falling(duration=100.0), 1).run()
+    assert record.timeline["end"] - record.timeline["start"] < 50.0
+
+
+def test_each_protocol_has_its_version_of_a_task() -> None:
+    found = {name: each.version_of(Versions()) for name, each in PROTOCOLS.items()}
+    assert found == {
+        "fast": Versions(version="as asked for"),
+        "paper": Versions(version="the study's"),
+        "smoke": Versions(version="the smallest"),
+    }
+    tiny = Falling(duration=0.1)  # a task with one version only
+    assert all(each.version_of(tiny) == tiny for each in PROTOCOLS.values())
+
+
+def test_a_repetition_runs_the_task_that_it_is_given(case: Case) -> None:
+    """The version has been chosen before: asked twice, a version of a version would be run."""
+    for protocol in PROTOCOLS.values():
+        assert Repetition(replace(case, protocol=protocol), Versions(), 1).task == Versions()
+
+
+def test_a_record_says_what_it_was(case: Case) -> None:
+    case = replace(case, changes={"timestep": "0.002"}, seed=7, jitter=0.5)
+    record, _ = Repetition(case, Falling(), 3).run()
+    assert (record.seed, record.repetition, record.jitter) == (9, 3, 0.5)
+    assert record.settings["timestep"] == 0.002
+    assert record.settings["task.duration"] == 0.6
+    assert {"mujoco", "python", "pytest-simbench"} <= set(record.versions)
+    assert record.stepping["simulated"] == pytest.approx(0.6)
+    assert record.resources["rss_mb"]["peak"] > 20
+    assert set(record.seconds) == {*("launch", "compile", "load", "plan", "step", "other", "total")}
+    assert record.details["log"].startswith("logs/")
+
+
+@dataclass(frozen=True)
+class Placed(Falling):
+    """Tells where the cubes started."""
+
+    def perform(self, world: World, seed: int, count: Count) -> Outcome:
+        outcome = super().perform(world, seed, count)
+        starts = {body.name: body.pose.position[:2] for body in world.scene.free_bodies}
+        outcome.details["starts"] = [list(starts[name]) for name in ("left", "right")]
+        return outcome
+
+
+def starts(case: Case, jitter: float, number: int) -> np.ndarray:
+    record, error = Repetition(replace(case, jitter=jitter), Placed(), number).run()
+    assert error is None
+    return np.array(record.details["starts"])
+
+
+def test_zero_jitter_repeats_the_nominal_scene(case: Case) -> None:
+    for number in (1, 2):
+        assert np.array_equal(starts(case, 0.0, number), [[0.0, 0.0], [0.2, 0.0]])
+
+
+def test_jitter_disturbs_each_cube_by_its_scale_in_both_directions(case: Case) -> None:
+    """1 is up to 1 mm in x and in y, another for each cube and seed."""
+    offsets = np.array([starts(case, 1.0, n) - [[0.0, 0.0], [0.2, 0.0]] for n in range(1, 5)])
+    assert 0.0004 < np.abs(offsets).max() <= 0.001
+    assert offsets.min() < 0 < offsets.max()
+    assert len(np.unique(offsets)) == offsets.size
+    half = starts(case, 0.5, 1) - [[0.0, 0.0], [0.2, 0.0]]
+    assert np.allclose(half, offsets[0] / 2)
+
+
+@pytest.mark.parametrize(
+    ("phase", "told"),
+    [
+        ("pick cube 3 of 15", "pick"),
+        ("recover from cube 12 of 15", "recover from"),
+        ("settle start", "settle start"),
+        ("settle", "settle"),
+        ("go home", "go home"),
+        ("wind up", "wind up"),
+        ("3 of 5", "3 of 5"),
+        ("step 3", "step"),
+    ],
+)
+def test_phases_that_count_on_are_told_together_and_no_others(phase: str, told: str) -> None:
+    assert group(phase) == told
+
+
+@dataclass(frozen=True)
+class Settling(Falling):
+    """Waits before and after."""
+
+    def perform(self, world: World, seed: int, count: Count) -> Outcome:
+        for phase in ("settle start", "settle"):
+            with world.phase(phase):
+                time.sleep(0.5)
+        return super().perform(world, seed, count)
+
+
+def test_settling_before_and_after_are_sampled_apart(case: Case) -> None:
+    record, _ = Repetition(case, Settling(), 1).run()
+    assert {"settle start", "settle"} <= set(record.resources["phases"])

@@ -1,0 +1,131 @@
+"""The record of a repetition whose world goes by a script: status, phase, scores, jitter."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pytest_simbench.client.errors import RepetitionTimeout
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.records.record import Record
+from pytest_simbench.scene import Pose
+from pytest_simbench.tasks import Jitter, LeaningTowers, Stacking, Task, Throwing
+from tests.tasks.scripted import Effect, Mishap, ScriptedProcess, fail, move, put, stacked
+
+TOWERS = LeaningTowers(margins=(0.01,))
+
+
+class ScriptedRepetition(Repetition):
+    """Its worker is a script."""
+
+    def __init__(self, case: Case, task: Task, number: int, *script: Mishap) -> None:
+        super().__init__(case, task, number)
+        self.process = ScriptedProcess(script)
+
+    def _worker(self, *limits: Any) -> Any:
+        self.process.where = self.where
+        self._process: Any = self.process
+        return self.process
+
+
+def run(case: Case, task: Task, *script: Mishap) -> Record:
+    repetition = ScriptedRepetition(case, task, 1, *script)
+    record, _ = repetition.run()
+    assert not repetition.process.pending
+    return record
+
+
+def fast(process: ScriptedProcess) -> None:
+    process.velocities["cube_02"] = np.array([0.0, 31.0, 0.0, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("effect", "message"),
+    [
+        (put("cube_02", Pose.at(5.2, 0.0, 0.025)), "'cube_02' left the room"),
+        (put("cube_02", Pose.at(0.0, 0.0, 10.2)), "'cube_02' left the room"),
+        (move("cube_02", z=-0.02), "overlap by 20 mm"),
+        (put("cube_02", Pose.at(-1.0, 0.0, 0.0)), "'cube_02' is 25 mm deep in the ground"),
+        (put("cube_02", Pose.at(-1.0, 0.0, -9.0)), "'cube_02' is 9025 mm deep in the ground"),
+        (move("cube_02", x=float("nan")), "'cube_02' is not finite"),
+        (fast, "'cube_02' moves at 31 m/s"),
+    ],
+)
+@pytest.mark.parametrize("task", [TOWERS, Stacking(towers=1, levels=1)], ids=lambda t: t.name)
+def test_a_world_that_cannot_be_has_diverged_and_no_score(
+    case: Case, task: Task, effect: Effect, message: str
+) -> None:
+    record = run(case, task, Mishap("settle", 2.0, effect))
+    assert record.status == "failed"
+    assert record.error is not None
+    assert (record.error.type, record.error.phase) == ("Diverged", "settle")
+    assert message in record.error.message
+    assert record.error.message.endswith(" s; a smaller timestep may help")
+    assert not record.metrics
+
+
+def test_it_may_happen_in_any_phase(case: Case) -> None:
+    for phase in ("settle start", "pick cube 1 of 2", "place cube 2 of 2", "go home"):
+        away = Mishap(phase, 0.1, put("cube_02", Pose.at(0.0, 6.0, 0.025)))
+        record = run(case, Stacking(towers=1, levels=2), away)
+        assert record.error is not None
+        assert (record.error.type, record.error.phase) == ("Diverged", phase)
+
+
+@pytest.mark.parametrize(
+    "pose",
+    [Pose.at(1.3, 0.2, 0.025), Pose.at(3.0, 0.0, 0.025), Pose.at(-3.0, -3.0, 0.025)],
+)
+def test_a_cube_beside_the_table_or_thrown_three_metres_is_counted(case: Case, pose: Pose) -> None:
+    task = Stacking(towers=1, levels=2)
+    record = run(case, task, Mishap("settle", 2.0, put(stacked(2), pose)))
+    assert record.status == "ok"
+    assert (record.metrics["placed"], record.metrics["at_end"]) == (1.0, 0.5)
+
+
+def test_a_world_that_times_out_has_failed_where_it_was(case: Case) -> None:
+    late = fail(RepetitionTimeout, "it took longer than 900 s")
+    record = run(case, Stacking(towers=1, levels=2), Mishap("place cube 2 of 2", 0.3, late))
+    assert record.status == "failed"
+    assert record.error is not None
+    assert (record.error.type, record.error.message, record.error.phase) == (
+        "RepetitionTimeout", "it took longer than 900 s", "place cube 2 of 2"
+    )  # fmt: skip
+    assert record.error.cause == "RepetitionTimeout in place cube 2 of 2"
+    assert not record.metrics
+    interrupted = run(case, TOWERS, Mishap("settle", 0.3, fail(KeyboardInterrupt)))
+    assert interrupted.status == "interrupted"
+
+
+def test_the_scores_and_details_are_in_the_record(case: Case) -> None:
+    record = run(
+        case, replace(TOWERS, margins=(0.01, 0.01)), Mishap("settle", 2.0, move("cube_08", x=0.1))
+    )
+    assert record.status == "ok"
+    assert record.metrics == {"standing": 7 / 8, "towers": 1 / 2}
+    assert record.details["fallen"] == ["cube_08"]
+    assert record.stepping["simulated"] == 3.0
+
+
+@pytest.mark.parametrize("task", [Stacking(), Throwing()], ids=lambda t: t.name)
+@pytest.mark.parametrize("scale", [0.0, 1.0, 3.0])
+def test_the_start_is_disturbed_as_asked_for(case: Case, task: Task, scale: float) -> None:
+    repetition = ScriptedRepetition(
+        replace(case, jitter=scale, seed=40), task, 3, Mishap("settle start", 0.0, fail(StopHere))
+    )
+    record, _ = repetition.run()
+    assert (record.seed, record.jitter) == (42, scale)
+    one = Jitter()
+    expected = task.scene(42, Jitter(scale * one.distance, scale * one.angle))
+    assert repetition.process.scene == expected
+    nominal = task.scene(42, Jitter(0.0, 0.0))
+    for body, still in zip(expected.free_bodies, nominal.free_bodies, strict=True):
+        assert (body.pose == still.pose) == (scale == 0.0)
+
+
+class StopHere(Exception):
+    """The test has seen what it wants."""

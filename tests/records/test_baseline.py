@@ -1,0 +1,112 @@
+"""Every form of a baseline gives the same records; a malformed one says what is wrong."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from pytest_simbench.records.baseline import BaselineError, from_benchmarks, read_baseline
+from pytest_simbench.records.record import Record, RecordError
+from pytest_simbench.records.record_file import RecordFile
+from pytest_simbench.records.saved import KEY, from_extra_info, to_extra_info
+
+from .build import failed, record
+
+RUN = [
+    record(0, metrics={"placed": 1.0, "hit": None}, details={"log": "logs/x.log"}),
+    record(1, metrics={"placed": 0.5, "hit": 1.0}, versions={"engine": "2.0"}),
+    failed(2),
+]
+
+
+def without_details(item: Record) -> dict[str, object]:
+    data = item.to_dict()
+    del data["details"]
+    if data["error"]:
+        data["error"]["log_tail"] = ""
+    return data
+
+
+def test_saving_with_the_benchmarks_loses_nothing_that_is_compared() -> None:
+    saved = json.loads(json.dumps(to_extra_info(RUN)))
+    found = from_extra_info(saved, "here")
+    assert [without_details(r) for r in found] == [without_details(r) for r in RUN]
+
+
+def test_what_all_share_is_saved_once() -> None:
+    saved = to_extra_info(RUN)
+    assert saved["shared"]["settings"] == {"timestep": 0.002}
+    assert all("settings" not in row for row in saved["repetitions"])
+    assert [row["versions"] for row in saved["repetitions"]] == [r.versions for r in RUN]
+
+
+@pytest.mark.parametrize("form", ["folder", "records", "benchmarks"])
+def test_every_form_gives_the_same_records(tmp_path: Path, form: str) -> None:
+    path = tmp_path
+    if form == "benchmarks":
+        path = tmp_path / "saved.json"
+        extra = [{}, {KEY: to_extra_info(RUN)}]
+        path.write_text(json.dumps({"benchmarks": [{"extra_info": item} for item in extra]}))
+    else:
+        file = RecordFile(tmp_path / "records.jsonl")
+        for item in RUN:
+            assert file.append(item)
+        path = tmp_path / "records.jsonl" if form == "records" else tmp_path
+    found = read_baseline(path)
+    assert found.name == str(path)
+    assert [without_details(r) for r in found.records] == [without_details(r) for r in RUN]
+    assert found.metric_names == ("placed", "hit")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", "holds no repetition"),
+        ("[1, 2]", "cannot be read: .*:1: a record is a JSON object, not list"),
+        ('{"test": "t"}', "cannot be read: .*:1: the record has no 'task'"),
+        ('{"benchmarks": {}}', "malformed: 'benchmarks' is not a list"),
+        ('{"benchmarks": [3, {"extra_info": 4}]}', "holds no repetition of a simulator"),
+        ('{"benchmarks": [{"extra_info": {"simbench": 1}}]}', "does not hold repetitions"),
+        (
+            '{"benchmarks": [{"fullname": "t", "extra_info": '
+            '{"simbench": {"shared": {}, "repetitions": [1]}}}]}',
+            "t: repetition 1 is not an object",
+        ),
+        (
+            '{"benchmarks": [{"extra_info": {"simbench": {"shared": {}, "repetitions": [{}]}}}]}',
+            "a benchmark without a name: repetition 1: the record has no 'test'",
+        ),
+        (
+            '{"benchmarks": [{"extra_info": '
+            '{"simbench": {"schema": 99, "shared": {}, "repetitions": [{}]}}}]}',
+            "written by a newer pytest-simbench",
+        ),
+    ],
+)
+def test_a_malformed_baseline_says_what_is_wrong(
+    tmp_path: Path, content: str, message: str
+) -> None:
+    path = tmp_path / "saved"
+    path.write_text(content)
+    with pytest.raises(BaselineError, match=message):
+        read_baseline(path)
+
+
+def test_nothing_there(tmp_path: Path) -> None:
+    with pytest.raises(BaselineError, match="there is no baseline .*; give a run folder"):
+        read_baseline(tmp_path / "none")
+    with pytest.raises(BaselineError, match="cannot read records from"):
+        read_baseline(tmp_path)  # a folder, but of no run
+
+
+def test_benchmarks_of_other_packages_are_left_out() -> None:
+    saved = {"benchmarks": [{"extra_info": {"mine": 1}}, {"extra_info": {KEY: to_extra_info(RUN)}}]}
+    assert len(from_benchmarks(saved, "x").records) == len(RUN)
+
+
+def test_an_empty_result_is_saved_as_such() -> None:
+    assert from_extra_info(to_extra_info([]), "x") == []
+    with pytest.raises(RecordError, match="x: 'simbench' does not hold repetitions"):
+        from_extra_info({"shared": {}}, "x")

@@ -1,0 +1,79 @@
+"""The table of what must be equal, and that pooling, resuming, merging and comparing go by it."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any, get_args
+
+import pytest
+
+from pytest_simbench.records.configuration import PARTS, Use, agree, equal_to
+from pytest_simbench.records.record import Record
+
+from .build import failed, record
+
+ANOTHER: dict[str, Any] = {
+    "profile": "default",
+    "settings": {"timestep": 0.004},
+    "protocol": "paper",
+    "jitter": 50.0,
+    "scene": "another",
+    "limits": {"timeout": 5.0},
+    "versions": {"engine": "2.0"},
+    "deviations": ("no armature",),
+    "host": {"cpu": "other"},
+    "contended": True,
+    "reused_worker": True,
+}
+"""A value of each field that some use wants equal."""
+
+
+def whole(**changes: Any) -> Record:
+    return record(scene="one", limits={"timeout": 4.0}, **changes)
+
+
+def test_every_field_of_a_record_has_its_line_and_reason() -> None:
+    assert sorted(part.name for part in PARTS) == sorted(f.name for f in fields(Record))
+    assert all(part.reason for part in PARTS)
+    assert {name for part in PARTS if part.equal_to for name in (part.name,)} == set(ANOTHER)
+
+
+@pytest.mark.parametrize("use", get_args(Use))
+@pytest.mark.parametrize("name", ANOTHER)
+def test_records_agree_as_the_table_says(use: Use, name: str) -> None:
+    other = replace(whole(), **{name: ANOTHER[name]})
+    assert agree(whole(), other, use) is (name not in equal_to(use))
+    assert agree(other, whole(), use) is (name not in equal_to(use))
+
+
+def test_a_configuration_is_equal_for_pooling_resuming_and_merging() -> None:
+    configuration = {"profile", "settings", "protocol", "jitter", "scene", "limits", "versions"}
+    assert set(equal_to("pool")) == set(equal_to("resume")) == configuration
+    assert set(equal_to("merge")) == {*configuration, "deviations"}
+    assert set(equal_to("compare")) == set(ANOTHER)
+
+
+def test_results_and_circumstances_are_no_configuration() -> None:
+    other = whole(
+        repetition=9, metrics={"placed": 0.1}, host={"cpu": "x"}, contended=True, attempt=2
+    )
+    assert agree(whole(), other)
+
+
+def test_what_a_failed_start_did_not_learn_contradicts_nothing() -> None:
+    dead = replace(failed(1), settings={"task.towers": 3}, versions={}, deviations=())
+    ours = whole(settings={"timestep": 0.002, "task.towers": 3})
+    assert agree(ours, dead)
+    assert agree(dead, ours)
+    assert not agree(ours, replace(dead, settings={"task.towers": 4}))
+    assert not agree(ours, replace(dead, settings={"task.towers": 3, "timestep": 0.1}))
+    assert not agree(ours, replace(dead, versions={"engine": "9"}))
+
+
+def test_a_setting_that_one_lacks_is_a_difference_between_records_that_ended() -> None:
+    assert not agree(whole(), whole(settings={"timestep": 0.002, "cone": "elliptic"}))
+    assert not agree(whole(), whole(versions={}))
+
+
+def test_an_older_record_without_scene_and_limits_agrees() -> None:
+    assert agree(whole(), record())

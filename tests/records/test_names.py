@@ -1,0 +1,48 @@
+"""Names of files: safe, and never shared."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pytest_simbench.records.names import file_name
+
+texts = st.text(st.characters(exclude_categories=()), max_size=300)
+near = st.text(st.sampled_from("aAbB/_.-: "), max_size=6)
+
+
+@given(texts | near)
+def test_every_name_is_safe(text: str) -> None:
+    name = file_name(text)
+    assert re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.=-]{0,99}", name)
+    assert not name.endswith(".")
+
+
+@given(near | texts, near | texts)
+def test_different_texts_have_different_names_also_where_case_is_not_told(a: str, b: str) -> None:
+    if a != b:
+        assert file_name(a).lower() != file_name(b).lower()
+        assert file_name(a).lower() != file_name(file_name(b)).lower() or a == file_name(b)
+
+
+@given(near, near, near, near)
+def test_what_is_not_shown_counts(a: str, b: str, c: str, d: str) -> None:
+    if (a, b) != (c, d):
+        assert file_name("x", a, b) != file_name("x", c, d)
+        assert file_name("x", a, b) != file_name("x")
+
+
+@pytest.mark.parametrize("text", ["stacking", "leaning_towers", "a-b.c=1"])
+def test_plain_names_stay(text: str) -> None:
+    assert file_name(text) == text
+
+
+@pytest.mark.parametrize("text", ["..", ".", "", "../../victim", "/etc/passwd", "a\0b", "x" * 999])
+def test_nothing_leads_anywhere(text: str, tmp_path: Path) -> None:
+    path = tmp_path / f"{file_name(text)}.log"
+    path.touch()
+    assert path.resolve().parent == tmp_path.resolve()

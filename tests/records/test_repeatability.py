@@ -1,0 +1,96 @@
+"""Results in the run folder."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from pytest_simbench.records.repeatability import NAME, Line, append, read
+from pytest_simbench.repeatability.motions import Difference
+from pytest_simbench.repeatability.replay_result import Again
+
+LINE = Line(
+    "search",
+    "t::x",
+    "mujoco",
+    "headless",
+    "tuned",
+    "towers",
+    1,
+    {"timestep": 0.1},
+    {},
+    {"n": 1 / 3, "sentence": "0.1 mm in x topples it"},
+)
+
+
+def test_kept_and_read_back(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    assert read(folder) == []
+    append(folder, LINE)
+    append(folder, LINE)
+    assert read(folder) == [LINE, LINE]
+    assert LINE.label == "mujoco headless tuned"
+
+
+AGAIN = Again("reset", Difference(1.0, "a", {1.0: 0.1, 5.0: None}, 0.2), ("moved",)).to_wire()
+REPLAY = replace(LINE, kind="replay", result={"claims": True, "again": [AGAIN]})
+
+
+def test_a_replay_is_read_back(tmp_path: Path) -> None:
+    append(tmp_path, REPLAY)
+    assert read(tmp_path) == [REPLAY]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        replace(LINE, kind="x"),
+        replace(LINE, seed="1"),
+        replace(LINE, task=None),
+        replace(LINE, result={}),
+        replace(LINE, result={"sentence": 3}),
+        replace(REPLAY, result={"claims": True}),
+        replace(REPLAY, result={"claims": True, "again": 3}),
+        *(
+            replace(REPLAY, result={"claims": True, "again": [{**AGAIN, key: wrong}]})
+            for key in ("way", "changed", "first", "growth", "largest", "body", "left_at")
+            for wrong in ("x" if key not in ("way", "body") else 1, {"x": "y"}, [3])
+            if not (key == "changed" and wrong == "x")
+        ),
+    ],
+    ids=lambda line: str(line.result)[:80],
+)
+def test_a_line_with_something_else_in_it(tmp_path: Path, line: Line) -> None:
+    append(tmp_path, line)
+    with pytest.raises(ValueError, match="line 1: not a result on repeatability"):
+        read(tmp_path)
+
+
+def test_no_number_is_infinite(tmp_path: Path) -> None:
+    append(
+        tmp_path, replace(REPLAY, result={"claims": True, "again": [{**AGAIN, "first": math.inf}]})
+    )
+    with pytest.raises(ValueError, match="line 1: not a result on repeatability"):
+        read(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "text", ["{}", "nonsense", "[1]", '{"schema": 1, "kind": "x"}', "[" * 99999]
+)
+def test_something_else(tmp_path: Path, text: str) -> None:
+    append(tmp_path, LINE)
+    with (tmp_path / NAME).open("a") as file:
+        file.write(text + "\n")
+    with pytest.raises(ValueError, match="line 2: not a result on repeatability"):
+        read(tmp_path)
+
+
+def test_a_newer_schema(tmp_path: Path) -> None:
+    append(tmp_path, LINE)
+    path = tmp_path / NAME
+    path.write_text(path.read_text().replace('"schema": 1', '"schema": 2'))
+    with pytest.raises(ValueError, match="line 1: schema 2, this reads 1"):
+        read(tmp_path)

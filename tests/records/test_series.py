@@ -1,0 +1,125 @@
+"""Which records count, which make a row, and how the row is told apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import permutations
+
+import pytest
+
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.series import by_test, comparable, configurations, series, settled
+
+from .build import failed, record
+
+
+def interrupted(repetition: int = 0) -> Record:
+    return record(repetition, status="interrupted")
+
+
+def test_an_interrupted_twin_is_never_kept() -> None:
+    for order in permutations([interrupted(), interrupted(), record()]):
+        assert settled(order) == [record()]
+    assert settled([interrupted(), failed(0)]) == [failed(0)]
+    assert settled([interrupted(), interrupted()]) == [interrupted()]
+
+
+def test_an_interrupted_start_is_the_twin_of_what_ended() -> None:
+    begun = replace(interrupted(), settings={"task.levels": 5}, versions={})
+    done = record(settings={"timestep": 0.002, "task.levels": 5})
+    assert settled([begun, done]) == [done]
+    other = record(settings={"timestep": 0.002, "task.levels": 3})
+    assert settled([begun, other]) == [begun, other]
+
+
+def test_the_last_attempt_counts_once() -> None:
+    first, second = (record(metrics={"placed": v}, attempt=k) for v, k in ((0.1, 1), (0.9, 2)))
+    assert settled([first, second]) == [second]
+    assert settled([second, first]) == [second]
+    again = record(metrics={"placed": 0.5})
+    assert settled([first, again]) == [again]  # written later
+    assert settled([first, replace(second, status="interrupted")]) == [first]
+
+
+def test_seeds_tasks_modes_and_configurations_are_not_twins() -> None:
+    found = [
+        record(),
+        record(seed=7),
+        record(1),
+        record(task="throwing"),
+        record(mode="gui"),
+        record(jitter=50.0),
+        record(settings={"timestep": 1.0}),
+    ]
+    assert settled(found) == found
+
+
+def test_groups_are_configurations_and_a_failed_start_joins_one() -> None:
+    fine, coarse = record(1), record(2, settings={"timestep": 0.01})
+    dead = replace(failed(3), settings={}, versions={})
+    assert configurations([fine, coarse]) == [[fine], [coarse]]
+    assert configurations([dead, fine, coarse]) == [[dead, fine], [coarse]]
+    assert configurations([dead]) == [[dead]]
+
+
+def test_a_row_is_one_configuration_and_names_the_difference() -> None:
+    tests = {v: f"t.py::test_x[{v}-engine-headless]" for v in (0.001, 0.004)}
+    runs = [record(k, test=t, settings={"timestep": v}) for v, t in tests.items() for k in (1, 2)]
+    assert [(r.label, len(r.records)) for r in series(runs)] == [
+        ("timestep=0.001", 2),
+        ("timestep=0.004", 2),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "label"),
+    [
+        ({"settings": {"timestep": 0.5}}, "timestep=0.5"),
+        ({"jitter": 50.0}, "jitter=50.0"),
+        ({"protocol": "paper"}, "protocol=paper"),
+        ({"versions": {"engine": "2.0"}}, "versions.engine=2.0"),
+        ({"limits": {"timeout": 9.0}}, "limits.timeout=9.0"),
+    ],
+)
+def test_records_of_one_test_that_were_mixed_are_rows_of_their_own(
+    change: dict[str, object], label: str
+) -> None:
+    ours = [record(k, limits={"timeout": 4.0}) for k in (1, 2)]
+    rows = series([*ours, *(replace(r, **change) for r in ours)])
+    assert [len(row.records) for row in rows] == [2, 2]
+    assert label in [row.label for row in rows]
+
+
+def test_a_parameter_that_changes_no_setting_still_tells_rows_apart() -> None:
+    """Else each seed would count twice."""
+    runs = [record(1, test=f"t.py::test_x[engine-headless-{p}]") for p in "ab"]
+    assert [row.label for row in series(runs)] == ["[a]", "[b]"]
+
+
+def test_one_row_needs_no_label_and_functions_have_theirs() -> None:
+    assert [row.label for row in series([record(1), record(2)])] == [""]
+    two = [record(1, test=f"t.py::test_{n}[engine-headless]") for n in "ab"]
+    assert [row.label for row in series(two)] == ["t.py::test_a", "t.py::test_b"]
+
+
+def test_rows_are_ranked_only_where_the_same_was_asked() -> None:
+    ours, other = record(1), record(1, simulator="b", test="test_stacking[b-headless]")
+
+    def ranked(**changes: object) -> bool:
+        return comparable(*series([ours, replace(other, **changes)]))
+
+    assert ranked()
+    assert ranked(settings={"timestep": 9.0})
+    assert not ranked(jitter=50.0)
+    assert not ranked(protocol="paper")
+
+
+def test_tests_are_matched_without_their_file_and_tasks_told_apart() -> None:
+    old = [record(1, test="a/t.py::test_x[e]"), record(1, test="a/t.py::test_x[e]", task="throw")]
+    new = [record(1, test="t.py::test_x[e]")]
+    before, after = by_test([old, new])
+    assert list(before) == ["test_x[e] (stacking)", "test_x[e] (throw)"]
+    assert list(after) == ["test_x[e] (stacking)"]
+    assert [list(side) for side in by_test([new, new])] == [["test_x[e]"]] * 2
+    mixed = [*new, replace(new[0], jitter=9.0)]
+    assert list(by_test([mixed])[0]) == ["test_x[e] (stacking)", "test_x[e] (stacking 2)"]

@@ -1,0 +1,37 @@
+"""The declaration of a metric."""
+
+from __future__ import annotations
+
+import pytest
+
+from pytest_simbench.tasks.metrics import COSTS, Metric, UnknownMetric
+
+
+def test_a_share_says_of_how_many() -> None:
+    with pytest.raises(ValueError, match="'placed' is a share: say of how many"):
+        Metric("placed", "placed", kind="share")
+
+
+@pytest.mark.parametrize(
+    ("metric", "value", "text"),
+    [
+        (Metric("placed", "placed", kind="share", of=15), 14 / 15, "93.33 %"),
+        (Metric("hit", "hit", kind="yes_no"), 1.0, "100 %"),
+        (Metric("landing_x", "landing", "m"), 1.3521, "1.35 m"),
+        (Metric("rtf", "real-time factor"), 17.53, "17.5"),
+    ],
+)
+def test_values_read_as_a_user_expects(metric: Metric, value: float, text: str) -> None:
+    assert metric.format(value) == text
+
+
+def test_an_unknown_name_lists_the_valid_ones_and_the_nearest() -> None:
+    error = UnknownMetric("placd", ["moved", "placed"])
+    assert str(error) == (
+        "no metric is named 'placd'; did you mean 'placed'? valid names: moved, placed"
+    )
+
+
+def test_costs_have_distinct_names_and_all_say_what_they_are() -> None:
+    assert len({metric.name for metric in COSTS}) == len(COSTS)
+    assert all(metric.doc and metric.better for metric in COSTS)
