@@ -21,7 +21,7 @@ from pytest_simbench.tasks.base import Task
 class ProgressLine(Interface):
     """What the live line is told; `report.progress.Progress` is one."""
 
-    def start_test(self, test_id: str, repetitions: int) -> None: ...
+    def start_test(self, test_id: str, repetitions: int, last: int | None = None) -> None: ...
     def repetition(self, number: int, seed: int) -> None: ...
     def phase(self, name: str) -> None: ...
     def count(self, done: int, total: int, noun: str = "") -> None: ...
@@ -59,7 +59,8 @@ class Repeater:
             KeyboardInterrupt: after the records of what was running are kept.
         """
         numbers = list(numbers)
-        self.progress.start_test(self.case.test.rpartition("::")[2], len(numbers))
+        name = self.case.test.rpartition("::")[2]
+        self.progress.start_test(name, len(numbers), max(numbers, default=0))
         try:
             if self.jobs > 1 and len(numbers) > 1:
                 records = self._side_by_side(task, numbers)
@@ -91,7 +92,7 @@ class Repeater:
             idle=self._idle,
             interrupts=interrupts,
             on_phase=progress.phase,
-            on_count=lambda done, total: progress.count(done, total, "cubes"),
+            on_count=lambda done, total: progress.count(done, total, task.counted),
         )
         self._active.add(repetition)
         if self._stopping.is_set():  # this thread took it up just before it could be cancelled

@@ -34,8 +34,8 @@ MARKDOWN_NAME = "repeatability.md"
 def replay(request: pytest.FixtureRequest, simbench_case: Case) -> Callable[[Task], Replay]:
     """Runs the first seed of a task again in every way: `replay(Throwing())`.
 
-    Takes `moments=` for tasks other than throwing. The first run's motion is kept for the
-    comparison between simulators.
+    Takes `moments=` in place of those that the task declares. The first run's motion is kept for
+    the comparison between simulators.
     """
     from pytest_simbench.repeatability import replay as replaying
     from pytest_simbench.repeatability.agreement import FOLDER, Sample
@@ -167,13 +167,11 @@ class Perturber:
         return result
 
     def sensitivity(self, body: str, steps: int = 1, **options: Any) -> Sensitivity:
-        """Growth of a displacement of a cube by `steps` times 0.1 mm in x. Takes `moments=` for
-        tasks other than throwing."""
+        """Growth of a displacement of a body by `steps` times 0.1 mm in x. Takes `moments=` in
+        place of those that the task declares."""
         from pytest_simbench.repeatability import stability
-        from pytest_simbench.repeatability.moments import THROWING_MOMENTS
         from pytest_simbench.repeatability.perturbation import Perturbation
 
-        options.setdefault("moments", THROWING_MOMENTS)
         displaced = Perturbation("x", steps, body)
         result = stability.sensitivity(self.experiment, displaced, **options)
         _keep(self.case, "sensitivity", self.experiment, result.to_wire())

@@ -103,13 +103,9 @@ def effect(task: Task, before: Outcome, after: Outcome, names: Sequence[str]) ->
     """What became of the outcome, in words: "topples tower 2"."""
     if not names:
         return ""
-    old, new = before.details.get("toppled", ()), after.details.get("toppled", ())
-    fallen = [name for name in new if name not in old]
-    if fallen:
-        return f"topples {' and '.join(fallen)}"
-    saved = [name for name in old if name not in new]
-    if saved:
-        return f"saves {' and '.join(saved)} from toppling"
+    words = task.change(before, after)
+    if words:
+        return words
     metrics = {metric.name: metric for metric in task.metrics}
     name = names[0]
     values = [

@@ -16,14 +16,23 @@ from pytest_simbench.client.errors import Unavailable, WorkerError
 from pytest_simbench.client.tape import Operation, TapedWorld
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.repeatability.episode import Episode, Experiment, changed
-from pytest_simbench.repeatability.moments import THROWING_MOMENTS, Moment
 from pytest_simbench.repeatability.motions import difference
 from pytest_simbench.repeatability.replay_result import Again, Replay
+from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.simulator.info import Capability
-from pytest_simbench.tasks import Jitter, LeaningTowers
+from pytest_simbench.tasks import Moment
 
 ASTRAY = 0.3
 """How long a world goes on after its state was saved, before it is restored [s]."""
+
+ANOTHER = Scene(
+    "another",
+    (
+        Box("below", (0.05, 0.05, 0.05), Pose.at(0.4, 0.0, 0.025), mass=0.1),
+        Box("beside", (0.05, 0.05, 0.05), Pose.at(0.43, 0.0, 0.09, yaw=0.3), mass=0.1),
+    ),
+)
+"""What a process simulates between two runs of an experiment: a cube falls upon another's edge."""
 
 
 def replay(
@@ -33,7 +42,7 @@ def replay(
     capabilities: frozenset[Capability],
     fresh: SimulatorHandle,
     other_mode: SimulatorHandle | str,
-    moments: tuple[Moment, ...] = THROWING_MOMENTS,
+    moments: Sequence[Moment] | None = None,
     jobs: int = 1,
 ) -> Replay:
     """Run an experiment and run it again in every way.
@@ -45,13 +54,14 @@ def replay(
         fresh: a handle of the same case, for a process of its own.
         other_mode: a handle in the other mode (with a window, when the first has none), or why
             there is none.
-        moments: at which to save and restore.
+        moments: at which to save and restore; by default those that the task declares.
         jobs: how many workers may run side by side.
 
     Raises:
         WorkerError: in the first run; later ones are results.
     """
     simulator = experiment.handle.case.simulator
+    moments = experiment.task.moments if moments is None else moments
     first = experiment.run()
     mode = "headless" if experiment.handle.case.mode == "gui" else "with a window"
     elsewhere = [_Elsewhere("fresh process", fresh), _Elsewhere(mode, other_mode)]
@@ -113,6 +123,8 @@ def _restored_at(
     experiment: Experiment,
     first: Episode,
 ) -> Iterator[Again]:
+    if not moments:
+        yield Again("restored", skipped=f"the task {experiment.task.name!r} declares no moments")
     for moment in moments:
         way = f"restored {moment.name}"
         if Capability.SAVE_RESTORE not in capabilities:
@@ -140,8 +152,7 @@ def _again(way: str, first: Episode, run: Callable[[], Episode]) -> Again:
 
 def _after_another(experiment: Experiment, first: Episode) -> Episode:
     """Another scene in the same process, then the experiment."""
-    another = LeaningTowers().smoke()
-    with experiment.handle.episode(another.scene(0, Jitter())) as world:
+    with experiment.handle.episode(ANOTHER) as world:
         world.wait(0.5)
     return experiment.run(play=first.tape)
 

@@ -12,7 +12,6 @@ from pytest_simbench.measure.results import InconclusiveWarning
 from pytest_simbench.measure.verdicts import Verdict, at_least, confidence, judge
 from pytest_simbench.repeatability.attack import Attack, Perturbations
 from pytest_simbench.repeatability.episode import Experiment
-from pytest_simbench.repeatability.moments import Moment
 from pytest_simbench.repeatability.motions import gaps
 from pytest_simbench.repeatability.perturbation import (
     QUANTITIES,
@@ -21,6 +20,7 @@ from pytest_simbench.repeatability.perturbation import (
     perturbations,
 )
 from pytest_simbench.repeatability.search import bounds_in_words
+from pytest_simbench.tasks import Moment
 from pytest_simbench.tasks.metrics import Metric, significant
 
 SENSITIVITY_TIMES = (0.1, 1.0, 5.0, 20.0)
@@ -208,7 +208,7 @@ class Sensitivity:
 
 
 def sensitivity(
-    experiment: Experiment, perturbation: Perturbation, moments: Sequence[Moment] = ()
+    experiment: Experiment, perturbation: Perturbation, moments: Sequence[Moment] | None = None
 ) -> Sensitivity:
     """Displace one cube by a little and send the same commands.
 
@@ -217,7 +217,7 @@ def sensitivity(
     Args:
         experiment: to be perturbed.
         perturbation: in x or y.
-        moments: of the task, until which the growth is told.
+        moments: until which the growth is told; by default those that the task declares.
 
     Raises:
         WorkerError: whatever happened to the worker.
@@ -234,7 +234,7 @@ def sensitivity(
     began = next((t for t, o in zip(starts, base.tape, strict=False) if o.kind == "follow"), 0.0)
     ratios = {time: between.after(began + time) for time in SENSITIVITY_TIMES}
     until: dict[str, float | None] = {}
-    for moment in moments:
+    for moment in experiment.task.moments if moments is None else moments:
         number = moment.place(base.tape)
         here = None if number is None else between.time <= starts[number] + 1e-9
         until[moment.name] = None if here is None else float(gap[here].max())

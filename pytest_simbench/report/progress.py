@@ -39,14 +39,23 @@ class _Repetition:
 
 @dataclass
 class _Test:
-    """One test under way; `seconds` are those of its finished repetitions."""
+    """One test under way; `seconds` are those of its finished repetitions.
+
+    Its `repetitions` are the last of those up to number `last`: the others ran before.
+    """
 
     id: str
     repetitions: int
+    last: int
     active: dict[int, _Repetition] = field(default_factory=dict)  # by thread
     seconds: list[float] = field(default_factory=list)
     failed: int = 0
     jobs: int = 1
+
+    @property
+    def done(self) -> int:
+        """Repetitions that ended, those before these among them."""
+        return self.last - self.repetitions + len(self.seconds)
 
     def left(self, now: float) -> float | None:
         """Estimated wall seconds until the last repetition ends, or None before the first has."""
@@ -90,10 +99,14 @@ class Progress:
         self._shown = 0
         self._last = float("-inf")
 
-    def start_test(self, test_id: str, repetitions: int) -> None:
-        """A test begins that will run so many repetitions."""
+    def start_test(self, test_id: str, repetitions: int, last: int | None = None) -> None:
+        """A test begins, or goes on, that will now run so many repetitions.
+
+        Args:
+            last: number of the last of them, where others ran before.
+        """
         with self._lock:
-            self._test = _Test(in_one_line(test_id), repetitions)
+            self._test = _Test(in_one_line(test_id), repetitions, last or repetitions)
             self._last = self._clock() if not self._is_tty else float("-inf")
             self._update(force=self._is_tty)
 
@@ -186,7 +199,7 @@ class Progress:
     def _log(self, test: _Test, ended: _Repetition, outcome: str) -> None:
         """One plain line for a repetition that ended."""
         count = f"{ended.done}/{ended.total} {ended.noun}".rstrip() if ended.total else ""
-        where = f"repetition {ended.number} of {test.repetitions}"
+        where = f"repetition {ended.number} of {test.last}"
         parts = [test.id, where, outcome, count, self._left(test)]
         self._write("  ".join(part for part in parts if part) + "\n")
         self._last = self._clock()
@@ -197,7 +210,7 @@ class Progress:
         numbers = ", ".join(str(item.number) for item in running)
         what = " | ".join(item.describe() for item in running)
         plural = "s" if len(running) > 1 else ""
-        of = f"{numbers or len(test.seconds)} of {test.repetitions}"
+        of = f"{numbers or test.done} of {test.last}"
         full_where = f"repetition{plural} {of}" if running else f"{of} repetitions done"
         failed = f"{test.failed} failed" if test.failed else ""
         full = [test.id, full_where, what, failed, self._left(test)]
@@ -205,7 +218,7 @@ class Progress:
         for unit in ("h", "min", "s"):
             left = left.replace(f" {unit}", unit[0])
         left = left.replace("m ", "m").replace("h ", "h")
-        short_where = f"{numbers.replace(', ', '+') or len(test.seconds)}/{test.repetitions}"
+        short_where = f"{numbers.replace(', ', '+') or test.done}/{test.last}"
         short = [test.id, short_where, what.replace("  ", " "), failed, left]
         return "  ".join(filter(None, full)), "  ".join(filter(None, short))
 

@@ -12,6 +12,7 @@ import numpy as np
 from pytest_simbench.client.world import World
 from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.tasks.moments import Moment
 
 CUBE_SIZE = 0.05
 """Edge of every cube [m] (the study)."""
@@ -58,7 +59,7 @@ class Outcome:
 
 
 Count = Callable[[int, int], None]
-"""Progress: called with the number of cubes done and of all."""
+"""Progress: called with how many are done, and of how many; `Task.counted` says what."""
 
 
 class Task(ABC):
@@ -69,11 +70,15 @@ class Task(ABC):
         metrics: what it measures.
         study_timeout: the reference study's time-out from launch, real time [s].
         references: metric name to the value of a perfect simulator, where there is one.
+        counted: what progress counts: "cubes placed" shows as `4/15 cubes placed`.
+        moments: where replays save and restore, and until which a disturbance is followed.
     """
 
     name: ClassVar[str]
     study_timeout: ClassVar[float]
     references: ClassVar[Mapping[str, float]] = {}
+    counted: ClassVar[str] = ""
+    moments: ClassVar[tuple[Moment, ...]] = ()
 
     @property
     @abstractmethod
@@ -105,6 +110,10 @@ class Task(ABC):
         Enter a phase (`world.phase`) for every stage, and measure what is planning
         with `world.stopwatch.measuring("plan")`.
         """
+
+    def change(self, before: Outcome, after: Outcome) -> str:
+        """What became of an outcome, in words that no metric has ("topples tower 2"), or ""."""
+        return ""
 
 
 def _flat(name: str, value: Any) -> Iterator[tuple[str, Any]]:

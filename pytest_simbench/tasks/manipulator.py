@@ -1,4 +1,8 @@
-"""Pick and place with one arm in one world: plan, send, follow, look again."""
+"""One arm in one world: plan, send, follow, look again.
+
+`pick`, `place` and `throw` are made of the verbs that a task may use too: `go_to`, `go_to_pose`,
+`move_straight`, `follow`, `close_hand`, `open_hand`. Waiting is the world's: `world.wait`.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from pytest_simbench.client.world import World
+from pytest_simbench.client.world import Motion, World
 from pytest_simbench.robot.collision import PlanningScene
 from pytest_simbench.robot.errors import PlanningError, Unreachable
 from pytest_simbench.robot.kinematics import inverse_kinematics, tool_over, top_down_grasps
@@ -111,13 +115,10 @@ class Manipulator:
             [tool_over(cube, pose.yaw) for pose in top_down_grasps(cube)], ignored=(name,)
         )
         self.go_to(above, speed=self.speeds.free)
-        self._linear(grasp, ignored=(name,), speed=self.speeds.contact)
-        self._move_fingers(self.gripper.closed, GRASP_TIME)
-        self.held, self._origin = name, cube
-        tool = self.model.tool_pose(self.arm)
-        self._grip = tool.inverse() * cube
-        self._linear(grasp.translated(z=APPROACH), ignored=(name,), speed=self.speeds.carry)
-        self._check_held()
+        self.move_straight(grasp, speed=self.speeds.contact, ignored=(name,))
+        self.close_hand(around=name, seen=cube)
+        self.move_straight(grasp.translated(z=APPROACH), speed=self.speeds.carry, ignored=(name,))
+        self.check_held()
 
     def place(self, target: Pose) -> None:
         """Bring the held cube to `target` [pose of its centre] and let it go there.
@@ -133,39 +134,124 @@ class Manipulator:
         tools = [grip * self._grip.inverse() for grip in grips]
         down, above = self._plan_choice(tools)
         self.go_to(above, speed=self.speeds.carry)
-        self._check_held()
-        self._linear(down, speed=self.speeds.contact)
-        self._open()
+        self.check_held()
+        self.move_straight(down, speed=self.speeds.contact)
+        self.open_hand()
 
-    def go_to(self, goal: FloatArray, *, speed: float) -> None:
-        """Collision-free motion to arm joints `goal`."""
-        self._refresh()
-        self._follow(
-            self._planned(lambda: self.planner.move_to(self.arm, goal, self.fingers, speed=speed))
-        )
-
-    def plan_throw(
+    def throw(
         self, goal: FloatArray, fraction: float, *, feasible: bool
-    ) -> tuple[Trajectory, Throw]:
-        """A swing to `goal`, fingers open at `fraction` of it; not yet followed.
+    ) -> tuple[Motion | None, Throw]:
+        """Swing to arm joints `goal`, the fingers open at `fraction` of the swing's duration.
 
         Args:
             feasible: within the limits of the motors; else as the reference study swings.
+
+        Returns:
+            The motion, sampled at every step, and what a perfect follower's throw would be.
         """
         gripper = self.gripper
-        planned = self._planned(
+        trajectory, perfect = self._planned(
             lambda: self.planner.throw(
                 self.arm, goal, gripper.closed, gripper.opened, fraction, feasible=feasible
             )
         )
-        self._note_end(planned[0])
         self.held = None
         self.planning.detach()
-        return planned
+        return self.follow(trajectory, log_period=0.0), perfect
 
-    def tool_positions(self, joints: FloatArray) -> FloatArray:
-        """Positions of the tool centre point for rows of joint positions, (n, 3) [m]."""
-        return np.array([self.model.tool_pose(row[: self.model.arm]).position for row in joints])
+    def go_to(self, goal: FloatArray, *, speed: float) -> None:
+        """Collision-free motion to arm joints `goal`, (arm,) [rad].
+
+        Args:
+            speed: share of the joint velocity limits.
+
+        Raises:
+            PlanningError: start or goal touch something, or no way was found.
+        """
+        self._refresh()
+        self.follow(
+            self._planned(lambda: self.planner.move_to(self.arm, goal, self.fingers, speed=speed))
+        )
+
+    def go_to_pose(self, tool: Pose, *, speed: float) -> None:
+        """Collision-free motion of the tool centre point to a pose in the world.
+
+        `robot.kinematics.tool_over` gives the pose of a tool that points down.
+
+        Args:
+            speed: share of the joint velocity limits.
+
+        Raises:
+            PlanningError: the pose is out of reach, touches something, or no way was found.
+        """
+        goal = self._planned(lambda: inverse_kinematics(self.model, tool, self.arm, self.rng))
+        self.go_to(goal, speed=speed)
+
+    def move_straight(self, tool: Pose, *, speed: float, ignored: tuple[str, ...] = ()) -> None:
+        """Motion of the tool centre point along a straight line to a pose in the world.
+
+        Args:
+            speed: share of the joint velocity limits.
+            ignored: names of bodies that may be touched, for instance the one to be pushed.
+
+        Raises:
+            PlanningError: the line leaves the workspace, or something else is in the way.
+        """
+        self._refresh()
+        self.follow(
+            self._planned(
+                lambda: self.planner.move_linear(
+                    self.arm, tool, self.fingers, ignored=ignored, speed=speed
+                )
+            )
+        )
+
+    def follow(self, trajectory: Trajectory, *, log_period: float | None = None) -> Motion | None:
+        """Follow a trajectory of one's own; it must begin at the commanded set points.
+
+        Args:
+            log_period: between samples of the motion [s]; 0: each step, None: no samples.
+        """
+        motion = self.world.follow(trajectory, log_period=log_period)
+        self.arm = trajectory.position[-1, : self.model.arm].copy()
+        self.fingers = float(trajectory.position[-1, -1])
+        return motion
+
+    def close_hand(self, around: str | None = None, seen: Pose | None = None) -> None:
+        """Close the fingers, and wait for `GRASP_TIME`.
+
+        Args:
+            around: name of the body between them: from now on it is `held`, and is planned for.
+            seen: its pose before the hand came; by default where it is before the fingers close.
+        """
+        if around is not None and seen is None:
+            seen = self.world.pose(around)
+        self._move_fingers(self.gripper.closed, GRASP_TIME)
+        if around is not None and seen is not None:
+            self.held, self._origin = around, seen
+            self._grip = self.tool.inverse() * seen
+
+    def open_hand(self) -> None:
+        """Open the fingers, let go of what they hold, and wait for `RELEASE_TIME`."""
+        self._released_at = self.world.time
+        self._released = (self.held,) if self.held else self._released
+        self.held = None
+        self.planning.detach()
+        self._move_fingers(self.gripper.opened, RELEASE_TIME)
+
+    @property
+    def tool(self) -> Pose:
+        """Pose of the tool centre point in the world, as commanded."""
+        return self.model.tool_pose(self.arm)
+
+    def check_held(self) -> None:
+        """See to it that the body in the hand is still there.
+
+        Raises:
+            LostCube: it is not.
+        """
+        if not self._in_hand():
+            raise LostCube(f"{self.held} is not in the hand")
 
     def time_since_release(self) -> float:
         """Simulated seconds since the fingers were told to open."""
@@ -176,9 +262,10 @@ class Manipulator:
 
         The fingers may touch that cube: it may have turned a little between them.
         """
-        above = self.model.tool_pose(self.arm).translated(z=APPROACH)
+        above = self.tool.translated(z=APPROACH)
         return self._attempt(
-            "retreat", lambda: self._linear(above, ignored=self._released, speed=self.speeds.free)
+            "retreat",
+            lambda: self.move_straight(above, speed=self.speeds.free, ignored=self._released),
         )
 
     def try_go_home(self) -> str | None:
@@ -194,7 +281,7 @@ class Manipulator:
             above = self._origin.translated(z=PUT_BACK_HEIGHT)
             problem = self._attempt("put back", lambda: self.place(above))
         if self.held is not None:
-            self._open()
+            self.open_hand()
         return problem or self.try_retreat()
 
     def _attempt(self, what: str, motion: Callable[[], None]) -> str | None:
@@ -234,25 +321,8 @@ class Manipulator:
             _, tool, above = min(found, key=lambda option: option[0])
             return tool, above
 
-    def _linear(self, target: Pose, *, ignored: tuple[str, ...] = (), speed: float) -> None:
-        self._refresh()
-        self._follow(
-            self._planned(
-                lambda: self.planner.move_linear(
-                    self.arm, target, self.fingers, ignored=ignored, speed=speed
-                )
-            )
-        )
-
-    def _open(self) -> None:
-        self._released_at = self.world.time
-        self._released = (self.held,) if self.held else self._released
-        self.held = None
-        self.planning.detach()
-        self._move_fingers(self.gripper.opened, RELEASE_TIME)
-
     def _move_fingers(self, target: float, hold: float) -> None:
-        self._follow(
+        self.follow(
             self._planned(lambda: self.planner.move_fingers(self.arm, self.fingers, target, hold))
         )
 
@@ -260,20 +330,11 @@ class Manipulator:
         with self.world.stopwatch.measuring("plan"):
             return plan()
 
-    def _follow(self, trajectory: Trajectory) -> None:
-        self.world.follow(trajectory)
-        self._note_end(trajectory)
-
-    def _note_end(self, trajectory: Trajectory) -> None:
-        self.arm = trajectory.position[-1, : self.model.arm].copy()
-        self.fingers = float(trajectory.position[-1, -1])
-
     def _refresh(self) -> None:
         """Take the cubes' present poses over into the planning scene."""
         with self.world.stopwatch.measuring("plan"):
             self.planning.update(self.world.poses())
-            opened = self.gripper.opened
-            self.planning.opening = opened if self.held is None else CUBE_SIZE / 2
+            self.planning.opening = self.fingers if self.held is None else CUBE_SIZE / 2
             if self.held is not None and self.planning.held != self.held:
                 self.planning.attach(self.held, self._grip)
 
@@ -283,7 +344,3 @@ class Manipulator:
         joints = self.world.joints[0, : self.model.arm]
         tool = np.array(self.model.tool_pose(joints).position)
         return bool(np.linalg.norm(tool - self.world.pose(self.held).position) < IN_HAND)
-
-    def _check_held(self) -> None:
-        if not self._in_hand():
-            raise LostCube(f"{self.held} is not in the hand")

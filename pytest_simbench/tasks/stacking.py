@@ -78,6 +78,7 @@ class Stacking(Task):
 
     name: ClassVar[str] = "stacking"
     study_timeout: ClassVar[float] = 900.0
+    counted: ClassVar[str] = "cubes placed"
 
     towers: int = 3
     levels: int = 5

@@ -34,6 +34,7 @@ from pytest_simbench.tasks.base import (
 from pytest_simbench.tasks.impact import impact
 from pytest_simbench.tasks.manipulator import LostCube, Manipulator, Speeds
 from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.tasks.moments import Moment
 from pytest_simbench.tasks.throw_analysis import Thrown
 
 PROJECTILE = Pose.at(0.5, 0.0, CUBE_SIZE / 2)
@@ -82,6 +83,11 @@ class Throwing(Task):
 
     name: ClassVar[str] = "throwing"
     study_timeout: ClassVar[float] = 600.0
+    counted: ClassVar[str] = "cubes moved"
+    moments: ClassVar[tuple[Moment, ...]] = (
+        Moment("in the grip", "wind up"),
+        Moment("after the swing", "throw", 1),
+    )
 
     release_fraction: float = 0.5
     wind_up_speed: float = 0.25
@@ -185,13 +191,10 @@ class Throwing(Task):
         """Swing, let go, and look on."""
         world = manipulator.world
         started = world.time
-        trajectory, perfect = manipulator.plan_throw(
+        swing, perfect = manipulator.throw(
             np.array(THROW_END), self.release_fraction, feasible=self.feasible
         )
-        parts = (
-            world.follow(trajectory, log_period=0.0),
-            world.wait(AFTER_THROW, log_period=0.0),
-        )
+        parts = (swing, world.wait(AFTER_THROW, log_period=0.0))
         motion = Motion.joined([part for part in parts if part is not None])
         held = world.scene.body("projectile")
         gravity = np.asarray(world.scene.gravity)

@@ -38,6 +38,7 @@ class LeaningTowers(Task):
 
     name: ClassVar[str] = "leaning towers"
     study_timeout: ClassVar[float] = 60.0
+    counted: ClassVar[str] = "cubes standing"
 
     margins: tuple[float, ...] = (0.008, 0.010, 0.012)
     levels: int = 4
@@ -55,6 +56,15 @@ class LeaningTowers(Task):
 
     def smoke(self) -> LeaningTowers:
         return replace(self, margins=self.margins[:1], settle=min(self.settle, 1.5))
+
+    def change(self, before: Outcome, after: Outcome) -> str:
+        """Which towers: "topples tower 2"."""
+        old, new = before.details["toppled"], after.details["toppled"]
+        fallen = [name for name in new if name not in old]
+        if fallen:
+            return f"topples {' and '.join(fallen)}"
+        saved = [name for name in old if name not in new]
+        return f"saves {' and '.join(saved)} from toppling" if saved else ""
 
     def overhang(self, margin: float) -> float:
         """How far each cube of a tower stands beyond the one below [m]."""

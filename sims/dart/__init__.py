@@ -1,0 +1,1 @@
+"""DART: the adapter, and what the parity check reads."""

@@ -164,7 +164,7 @@ class ReadBack:
 def _merged(boxes: Sequence[FloatArray], spheres: Sequence[FloatArray]) -> list[FloatArray]:
     """Reaches of the boxes, each sphere made one with the box that it sticks out of least."""
     merged = list(boxes)
-    for sphere in spheres:  # which the adapter adds, see `drake_world`
+    for sphere in spheres:  # which the adapter adds, see `world`
         k = int(np.argmin([np.max(sphere - box) for box in boxes]))
         merged[k] = np.maximum(merged[k], sphere)
     return merged

@@ -1,0 +1,1 @@
+"""MuJoCo: the adapter, its pictures, and what the parity check reads."""

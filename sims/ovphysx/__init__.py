@@ -1,0 +1,1 @@
+"""Omniverse PhysX: the adapter, the session, the stage, and what the parity check reads."""

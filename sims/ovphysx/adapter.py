@@ -1,11 +1,11 @@
 """Omniverse PhysX (NVIDIA), the engine inside Isaac Sim, through the package ovphysx.
 
-The world is handed over as a USD stage, see `ovphysx_stage`. Drives are PhysX's own: implicit
+The world is handed over as a USD stage, see `stage`. Drives are PhysX's own: implicit
 springs and dampers in reduced coordinates. Their largest force bounds the drive alone, so effort
 feed-forward rides on the position target, q* + tau_ff / k, and the limit bounds the whole sum.
 
 While stepping the engine is commanded and read through its tensor bindings: 0.01 ms each, where a
-session (`ovphysx_session`) takes 0.4 ms. They are deprecated; the version is pinned. The first
+session (`session`) takes 0.4 ms. They are deprecated; the version is pinned. The first
 touch of a binding runs a step of its own, so before the first step only sessions are used.
 
 It has no renderer: ovphysx is a headless library, and Isaac Sim's window is not part of it.

@@ -1,0 +1,1 @@
+"""PyBullet: the adapter, and what the parity check reads."""

@@ -1,0 +1,1 @@
+"""SAPIEN: the adapter, its drawing scene, and what the parity check reads."""

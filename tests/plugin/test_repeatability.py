@@ -10,7 +10,7 @@ import sys
 import pytest
 
 TEST = """
-    from pytest_simbench.repeatability.moments import Moment
+    from pytest_simbench.tasks import Moment
     from pytest_simbench.tasks import LeaningTowers
     from tests.repeatability.conftest import Tumbling
 

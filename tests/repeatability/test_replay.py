@@ -9,12 +9,11 @@ import pytest
 
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.repeatability.episode import Experiment
-from pytest_simbench.repeatability.moments import Moment
 from pytest_simbench.repeatability.motions import Difference
 from pytest_simbench.repeatability.replay import replay
 from pytest_simbench.repeatability.replay_result import Again, Replay
 from pytest_simbench.simulator import Capability
-from pytest_simbench.tasks import Jitter, Throwing
+from pytest_simbench.tasks import Jitter, Moment, Throwing
 
 EVERYTHING = frozenset(Capability)
 MOMENTS = (Moment("in flight", "fly"),)

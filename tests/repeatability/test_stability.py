@@ -11,7 +11,6 @@ import pytest
 from pytest_simbench.client.world import World
 from pytest_simbench.measure.results import InconclusiveWarning
 from pytest_simbench.repeatability.episode import Experiment
-from pytest_simbench.repeatability.moments import Moment
 from pytest_simbench.repeatability.motions import gaps
 from pytest_simbench.repeatability.perturbation import Perturbation
 from pytest_simbench.repeatability.stability import (
@@ -22,7 +21,7 @@ from pytest_simbench.repeatability.stability import (
 )
 from pytest_simbench.robot.panda import panda
 from pytest_simbench.scene import Scene, Trajectory
-from pytest_simbench.tasks import Jitter
+from pytest_simbench.tasks import Jitter, Moment
 from pytest_simbench.tasks.base import Count, Outcome
 from tests.repeatability.conftest import Tumbling
 

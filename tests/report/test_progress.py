@@ -55,8 +55,30 @@ def test_a_terminal_line_tells_where_the_run_is_and_how_long_it_takes() -> None:
     desk.progress.repetition(3, seed=7)
     desk.progress.phase("place")
     desk.now += 2.0
-    desk.progress.count(9, 15, "cubes")
-    assert desk.screen == f"{TEST}  repetition 3 of 16  place  9/15 cubes  about 2 min 20 s left"
+    desk.progress.count(9, 15, "cubes placed")
+    assert desk.screen == (
+        f"{TEST}  repetition 3 of 16  place  9/15 cubes placed  about 2 min 20 s left"
+    )
+
+
+@pytest.mark.parametrize("width", [120, 50])
+def test_more_repetitions_of_a_test_are_counted_on(width: int) -> None:
+    """`--reps auto` runs some more, and a resumed run what is missing: never `11 of 2`."""
+    desk = Desk(is_tty=True, width=width)
+    desk.progress.start_test(TEST, 2, last=12)
+    of, before = ("repetition 11 of 12", "  10 of 12") if width > 50 else ("  11/12", "  10/12")
+    assert before in desk.screen
+    desk.progress.repetition(11, seed=7)
+    desk.now += 1.0
+    desk.progress.phase("place")
+    assert of in desk.screen
+    desk.progress.end_repetition("ok", 10.0)
+    desk.repeat(12, 10.0)
+    assert before.replace("10", "12") in desk.screen
+    log = Desk(is_tty=False)
+    log.progress.start_test(TEST, 2, last=12)
+    log.repeat(11, 10.0)
+    assert "repetition 11 of 12  ok after 10.0 s  about 10 s left" in log.text
 
 
 def test_a_narrow_terminal_gets_the_short_form_and_then_a_cut_one() -> None:

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from pytest_simbench.robot.errors import PlanningError
+from pytest_simbench.robot.kinematics import tool_over
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import READY
 from pytest_simbench.robot.planning import MotionPlanner
-from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.scene import Box, Pose, Scene, Trajectory
 from pytest_simbench.tasks import Jitter, Stacking
 from pytest_simbench.tasks.base import generators
 from pytest_simbench.tasks.manipulator import FULL_SPEED, LostCube, Manipulator, Speeds
@@ -311,3 +312,70 @@ def test_a_scene_without_a_robot_has_no_manipulator() -> None:
     world = ScriptedWorld(ScriptedProcess(), scene)
     with pytest.raises(ValueError, match="scene 'bare' has no robot"):
         Manipulator(world, np.random.default_rng(1))
+
+
+def test_a_task_moves_the_arm_with_verbs_of_its_own() -> None:
+    """A push: the closed hand beside a cube, straight through where it stands."""
+    arm = Arm()
+    hand, (x, y, _) = arm.manipulator, arm.process.scene.body(CUBE).pose.position
+    beside = tool_over(Pose.at(x - 0.07, y, 0.37), 0.0)
+    hand.go_to_pose(tool_over(Pose.at(x - 0.07, y, 0.45), 0.0), speed=0.5)
+    hand.close_hand()
+    hand.move_straight(beside, speed=0.3, ignored=("cube_04",))
+    assert hand.tool.position == pytest.approx(beside.position, abs=1e-5)
+    with pytest.raises(PlanningError, match="blocked"):
+        hand.move_straight(beside.translated(x=0.06, z=-0.04), speed=0.3)
+    pushed = beside.translated(x=0.06, z=-0.04)
+    hand.move_straight(pushed, speed=0.3, ignored=(CUBE, "cube_04"))
+    assert arm.tools[-1].position == pytest.approx(pushed.position, abs=1e-4)
+    assert arm.fingers == [0.035, 0.0, 0.0, 0.0]
+    assert hand.held is None
+    hand.open_hand()
+    assert arm.fingers[-1] == 0.035
+
+
+def test_a_closed_hand_is_planned_for_as_it_is() -> None:
+    """Its fingers pass where those of an open hand would touch."""
+    arm = Arm()
+    x, y, _ = arm.process.scene.body(CUBE).pose.position
+    between = tool_over(Pose.at(x, y + 0.05, 0.33), 0.0)
+    arm.manipulator.go_to_pose(between.translated(z=0.12), speed=0.5)
+    with pytest.raises(PlanningError, match="blocked"):
+        arm.manipulator.move_straight(between, speed=0.3)
+    arm.manipulator.close_hand()
+    arm.manipulator.move_straight(between, speed=0.3)
+
+
+def test_a_grasp_of_ones_own_is_held_and_planned_for() -> None:
+    arm = Arm()
+    hand, cube = arm.manipulator, arm.process.scene.body(CUBE).pose
+    hand.go_to_pose(tool_over(cube.translated(z=0.1), 0.0), speed=0.5)
+    hand.move_straight(tool_over(cube, 0.0), speed=0.3, ignored=(CUBE,))
+    hand.close_hand(around=CUBE)
+    assert hand.held == CUBE
+    hand.move_straight(hand.tool.translated(z=0.2), speed=0.3, ignored=(CUBE,))
+    hand.check_held()
+    assert arm.process.poses[CUBE].position[2] == pytest.approx(cube.position[2] + 0.2, abs=1e-4)
+    hand.place(PLACE)
+    assert arm.process.poses[CUBE].position == pytest.approx([0.5, 0.0, 0.325], abs=1e-4)
+    with pytest.raises(LostCube):
+        hand.check_held()
+
+
+def test_a_trajectory_of_ones_own_ends_where_the_next_motion_begins() -> None:
+    arm = Arm()
+    start = arm.world.joints[0]
+    goal = start + np.array([0.1, 0, 0, 0, 0, 0, 0, -0.01, -0.01])
+    rows = start + np.linspace(0.0, 1.0, 101)[:, None] * (goal - start)
+    motion = arm.manipulator.follow(Trajectory(0.01, rows, 0 * rows, 0 * rows), log_period=0.1)
+    assert motion is not None
+    assert len(motion) == 10
+    assert arm.manipulator.arm == pytest.approx(goal[:7])
+    assert arm.manipulator.fingers == pytest.approx(goal[-1])
+    arm.manipulator.go_to(start[:7], speed=0.5)
+    assert arm.process.asked[-1].arguments["position"][0] == pytest.approx(goal)
+
+
+def test_a_pose_out_of_reach_is_told() -> None:
+    with pytest.raises(PlanningError, match=r"unreachable: tool at \(2.000"):
+        Arm().manipulator.go_to_pose(tool_over(Pose.at(2.0, 0.0, 0.5), 0.0), speed=0.5)

@@ -25,8 +25,3 @@ class Moment:
         """Number of the operation of a tape before which it is; None: there is none."""
         numbers = [k for k, operation in enumerate(tape) if operation.phase == self.phase]
         return numbers[self.operation] if self.operation < len(numbers) else None
-
-
-THROWING_MOMENTS = (Moment("in the grip", "wind up"), Moment("after the swing", "throw", 1))
-"""Of `tasks.Throwing`: before winding up with the cube between the fingers, and when the swing has
-ended, by when the cube has flown and hit."""
