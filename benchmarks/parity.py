@@ -15,7 +15,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from pytest_simbench.client.environments import missing
-from pytest_simbench.simulator.parity import Comparison
+from pytest_simbench.simulator.parity import ParityResult
 from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.testing import CHECKS, Subject
 from pytest_simbench.testing.faults import FAULTS, Fault, rounds
@@ -87,7 +87,7 @@ def cells(subject: Subject) -> dict[str, str]:
     }
 
 
-def cell(subject: Subject, fault: Fault, found: Comparison) -> str:
+def cell(subject: Subject, fault: Fault, found: ParityResult) -> str:
     if fault.quantity in found.wrong:
         return "parity"
     return silent(subject, fault.quantity) if fault.quantity in found.untold else "**missed**"

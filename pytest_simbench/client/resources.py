@@ -24,7 +24,7 @@ LISTING_INTERVAL = 1.0
 """Wall seconds between two looks for new children: listing reads every process of the machine."""
 
 
-class Sample(NamedTuple):
+class ResourceSample(NamedTuple):
     """One look at the tree: `time` since the start [s], CPU in [% of a core], RSS in [MB]."""
 
     time: float
@@ -34,14 +34,14 @@ class Sample(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Spread:
+class MeanAndStd:
     """Mean and standard deviation (of the sample: n - 1; 0 for a single one)."""
 
     mean: float
     std: float
 
     @classmethod
-    def of(cls, values: Iterable[float]) -> Spread:
+    def of(cls, values: Iterable[float]) -> MeanAndStd:
         """Of at least one value."""
         found = list(values)
         mean = sum(found) / len(found)
@@ -60,26 +60,24 @@ class ResourceUse:
         samples: in the order of time.
         peak_mb: largest resident memory [MB]: the exact one where the worker reported it,
             or the largest sample of the tree where that is larger; None without both.
-        limit_hit: whether the memory limit was exceeded.
     """
 
-    samples: tuple[Sample, ...] = ()
+    samples: tuple[ResourceSample, ...] = ()
     peak_mb: float | None = None
-    limit_hit: bool = False
 
     @property
-    def cpu_percent(self) -> Spread | None:
+    def cpu_percent(self) -> MeanAndStd | None:
         """CPU of the tree [% of a core]; None without samples."""
-        return Spread.of(s.cpu_percent for s in self.samples) if self.samples else None
+        return MeanAndStd.of(s.cpu_percent for s in self.samples) if self.samples else None
 
     @property
-    def rss_mb(self) -> Spread | None:
+    def rss_mb(self) -> MeanAndStd | None:
         """Resident memory of the tree [MB]; None without samples."""
-        return Spread.of(s.rss_mb for s in self.samples) if self.samples else None
+        return MeanAndStd.of(s.rss_mb for s in self.samples) if self.samples else None
 
     def phases(self) -> dict[str, ResourceUse]:
         """The samples by phase, in the order the phases began."""
-        found: dict[str, list[Sample]] = {}
+        found: dict[str, list[ResourceSample]] = {}
         for sample in self.samples:
             found.setdefault(sample.phase, []).append(sample)
         return {
@@ -97,8 +95,8 @@ class ResourceUse:
             "samples": len(self.samples),
             "phases": {
                 phase: {
-                    "cpu_percent": Spread.of(s.cpu_percent for s in use.samples).to_wire(),
-                    "rss_mb": Spread.of(s.rss_mb for s in use.samples).to_wire(),
+                    "cpu_percent": MeanAndStd.of(s.cpu_percent for s in use.samples).to_wire(),
+                    "rss_mb": MeanAndStd.of(s.rss_mb for s in use.samples).to_wire(),
                     "samples": len(use.samples),
                 }
                 for phase, use in self.phases().items()
@@ -173,7 +171,7 @@ class ResourceSampler:
         self.callback_error: Exception | None = None
         self._on_limit = on_limit
         self._limit_hit = False
-        self._samples: list[Sample] = []
+        self._samples: list[ResourceSample] = []
         self._stop = threading.Event()
         self._began = time.perf_counter()
         self._tree: _Tree | None = None
@@ -192,14 +190,9 @@ class ResourceSampler:
         self.stop()
 
     @property
-    def latest(self) -> Sample | None:
+    def latest(self) -> ResourceSample | None:
         """The last sample, for a live display."""
         return self._samples[-1] if self._samples else None
-
-    @property
-    def limit_hit(self) -> bool:
-        """Whether the tree has used more than `limit_mb`."""
-        return self._limit_hit
 
     def stop(self, peak_mb: float | None = None) -> ResourceUse:
         """End the sampling; what was used so far. May be called again.
@@ -214,7 +207,7 @@ class ResourceSampler:
         peaks = [sample.rss_mb for sample in samples]
         if peak_mb is not None:
             peaks.append(peak_mb)
-        return ResourceUse(samples, max(peaks, default=None), self._limit_hit)
+        return ResourceUse(samples, max(peaks, default=None))
 
     def _run(self) -> None:
         due = self._began
@@ -231,7 +224,7 @@ class ResourceSampler:
                 cpu, rss = self._tree.look(now)
             except psutil.Error:
                 return
-            self._samples.append(Sample(now - self._began, phase, cpu, rss))
+            self._samples.append(ResourceSample(now - self._began, phase, cpu, rss))
             if self.limit_mb is not None and rss > self.limit_mb and not self._limit_hit:
                 self._limit_hit = True
                 if self._on_limit is not None:

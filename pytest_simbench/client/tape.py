@@ -42,12 +42,6 @@ class Operation:
             return float(self.arguments["duration"])
         return float(self.arguments["tick"]) * (len(self.arguments["position"]) - 1)
 
-    def same_command(self, other: Operation) -> bool:
-        """Whether both ask for the same, bit for bit."""
-        if self.kind != other.kind or self.arguments.keys() != other.arguments.keys():
-            return False
-        return all(np.array_equal(value, other.arguments[k]) for k, value in self.arguments.items())
-
     def to_wire(self) -> dict[str, Any]:
         """Plain data for JSON; numbers are kept to the last bit."""
         arguments = {

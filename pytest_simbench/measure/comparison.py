@@ -1,15 +1,13 @@
 """Do two simulators, modes or runs differ, or do they agree? Tests on their repetitions.
 
 Where the two sides share their seeds (same cube order, same jitter) their values are paired, which
-removes what the seeds have in common. The default test is a permutation test of the difference of
-means: it asks what the tables show, needs no distribution, and bears ties. Wilcoxon's and
-Brunner and Munzel's tests are there for ordinal questions ("is the one usually larger?").
+removes what the seeds have in common. The test is a permutation test of the difference of
+means: it asks what the tables show, needs no distribution, and bears ties.
 """
 
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -30,17 +28,15 @@ COMMON_SEEDS = 0.9
 
 Alternative = Literal["two-sided", "less", "greater"]
 FloatArray = NDArray[np.float64]
-Method = Literal["permutation", "wilcoxon", "brunner-munzel"]
 
 
 @dataclass(frozen=True)
-class Comparison:
+class MeanDifference:
     """The difference second minus first of two means, and how likely it is by chance.
 
     Attributes:
         first, second: the means.
         p_value: probability of such a difference (in the direction asked for) without a true one.
-        test: the name of the test.
         paired: whether values of the same seed were paired.
         n: repetitions on each side, or pairs.
     """
@@ -48,7 +44,6 @@ class Comparison:
     first: float
     second: float
     p_value: float
-    test: str
     paired: bool
     n: tuple[int, int]
 
@@ -71,7 +66,7 @@ def pair(first: Mapping[int, float], second: Mapping[int, float]) -> tuple[Float
 
 def compare_by_seed(
     first: Mapping[int, float], second: Mapping[int, float], alternative: Alternative = "two-sided"
-) -> Comparison:
+) -> MeanDifference:
     """Test whether `second` differs from `first`, paired where nearly all seeds are on both sides.
 
     Raises:
@@ -89,48 +84,24 @@ def compare(
     *,
     paired: bool = False,
     alternative: Alternative = "two-sided",
-    method: Method | None = None,
-) -> Comparison:
+) -> MeanDifference:
     """Test whether `second` differs from `first` (is `less`, is `greater`).
 
     Args:
         first, second: values (n,) and (m,); pairs in order where paired.
         paired: whether they share their seeds.
         alternative: the direction of the difference second - first.
-        method: `permutation` (default); `wilcoxon` for pairs, `brunner-munzel` for others.
 
     Raises:
-        ValueError: an empty side, pairs of different numbers, or a method that does not fit.
+        ValueError: an empty side, or pairs of different numbers.
     """
-    from scipy import stats
-
     a, b = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
     if not a.size or not b.size:
         raise ValueError("nothing to compare: a side has no repetitions")
     if paired and a.size != b.size:
         raise ValueError(f"pairs need as many values on each side, not {a.size} and {b.size}")
-    if method == "wilcoxon" and not paired:
-        raise ValueError("Wilcoxon's test is for pairs; use brunner-munzel or permutation")
-    if method == "brunner-munzel" and paired:
-        raise ValueError("Brunner and Munzel's test is not for pairs; use wilcoxon or permutation")
-
-    p = math.nan
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of few or equal values: answered by the nan below
-        if method == "wilcoxon":
-            p = float(stats.wilcoxon(b - a, alternative=alternative).pvalue)
-        elif method == "brunner-munzel":
-            p = float(stats.brunnermunzel(b, a, alternative=alternative).pvalue)
-    if math.isnan(p):  # a rank test has no answer where nothing varies
-        p = _permutation(a, b, paired, alternative)
-    return Comparison(
-        float(a.mean()),
-        float(b.mean()),
-        p,
-        method or "permutation",
-        paired,
-        (a.size, b.size),
-    )
+    p = _permutation(a, b, paired, alternative)
+    return MeanDifference(float(a.mean()), float(b.mean()), p, paired, (a.size, b.size))
 
 
 def _permutation(a: FloatArray, b: FloatArray, paired: bool, alternative: Alternative) -> float:
@@ -189,17 +160,14 @@ class Equivalence:
         return self.p_value <= alpha
 
 
-def equivalence(
-    first: ArrayLike, second: ArrayLike, margin: float, *, paired: bool = False
-) -> Equivalence:
-    """Two one-sided t tests (TOST): "headless and GUI do not differ by more than `margin`".
+def equivalence(first: ArrayLike, second: ArrayLike, margin: float) -> Equivalence:
+    """Two one-sided paired t tests (TOST): "headless and GUI do not differ by more than `margin`".
 
     Not significantly different is not the same as equivalent: few repetitions show neither.
 
     Args:
-        first, second: values (n,) and (m,), at least two each; pairs in order where paired.
+        first, second: values of the same seeds, (n,) each, at least two.
         margin: above 0.
-        paired: whether they share their seeds.
 
     Raises:
         ValueError: fewer than two values on a side, unequal pairs, or a margin that is not above 0.
@@ -209,21 +177,14 @@ def equivalence(
     a, b = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
     if margin <= 0:
         raise ValueError(f"the margin of an equivalence must be above 0, not {margin:g}")
-    if a.size < 2 or b.size < 2 or (paired and a.size != b.size):
-        raise ValueError(f"equivalence needs two or more values a side, not {a.size} and {b.size}")
+    if a.size < 2 or a.size != b.size:
+        raise ValueError(f"equivalence needs two or more pairs, not {a.size} and {b.size} values")
     difference = float(b.mean() - a.mean())
-    spread = np.ptp(b - a) if paired else max(np.ptp(a), np.ptp(b))
-    if spread <= 1e-12 * max(1.0, float(np.abs(a).max())):
+    if np.ptp(b - a) <= 1e-12 * max(1.0, float(np.abs(a).max())):
         return Equivalence(difference, margin, 0.0 if abs(difference) < margin else 1.0)
-    worst = 0.0
     sides: tuple[tuple[FloatArray, Alternative], ...] = (
         (b + margin, "greater"),
         (b - margin, "less"),
     )
-    for shifted, alternative in sides:
-        if paired:
-            p = stats.ttest_rel(shifted, a, alternative=alternative).pvalue
-        else:
-            p = stats.ttest_ind(shifted, a, equal_var=False, alternative=alternative).pvalue
-        worst = max(worst, float(p))
-    return Equivalence(difference, margin, worst)
+    found = [stats.ttest_rel(side, a, alternative=way).pvalue for side, way in sides]
+    return Equivalence(difference, margin, float(max(found)))

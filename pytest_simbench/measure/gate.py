@@ -22,7 +22,7 @@ from pytest_simbench.measure.comparison import (
     ALPHA,
     PERMUTATIONS,
     Alternative,
-    Comparison,
+    MeanDifference,
     compare_by_seed,
     holm,
 )
@@ -53,7 +53,7 @@ class Change:
     test: str
     metric: Metric
     limit: Limit
-    comparison: Comparison
+    comparison: MeanDifference
     p_value: float
     loss: float
     normalised: bool = False
@@ -222,7 +222,7 @@ def _failed(result: ResultSet) -> dict[int, float]:
     return {r.seed: float(not r.ok) for r in (*result.ok, *result.failures)}
 
 
-def _smallest_p(comparison: Comparison) -> float:
+def _smallest_p(comparison: MeanDifference) -> float:
     """The smallest p value that so many repetitions can give in a permutation test."""
     first, second = comparison.n
     arrangements = 2**first if comparison.paired else math.comb(first + second, first)

@@ -75,6 +75,6 @@ def compare_modes(records: Sequence[Record], metrics: Iterable[Metric]) -> list[
             result = None
             if len(pairs) >= 2:
                 headless, gui = zip(*pairs, strict=True)
-                result = equivalence(headless, gui, MARGIN, paired=True)
+                result = equivalence(headless, gui, MARGIN)
             found.append(ModeComparison(simulator, profile, test, metric, len(pairs), result))
     return found

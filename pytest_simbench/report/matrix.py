@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from pytest_simbench.measure.contest import wins
 from pytest_simbench.measure.modes import compare_modes
+from pytest_simbench.measure.wins import wins
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import comparable, series
 from pytest_simbench.report.summary import TaskSummary

@@ -11,7 +11,7 @@ import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from pytest_simbench.measure.contest import Win
+from pytest_simbench.measure.wins import Win
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import series
 from pytest_simbench.report.pooling import (

@@ -23,7 +23,7 @@ LENGTH_TOLERANCE = 1e-5
 
 
 @dataclass(frozen=True)
-class Comparison:
+class ParityResult:
     """A world held against its scene.
 
     Attributes:
@@ -43,7 +43,7 @@ def compare(
     reported: Mapping[str, Any],
     deviations: Iterable[Deviation],
     simulator: str,
-) -> Comparison:
+) -> ParityResult:
     """Hold what a simulator reports against what is expected of it."""
     deviations = tuple(deviations)
     wrong: dict[str, str] = {}
@@ -70,7 +70,7 @@ def compare(
         wrong[name] = "reported, but not part of the scene"
     untellable = set(untold.values())
     sentences = [_sentence(d, d in untellable, differing.get(d)) for d in deviations]
-    return Comparison(wrong, [sentence for sentence in sentences if sentence], list(untold))
+    return ParityResult(wrong, [sentence for sentence in sentences if sentence], list(untold))
 
 
 def check(

@@ -11,7 +11,7 @@ import numpy as np
 
 from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import Capability
-from pytest_simbench.simulator.parity import Comparison, compare
+from pytest_simbench.simulator.parity import ParityResult, compare
 from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
@@ -82,7 +82,7 @@ def planted_faults_are_seen(subject: Subject) -> None:
     require(not missed, f"parity does not see {'; '.join(missed)}")
 
 
-def planted(subject: Subject, faults: Iterable[Fault]) -> Comparison:
+def planted(subject: Subject, faults: Iterable[Fault]) -> ParityResult:
     """A world with the faults, read back by an adapter that remembers the true scene."""
     truth, process = true_scene(), subject.shared()
     faulty = truth

@@ -14,9 +14,9 @@ import pytest
 from pytest_simbench.client import resources
 from pytest_simbench.client.resources import (
     LISTING_INTERVAL,
+    ResourceSample,
     ResourceSampler,
     ResourceUse,
-    Sample,
     _Tree,
 )
 
@@ -127,7 +127,7 @@ class Clock:
 
 def sampled(
     monkeypatch: pytest.MonkeyPatch, looks: Sequence[float], **options: Any
-) -> list[Sample]:
+) -> list[ResourceSample]:
     """What a sampler at 10 Hz takes whose looks last so long [s]."""
     clock = Clock(looks)
     monkeypatch.setattr(resources, "time", clock)
@@ -180,7 +180,11 @@ def test_a_sampler_begins_in_the_phase_of_launching() -> None:
 
 
 def test_phases_have_their_own_peak_and_the_wire_three_decimals() -> None:
-    samples = (Sample(0.1, "a", 1, 10.0), Sample(0.2, "b", 2, 30.0), Sample(0.3, "a", 3, 20.0))
+    samples = (
+        ResourceSample(0.1, "a", 1, 10.0),
+        ResourceSample(0.2, "b", 2, 30.0),
+        ResourceSample(0.3, "a", 3, 20.0),
+    )
     use = ResourceUse(samples, 30.123456)
     assert {phase: part.peak_mb for phase, part in use.phases().items()} == {"a": 20.0, "b": 30.0}
     assert use.to_wire()["rss_mb"]["peak"] == 30.123

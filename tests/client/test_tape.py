@@ -100,7 +100,7 @@ def test_playing_a_tape_repeats_the_episode(handle: SimulatorHandle) -> None:
         world.play(first.tape)
         assert world.bodies.tobytes() == first.bodies.tobytes()
     assert [operation.phase for operation in world.tape] == ["fall", "land"]
-    assert all(a.same_command(b) for a, b in zip(first.tape, world.tape, strict=True))
+    assert all(a.to_wire() == b.to_wire() for a, b in zip(first.tape, world.tape, strict=True))
     for a, b in zip(first.motions, world.motions, strict=True):
         assert a.bodies.tobytes() == b.bodies.tobytes()
     assert [round(motion.time[-1], 3) for motion in first.motions] == [0.0, 0.1, 0.6]
@@ -146,8 +146,8 @@ def test_performing_leaves_no_trace(handle: SimulatorHandle) -> None:
 def test_operations_travel_as_json_to_the_last_bit() -> None:
     for operation in (ramp(0.1, 1 / 3, 7), wait(0.1)):
         again = Operation.from_wire(json.loads(json.dumps(operation.to_wire())))
-        assert again.same_command(operation)
-        assert again.phase == operation.phase
+        assert (again.kind, again.phase) == (operation.kind, operation.phase)
+        assert again.arguments.keys() == operation.arguments.keys()
+        for name, value in operation.arguments.items():
+            np.testing.assert_array_equal(again.arguments[name], value)
         assert again.duration == operation.duration
-    assert not ramp(0, 1, 7).same_command(ramp(0, 1, 8))
-    assert not ramp(0, 1, 7).same_command(wait(1.0))

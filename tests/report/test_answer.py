@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.measure.comparison import Comparison
-from pytest_simbench.measure.contest import Win
+from pytest_simbench.measure.comparison import MeanDifference
+from pytest_simbench.measure.wins import Win
 from pytest_simbench.report.answer import sentences, short_labels
 from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.pooling import Spread
@@ -37,7 +37,7 @@ def task(
         for name, mean in found.items()
     )  # fmt: skip
     places = list(found)
-    comparison = Comparison(0.0, 1.0, 0.001, "permutation", True, (count, count))
+    comparison = MeanDifference(0.0, 1.0, 0.001, True, (count, count))
     wins = tuple(
         Win(*(places.index(name) for name in text.split(">")), metric, comparison, 0.001)
         for text in beats

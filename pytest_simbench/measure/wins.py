@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
-from pytest_simbench.measure.comparison import ALPHA, Comparison, compare_by_seed
+from pytest_simbench.measure.comparison import ALPHA, MeanDifference, compare_by_seed
 from pytest_simbench.measure.intervals import FEWEST, varies
 from pytest_simbench.measure.limits import FAILURES
 from pytest_simbench.records.record import Record
@@ -31,7 +31,7 @@ class Win:
     winner: Any
     loser: Any
     metric: Metric
-    comparison: Comparison
+    comparison: MeanDifference
     p_value: float
 
 
@@ -63,7 +63,7 @@ def wins(
         m for m in COSTS if m.name in COMPARED_COSTS and m.name not in {j.name for j in judged}
     ]
     values = {(key, m.name): _values(run, m) for key, run in sides.items() for m in judged}
-    found: list[tuple[Any, Any, Metric, Comparison]] = []
+    found: list[tuple[Any, Any, Metric, MeanDifference]] = []
     for (a, b), metric in ((p, m) for p in combinations(sides, 2) for m in judged):
         first, second = values[a, metric.name], values[b, metric.name]
         if comparable(a, b) and _testable(first, metric) and _testable(second, metric):

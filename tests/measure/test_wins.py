@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pytest_simbench.measure import comparison
-from pytest_simbench.measure.contest import wins
+from pytest_simbench.measure.wins import wins
 from pytest_simbench.records.record import Record
 from tests.records.build import METRICS, failed, record
 
