@@ -1,8 +1,7 @@
-"""What all tests share."""
+"""What all tests share; what they share with the suites stands in `conftest.py` at the top."""
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,8 +15,6 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter, registered
 
-pytest_plugins = ["pytester"]
-
 settings.register_profile("simbench-tests", deadline=None)  # speed is measured in benchmarks/
 settings.load_profile("simbench-tests")
 
@@ -30,15 +27,6 @@ HERE = [
     if not adapter(name).info.requirements and not missing(adapter(name).info)
 ]
 """The engines that can be imported in this process."""
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Under `-n N --dist loadgroup`, one process tests an engine that is slow to start."""
-    slow = [name for name in ADAPTERS if adapter(name).info.costly_start]
-    for item in items:
-        words = re.split(r"\W|_", f"{item.path.stem} {item.name}")
-        for name in set(slow).intersection(words):
-            item.add_marker(pytest.mark.xdist_group(name))
 
 
 def able_to(capability: Capability) -> list[str]:
