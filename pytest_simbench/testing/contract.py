@@ -24,7 +24,7 @@ _WITHOUT_ENGINE = """
 import importlib, sys
 class Missing:
     def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] in {roots!r}:
+        if any(name == part or name.startswith(part + ".") for part in {engine!r}):
             raise ImportError(name + " was imported")
 sys.meta_path.insert(0, Missing())
 sys.path[:0] = {path!r}
@@ -35,10 +35,20 @@ cls.info, cls.profiles
 
 @check()
 def imports_without_engine(subject: Subject) -> None:
-    """The adapter's module imports where the engine is not installed: `--sims` reads its facts."""
+    """The adapter's module imports where the engine is not installed, or not loaded: `--sims` reads
+    its facts. The engine is the packages in `info.modules`; in the adapter's own package it is just
+    the modules that stand there by name."""
     module, _, name = subject.adapter.partition(":")
-    roots = {part.partition(".")[0] for part in subject.cls.info.modules}
-    code = _WITHOUT_ENGINE.format(roots=roots, module=module, name=name, path=sys.path)
+    own = module.partition(".")[0]
+    roots = {part: part.partition(".")[0] for part in subject.cls.info.modules}
+    engine = {part if root == own else root for part, root in roots.items()}
+    engine = {part for part in engine if not f"{module}.".startswith(f"{part}.")}
+    require(
+        engine,
+        f"info.modules names only packages that {module} itself lies in; name the module that is "
+        f"the engine ({own}.core, say), which {module} imports lazily",
+    )
+    code = _WITHOUT_ENGINE.format(engine=sorted(engine), module=module, name=name, path=sys.path)
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
     )

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+from pathlib import Path
+from textwrap import dedent
+
 import pytest
 
 from pytest_simbench.client.errors import WorkerError, WorldParityError
@@ -33,6 +37,7 @@ FAULTS: list[tuple[type[Simulator], str]] = [
     (wrong.WrongMass, "collision_keeps_momentum"),
     (wrong.NoContacts, "contacts_counted"),
     (wrong.SoftDrives, "static_hold"),
+    (wrong.SoftDrivesNotTold, "static_hold"),
     (wrong.NoFeedForward, "tracks_trajectory"),
     (wrong.EchoLimits, "planted_faults_are_seen"),
     (wrong.EchoGroundFriction, "planted_faults_are_seen"),
@@ -80,3 +85,42 @@ def test_parity_check_runs_while_loading() -> None:
     class_without_lie = Subject(wrong.Misbuilt)
     with pytest.raises(WorkerError, match="gravity: scene"):
         CHECKS["parity_of_full_scene"].law(class_without_lie)
+
+
+def test_springs_that_are_declared_not_to_be_told_may_sag_as_springs_do() -> None:
+    """An engine without drives of its own: the adapter computes the law of `scene.Joint`."""
+    ConformanceTest(Subject(wrong.DrivesNotTold), CHECKS["static_hold"])()
+
+
+OWN_PACKAGE = {
+    "__init__": "",
+    "core": "answer = 42",
+    "lazy": """
+        from dataclasses import replace
+        from pytest_simbench.simulator import lazy_import
+        from pytest_simbench.sims.mujoco.adapter import MuJoCo
+        core = lazy_import("ownsim.core")
+        class Own(MuJoCo):
+            info = replace(MuJoCo.info, modules=("ownsim.core",))
+        class Vague(MuJoCo):
+            info = replace(MuJoCo.info, modules=("ownsim", "ownsim.lazy"))
+    """,
+    "eager": "from .core import answer\nfrom .lazy import MuJoCo, Own\nclass Eager(Own): ...",
+}
+
+
+def test_an_adapter_may_live_in_its_engines_own_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is not to be imported is then the engine itself, by the name of its module."""
+    for name, text in OWN_PACKAGE.items():
+        path = tmp_path / "ownsim" / f"{name}.py"
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(dedent(text))
+    monkeypatch.syspath_prepend(tmp_path)
+    law = CHECKS["imports_without_engine"].law
+    law(Subject(import_module("ownsim.lazy").Own))
+    with pytest.raises(ConformanceFailure, match=r"ownsim\.core was imported"):
+        law(Subject(import_module("ownsim.eager").Eager))
+    with pytest.raises(ConformanceFailure, match=r"name the module that is the engine \(ownsim\."):
+        law(Subject(import_module("ownsim.lazy").Vague))

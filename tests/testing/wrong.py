@@ -14,7 +14,7 @@ import numpy as np
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 from pytest_simbench.scene import FloatArray, Scene
-from pytest_simbench.simulator import SimulatorInfo
+from pytest_simbench.simulator import Deviation, SimulatorInfo
 from pytest_simbench.simulator.quantities import expected_quantities
 
 
@@ -147,6 +147,25 @@ class SoftDrives(Lying):
     def tamper(self) -> None:
         self.model.actuator_gainprm[:, 0] /= 2
         self.model.actuator_biasprm[:, 1] /= 2
+
+
+DRIVE_NOT_TOLD = replace(
+    MuJoCo.info,
+    deviations=(
+        *MuJoCo.info.deviations,
+        Deviation("joint/*/stiffness joint/*/damping", "the adapter's own drive"),
+    ),
+)
+
+
+class DrivesNotTold(MuJoCo):
+    """Springs as they should be, which are declared not to be told."""
+
+    info: ClassVar[SimulatorInfo] = DRIVE_NOT_TOLD
+
+
+class SoftDrivesNotTold(SoftDrives):
+    info: ClassVar[SimulatorInfo] = DRIVE_NOT_TOLD
 
 
 class NoFeedForward(MuJoCo):
