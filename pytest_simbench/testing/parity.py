@@ -84,7 +84,9 @@ def planted_faults_are_seen(subject: Subject) -> None:
 
 def planted(subject: Subject, faults: Iterable[Fault]) -> ParityResult:
     """A world with the faults, read back by an adapter that remembers the true scene."""
-    truth, process = true_scene(), subject.shared()
+    truth = true_scene()
+    subject.can_build(truth)
+    process = subject.shared()
     faulty = truth
     with tempfile.TemporaryDirectory() as folder:
         for fault in faults:

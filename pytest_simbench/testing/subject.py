@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from pytest_simbench.client.environments import Environment, interpreter
 from pytest_simbench.client.errors import BadState, Diverged, Where, WorkerError
 from pytest_simbench.client.process import Launch, WorkerProcess
@@ -18,6 +20,7 @@ from pytest_simbench.client.world import Motion, World
 from pytest_simbench.scene import Scene
 from pytest_simbench.simulator import Capability, Settings, Simulator
 from pytest_simbench.simulator.settings import profile
+from pytest_simbench.simulator.urdf import ROOT
 
 
 class ConformanceFailure(AssertionError):
@@ -86,6 +89,15 @@ class Subject:
     def can(self, capability: Capability) -> bool:
         return capability in self.cls.info.capabilities
 
+    def can_build(self, scene: Scene) -> None:
+        """Skip the law when the scene has a robot and the adapter declares that it has none: as a
+        deviation of every link, `Deviation("link/*", "mysim has no robots")`."""
+        if scene.robot is not None:
+            lacking = [d for d in self.cls.info.deviations if d.within is None]
+            reason = next((d.reason for d in lacking if d.excuses(f"link/{ROOT}/pose")), None)
+            if reason is not None:
+                pytest.skip(reason)
+
     def launch(self, *, gui: bool = False) -> WorkerProcess:
         """A worker process of its own; the caller closes it."""
         handle, log = tempfile.mkstemp(prefix=f"{self.name}-", suffix=".log")
@@ -135,6 +147,7 @@ class Subject:
         parity: bool = True,
     ) -> Iterator[World]:
         """A world of `scene`, checked if `parity`; in a process of its own if `fresh` or `gui`."""
+        self.can_build(scene)
         alone = fresh or gui
         process = self.launch(gui=gui) if alone else self.shared()
         try:

@@ -124,3 +124,13 @@ def test_an_adapter_may_live_in_its_engines_own_package(
         law(Subject(import_module("ownsim.eager").Eager))
     with pytest.raises(ConformanceFailure, match=r"name the module that is the engine \(ownsim\."):
         law(Subject(import_module("ownsim.lazy").Vague))
+
+
+@pytest.mark.parametrize("name", ["static_hold", "planted_faults_are_seen", "links_are_felt"])
+def test_laws_of_robots_are_skipped_where_an_adapter_declares_that_it_has_none(name: str) -> None:
+    with pytest.raises(pytest.skip.Exception, match="there are no robots here"):
+        ConformanceTest(Subject(wrong.NoRobots), CHECKS[name])()
+
+
+def test_laws_of_boxes_hold_where_there_are_no_robots() -> None:
+    ConformanceTest(Subject(wrong.NoRobots), CHECKS["free_fall"])()

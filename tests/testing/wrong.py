@@ -14,7 +14,7 @@ import numpy as np
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 from pytest_simbench.scene import FloatArray, Scene
-from pytest_simbench.simulator import Deviation, SimulatorInfo
+from pytest_simbench.simulator import Deviation, NotSupportedError, SimulatorInfo
 from pytest_simbench.simulator.quantities import expected_quantities
 
 
@@ -166,6 +166,19 @@ class DrivesNotTold(MuJoCo):
 
 class SoftDrivesNotTold(SoftDrives):
     info: ClassVar[SimulatorInfo] = DRIVE_NOT_TOLD
+
+
+class NoRobots(MuJoCo):
+    """Builds no robot, and says so."""
+
+    info: ClassVar[SimulatorInfo] = replace(
+        MuJoCo.info, deviations=(Deviation("link/*", "there are no robots here"),)
+    )
+
+    def load(self, scene: Scene) -> None:
+        if scene.robot is not None:
+            raise NotSupportedError("there are no robots here")
+        super().load(scene)
 
 
 class NoFeedForward(MuJoCo):
