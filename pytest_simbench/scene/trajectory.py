@@ -39,6 +39,15 @@ class Trajectory:
         if not all(np.isfinite(rows).all() for rows in arrays):
             raise SceneError("a trajectory holds a number that is not finite")
 
+    @classmethod
+    def holding(
+        cls, tick: float, position: FloatArray, effort: FloatArray | None = None
+    ) -> Trajectory:
+        """One set point for one tick: joints at rest at `position`, (n_joints,), with `effort`."""
+        rest = np.zeros_like(position)
+        rows = (position, rest, rest if effort is None else effort)
+        return cls(tick, *(np.array([row, row]) for row in rows))
+
     @property
     def duration(self) -> float:
         """[s], from the first row to the last."""

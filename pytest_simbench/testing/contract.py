@@ -184,7 +184,7 @@ def commands_persist(subject: Subject) -> None:
     goal = start.copy()
     goal[:7] += 0.05
     goal[7:] -= 0.01
-    once = Trajectory(subject.timestep, *(np.array([r, r]) for r in (goal, 0 * goal, 0 * goal)))
+    once = Trajectory.holding(subject.timestep, goal)
     with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "arm weightless")) as world:
         world.wait(0.2)
         idle = float(np.abs(world.joints[0] - start).max())

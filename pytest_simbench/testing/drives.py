@@ -72,7 +72,7 @@ def tracks_trajectory(subject: Subject) -> None:
     a = (goal - start) * (60 * s - 180 * s**2 + 120 * s**3) / 1.5**2
     effort = model_of(robot).inverse_dynamics(np.array(STANDARD_GRAVITY), q, v, a)
     rest = gravity_effort(robot, start)
-    hold = Trajectory(ARM_TICK, *(np.array([r, r]) for r in (start, 0 * start, rest)))
+    hold = Trajectory.holding(ARM_TICK, start, rest)
     with subject.world(scenes.arm_alone(robot)) as world:
         world.follow(hold)
         world.wait(1.0)  # so that the load's own transient is over
@@ -95,7 +95,7 @@ def effort_limit_bounds_acceleration(subject: Subject) -> None:
     start = robot.column("initial_position")
     goal = start.copy()
     goal[0] += 2.0
-    far = Trajectory(subject.timestep, *(np.array([r, r]) for r in (goal, 0 * goal, 0 * goal)))
+    far = Trajectory.holding(subject.timestep, goal)
     with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "arm weightless")) as world:
         world.follow(far)
         world.wait(0.1 - subject.timestep)
@@ -137,7 +137,7 @@ def fingers_stay_coupled(subject: Subject) -> None:
     robot = scenes.arm()
     goal = robot.column("initial_position")
     goal[robot.finger_indices] = [0.03, 0.01]
-    split = Trajectory(subject.timestep, *(np.array([r, r]) for r in (goal, 0 * goal, 0 * goal)))
+    split = Trajectory.holding(subject.timestep, goal)
     with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "arm weightless")) as world:
         world.follow(split)
         world.wait(1.0)
@@ -184,7 +184,7 @@ def hold_command(scene: Scene, timestep: float) -> Trajectory:
     robot = scene.robot or scenes.arm()
     start = robot.column("initial_position")
     effort = gravity_effort(robot, start, scene.gravity)
-    return Trajectory(timestep, *(np.array([r, r]) for r in (start, 0 * start, effort)))
+    return Trajectory.holding(timestep, start, effort)
 
 
 def close_command(scene: Scene, timestep: float) -> Trajectory:
@@ -194,4 +194,4 @@ def close_command(scene: Scene, timestep: float) -> Trajectory:
     effort = gravity_effort(robot, goal, scene.gravity)
     goal[robot.finger_indices] = robot.gripper.closed
     effort[robot.finger_indices] = 0.0
-    return Trajectory(timestep, *(np.array([r, r]) for r in (goal, 0 * goal, effort)))
+    return Trajectory.holding(timestep, goal, effort)

@@ -106,7 +106,7 @@ def _speeds_up(subject: Subject, robot: Robot, k: int) -> None:
     start = robot.column("initial_position")
     goal = start.copy()
     goal[k] += 1.0 if goal[k] < 0 else -1.0
-    far = Trajectory(subject.timestep, *(np.array([r, r]) for r in (goal, 0 * goal, 0 * goal)))
+    far = Trajectory.holding(subject.timestep, goal)
     with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "speeding up")) as world:
         world.follow(far)
         world.wait(seconds - subject.timestep)
@@ -119,7 +119,7 @@ def _gives_way(subject: Subject, robot: Robot, gravity: tuple[float, float, floa
     """How far the arm's joints move in 0.3 s under a command to stay, gravity compensated."""
     start = robot.column("initial_position")
     effort = gravity_effort(robot, start, gravity)
-    hold = Trajectory(subject.timestep, *(np.array([r, r]) for r in (start, 0 * start, effort)))
+    hold = Trajectory.holding(subject.timestep, start, effort)
     with subject.world(scenes.arm_alone(robot, gravity, "weak arm")) as world:
         world.follow(hold)
         world.wait(0.3)

@@ -26,8 +26,7 @@ def _swing(scene: Scene, timestep: float, share: float) -> Trajectory:
     start = robot.column("initial_position")
     goal = start + share
     goal[robot.finger_indices] = start[robot.finger_indices]
-    zero = np.zeros_like(goal)
-    return Trajectory(timestep, *(np.array([row, row]) for row in (goal, zero, zero)))
+    return Trajectory.holding(timestep, goal)
 
 
 def require_same(what: str, a: Motion, b: Motion) -> None:

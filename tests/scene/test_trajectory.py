@@ -27,6 +27,16 @@ def test_a_linear_motion_stays_linear_and_each_array_itself(rows: int, timestep:
     assert resampled.tick == timestep
 
 
+def test_one_set_point_is_held_at_rest() -> None:
+    goal, effort = np.array([0.1, -0.2]), np.array([3.0, 4.0])
+    held = Trajectory.holding(0.004, goal, effort)
+    assert (held.tick, held.duration) == (0.004, 0.004)
+    assert held.position.tolist() == [goal.tolist()] * 2
+    assert held.velocity.tolist() == [[0.0, 0.0]] * 2
+    assert held.effort.tolist() == [effort.tolist()] * 2
+    assert Trajectory.holding(0.004, goal).effort.tolist() == [[0.0, 0.0]] * 2
+
+
 @given(st.integers(2, 50), TIMESTEPS)
 def test_it_ends_within_half_a_step_of_its_end(rows: int, timestep: float) -> None:
     """No step is left out or added, but that there is always one."""

@@ -14,7 +14,7 @@ from pytest_simbench.sims.ovphysx.adapter import OvPhysX
 
 from pytest_simbench.client.environments import missing
 from pytest_simbench.client.errors import WorkerError
-from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Trajectory
+from pytest_simbench.scene import Box, Pose, Scene, Trajectory
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
 from pytest_simbench.testing import ConformanceFailure, Subject, scenes
 
@@ -64,11 +64,6 @@ def test_nothing_is_left_out() -> None:
         assert uncovered(world.process.request("read_back"), FAULTS) == set()
 
 
-def held(position: FloatArray, effort: FloatArray, timestep: float) -> Trajectory:
-    rest = np.zeros_like(position)
-    return Trajectory(timestep, *(np.array([row, row]) for row in (position, rest, effort)))
-
-
 def test_the_limit_bounds_drive_and_feed_forward_together() -> None:
     """An effort of 3000 N m asked for as feed-forward moves joint 1 just as a far position does:
     both are cut to 87 N m (in so short a time that the damping does not leave the limit)."""
@@ -78,7 +73,7 @@ def test_the_limit_bounds_drive_and_feed_forward_together() -> None:
     far[0] += 2.0
     effort[0] = 3000.0
     speeds = []
-    for command in (held(far, 0 * effort, 0.004), held(start, effort, 0.004)):
+    for command in (Trajectory.holding(0.004, far), Trajectory.holding(0.004, start, effort)):
         with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "weightless")) as world:
             world.follow(command)
             world.wait(0.02)
@@ -98,7 +93,7 @@ def test_the_first_command_is_obeyed_like_any_other() -> None:
         with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "weightless")) as world:
             if wait:
                 world.wait(wait)
-            world.follow(held(goal, np.zeros(9), 0.004))
+            world.follow(Trajectory.holding(0.004, goal))
             world.wait(1.0)
             ends.append(world.joints[0])
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-5)
