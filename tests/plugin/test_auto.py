@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from xml.etree import ElementTree
 
 import pytest
@@ -33,6 +34,9 @@ def test_it_repeats_until_the_claims_are_decided(pytester: pytest.Pytester) -> N
     wanted = {"test_decided": 10, "test_undecided": 12, "test_without_a_claim": 10}
     assert {name: tests.count(name) for name in wanted} == wanted
     result.stdout.fnmatch_lines(["*97.5 % bounds*12 repetitions*: inconclusive whether*90 %*"])
+    told = re.findall(r"repetition (\d+) of (\d+)", result.stdout.str())
+    assert len(told) == sum(wanted.values())
+    assert [pair for pair in told if int(pair[0]) > int(pair[1])] == []
     # What pytest-benchmark and JUnit are told is known when the test has ended only.
     saved = json.loads((pytester.path / "b.json").read_text())["benchmarks"]
     assert [b["stats"]["rounds"] for b in saved] == [10, 12, 10]

@@ -151,6 +151,20 @@ def test_what_cannot_be_done_is_told(
     assert run(EVERYTHING, Moment("x", "swim")).text == "the task never came to swim"
 
 
+def test_a_task_without_moments_is_restored_nowhere(
+    tumbling: Callable[..., Experiment], handle_of: Callable[..., SimulatorHandle]
+) -> None:
+    result = replay(
+        tumbling(),
+        claims=True,
+        capabilities=EVERYTHING,
+        fresh=handle_of(),
+        other_mode="no display",
+    )
+    assert [again.way for again in result.again][2] == "restored"
+    assert result.again[2].text == "the task 'tumbling' declares no moments"
+
+
 def test_a_throw_with_the_cube_in_the_grip_and_after_the_swing(
     handle_of: Callable[..., SimulatorHandle],
 ) -> None:
