@@ -4,8 +4,9 @@
     python tests/matrix.py --all        pytest 8 and 9, with and without each of them
     python tests/matrix.py --folder F   keep the environments in F, to run again in seconds
 
-Makes each environment with venv and pip (with uv, where it is on the PATH), and runs there what a
-user types first. Ends with exit status 1 when one of the commands does not do what it should.
+First the wheel and the sdist are built and looked at. Then each environment is made with venv and
+pip (with uv, where it is on the PATH), and what a user types first is run there. Ends with exit
+status 1 when something is not as it should be.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,12 +58,55 @@ class Place:
 
 
 ALL = tuple(p for p in PLUGINS if p != "seleniumbase")
-QUICK = (Place(9, ALL), Place(9, ("seleniumbase",)))
+QUICK = (Place(9), Place(9, ALL), Place(9, ("seleniumbase",)))
 EVERY = tuple(
     Place(pytest, plugins)
     for pytest in (8, 9)
     for plugins in ((), *((plugin,) for plugin in PLUGINS), ALL)
 )
+
+
+def build(source: Path, folder: Path) -> Path:
+    """The wheel, made from the sdist.
+
+    Raises:
+        SystemExit: sdist or wheel are not as they should be.
+    """
+    for kind, arguments in (("sdist", ()), ("tree", ("--wheel",))):
+        command = [sys.executable, "-m", "build", "--outdir", str(folder / kind), *arguments]
+        quiet = subprocess.DEVNULL  # the build's own warnings
+        subprocess.run([*command, str(source)], check=True, stdout=quiet, stderr=quiet)
+    files = sorted(map(str, (folder / "sdist").iterdir()))
+    subprocess.run([sys.executable, "-m", "twine", "check", "--strict", *files], check=True)
+    wheel, other = (next((folder / kind).glob("*.whl")) for kind in ("sdist", "tree"))
+    problem = wrong_content(contents(wheel), contents(other), source)
+    if problem:
+        sys.exit(problem)
+    return wheel
+
+
+def contents(wheel: Path) -> dict[str, bytes]:
+    """The files of a wheel."""
+    with zipfile.ZipFile(wheel) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def wrong_content(wheel: dict[str, bytes], other: dict[str, bytes], source: Path) -> str:
+    """What is wrong with the wheel of the sdist: against that of the tree, and the tree itself."""
+    package = "pytest_simbench"
+    wanted = {f"{package}/py.typed"}
+    for folder, inside in (
+        (package, package),
+        *((n, f"{package}/{n}") for n in ("sims", "suites")),
+    ):
+        tree = source / folder
+        wanted |= {f"{inside}/{path.relative_to(tree)}" for path in tree.rglob("*.py")}
+    found = {name for name in wheel if ".dist-info/" not in name}
+    if found != wanted:
+        return f"missing in the wheel: {wanted - found}; too much: {found - wanted}"
+    if wheel != other:
+        return "the sdist and the tree build two different wheels"
+    return ""
 
 
 def make(place: Place, wheel: Path, folder: Path) -> Path:
@@ -141,6 +186,8 @@ def steps(place: Place) -> Iterator[Step]:
     files = tuple((name, (HERE / "suites" / name).read_text("utf-8")) for name in suites)
     shown = (f"{len(suites)} passed", "simulator comparison")
     yield Step((*suites, *smallest), shown, files)
+    if not place.plugins:
+        yield Step(("--pyargs", "pytest_simbench.suites", *smallest), ("6 passed", shown[1]))
     if place.plugins in ((), ALL):
         without = ("-p", "no:benchmark", "--strict-markers")
         yield Step((suites[0], *smallest, *without), ("1 passed",), files)
@@ -183,18 +230,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     failed = 0
     with tempfile.TemporaryDirectory() as temporary:
         folder = (given.folder or Path(temporary)).absolute()
-        built, copy = Path(temporary, "wheel"), Path(temporary, "source")
+        built, copy = Path(temporary, "built"), Path(temporary, "source")
         hidden = shutil.ignore_patterns(".*", "build", "*.egg-info")  # an old build would stay in
         shutil.copytree(HERE, copy, ignore=hidden)
-        subprocess.run(
-            [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", str(built), str(copy)],
-            check=True,
-            stderr=subprocess.DEVNULL,  # the build's own warnings
-        )
+        wheel = build(copy, built)
         for place in EVERY if given.all or given.only else QUICK:
             if given.only not in (None, place.name):
                 continue
-            python = make(place, next(built.glob("*.whl")), folder)
+            python = make(place, wheel, folder)
             for step in steps(place):
                 problem = check(python, step)
                 failed += bool(problem)

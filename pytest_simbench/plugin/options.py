@@ -134,7 +134,7 @@ OPTIONS = (
     Option("--sim-install", Words(), "make the environment of a simulator that needs one of its "
            "own, and exit", metavar="NAME", ini=False),
 )  # fmt: skip
-"""All options. Only their tests and the README know them besides this table."""
+"""All options. Only their tests know them besides this table; docs/options.md is made of it."""
 
 _BY_NAME = {item.name: item for item in OPTIONS}
 

@@ -4,15 +4,7 @@ Drives are MuJoCo's own actuators, one a joint, with an affine bias: force = k (
 velocity and effort feed-forward ride on the control: ctrl = q* + (d v* + tau_ff) / k. The
 actuator's force range is the effort limit, so it bounds the whole sum.
 
-What was learnt of the grip (2 cores, MuJoCo 4.0, seed 1): a held cube drifts along the pads while
-the hand turns, whatever the friction settings (impratio 1 to 100, noslip 5, either cone: landing
-of the throw 1.398 +- 0.001). It does not creep at rest. MuJoCo's contact rows leave out the
-centripetal part of the relative acceleration, v^2 / r, and damp the velocity it causes with b = 2
-/ timeconst, so the cube drifts at v^2 / (r b): 16 mm at release with solref 0.005, and the throw
-lands 46 mm too far. The time constant may not be shorter than two steps, so the step decides: 2
-ms, solref 0.004: lands at 1.376 (RTF 19); 1 ms, solref 0.002: 1.366 (RTF 10). A smaller step with
-the old solref is worse (0.5 ms, 0.005: 13 mm drift before the throw, against 8). `tuned` takes 1
-ms, elliptic cone: stacking errors stay below 1.1 mm, RTF 10, against 8 with the pyramidal cone.
+What was learnt stands in docs/engines/mujoco.md.
 """
 
 from __future__ import annotations

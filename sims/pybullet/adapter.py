@@ -5,23 +5,7 @@ Drives are Bullet's own position motors: velocity constraints that ask, each ste
 force. They are not springs: there is no stiffness in N m/rad, and no effort feed-forward, which
 they do not need. The fingers' effort limit is the grip's squeeze.
 
-What was learnt (3.2.7, tuned settings but for the one named):
-- without the gear constraint between the fingers the cube wanders 15 mm sideways in the hand
-  while the arm winds up, until one finger is at its stop; the throw lands 94 mm too far
-- friction works on velocities: a held cube drifts along the pads while the hand turns, 15 mm
-  until release; the throw lands 46 mm too far at 1/240 s, 23 mm at 1/480 s
-- friction anchors hold positions instead: it lands 2 mm from a perfect follower's, at 1/240 s.
-  They are set on the robot alone; on the cubes, too, they would glue the pyramid
-- what the throw then moves hangs on how the solver takes the impact, not on the throw, which
-  always lands at 1.353 to 1.354. Of seeds 2022 to 2041, a cube of the pyramid moved in: friction
-  cone and contact ERP 0.2 (`tuned`) 19, friction pyramid 15, pyramid and ERP 0.8 20, anchors on
-  the cubes too 18, 200 solver iterations and pyramid 2, 1/480 s (gain 0.16) and pyramid 0; with the
-  engine's ERP 0.08 and the cone 1 of the first 10. The better converged, the less moves: the
-  resting pyramid takes the impact as one block. `tuned` was chosen among these on these seeds; on
-  fresh ones, 5000 to 5019, it hits in 17 of 20. ERP 0.8 lets towers drift (2 of 15 cubes beyond
-  1 cm at the end for seed 2024)
-- changeDynamics on a link of a robot drops the friction without a word when damping or activation
-  state are in the same call: fingers then keep Bullet's 0.5
+What was learnt stands in docs/engines/pybullet.md.
 """
 
 from __future__ import annotations

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import pytest
 
@@ -206,9 +205,3 @@ def test_informational_commands(pytester: pytest.Pytester, command: str) -> None
     result = pytester.runpytest_subprocess(*command.split())
     assert result.ret == 0
     assert "Traceback (" not in result.stdout.str() + result.stderr.str()
-
-
-def test_readme_names_every_option(request: pytest.FixtureRequest) -> None:
-    text = Path(request.config.rootpath, "README.md").read_text("utf-8")
-    missing = [o.flag for o in OPTIONS if not any(flag in text for flag in o.flags)]
-    assert missing == []

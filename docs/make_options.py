@@ -1,0 +1,96 @@
+"""Writes docs/options.md: every option, mark and fixture, from where the plugin has them.
+
+python docs/make_options.py
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from pytest_simbench.plugin import fixtures, repeatability
+from pytest_simbench.plugin.hooks import MARKS
+from pytest_simbench.plugin.options import OPTIONS, Option
+
+PAGE = Path(__file__).with_name("options.md")
+
+INTERNAL = ("sim_case", "simbench_case", "simbench_handle")
+"""Fixtures that tests do not ask for by name."""
+
+TEMPLATE = """\
+# Options, marks and fixtures
+
+The script `docs/make_options.py` writes this page. A test checks that it is up to date.
+
+## Options
+
+{options}
+
+*also* is a short name. Another plugin or a conftest may have this name. Then the short name is
+theirs, and the long name still works. `pytest --sims` and the test run say so.
+
+Each option has a twin in the ini file. Its name has underscores: `sim_jobs = 2`. A short name works
+too: `reps = 40`. Options with *no ini* concern a single run and have no twin. The command line wins
+over the ini file. The plugin checks all values before the run begins. A wrong value ends the run in
+one sentence.
+
+A comma separates several values (`--sim mujoco,pybullet`). A value of `--sim-python` or
+`--sim-spec` may hold a comma. Repeat these options instead.
+
+## Marks
+
+{marks}
+
+A mark takes several names: `@pytest.mark.only_sim("mujoco", "drake")`.
+
+## Fixtures
+
+{fixtures}
+
+Another plugin may have a fixture of the same name. Then the name is theirs. A conftest gives ours
+another name with an import:
+`from pytest_simbench.plugin.fixtures import output_path as run_folder`.
+Without pytest-benchmark (`-p no:benchmark`) all works but its rounds.
+"""
+
+
+def page() -> str:
+    """The page as it should be."""
+    return TEMPLATE.format(
+        options=table(("option", "also", "default", "meaning"), map(option_row, OPTIONS)),
+        marks=table(("mark", "meaning"), (mark.split(": ", 1) for mark in MARKS), code=1),
+        fixtures=table(("fixture", "lives for", "meaning"), fixture_rows()),
+    )
+
+
+def option_row(option: Option) -> tuple[str, str, str, str]:
+    """The cells of an option."""
+    typed = f"{option.flag} {option.metavar or ''}".strip()
+    default = "" if option.default in (None, False, [], {}) else f"`{option.default}`"
+    meaning = option.help + ("" if option.ini else " (*no ini*)")
+    return f"`{typed}`", f"`{option.short}`" if option.short else "", default, meaning
+
+
+def fixture_rows() -> Iterable[tuple[str, str, str]]:
+    """The cells of each fixture."""
+    found: dict[str, Any] = {**vars(repeatability), **vars(fixtures)}
+    for name in sorted((*fixtures.SHARED, *fixtures.OWN)):
+        if name not in INTERNAL:
+            lives = found[name]._fixture_function_marker.scope
+            meaning = (found[name].__doc__ or "").split("\n\n")[0]
+            yield f"`{name}`", "a test" if lives == "function" else f"the {lives}", meaning
+
+
+def table(headings: Iterable[str], rows: Iterable[Iterable[str]], code: int = 0) -> str:
+    """A Markdown table; the first `code` cells of each row are code."""
+    lines = [list(headings)]
+    lines.append(["---"] * len(lines[0]))
+    for row in rows:
+        cells = [" ".join(cell.split()).replace("|", "\\|") for cell in row]
+        lines.append([f"`{cell}`" if i < code else cell for i, cell in enumerate(cells)])
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), "utf-8")

@@ -1,0 +1,37 @@
+"""What the pages tell users to type does what they say."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+
+def block(page: str, language: str, number: int = 0) -> str:
+    """A block of code on a page."""
+    text = (DOCS / page).read_text("utf-8")
+    return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)[number]
+
+
+def test_write_a_task(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(test_falling=block("write_a_task.md", "python"))
+    result = pytester.runpytest_subprocess("test_falling.py", "--sim=mujoco", "--reps=5")
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines(["*landed %", "mujoco headless tuned * 100 [[]*, 100[]]"])
+
+
+def test_example_workflow(pytester: pytest.Pytester) -> None:
+    """Save a run and compare with it, by the commands of the file but for the size of the work."""
+    text = (DOCS / "example_workflow.yml").read_text("utf-8")
+    save, gate = (
+        command.replace('"', "").replace("--reps=20", "").split()
+        for command in re.findall(r"pytest (--pyargs (?:.|\n +)*?)(?=\n#?\n|\n      -)", text)
+    )
+    smallest = ("--protocol=smoke", "--reps=1", "-k", "throwing")
+    assert pytester.runpytest_subprocess(*save, *smallest).ret == 0
+    result = pytester.runpytest_subprocess(*gate, *smallest)
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(["no metric got worse beyond its limit"])

@@ -1,0 +1,50 @@
+"""The README begins with a test that runs, is short, and leads somewhere."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+README = (ROOT / "README.md").read_text("utf-8")
+PAGES = [
+    path
+    for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md"))
+    if "_build" not in path.parts
+]
+
+
+def test_it_is_short() -> None:
+    lines = README.splitlines()
+    assert len(lines) <= 120
+    assert [line for line in lines if len(line) > 120] == []
+
+
+def test_it_begins_with_a_test_that_runs(pytester: pytest.Pytester) -> None:
+    blocks = re.findall(r"```(\w+)\n(.*?)```", README, re.DOTALL)
+    (first, code), (second, command) = blocks[:2]
+    assert (first, second) == ("python", "sh")
+    assert len(code.splitlines()) <= 6
+    pytester.makepyfile(test_throwing=code)
+
+    result = pytester.runpytest_subprocess("test_throwing.py", "--sim=mujoco", "--protocol=smoke")
+
+    assert command.startswith("pytest test_throwing.py --sim=mujoco")
+    result.assert_outcomes(passed=1, warnings=1)  # one repetition is not judged
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_to_files(page: Path) -> None:
+    text = re.sub(r"```.*?```", "", page.read_text("utf-8"), flags=re.DOTALL)
+    targets = re.findall(r"\]\((?!https?:|#)([^)#\s]+)", text)
+    assert [target for target in targets if not (page.parent / target).exists()] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_pages_name_no_machine(page: Path) -> None:
+    """Paths of the machine on which a page was written."""
+    assert (
+        re.findall(r"(?<![\w.~])/(?:work|home|root|Users|tmp)/\S*", page.read_text("utf-8")) == []
+    )
