@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 from pytest_simbench.plugin import fixtures, repeatability
 from pytest_simbench.plugin.hooks import MARKS
@@ -15,7 +14,7 @@ from pytest_simbench.plugin.options import OPTIONS, Option
 
 PAGE = Path(__file__).with_name("options.md")
 
-INTERNAL = ("sim_case", "simbench_case", "simbench_handle")
+INTERNAL = ("sim_case", "simbench_case", "simbench_handle", "benchmark_rounds", "no_rounds")
 """Fixtures that tests do not ask for by name."""
 
 TEMPLATE = """\
@@ -74,12 +73,11 @@ def option_row(option: Option) -> tuple[str, str, str, str]:
 
 def fixture_rows() -> Iterable[tuple[str, str, str]]:
     """The cells of each fixture."""
-    found: dict[str, Any] = {**vars(repeatability), **vars(fixtures)}
-    for name in sorted((*fixtures.SHARED, *fixtures.OWN)):
-        if name not in INTERNAL:
-            lives = found[name]._fixture_function_marker.scope
-            meaning = (found[name].__doc__ or "").split("\n\n")[0]
-            yield f"`{name}`", "a test" if lives == "function" else f"the {lives}", meaning
+    for name, thing in sorted({**vars(repeatability), **vars(fixtures)}.items()):
+        marker = getattr(thing, "_fixture_function_marker", None)
+        if marker is not None and name not in INTERNAL:
+            lives = "a test" if marker.scope == "function" else f"the {marker.scope}"
+            yield f"`{name}`", lives, (thing.__doc__ or "").split("\n\n")[0]
 
 
 def table(headings: Iterable[str], rows: Iterable[Iterable[str]], code: int = 0) -> str:
