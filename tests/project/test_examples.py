@@ -16,11 +16,27 @@ def block(page: str, language: str, number: int = 0) -> str:
     return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)[number]
 
 
-def test_write_a_task(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(test_falling=block("write_a_task.md", "python"))
-    result = pytester.runpytest_subprocess("test_falling.py", "--sim=mujoco", "--reps=5")
+@pytest.mark.parametrize(
+    ("page", "shown"),
+    [
+        ("write_a_task.md", ("*2/2 cubes landed*", "*landed %", "mujoco headless tuned * 100 [[]*")),
+        ("extending/arm.md", ("*1/1 cubes pushed*",)),
+    ],
+)
+def test_tasks(pytester: pytest.Pytester, page: str, shown: tuple[str, ...]) -> None:
+    pytester.makepyfile(test_mine=block(page, "python"))
+    result = pytester.runpytest_subprocess("test_mine.py", "--sim=mujoco", "--reps=5")
     result.assert_outcomes(passed=1)
-    result.stdout.fnmatch_lines(["*landed %", "mujoco headless tuned * 100 [[]*, 100[]]"])
+    result.stdout.fnmatch_lines(shown)
+
+
+def test_laws_that_shipped_engines_break() -> None:
+    """The page has each line of the file that the tests go by."""
+    page = (DOCS / "extending" / "known_failures.md").read_text("utf-8")
+    lines = (DOCS.parent / "tests" / "sims" / "expected_failures.txt").read_text("utf-8")
+    reasons = re.findall(r"^[^#\n]*?: *(.+)$", lines, re.MULTILINE)
+    assert reasons
+    assert [reason for reason in reasons if reason.replace("|", "\\|") not in page] == []
 
 
 def test_example_workflow(pytester: pytest.Pytester) -> None:
