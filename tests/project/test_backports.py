@@ -90,3 +90,7 @@ def test_backports_come_from_where_debian_comes_from(tmp_path: Path, name: str, 
     )
 
     assert found.stdout == f"deb file:{debian}/ bookworm-backports main\n"
+
+
+def test_ci_names_no_host() -> None:
+    assert [path.name for path in SCRIPT.parent.iterdir() if "://" in path.read_text()] == []

@@ -19,7 +19,10 @@ def block(page: str, language: str, number: int = 0) -> str:
 @pytest.mark.parametrize(
     ("page", "shown"),
     [
-        ("write_a_task.md", ("*2/2 cubes landed*", "*landed %", "mujoco headless tuned * 100 [[]*")),
+        (
+            "write_a_task.md",
+            ("*2/2 cubes landed*", "*landed %", "mujoco headless tuned * 100 [[]*"),
+        ),
         ("extending/arm.md", ("*1/1 cubes pushed*",)),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import re
 from pathlib import Path
 
@@ -33,6 +34,12 @@ def test_it_begins_with_a_test_that_runs(pytester: pytest.Pytester) -> None:
 
     assert command.startswith("pytest test_throwing.py --sim=mujoco")
     result.assert_outcomes(passed=1, warnings=1)  # one repetition is not judged
+
+
+def test_the_picture_is_of_the_command() -> None:
+    command = re.findall(r"```sh\n(.*)\n```", README)[0]
+    picture = (ROOT / "docs" / "pictures" / "first_test.svg").read_text("utf-8")
+    assert f"$ {command}" in html.unescape(picture).replace("\xa0", " ")
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
