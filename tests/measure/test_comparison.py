@@ -217,26 +217,21 @@ def test_equivalence_is_not_the_lack_of_a_difference() -> None:
 def test_equivalence_of_sides_without_spread() -> None:
     assert equivalence([0.9] * 3, [0.9] * 3, 0.01).equivalent()
     assert not equivalence([0.9] * 3, [0.8] * 3, 0.05).equivalent()
-    shifted = equivalence([1.0, 2.0, 3.0], [1.25, 2.25, 3.25], 0.5, paired=True)
+    shifted = equivalence([1.0, 2.0, 3.0], [1.25, 2.25, 3.25], 0.5)
     assert shifted == Equivalence(0.25, 0.5, 0.0)
-    assert equivalence([1.0, 2.0], [1.5, 2.5], 0.5, paired=True).p_value == 1.0  # not below it
-    assert equivalence([1.0, 2.0], [0.25, 1.25], 0.5, paired=True).p_value == 1.0
+    assert equivalence([1.0, 2.0], [1.5, 2.5], 0.5).p_value == 1.0  # not below it
+    assert equivalence([1.0, 2.0], [0.25, 1.25], 0.5).p_value == 1.0
 
 
-@pytest.mark.parametrize("paired", [True, False])
-def test_equivalence_is_two_t_tests(paired: bool) -> None:
-    """The worse of both; also where each pair's sum, or one side, is always the same."""
-    from scipy.stats import ttest_ind, ttest_rel
+def test_equivalence_is_two_paired_t_tests() -> None:
+    """The worse of both; also where each pair's sum is always the same."""
+    from scipy.stats import ttest_rel
 
     first = np.array([0.1, 0.2, 0.3, 0.45])
-    for second in (0.5 - first, first[::-1] + 0.02, np.array([0.25, 0.25, 0.25, 0.26])):
-        found = equivalence(first, second, 0.05, paired=paired)
-        tests = [
-            ttest_rel(second + side, first, alternative=way)
-            if paired
-            else ttest_ind(second + side, first, equal_var=False, alternative=way)
-            for side, way in ((0.05, "greater"), (-0.05, "less"))
-        ]
+    for second in (0.5 - first, first[::-1] + 0.02, np.full(4, 0.25)):
+        found = equivalence(first, second, 0.05)
+        ways = (0.05, "greater"), (-0.05, "less")
+        tests = [ttest_rel(second + side, first, alternative=way) for side, way in ways]
         assert found.p_value == pytest.approx(max(test.pvalue for test in tests))
         assert found.difference == pytest.approx(second.mean() - first.mean())
         assert found.margin == 0.05
