@@ -58,7 +58,6 @@ def unclenched(fingers: FloatArray) -> BoolArray:
 
 def free_flight(
     time: FloatArray,
-    position: FloatArray,
     velocity: FloatArray,
     gone: BoolArray,
     gravity: FloatArray,
@@ -67,7 +66,6 @@ def free_flight(
 
     Args:
         time: of each sample [s], (n,), evenly spaced.
-        position: of the cube [m], (n, 3).
         velocity: of the cube [m/s], (n, 3).
         gone: whether it is out of the hand, (n,).
         gravity: [m/s^2], (3,).
@@ -136,7 +134,7 @@ class Thrown:
             return
         if early.any():
             self.lost = f"left the hand {self._time[np.argmax(early)]:.3f} s into the throw"
-        self.flight = free_flight(self._time, self._position, self._velocity, gone, gravity)
+        self.flight = free_flight(self._time, self._velocity, gone, gravity)
 
     def metrics(self) -> dict[str, float | None]:
         """How the cube left the hand, where that sent it, and what the flight made of it."""

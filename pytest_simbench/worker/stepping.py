@@ -105,6 +105,9 @@ class Stepper:
     ) -> dict[str, Any]:
         """Advance by `steps`; a log sample every `log_period` [s] (0: every step; None: no log).
 
+        Returns:
+            The log; {} where there is no sample.
+
         Raises:
             DivergedError: joint or body state is not finite.
         """
@@ -152,7 +155,7 @@ class Stepper:
         totals.steps += steps
         totals.simulated += steps * timestep
         self._check_finite()
-        return log.arrays() if log_every else {}
+        return log.arrays() if log.times else {}
 
     def _check_finite(self) -> None:
         simulator = self.simulator

@@ -11,7 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.measure import comparison
-from pytest_simbench.measure.comparison import compare, equivalence, holm, pair
+from pytest_simbench.measure.comparison import (
+    Equivalence,
+    compare,
+    compare_by_seed,
+    equivalence,
+    holm,
+    pair,
+)
 
 EXPERIMENTS = 400
 SAMPLING = 2 * (0.05 * 0.95 / EXPERIMENTS) ** 0.5
@@ -120,15 +127,53 @@ def test_only_common_seeds_are_paired() -> None:
 @pytest.mark.parametrize(
     ("first", "second", "options", "message"),
     [
-        ([], [1.0], {}, "a side has no repetitions"),
-        ([1.0], [1.0, 2.0], {"paired": True}, "as many values on each side, not 1 and 2"),
+        ([], [1.0], {}, "nothing to compare: a side has no repetitions"),
+        ([1.0], [], {}, "nothing to compare: a side has no repetitions"),
+        (
+            [1.0],
+            [1.0, 2.0],
+            {"paired": True},
+            "pairs need as many values on each side, not 1 and 2",
+        ),
     ],
 )
 def test_what_cannot_be_compared_is_refused(
     first: list[float], second: list[float], options: dict[str, Any], message: str
 ) -> None:
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=f"^{message}$"):
         compare(first, second, **options)
+
+
+def test_exact_p_values_of_few() -> None:
+    """By counting: of 6 ways to draw two of four, of 20 ways to draw three of six, of 8 signs."""
+    two = compare([1.0, 1.1], [0.0, 0.1], alternative="less")
+    assert (two.p_value, two.n, two.paired) == (pytest.approx(1 / 6), (2, 2), False)
+    assert (two.first, two.second, two.difference) == pytest.approx((1.05, 0.05, -1.0))
+    assert compare([1.0, 1.1], [0.0, 0.1]).p_value == pytest.approx(2 / 6)
+    assert compare([1.0, 1.1], [0.0, 0.1], alternative="greater").p_value == 1.0
+    assert compare([1, 2, 3], [4, 5, 6], alternative="greater").p_value == pytest.approx(1 / 20)
+    signs = compare([1, 2, 3], [1.5, 2.5, 3.4], alternative="greater", paired=True)
+    assert (signs.p_value, signs.n, signs.paired) == (pytest.approx(1 / 8), (3, 3), True)
+
+
+def test_where_seeds_are_shared() -> None:
+    """Pairs where nine of ten of the smaller side's seeds are on both, and two at least."""
+    side = {seed: float(seed % 3) for seed in range(20)}
+    for shared, paired in ((20, True), (18, True), (17, False), (2, False)):
+        other = {seed + 20 - shared: value for seed, value in side.items()}
+        found = compare_by_seed(side, other)
+        assert found.paired == paired
+        assert found.n == ((shared, shared) if paired else (20, 20))
+    assert compare_by_seed(side, {3: 1.0, 4: 2.0}).paired
+    assert not compare_by_seed(side, {3: 1.0}).paired
+
+
+def test_a_significant_p_value_is_at_most_alpha() -> None:
+    found = compare([1, 2, 3], [4, 5, 6], alternative="greater")
+    assert found.significant(found.p_value)
+    assert not found.significant(found.p_value - 1e-9)
+    assert Equivalence(0.0, 1.0, 0.2).equivalent(0.2)
+    assert not Equivalence(0.0, 1.0, 0.2).equivalent(0.19)
 
 
 def test_holm_agrees_with_a_worked_example() -> None:
@@ -172,6 +217,28 @@ def test_equivalence_is_not_the_lack_of_a_difference() -> None:
 def test_equivalence_of_sides_without_spread() -> None:
     assert equivalence([0.9] * 3, [0.9] * 3, 0.01).equivalent()
     assert not equivalence([0.9] * 3, [0.8] * 3, 0.05).equivalent()
+    shifted = equivalence([1.0, 2.0, 3.0], [1.25, 2.25, 3.25], 0.5)
+    assert shifted == Equivalence(0.25, 0.5, 0.0)
+    assert equivalence([1.0, 2.0], [1.5, 2.5], 0.5).p_value == 1.0  # not below it
+    assert equivalence([1.0, 2.0], [0.25, 1.25], 0.5).p_value == 1.0
+
+
+def test_equivalence_is_two_paired_t_tests() -> None:
+    """The worse of both; also where each pair's sum is always the same."""
+    from scipy.stats import ttest_rel
+
+    first = np.array([0.1, 0.2, 0.3, 0.45])
+    for second in (0.5 - first, first[::-1] + 0.02, np.full(4, 0.25)):
+        found = equivalence(first, second, 0.05)
+        ways = (0.05, "greater"), (-0.05, "less")
+        tests = [ttest_rel(second + side, first, alternative=way) for side, way in ways]
+        assert found.p_value == pytest.approx(max(test.pvalue for test in tests))
+        assert found.difference == pytest.approx(second.mean() - first.mean())
+        assert found.margin == 0.05
+
+
+def test_two_values_a_side_are_enough_for_equivalence() -> None:
+    assert 0 < equivalence([0.1, 0.2], [0.15, 0.2], 0.5).p_value < 0.05
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 
 from pytest_simbench.measure import comparison, gate
 from pytest_simbench.measure.gate import GateReport, run_gate
-from pytest_simbench.measure.limits import parse_limits
+from pytest_simbench.measure.limits import Limit, parse_limits
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.record_file import read_records
 from tests.records.build import METRICS, failed, record
@@ -211,3 +211,76 @@ def test_what_cannot_be_compared_is_said() -> None:
         "landing_error was not measured in both runs, so its limit is not tested",
         "new is not in the baseline and is not compared",
     )
+
+
+def test_what_has_no_limit_is_tested_in_both_directions_and_fails_nothing() -> None:
+    """And corrected among itself: a thing that changed shows, whichever way."""
+    baseline = [
+        replace(item, metrics={"placed": 0.5, "hit": 0.0, "landing_x": 1.0})
+        for item in made([0.5] * 20)
+    ]
+    current = [
+        replace(item, metrics={"placed": 0.5, "hit": 1.0, "landing_x": 2.0})
+        for item in made([0.5] * 20)
+    ]
+    report = run(baseline, current, "placed:5%")
+    assert report.failures == ()
+    assert [change.metric.name for change in report.changes] == ["placed"]
+    costs = ["rtf", "cpu", "ram", "ram_peak", "cpu_cost", "start", "end", "total"]
+    assert [change.metric.name for change in report.others] == ["failures", "hit", *costs]
+    others = {change.metric.name: change for change in report.others}
+    assert others["hit"].significant
+    assert others["hit"].loss == -1.0
+    assert others["hit"].p_value == pytest.approx(10 * others["hit"].comparison.p_value)
+    assert not others["ram"].significant
+    assert others["hit"].limit == Limit("hit", 0.0, True)
+    assert not any(change.normalised for change in report.others)
+
+
+def test_one_comparison_more_makes_each_less_sure() -> None:
+    """Holm's correction, over all limits of all tests."""
+    one = run(made([1.0] * 8), made([0.5] * 8), "placed:5%").changes[0]
+    both = run(made([1.0] * 8), made([0.5] * 8), "placed:5%,ram:10%").changes[0]
+    assert one.p_value == one.comparison.p_value == pytest.approx(1 / 2**8)
+    assert both.p_value == pytest.approx(2 / 2**8)
+
+
+def test_how_few_are_too_few() -> None:
+    """The smallest p value of n pairs is 1 / 2^n, of n and m others 1 / (n + m over n)."""
+
+    def notes(first: int, second: int, text: str = "placed:5%", seed: int = 0) -> tuple[str, ...]:
+        return run(made([1.0] * first), made([1.0] * second, first_seed=seed), text).notes
+
+    assert "4 pairs are too few" in notes(4, 4)[0]
+    assert notes(5, 5) == ()
+    assert "3 and 2 repetitions are too few" in notes(3, 2, seed=500)[0]
+    assert notes(3, 3, seed=500) == ()  # 1 of 20 is 0.05
+    two = "placed:5%,ram:10%"
+    assert notes(5, 5, two) == tuple(
+        f"test_stacking[engine-headless]: 5 pairs are too few for a change of {name} to be "
+        "significant among 2 comparisons"
+        for name in ("placed", "ram")
+    )
+    assert notes(6, 6, two) == ()
+
+
+def test_the_sentence_of_a_metric_in_its_unit() -> None:
+    values = [record(k, metrics={"landing_error": 0.25}) for k in range(12)]
+    worse = [record(k, metrics={"landing_error": 0.75}) for k in range(12)]
+    report = run(values, worse, "landing_error:0.25")
+    assert report.failures == (
+        "test_stacking[engine-headless]: landing_error rose from 0.25 m to 0.75 m (worse by 0.5 m,"
+        " limit 0.25 m; p = 0.00024, 12 pairs)",
+    )
+    assert not run(values, worse, "landing_error:0.5").failures  # not by more than the limit
+    same = run(values, values, "landing_error:0.01").changes[0]
+    assert "landing_error stayed from 0.25 m to 0.25 m" in same.sentence()
+
+
+def test_a_test_that_is_broken_is_told_beside_its_limits() -> None:
+    """Only where the baseline had results, and the run has failures."""
+    assert run([failed(0)], [failed(0)], "placed:5%").broken == ()
+    assert run(made([1.0]), made([1.0]), "placed:5%").broken == ()
+    report = run(made([1.0] * 2), [failed(0), failed(1, "WorkerDied"), failed(2)], "placed:5%")
+    assert report.broken == report.failures
+    assert "none of 3 repetitions succeeded (most often WorkerHung in settle)" in report.broken[0]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -62,3 +64,48 @@ def test_error_rates(true: float, low: float, high: float) -> None:
         assert result is not None
         claims += result.equivalent()
     assert low <= claims / 300 <= high
+
+
+def test_each_sentence_word_by_word() -> None:
+    same = compared([1.0, 0.8, 1.0], [1.0, 0.8, 1.0])
+    name = "mujoco, headless and gui, placed"
+    assert (same.simulator, same.profile, same.pairs) == ("mujoco", "tuned", 3)
+    assert same.test == "suites/test_stacking.py::test_stacking"
+    assert same.sentence == (f"{name}: the same within 5 points (gui +0 points, 3 common seeds).")
+    other = compared([1.0, 0.5, 0.75, 0.5], [0.75, 0.5, 0.5, 0.25])
+    assert other.result is not None
+    assert other.sentence == (
+        f"{name}: not shown to be the same within 5 points (gui -18.8 points, 4 common seeds, "
+        f"p = {other.result.p_value:.2g})."
+    )
+    assert compared([1.0], [1.0]).sentence == f"{name}: too few common seeds to compare."
+
+
+def test_two_common_seeds_are_paired_by_seed() -> None:
+    """Not by their place: gui ran the seeds the other way round, and one more."""
+    records = [record("headless", k, value) for k, value in enumerate([1.0, 0.5])]
+    records += [record("gui", k, value) for k, value in ((7, 0.2), (1, 0.5), (0, 1.0))]
+    (found,) = compare_modes(records, [PLACED])
+    assert found.pairs == 2
+    assert found.result is not None
+    assert (found.result.difference, found.result.p_value) == (0.0, 0.0)
+
+
+def test_only_the_studys_shares_of_good_repetitions_are_compared() -> None:
+    metrics = [
+        replace(PLACED, name="a", study=False),
+        Metric("b", "b", study=True),
+        replace(PLACED, name="c"),
+    ]
+    values = {"a": 1.0, "b": 1.0, "c": None, "placed": 1.0}
+    records = [
+        replace(record(mode, k, 1.0), metrics=values)
+        for mode in ("headless", "gui")
+        for k in (0, 1)
+    ]
+    failed = replace(record("gui", 5, 0.0), status="failed")
+    found = compare_modes([*records, failed, record("headless", 5, 0.0)], [*metrics, PLACED])
+    assert [(row.metric.name, row.pairs, row.result is None) for row in found] == [
+        ("c", 0, True),
+        ("placed", 2, False),
+    ]

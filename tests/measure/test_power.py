@@ -25,6 +25,13 @@ HIT = Metric("hit", "hit", kind="yes_no")
 PLACED = Metric("placed", "placed", kind="share", of=15)
 
 
+def test_one_success_shows_two_percent() -> None:
+    """0.025^(1 / n) >= 0.02 at once; the fewest is one."""
+    assert repetitions_for_proportion(1.0, 0.02) == 1
+    assert repetitions_for_proportion(0.0, 0.98) == 1
+    assert repetitions_for_proportion(0.5, 0.5) is None
+
+
 def test_36_successes_show_90_percent() -> None:
     """0.025^(1 / n) >= 0.9 gives n >= 35.01; one-sided, 0.05^(1 / n), 28.4."""
     assert repetitions_for_proportion(1.0, 0.9) == 36

@@ -77,3 +77,17 @@ def test_a_setting_that_one_lacks_is_a_difference_between_records_that_ended() -
 
 def test_an_older_record_without_scene_and_limits_agrees() -> None:
     assert agree(whole(), record())
+
+
+def test_a_failure_that_knows_its_settings_agrees_with_no_others() -> None:
+    """One that knows the task's alone died before the engine told its own."""
+    ok = whole(settings={"timestep": 0.002, "task.cubes": 15})
+    dead = replace(failed(1), limits=ok.limits, scene=ok.scene)
+    for settings, fits in (
+        ({"timestep": 0.002, "task.cubes": 15}, True),
+        ({"timestep": 0.004, "task.cubes": 15}, False),
+        ({"task.cubes": 15}, True),
+        ({"task.cubes": 20}, False),
+        ({}, True),
+    ):
+        assert agree(ok, replace(dead, settings=settings)) is fits

@@ -126,3 +126,23 @@ def test_machines_may_differ() -> None:
 def test_a_seed_twice_in_one_run_is_refused() -> None:
     with pytest.raises(JoinError, match="a has 1 of its seeds of test_stacking.* twice"):
         join({"a": [*straight(2), straight(1)[0]]})
+
+
+def test_what_a_run_without_a_good_repetition_knows_counts() -> None:
+    """Its failures' settings, which must be the others' all the same."""
+    whole = straight(4)
+    bad = [replace(r, status="failed") for r in whole[2:]]
+    assert len(join({"a": whole[:2], "b": bad})) == 4
+    assert len(join({"b": bad, "a": whole[:2]})) == 4
+    other = [replace(r, settings={"timestep": 0.5}) for r in bad]
+    for runs in ({"a": whole[:2], "b": other}, {"b": other, "a": whole[:2]}):
+        with pytest.raises(JoinError, match="a and b|b and a") as caught:
+            join(runs)
+        assert "settings.timestep" in str(caught.value)
+
+
+def test_the_whole_has_the_test_id_of_the_first_run() -> None:
+    first, second = straight(1), [replace(r, seed=2023) for r in straight(1)]
+    here = [replace(r, test=f"a/t.py::{r.test}") for r in first]
+    assert {item.record.test for item in join({"a": here, "b": second})} == {here[0].test}
+    assert {item.record.test for item in join({"b": second, "a": here})} == {second[0].test}

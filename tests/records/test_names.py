@@ -46,3 +46,14 @@ def test_nothing_leads_anywhere(text: str, tmp_path: Path) -> None:
     path = tmp_path / f"{file_name(text)}.log"
     path.touch()
     assert path.resolve().parent == tmp_path.resolve()
+
+
+def test_what_is_left_of_a_name_word_by_word() -> None:
+    """Each run of unsafe characters is one underscore; ten digits of the digest follow."""
+    assert re.fullmatch(r"a_b_C-[0-9a-f]{10}", file_name("a / b::C"))
+    assert re.fullmatch(r"unnamed-[0-9a-f]{10}", file_name("../"))
+    assert re.fullmatch(r"unnamed-[0-9a-f]{10}", file_name(""))
+    assert re.fullmatch(r"x{80}-[0-9a-f]{10}", file_name("x" * 81))
+    assert file_name("x" * 80) == "x" * 80
+    assert re.fullmatch(r"a-0123456789-[0-9a-f]{10}", file_name("a-0123456789"))
+    assert re.fullmatch(r"a-[0-9a-f]{10}", file_name("a", 1))

@@ -94,3 +94,8 @@ def test_a_newer_schema(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace('"schema": 1', '"schema": 2'))
     with pytest.raises(ValueError, match="line 1: schema 2, this reads 1"):
         read(tmp_path)
+
+
+def test_the_folder_is_made_with_those_above_it(tmp_path: Path) -> None:
+    append(tmp_path / "a" / "b", LINE)
+    assert read(tmp_path / "a" / "b") == [LINE]

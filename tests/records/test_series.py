@@ -123,3 +123,31 @@ def test_tests_are_matched_without_their_file_and_tasks_told_apart() -> None:
     assert [list(side) for side in by_test([new, new])] == [["test_x[e]"]] * 2
     mixed = [*new, replace(new[0], jitter=9.0)]
     assert list(by_test([mixed])[0]) == ["test_x[e] (stacking)", "test_x[e] (stacking 2)"]
+
+
+def test_a_label_lists_three_differences() -> None:
+    """And says when there are more."""
+    ours = record(1, settings={"a": 1, "b": 1, "c": 1, "d": 1})
+
+    def labels(**settings: int) -> list[str]:
+        other = replace(ours, settings={**ours.settings, **settings})
+        return [row.label for row in series([ours, other])]
+
+    assert labels(a=2, b=2, c=2) == ["a=1 b=1 c=1", "a=2 b=2 c=2"]
+    assert labels(a=2, b=2, c=2, d=2) == ["a=1 b=1 c=1 ...", "a=2 b=2 c=2 ..."]
+
+
+def test_rows_of_other_modes_profiles_or_functions_are_not_ranked() -> None:
+    ours, other = record(1), record(1, simulator="b", test="test_stacking[b-headless]")
+
+    def ranked(**changes: object) -> bool:
+        mine, another = series([ours]) + series([replace(other, **changes)])
+        return comparable(mine, another)
+
+    assert ranked()
+    assert not ranked(mode="gui")
+    assert not ranked(profile="default")
+    runs = [record(1, test=f"test_{n}[{s}]", simulator=s) for s in "ab" for n in "xy"]
+    rows = {(row.subject.simulator, row.label): row for row in series(runs)}
+    assert comparable(rows["a", "test_x"], rows["b", "test_x"])
+    assert not comparable(rows["a", "test_x"], rows["b", "test_y"])

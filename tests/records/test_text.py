@@ -136,3 +136,16 @@ def test_numbers_stay_numbers(value: object) -> None:
 def test_labels_are_short(text: str) -> None:
     assert len(for_figure(text)) <= LONGEST_LABEL
     assert for_figure(text).isprintable()
+
+
+def test_what_can_be_read_stays() -> None:
+    """Beside what cannot, too."""
+    assert for_terminal("\u00e4\x1b\u4e2d\u2003x\ty") == "\u00e4\\x1b\u4e2d x y"
+    assert in_one_line("a\n b\u202e") == "a b\\u202e"
+
+
+def test_how_a_long_line_ends() -> None:
+    assert for_terminal("x" * 50, 50) == "x" * 50
+    assert for_terminal("x" * 51, 50) == "x" * 31 + "... (51 characters)"
+    assert len(for_terminal("\x1b" * 30, 50)) == 50
+    assert for_terminal("a\r\nb\nc") == "a\nb\nc"

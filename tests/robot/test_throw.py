@@ -137,6 +137,15 @@ def test_the_throw_reaches_the_pyramid() -> None:
     assert np.allclose(study.velocity, [2.75, 0.0, -0.13], atol=0.04)
 
 
+def test_the_swing_stays_as_it_was_published() -> None:
+    """All scores of throws are held against it: its length and where it throws."""
+    timed, duration = feasible_swing(MODEL, START, GOAL, GRAVITY, CUBE)
+    assert duration == pytest.approx(1.640264, abs=1e-5)
+    assert released(MODEL, timed, duration, 0.5).landing(GRAVITY) == pytest.approx(
+        1.36671, abs=1e-4
+    )
+
+
 def test_landing_of_a_closed_form() -> None:
     fall = np.sqrt(2 * 1.0 / 9.80665)
     x = landing_x(np.array([0.3, 0, 1.05]), np.array([2.0, 0, 0]), GRAVITY)

@@ -89,3 +89,103 @@ def test_both_signs_of_a_quaternion_are_one_pose() -> None:
     pose = np.array([1, 2, 3, 0.5, 0.5, 0.5, 0.5])
     flipped = np.concatenate([pose[:3], -pose[3:]])
     assert not compare({"body/a/pose": pose}, {"body/a/pose": flipped}, (), "sim").wrong
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "near", "far"),
+    [
+        ("gravity", [0.0, 0.0, -9.8], [0.9e-6, 0.0, -9.8], [1.1e-6, 0.0, -9.8]),
+        ("joint/a/limits", [0.0, 2.0], [0.0, 2.00019], [0.0, 2.0003]),
+        ("body/a/pose", [0, 0, 0, 1, 0, 0, 0], [9e-7, 0, 0, 1, 0, 0, 0], [2e-6, 0, 0, 1, 0, 0, 0]),
+        ("link/a/pose", [0, 0, 0, 1, 0, 0, 0], [9e-6, 0, 0, 1, 0, 0, 0], [2e-5, 0, 0, 1, 0, 0, 0]),
+        ("body/a/boxes", [[0.0, 1.0]], [[9e-6, 1.0]], [[2e-5, 1.0]]),
+        ("body/a/meshes", [[0.0, 1.0]], [[9e-6, 1.0]], [[2e-5, 1.0]]),
+        ("body/a/com", [0.0, 0.0, 0.0], [9e-6, 0.0, 0.0], [2e-5, 0.0, 0.0]),
+        ("joint/a/axis", [0, 0, 1, 0, 0, 0], [9e-6, 0, 1, 0, 0, 0], [2e-5, 0, 1, 0, 0, 0]),
+        ("link/a/mass", 1e-3, 1.00009e-3, 1.0002e-3),
+        ("body/a/mass", 2.0, 2.00019, 2.0003),
+        ("link/a/inertia", [1e-6, 0.0, 1e-7], [1e-6, 9e-11, 1e-7], [1e-6, 2e-10, 1e-7]),
+        ("body/a/inertia", np.zeros((3, 3)), np.full((3, 3), 9e-13), np.full((3, 3), 2e-12)),
+    ],
+)  # fmt: skip
+def test_how_near_is_equal(name: str, value: object, near: object, far: object) -> None:
+    """Up to 1e-4 of the value and 1e-6; 1e-5 m where single precision composes poses."""
+    assert not compare({name: value}, {name: near}, (), "sim").wrong
+    assert name in compare({name: value}, {name: far}, (), "sim").wrong
+
+
+def test_a_pose_at_a_right_angle_is_no_mirror() -> None:
+    """q and -q are one rotation; others whose product is not negative are as they are."""
+    one, other = np.array([0, 0, 0, 1, 0, 0, 0]), np.array([0, 0, 0, 0, 1, 0, 0])
+    assert compare({"body/a/pose": one}, {"body/a/pose": other}, (), "sim").wrong
+    assert not compare({"body/a/pose": one}, {"body/a/pose": one}, (), "sim").wrong
+
+
+def test_what_the_comparison_says_word_by_word() -> None:
+    expected = {
+        "gravity": [0, 0, -9.80665123],
+        "link/a/inertia": np.diag([1.0, 2.0, 3.0]),
+        "link/a/meshes": np.ones((1, 26)),
+        "link/b/meshes": np.ones((1, 26)),
+        "joint/a/armature": 0.1,
+    }
+    reported = {
+        "gravity": [0, 0, -1],
+        "link/a/inertia": np.diag([2.0, 1.0, 3.0]),
+        "link/a/meshes": np.full((1, 26), 1.25),
+        "link/b/meshes": np.ones((2, 26)),
+        "body/z/mass": 1,
+    }
+    found = compare(expected, reported, (SOFT, ROUND), "sim")
+    declared = " (declared is at most 0.001: corners are rounded)"
+    assert found.wrong == {
+        "gravity": "scene [ 0.      ,  0.      , -9.806651], sim [ 0.,  0., -1.]",
+        "link/a/inertia": "scene [[1., 0., 0.], [0., 2., 0.], [0., 0., 3.]], "
+        "sim [[2., 0., 0.], [0., 1., 0.], [0., 0., 3.]]",
+        "link/a/meshes": "scene 1x26 numbers, sim 1x26 numbers, which differ by up to 0.25"
+        + declared,
+        "link/b/meshes": "scene 1x26 numbers, sim 2x26 numbers" + declared,
+        "joint/a/armature": "sim reports nothing, and declares no deviation",
+        "body/z/mass": "reported, but not part of the scene",
+    }
+    assert list(found.untold) == []
+    assert list(found.deviations) == ["contacts are soft"]
+
+
+def test_the_first_ten_differences_are_told() -> None:
+    expected = {f"joint/{k:02}/damping": float(k) for k in range(12)}
+    reported = {name: value + 1 for name, value in expected.items()}
+    with pytest.raises(ParityError) as caught:
+        check(expected, reported, (), "sim")
+    parts = [f"joint/{k:02}/damping: scene {k}., sim {k + 1}." for k in range(10)]
+    start = "sim built another world than the scene describes: "
+    assert str(caught.value) == start + "; ".join(parts) + "; and 2 more"
+    ten = dict(list(expected.items())[:10])
+    with pytest.raises(ParityError) as caught:
+        check(ten, dict(list(reported.items())[:10]), (), "sim")
+    assert str(caught.value) == start + "; ".join(parts)
+
+
+def test_what_is_untold_is_named_and_the_first_difference_stands_for_all() -> None:
+    names = [f"joint/{joint}/armature" for joint in "abc"]
+    expected = dict.fromkeys(names, 0.1)
+    found = compare(expected, {names[1]: 0.2, names[2]: 0.3}, (SOFT, NO_ROTOR), "sim")
+    assert not found.wrong
+    assert list(found.untold) == [names[0]]
+    assert list(found.deviations) == [
+        "contacts are soft",
+        "joint/*/armature: no rotor inertia (not told by the engine; joint/b/armature: "
+        "scene 0.1, sim 0.2)",
+    ]
+
+
+def test_a_difference_of_just_the_declared_size_is_excused() -> None:
+    half = Deviation("gravity", "why not", within=0.5)
+    assert not compare({"gravity": 1.0}, {"gravity": 1.5}, (half,), "sim").wrong
+    assert compare({"gravity": 1.0}, {"gravity": 1.5000001}, (half,), "sim").wrong
+    assert compare({"gravity": 1.0}, {"gravity": 0.0}, (half,), "sim").wrong
+
+
+def test_no_shapes_where_none_are_asked_for() -> None:
+    none = np.zeros((0, 26))
+    assert not compare({"body/a/meshes": none}, {"body/a/meshes": none}, (), "sim").wrong

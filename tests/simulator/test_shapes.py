@@ -16,7 +16,9 @@ from pytest_simbench.simulator.shapes import (
     outlines,
     placed,
     reach,
+    shape_points,
 )
+from pytest_simbench.simulator.urdf import Shape
 
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 2, 3]], dtype=float)
 
@@ -71,6 +73,75 @@ def test_meshes_are_read(tmp_path: Path, name: str, data: bytes) -> None:
     (tmp_path / name).write_bytes(data)
     points = mesh_points(str(tmp_path / name))
     np.testing.assert_array_equal(points, TRIANGLE[np.lexsort(TRIANGLE.T[::-1])])
+
+
+def test_the_corners_of_a_box() -> None:
+    corners = {tuple(c) for c in box_corners((2, 4, 6))}
+    assert corners == {(x, y, z) for x in (-1, 1) for y in (-2, 2) for z in (-3, 3)}
+
+
+def test_a_frame_is_turned_and_then_moved() -> None:
+    there = placed(np.array([[1.0, 2.0, 3.0]]), Pose.at(10, 20, 30, yaw=np.pi / 2))
+    np.testing.assert_allclose(there, [[8, 21, 33]])
+
+
+def test_shapes_of_a_link_in_its_frame(tmp_path: Path) -> None:
+    (tmp_path / "c.obj").write_bytes(obj_text())
+    pose, up = Pose.at(0, 0, 5), np.array([0.0, 0.0, 5.0])
+    mesh = shape_points(Shape(pose, mesh=str(tmp_path / "c.obj")))
+    np.testing.assert_array_equal(mesh, mesh_points(str(tmp_path / "c.obj")) + up)
+    box = shape_points(Shape(pose, size=(2, 4, 6)))
+    np.testing.assert_array_equal(box, box_corners((2, 4, 6)) + up)
+
+
+def test_order_is_by_what_tells_symmetric_shapes_apart() -> None:
+    """All orders of six boxes that mirror each other give the same rows."""
+    places = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
+    rows = [reach(placed(box_corners((1, 1, 1)), Pose.at(*place))) for place in places]
+    wanted = outlines("a", rows, rows[:2])
+    assert set(wanted) == {"a/boxes", "a/meshes"}
+    assert {row.tobytes() for row in wanted["a/boxes"]} == {row.tobytes() for row in rows}
+    for seed in range(10):
+        order = np.random.default_rng(seed).permutation(6)
+        found = outlines("a", [rows[k] for k in order], rows[1::-1])
+        for name, value in wanted.items():
+            np.testing.assert_array_equal(found[name], value)
+
+
+def test_a_point_reaches_as_points_do() -> None:
+    np.testing.assert_array_equal(reach(np.array([1.0, 2, 3])), DIRECTIONS @ [1, 2, 3])
+
+
+def test_directions_are_unit_vectors_to_faces_edges_and_corners() -> None:
+    assert DIRECTIONS.shape == (26, 3)
+    np.testing.assert_allclose(np.linalg.norm(DIRECTIONS, axis=1), 1.0)
+    assert len(np.unique(DIRECTIONS.round(6), axis=0)) == 26
+
+
+@pytest.mark.parametrize(
+    "text",
+    [b"  \nsolid \xff\nvertex 1 2 3 4\n\nvertex 4 5 6", b"solid\nvertex 1 2 3\nvertex 4 5 6"],
+)
+def test_a_text_that_is_odd_but_stl(tmp_path: Path, text: bytes) -> None:
+    """Blank lines, a name in another encoding, numbers too many."""
+    (tmp_path / "a.stl").write_bytes(text + b"\n" + b" " * 84)
+    np.testing.assert_array_equal(mesh_points(str(tmp_path / "a.stl")), [[1, 2, 3], [4, 5, 6]])
+
+
+def test_many_triangles_have_few_corners(tmp_path: Path) -> None:
+    floats = np.zeros((1, 12), "<f4")
+    floats[0, 3:] = TRIANGLE.ravel()
+    record = floats.tobytes() + bytes(2)
+    (tmp_path / "a.stl").write_bytes(bytes(80) + (300).to_bytes(4, "little") + 300 * record)
+    points = mesh_points(str(tmp_path / "a.stl"))
+    assert points.dtype == np.float64
+    np.testing.assert_array_equal(points, TRIANGLE[np.lexsort(TRIANGLE.T[::-1])])
+
+
+def test_a_mesh_may_be_a_solid_in_binary(tmp_path: Path) -> None:
+    """Some programs begin a binary file's header with "solid", as a text file begins."""
+    (tmp_path / "a.stl").write_bytes(b"solid" + stl_binary()[5:])
+    assert len(mesh_points(str(tmp_path / "a.stl"))) == 3
 
 
 @pytest.mark.parametrize(

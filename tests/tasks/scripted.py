@@ -172,7 +172,7 @@ class ScriptedProcess:
             if instant in samples:
                 self._samples.append((self.time, self._joints(), self._bodies()))
         log = {}
-        if log_period is not None:
+        if samples:
             log = {
                 "time": np.array([sample[0] for sample in self._samples]),
                 "joints": np.array([sample[1] for sample in self._samples]),

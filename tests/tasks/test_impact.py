@@ -70,6 +70,13 @@ def test_a_chain() -> None:
     assert caused(THROWN, *row[1:]) == ()  # without the first link none
 
 
+def test_two_that_begin_in_the_same_sample() -> None:
+    """The farther one, which the thrown cube does not reach, leans on the nearer one."""
+    near, far = (going(x, 1.0, 0.475, 0.6) for x in (1.0, 1.05))
+    assert caused(THROWN, near, far) == (0, 1)
+    assert caused(THROWN, far, near) == (1, 0)
+
+
 def test_a_chain_has_a_direction() -> None:
     """0 leaves 1 by itself, which the thrown cube hits later."""
     first = going(1.051, 1.0, 0.2, 0.3)

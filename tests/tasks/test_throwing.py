@@ -69,6 +69,31 @@ def test_a_perfect_throw() -> None:
     assert set(metrics) == {metric.name for metric in TASK.metrics}
 
 
+def test_the_details_explain_it() -> None:
+    """What was released and flew, beside what a perfect follower's throw is."""
+    outcome, _ = thrown(pushed={"pyramid_6": (0.10, 0.0, -0.05)}, late=0.1, drop=0.05)
+    details = outcome.details
+    assert set(details) == {
+        "limits", "release", "flight_landing_x", "moved", "moved_otherwise", "projectile_end",
+    }  # fmt: skip
+    release = dict(details["release"])
+    landing = PERFECT.landing(GRAVITY)
+    assert release.pop("reference_time") == PERFECT.time
+    assert release.pop("reference_landing_x") == pytest.approx(landing)
+    assert np.allclose(release.pop("reference_position"), PERFECT.position, atol=1e-12)
+    assert np.allclose(release.pop("reference_velocity"), PERFECT.velocity, atol=1e-12)
+    assert release.pop("time") == pytest.approx(PERFECT.time + 0.1, abs=0.003)
+    position, velocity = release.pop("position"), release.pop("velocity")
+    assert not release
+    assert parabola(position, velocity) == pytest.approx(outcome.metrics["landing_x"], abs=1e-3)
+    assert np.linalg.norm(velocity) == pytest.approx(outcome.metrics["release_speed"])
+    limits = details["limits"]
+    assert limits["velocity"] == pytest.approx(0.965, abs=0.001)
+    assert limits["acceleration"] == pytest.approx(0.68, abs=0.01)
+    assert limits["torque"] == pytest.approx(0.8994, abs=0.002)  # with the cube in the hand
+    assert details["flight_landing_x"] < outcome.metrics["landing_x"]
+
+
 def test_one_cube_is_a_hit() -> None:
     outcome, _ = thrown(pushed={"pyramid_6": (0.0, 0.06, 0.0)})
     assert values(outcome) == {"moved": 1 / 6, "hit": 1.0, "moved_otherwise": 0.0}
@@ -260,6 +285,12 @@ def test_it_is_counted_a_minute_after() -> None:
     assert [asked.duration for asked in settle] == [60.0]
 
 
+def test_it_may_be_counted_at_once() -> None:
+    """After a wait too short for a sample."""
+    outcome, _ = thrown(task=Throwing(settle=0.01), pushed={"pyramid_6": (0.1, 0.0, 0.0)})
+    assert values(outcome) == {"moved": 1 / 6, "hit": 1.0, "moved_otherwise": 0.0}
+
+
 def test_places_are_taken_when_the_start_has_settled() -> None:
     """Within the first second the pyramid may move."""
     outcome, _ = thrown(Mishap("settle start", 0.9, move("pyramid_1", y=-0.2)))
@@ -319,6 +350,8 @@ def test_the_studys_throw() -> None:
     speeds = np.abs(wind_up.arguments["velocity"][:, :7])
     limits = np.array([2.175] * 4 + [2.61] * 3)
     assert 0.4 < (speeds / limits).max() <= 0.5 + 1e-6
+    pick = [asked.arguments["velocity"][:, :7] for asked in follows if asked.phase == "pick"]
+    assert max((np.abs(rows) / limits).max() for rows in pick) <= 0.5 + 1e-6
     swing = next(asked for asked in follows if asked.phase == "throw")
     assert swing.duration == pytest.approx(1.464, abs=0.0041)
     assert outcome.metrics["limits"] > 115.0

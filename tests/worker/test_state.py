@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from types import SimpleNamespace
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -13,9 +14,11 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.records.record import Record
-from pytest_simbench.scene import Scene, Trajectory
+from pytest_simbench.scene import Box, Pose, Scene, Trajectory
+from pytest_simbench.simulator import ParityError, StateError
 from pytest_simbench.tasks import Stacking
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
+from pytest_simbench.worker.state import check_following, check_log, check_start, checked_state
 from tests.client.test_faults import Silent
 from tests.tiny import Falling
 from tests.worker.misshapen import BODIES, JOINTS, LATER, TIMES
@@ -130,3 +133,177 @@ def test_it_ends_that_repetition_alone(case: Case) -> None:
     repeater = Repeater(misshapen(case, "too few bodies"), 1, Silent(), kept.append)  # type: ignore[arg-type]
     repeater.run(Falling(), [1, 2])
     assert [record.status for record in kept] == ["failed", "failed"]
+
+
+CUBES = tuple(
+    Box(name, (0.05,) * 3, Pose.at(x, 0.0, 0.5, yaw=x), mass=0.1)
+    for name, x in (("a", 0.4), ("shelf", 0.5), ("b", 0.6))
+)
+WORLD = Scene("world", (CUBES[0], replace(CUBES[1], mass=0.0), CUBES[2]), ROBOT)
+FREE = (CUBES[0], CUBES[2])
+HOME = ROBOT.column("initial_position") if ROBOT is not None else np.zeros(0)
+
+
+def saying(**what: Any) -> Any:
+    """A simulator that says what a sound one says at the start, but for `what`."""
+    bodies = np.hstack([[cube.pose.as_array() for cube in FREE], np.zeros((2, 6))])
+    joints = np.array([HOME, np.zeros(9)])
+    says = {"time": 0.0, "joints": joints, "bodies": bodies, **what}
+    return SimpleNamespace(
+        info=SimpleNamespace(name="sim"),
+        time=says["time"],
+        joint_state=lambda: says["joints"],
+        body_state=lambda: says["bodies"],
+    )
+
+
+def changed(what: str, index: Any, value: Any) -> Any:
+    """The same with one value of its state changed."""
+    sound = saying()
+    state = {"joints": sound.joint_state, "bodies": sound.body_state}[what]().copy()
+    state[index] = value
+    return saying(**{what: state})
+
+
+def test_a_sound_state_is_given_on() -> None:
+    for time in (0, 0.0, np.float32(0.5), np.float64(1e-9)):
+        state = checked_state(saying(time=time), WORLD)
+        assert set(state) == {"time", "joints", "bodies"}
+        assert (type(state["time"]), state["time"]) == (float, float(time))
+        assert state["joints"].shape == (2, 9)
+        assert state["bodies"].shape == (2, 13)
+    check_start(saying(time=1e-9), WORLD)
+    check_start(saying(joints=np.zeros((2, 0)), bodies=np.zeros((0, 13))), Scene("empty"))
+
+
+@pytest.mark.parametrize("time", [True, "0" * 99, None, 0j])
+def test_a_time_that_is_none(time: Any) -> None:
+    with pytest.raises(StateError) as caught:
+        checked_state(saying(time=time), WORLD)
+    assert str(caught.value) == f"sim: the time must be a float, not {time!r:.80}"
+
+
+@pytest.mark.parametrize(("length", "found"), [(0.9991, ""), (1.0009, ""), (1.0011, "1.001")])
+def test_how_long_a_quaternion_may_be(length: float, found: str) -> None:
+    odd = changed("bodies", (1, slice(3, 7)), (0.0, 0.0, length, 0.0))
+    if not found:
+        checked_state(odd, WORLD)
+        return
+    with pytest.raises(StateError) as caught:
+        checked_state(odd, WORLD)
+    assert str(caught.value) == (
+        f"sim: the quaternion of 'b' must have length 1, but (0, 0, {length:.4g}, 0) has {found}"
+    )
+
+
+@pytest.mark.parametrize(
+    ("world", "time", "speed"),
+    [
+        (changed("joints", (1, 3), -2e-6), 0, 2e-6),
+        (changed("bodies", (0, 12), 0.5), 0, 0.5),
+        (saying(time=2e-9), 2e-9, 0),
+        (saying(time=-1.0), -1, 0),
+    ],
+)
+def test_a_world_starts_at_0_and_at_rest(world: Any, time: float, speed: float) -> None:
+    with pytest.raises(ParityError) as caught:
+        check_start(world, WORLD)
+    assert str(caught.value) == (
+        f"sim starts a world at t = {time:g} s with speeds up to {speed:.3g} (m/s, rad/s); it must "
+        "start at 0 and at rest"
+    )
+    check_start(changed("joints", (1, 3), 9e-7), WORLD)
+
+
+@pytest.mark.parametrize(("what", "index"), [("joints", (0, 8)), ("bodies", (1, 7))])
+def test_what_is_not_finite_at_the_start(what: str, index: Any) -> None:
+    with pytest.raises(StateError) as caught:
+        check_start(changed(what, index, np.inf), WORLD)
+    assert str(caught.value) == f"sim: the state of the {what} is not finite after loading"
+
+
+def test_where_joints_and_bodies_start() -> None:
+    """Up to 1 mm or 1 mrad off; else the message says whose place it is, if it is one."""
+    names = [joint.name for joint in ROBOT.joints] if ROBOT is not None else []
+    check_start(changed("joints", (0, 3), HOME[3] + 0.0009), WORLD)
+    check_start(changed("bodies", (1, 0), 0.6009), WORLD)
+    with pytest.raises(StateError) as caught:
+        check_start(changed("joints", (0, 3), 0.5), WORLD)
+    assert str(caught.value) == (
+        f"sim: joint_state() row 3, {names[3]!r}, starts at (0.5), where the scene has "
+        f"({HOME[3]:.4g})"
+    )
+    with pytest.raises(StateError) as caught:
+        check_start(changed("bodies", (1, 0), 0.6011), WORLD)
+    assert str(caught.value) == (
+        "sim: body_state() row 1, 'b', starts at (0.6011, 0, 0.5), where the scene has "
+        "(0.6, 0, 0.5)"
+    )
+    with pytest.raises(StateError) as caught:
+        check_start(changed("bodies", (0, 0), 0.6), WORLD)
+    assert str(caught.value) == (
+        "sim: body_state() row 0, 'a', starts at (0.6, 0, 0.5), where the scene has (0.4, 0, 0.5); "
+        "that is the place of 'b', so the order is another"
+    )
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_how_a_body_is_turned_at_the_start(sign: int) -> None:
+    """By up to 1.6 degrees otherwise; both signs of a quaternion are one rotation."""
+
+    def turned(angle: float) -> Any:
+        yaw = 0.6 + angle
+        quaternion = sign * np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]) + 0.0
+        return changed("bodies", (1, slice(3, 7)), quaternion)
+
+    check_start(turned(np.radians(1.5)), WORLD)
+    with pytest.raises(StateError) as caught:
+        check_start(turned(np.radians(90.0)), WORLD)
+    here, there = (sign * np.cos(0.3 + np.pi / 4), sign * np.sin(0.3 + np.pi / 4)), (0.9553, 0.2955)
+    assert str(caught.value) == (
+        f"sim: body 'b' starts with quaternion ({here[0]:.4g}, 0, 0, {here[1]:.4g}), where the "
+        f"scene has ({there[0]}, 0, 0, {there[1]}) (w, x, y, z)"
+    )
+    with pytest.raises(StateError):
+        check_start(turned(np.radians(1.7)), WORLD)
+
+
+def test_joints_at_each_others_set_points() -> None:
+    goal = HOME.copy()
+    goal[[0, 2]] = 0.5, -0.4
+
+    def reached(**places: float) -> np.ndarray:
+        position = goal.copy()
+        for joint, place in places.items():
+            position[int(joint[1:])] = place
+        return np.array([position, np.zeros(9)])
+
+    with pytest.raises(StateError) as caught:
+        check_following(saying(), WORLD, reached(j0=-0.4, j2=0.5), goal)
+    assert str(caught.value) == (
+        "sim: the joints panda_joint1, panda_joint3 stand at each other's set points, (-0.4, 0.5) "
+        "where (0.5, -0.4) was commanded: their order is not that of scene.robot.joints"
+    )
+    with pytest.raises(StateError):  # nearly there
+        check_following(saying(), WORLD, reached(j0=-0.381, j2=0.519), list(goal))
+    check_following(saying(), WORLD, reached(j0=-0.379, j2=0.5), goal)  # late, and badly
+    check_following(saying(), WORLD, reached(j0=0.4001, j2=-0.4999), goal)  # lag is no exchange
+    check_following(saying(), WORLD, reached(j0=-0.4), goal)  # one alone changed with none
+    check_following(saying(), WORLD, reached(), goal)
+    check_following(saying(), Scene("no robot", CUBES), reached(j0=-0.4, j2=0.5), goal)
+
+
+def test_the_samples_of_a_motion() -> None:
+    sound = {
+        "time": np.zeros(4),
+        "joints": np.zeros((4, 2, 9)),
+        "bodies": np.zeros((4, 2, 13)),
+    }
+    check_log(saying(), WORLD, sound)
+    check_log(saying(), WORLD, {})
+    for what, shape in (("joints", "(4, 2, 9)"), ("bodies", "(4, 2, 13)")):
+        with pytest.raises(StateError) as caught:
+            check_log(saying(), WORLD, {**sound, what: np.zeros((3, 2, 9), np.float32)})
+        assert str(caught.value) == (
+            f"sim: the logged {what} must be an array of float64 {shape}, not float32 (3, 2, 9)"
+        )

@@ -151,6 +151,12 @@ def test_log_at_its_period(stepper: Stepper) -> None:
     assert stepper.wait(0.01, None) == {}
 
 
+def test_a_motion_shorter_than_the_period_has_no_log(stepper: Stepper) -> None:
+    """None at all: arrays of no samples would not have a sample's shape."""
+    assert stepper.wait(0.01, 0.05) == {}
+    assert len(stepper.wait(0.05, 0.05)["time"]) == 1
+
+
 def test_a_trajectory_is_followed_and_its_end_held(stepper: Stepper) -> None:
     start = stepper.simulator.joint_state()[0]
     s = np.linspace(0, 1, 126)[:, None]

@@ -26,3 +26,14 @@ def test_arrays_come_back(array: np.ndarray) -> None:
 
 def test_numpy_scalars_and_tuples_become_plain() -> None:
     assert pack({"x": np.float64(1.5), "y": (1, np.int32(2))}) == {"x": 1.5, "y": [1, 2]}
+
+
+def test_what_the_wire_carries() -> None:
+    array = np.arange(6.0).reshape(2, 3).T  # not in C's order
+    packed = pack(array)
+    assert packed == {"__array__": ["<f8", [3, 2], np.ascontiguousarray(array).tobytes()]}
+    back = unpack(packed)
+    assert np.array_equal(back, array)
+    back[0, 0] = 7.0  # it may be written to
+    assert pack(["a", None, 1, {"b": (2.5,)}]) == ["a", None, 1, {"b": [2.5]}]
+    assert unpack({"a": [1, {"b": None}]}) == {"a": [1, {"b": None}]}

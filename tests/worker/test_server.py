@@ -1,0 +1,354 @@
+"""Every request that a worker answers, asked in this process of an adapter that keeps a diary."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pytest_simbench import __version__
+from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.simulator import DivergedError, ParityError, StateError
+from pytest_simbench.worker import stepping
+from pytest_simbench.worker.server import Server, serve
+from pytest_simbench.worker.text import LONGEST
+from pytest_simbench.worker.wire import pack, unpack
+from tests.worker.hosted import Hosted
+
+CUBE = Box("cube", (0.05, 0.05, 0.05), Pose.at(0.5, 0.0, 0.5), mass=0.1)
+SCENE = Scene("one", (CUBE,))
+CONSTRUCT = {
+    "adapter": "tests.worker.hosted:Hosted",
+    "profile": "tuned",
+    "changes": {},
+    "gui": False,
+    "real_time": False,
+}
+
+
+class Asked:
+    """A server and its answers."""
+
+    def __init__(self) -> None:
+        self.sent: list[Any] = []
+        self.server = Server(self.sent.append)
+
+    def __call__(self, op: str, **arguments: Any) -> Any:
+        """The result of a request."""
+        answer = self.answer(op, **arguments)
+        assert set(answer) == {"ok"}, answer
+        return unpack(answer["ok"])
+
+    def answer(self, op: str, **arguments: Any) -> Any:
+        self.server.answer({"op": op, **pack(arguments)})
+        return self.sent.pop()
+
+    def error(self, op: str, **arguments: Any) -> tuple[str, str]:
+        """Type and message of what went wrong."""
+        answer = self.answer(op, **arguments)
+        assert set(answer) == {"error"}
+        assert set(answer["error"]) == {"type", "message"}
+        return answer["error"]["type"], answer["error"]["message"]
+
+    def construct(self, **changes: Any) -> Any:
+        return self("construct", **{**CONSTRUCT, **changes})
+
+    def load(self, scene: Scene = SCENE, parity: bool = True) -> Any:
+        return self("load", scene=scene.to_wire(), parity=parity)
+
+
+@pytest.fixture
+def ask(monkeypatch: pytest.MonkeyPatch) -> Iterator[Asked]:
+    for name, value in {"calls": [], "instances": [], "raises": [], "built": {}}.items():
+        monkeypatch.setattr(Hosted, name, value)
+    for variable in Hosted.info.environment:
+        monkeypatch.delenv(variable, raising=False)
+    yield Asked()
+    for variable in Hosted.info.environment:
+        os.environ.pop(variable, None)
+
+
+def test_hello(ask: Asked) -> None:
+    version = "{}.{}.{}".format(*sys.version_info)
+    assert ask("hello") == {"pid": os.getpid(), "version": __version__, "python": version}
+
+
+def test_an_adapter_gets_its_settings(ask: Asked) -> None:
+    answer = ask.construct(changes={"stiffness": "3"})
+    assert answer == {
+        "settings": {"timestep": 0.004, "stiffness": 3.0},
+        "versions": {"pytest-simbench": __version__},
+        "untested": "not tested",
+    }
+    (made,) = Hosted.instances
+    assert made.settings.to_wire() == answer["settings"]
+    assert not made.gui
+    assert ask.construct(profile="default")["settings"] == {"timestep": 0.002, "stiffness": 1.0}
+    kind, message = ask.error("construct", **{**CONSTRUCT, "changes": {"speed": 1}})
+    assert (kind, message[:31]) == ("SettingsError", "hosted has no setting 'speed'; ")
+
+
+def test_a_window_is_the_users_and_gets_no_variables(ask: Asked) -> None:
+    os.environ["HOSTED_KEPT"] = "user's"
+    ask.construct(gui=True)
+    assert Hosted.instances[0].gui
+    assert "HOSTED_SET" not in os.environ
+    ask.construct()
+    assert (os.environ["HOSTED_SET"], os.environ["HOSTED_KEPT"]) == ("ours", "user's")
+
+
+def test_a_missing_engine_is_told_with_what_to_type(ask: Asked) -> None:
+    assert ask.error("construct", **{**CONSTRUCT, "adapter": "tests.worker.hosted:Lame"}) == (
+        "SimulatorError",
+        "Lame does not import (No module named 'no_such_engine'); it is missing or half installed "
+        f"in {sys.executable}: pip install lame",
+    )
+
+
+def test_a_worker_used_again_starts_anew(ask: Asked) -> None:
+    ask.construct()
+    assert Hosted.calls == []
+    ask.load()
+    ask("wait", duration=0.02, log_period=None)
+    ask("save", name="a")
+    ask.construct()
+    assert Hosted.calls == [("load", "one"), "close"]
+    assert len(Hosted.instances) == 2
+    assert ask.error("wait", duration=0.1, log_period=None)[1] == "no scene was loaded yet"
+    ask.load()
+    assert ask.error("restore", name="a") == ("EngineError", "KeyError: 'a'")
+    assert ask("state")["time"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("op", "arguments"),
+    [
+        ("state", {}),
+        ("load", {"scene": SCENE.to_wire(), "parity": True}),
+        ("compile", {"scene": SCENE.to_wire()}),
+        ("read_back", {}),
+        ("save", {"name": "a"}),
+        ("contact_count", {}),
+        ("render", {"width": 1, "height": 1}),
+    ],
+)
+def test_nothing_goes_before_the_simulator(ask: Asked, op: str, arguments: dict[str, Any]) -> None:
+    assert ask.error(op, **arguments) == ("SimulatorError", "no simulator was constructed yet")
+
+
+def test_a_loaded_world(ask: Asked) -> None:
+    ask.construct()
+    ask("compile", scene=SCENE.to_wire())
+    answer = ask.load()
+    assert set(answer) == {"time", "joints", "bodies", "excused"}
+    assert (answer["time"], answer["joints"].shape, answer["excused"]) == (0.0, (2, 0), [])
+    assert answer["bodies"].tolist() == [[0.5, 0, 0.5, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0]]
+    assert Hosted.calls == [("compile", "one"), ("load", "one")]
+    assert ask.server.scene == SCENE
+    state = ask("state")
+    assert set(state) == {"time", "joints", "bodies"}
+    assert state["bodies"].tolist() == answer["bodies"].tolist()
+
+
+def test_a_window_shows_the_loaded_world(ask: Asked) -> None:
+    ask.construct(gui=True)
+    ask.load()
+    assert Hosted.calls == [("load", "one"), "picture"]
+
+
+def test_what_was_built_is_held_against_the_scene(ask: Asked) -> None:
+    ask.construct()
+    Hosted.built.update({"body/cube/margin": None})
+    assert ask.load()["excused"] == ["body/*/margin: has margins (not told by the engine)"]
+    Hosted.built.update({"body/cube/mass": 0.2})
+    kind, message = ask.error("load", scene=SCENE.to_wire(), parity=True)
+    assert kind == "ParityError"
+    assert message == (
+        "hosted built another world than the scene describes: body/cube/mass: scene 0.1, hosted 0.2"
+    )
+    assert ask.load(parity=False)["excused"] == []
+
+
+def test_a_world_that_starts_elsewhere_is_found(ask: Asked, monkeypatch: Any) -> None:
+    ask.construct()
+    monkeypatch.setattr(Hosted, "body_state", lambda self: np.zeros((1, 13)))
+    assert ask.error("load", scene=SCENE.to_wire(), parity=False)[0] == "StateError"
+
+
+def test_a_body_with_the_name_of_a_link(ask: Asked) -> None:
+    from pytest_simbench.robot.panda import panda
+
+    ask.construct()
+    cube = Box("panda_hand", (0.05,) * 3, Pose.at(0.5, 0, 0.5), mass=0.1)
+    scene = Scene("one", (cube,), panda())
+    _, message = ask.error("load", scene=scene.to_wire(), parity=False)
+    assert "a body is named 'panda_hand', as a link of the robot" in message
+    assert Hosted.calls == []
+
+
+def test_what_the_engine_says_while_it_remembers_another_scene(ask: Asked) -> None:
+    ask.construct()
+    ask.load()
+    assert ask("read_back")["body/cube/mass"] == 0.1
+    other = SCENE.with_body(Box("cube", (0.05,) * 3, Pose.at(0.5, 0, 0.5), mass=0.3))
+    assert ask("read_back", remember=other.to_wire())["body/cube/mass"] == 0.3
+    assert ask("read_back")["body/cube/mass"] == 0.1
+
+
+def test_waiting_and_following(ask: Asked) -> None:
+    ask.construct()
+    ask.load()
+    answer = ask("wait", duration=0.04, log_period=0.02)
+    assert set(answer) == {"log", "time", "joints", "bodies"}
+    assert answer["time"] == pytest.approx(0.04)
+    assert np.allclose(answer["log"]["time"], [0.02, 0.04])
+    assert answer["log"]["bodies"].shape == (2, 1, 13)
+    rows = np.zeros((3, 0))
+    moved = {"tick": 0.004, "position": rows, "velocity": rows, "effort": rows}
+    answer = ask("follow", **moved, log_period=None)
+    assert set(answer) == {"log", "time", "joints", "bodies"}
+    assert answer["time"] == pytest.approx(0.048)
+    assert answer["log"] == {}
+    assert [call for call in Hosted.calls if call[0] == "command"] == [("command", [], [], [])] * 2
+
+
+def test_a_log_that_is_none_is_found(ask: Asked, monkeypatch: Any) -> None:
+    ask.construct()
+    ask.load()
+    monkeypatch.setattr(Hosted, "joint_state", lambda self: np.zeros((2, 1)))
+    kind, message = ask.error("wait", duration=0.04, log_period=0.02)
+    assert kind == "StateError"
+    assert message == (
+        "hosted: the logged joints must be an array of float64 (2, 2, 0), not float64 (2, 2, 1)"
+    )
+
+
+def test_saved_states_have_names(ask: Asked) -> None:
+    ask.construct()
+    ask.load()
+    ask("save", name="start")
+    ask("wait", duration=0.04, log_period=None)
+    ask("save", name="later")
+    ask("wait", duration=0.04, log_period=None)
+    assert ask("restore", name="start")["time"] == 0.0
+    assert ask("restore", name="later")["time"] == pytest.approx(0.04)
+
+
+def test_contacts_and_pictures(ask: Asked) -> None:
+    ask.construct()
+    ask.load()
+    assert ask("contact_count") == 7
+    assert ask("render", width=4, height=3).shape == (3, 4, 3)
+
+
+def test_statistics(ask: Asked) -> None:
+    assert ask("stats")["stepping"] == {}
+    ask.construct()
+    ask.load()
+    ask("wait", duration=0.04, log_period=None)
+    stats = ask("stats")
+    assert set(stats) == {"stepping", "peak_rss_mb"}
+    assert stats["stepping"]["steps"] == 10
+    assert set(stats["stepping"]) == {
+        "steps", "simulated", "wall", "waited", "cpu",
+        "control_runs", "control_wall", "control_waited", "control_cpu",
+    }  # fmt: skip
+    assert 10 < stats["peak_rss_mb"] < 100_000
+
+
+def test_it_waits_for_the_wall_clock_where_asked(ask: Asked) -> None:
+    ask.construct(real_time=True)
+    ask.load()
+    assert ask.server.stepper is not None
+    assert ask.server.stepper.real_time is True
+    ask.construct()
+    ask.load()
+    assert ask.server.stepper.real_time is False
+
+
+def test_signs_of_life(ask: Asked, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stepping, "HEARTBEAT_PERIOD", -1.0)
+    ask.construct()
+    ask.load()
+    ask("wait", duration=0.2, log_period=None)
+    assert ask.sent
+    assert all(set(sign) == {"alive"} and type(sign["alive"]) is float for sign in ask.sent)
+    assert [sign["alive"] for sign in ask.sent] == pytest.approx([0.1, 0.2])
+
+
+def test_closing(ask: Asked) -> None:
+    assert ask("close") is None  # nothing to close
+    ask.construct()
+    assert ask("close") is None
+    assert Hosted.calls == ["close"]
+
+
+class Adapters(StateError):
+    """An adapter's own kind of error."""
+
+
+class Mute(Exception):
+    def __str__(self) -> str:
+        raise RuntimeError("no text")
+
+
+@pytest.mark.parametrize(
+    ("error", "kind", "message"),
+    [
+        (ParityError("so"), "ParityError", "so"),
+        (DivergedError("so"), "DivergedError", "so"),
+        (Adapters("so"), "StateError", "so"),
+        (MemoryError("so"), "MemoryError", "so"),
+        (MemoryError(), "MemoryError", "out of memory"),
+        (SystemExit(), "SystemExit", "the adapter called sys.exit(0)"),
+        (SystemExit(3), "SystemExit", "the adapter called sys.exit(3)"),
+        (SystemExit("no"), "SystemExit", "the adapter called sys.exit('no'), status 1"),
+        (ValueError("so"), "EngineError", "ValueError: so"),
+        (ValueError(), "EngineError", "ValueError"),
+        (KeyboardInterrupt(), "EngineError", "KeyboardInterrupt"),
+        (Mute(), "EngineError", "Mute: (its message cannot be read: RuntimeError)"),
+        (
+            ValueError("x" * 5000),
+            "EngineError",
+            f"ValueError: {'x' * LONGEST} ... (3000 more characters)",
+        ),
+    ],
+)
+def test_every_error_is_an_answer(
+    ask: Asked, error: BaseException, kind: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ask.construct()
+    ask.load()
+    Hosted.raises.append(error)
+    assert ask.error("wait", duration=0.1, log_period=None) == (kind, message)
+    log = capsys.readouterr().err
+    assert log.startswith("Traceback (most recent call last):")
+    assert type(error).__name__ in log
+    Hosted.raises.clear()
+    assert ask("wait", duration=0.1, log_period=None)["time"] == pytest.approx(0.1)
+
+
+def test_the_log_holds_a_long_traceback_cut(ask: Asked, capsys: pytest.CaptureFixture[str]) -> None:
+    ask.construct()
+    ask.load()
+    Hosted.raises.append(ValueError("x" * 200_000))
+    ask.error("wait", duration=0.1, log_period=None)
+    assert 100_000 < len(capsys.readouterr().err) < 100_100
+
+
+def test_an_unknown_request_is_an_answer_too(ask: Asked) -> None:
+    kind, message = ask.error("dance")
+    assert (kind, "do_dance" in message) == ("EngineError", True)
+
+
+def test_it_serves_until_it_is_told_to_close() -> None:
+    requests: list[dict[str, Any]] = [{"op": "hello"}, {"op": "close"}, {"op": "hello"}]
+    sent: list[Any] = []
+    serve(lambda: requests.pop(0), sent.append)
+    assert [list(answer) for answer in sent] == [["ok"], ["ok"]]
+    assert sent[1] == {"ok": None}
+    assert len(requests) == 1
