@@ -35,7 +35,7 @@ def worlds(request: pytest.FixtureRequest) -> Iterator[Worlds]:
         yield worlds
 
 
-@pytest.mark.parametrize(("worlds", "profile"), HONEST, indirect=["worlds"])
+@pytest.mark.parametrize(("worlds", "profile"), HONEST, indirect=["worlds"], scope="module")
 @pytest.mark.parametrize("task", [Stacking(), Throwing()], ids=lambda task: task.name)
 def test_an_honest_world_passes(worlds: Worlds, task: Any, profile: str) -> None:
     assert worlds.load(task.scene(7, Jitter()), profile).time == 0.0
@@ -45,6 +45,7 @@ def test_an_honest_world_passes(worlds: Worlds, task: Any, profile: str) -> None
     ("worlds", "quantity"),
     [(name, quantity) for name, (_, faults) in ENGINES.items() for quantity in faults],
     indirect=["worlds"],
+    scope="module",  # else pytest makes a worker for every quantity
 )
 def test_fault_is_caught(worlds: Worlds, quantity: str) -> None:
     world, cls = worlds.load(SCENE, parity=False, fault=quantity), worlds.cls
