@@ -5,6 +5,10 @@ The modules' own tests do the same with engines.
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -12,7 +16,7 @@ from pytest_simbench.client.errors import Where, WorkerError, WorkerExited
 from pytest_simbench.repeatability.attack import Attack, Trial, divergence, effect
 from pytest_simbench.repeatability.episode import Episode, changed, scaled_jitter
 from pytest_simbench.repeatability.motions import Difference
-from pytest_simbench.repeatability.perturbation import Perturbation
+from pytest_simbench.repeatability.perturbation import Perturbation, described
 from pytest_simbench.repeatability.replay_result import Again, Replay
 from pytest_simbench.repeatability.search import Finding, bounds_in_words, search, to_wire
 from pytest_simbench.repeatability.stability import Sensitivity, Stability, sensitivity, stability
@@ -20,6 +24,8 @@ from pytest_simbench.tasks import Jitter
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.tasks.moments import Moment
 from tests.repeatability.scripted import METRICS, Scripted, episode, motion, operation
+
+search_module = sys.modules[search.__module__]
 
 ALL = {"standing": 1.0, "lost": 0.0, "height": 0.3}
 Perturbed = tuple[Perturbation, ...]
@@ -365,6 +371,7 @@ PARTED = Difference(1.25, "a", {1.0: 0.0012, 5.0: None}, 0.02)
     ("again", "identical", "text"),
     [
         (Again("w"), True, "bit-identical"),
+        (Again("w", left_at=2.5, claimed=False), True, "bit-identical"),
         (Again("w", skipped="no window"), False, "no window"),
         (Again("w", failure="WorkerExited: gone"), False, "WorkerExited: gone"),
         (
@@ -414,3 +421,49 @@ def test_what_a_claim_of_determinism_means() -> None:
 
 def test_the_metrics_that_count() -> None:
     assert [m.name for m in METRICS if m.bounded] == list(moved(0.0).counts)
+
+
+def test_the_smallest_is_kept_as_an_example(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """With its own scene and commands, and the line that replays it; none where it crashed, or
+    where the folder takes none."""
+    kept: list[Any] = []
+    experiment = Scripted(toppling)
+    case = experiment.handle.case
+    experiment.handle.constructed = {"versions": {"sim": "1"}}
+
+    def write(*arguments: Any) -> Path:
+        kept.append(arguments)
+        return tmp_path / "example.json"
+
+    def command(path: Path, of: Any, scene: Any) -> str:
+        assert of is case
+        return f"replay {path.name} of {scene.body('a').pose.position[0]:.4f}"
+
+    monkeypatch.setattr(search_module, "write_example", write)
+    monkeypatch.setattr(search_module, "replay_command", command)
+    found = search(experiment, {"x": 2e-3}, examples=40, at_once=1)  # type: ignore[arg-type]
+    assert found.smallest is not None
+    x = shift(found.smallest)
+    assert found.replay == f"replay example.json of {x:.4f}"
+    ((of, name, scene, tape, versions),) = kept
+    assert (of, name) == (case, "smallest-scripted-sim-headless")
+    assert scene.body("a").pose.position[0] == pytest.approx(x)
+    assert (tape, versions) == (moved(0.0).tape, {"sim": "1"})
+    assert to_wire(found)["first"] == described(found.first or ())
+    found.assert_not_below("x", found.amount("x"))
+
+    def full(*arguments: Any) -> Path:
+        raise OSError("no space")
+
+    monkeypatch.setattr(search_module, "write_example", full)
+    assert search(experiment, {"x": 2e-3}, examples=40, at_once=1).replay == ""  # type: ignore[arg-type]
+
+    def crashing(perturbed: Perturbed) -> Episode:
+        if abs(shift(perturbed)) > 4.5e-4:
+            raise dead(perturbed)
+        return moved(0.0)
+
+    crash = search(Scripted(crashing), {"x": 2e-3}, examples=40, at_once=1)  # type: ignore[arg-type]
+    assert (crash.effect, crash.replay) == ("ends in WorkerExited", "")
