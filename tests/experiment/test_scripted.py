@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from typing import Any
 
@@ -26,7 +27,8 @@ class ScriptedRepetition(Repetition):
         super().__init__(case, task, number)
         self.process = ScriptedProcess(script)
 
-    def _worker(self, *limits: Any) -> Any:
+    def _worker(self, deadline: float) -> Any:
+        self.process.deadline = deadline
         self.process.where = self.where
         self._process: Any = self.process
         return self.process
@@ -99,6 +101,19 @@ def test_a_world_that_times_out_has_failed_where_it_was(case: Case) -> None:
     assert not record.metrics
     interrupted = run(case, TOWERS, Mishap("settle", 0.3, fail(KeyboardInterrupt)))
     assert interrupted.status == "interrupted"
+
+
+@pytest.mark.parametrize(("timeout", "seconds"), [(None, 60.0), (7.0, 7.0)])
+def test_a_repetition_has_the_studys_time_out_or_the_users(
+    case: Case, timeout: float | None, seconds: float
+) -> None:
+    repetition = ScriptedRepetition(replace(case, timeout=timeout), TOWERS, 1)
+    began = time.monotonic()
+    record, _ = repetition.run()
+    deadline = repetition.process.deadline
+    assert deadline is not None
+    assert began + seconds <= deadline <= time.monotonic() + seconds
+    assert record.limits["timeout"] == seconds
 
 
 def test_the_scores_and_details_are_in_the_record(case: Case) -> None:

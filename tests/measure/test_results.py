@@ -261,3 +261,12 @@ def test_a_range_may_be_a_point_and_failures_any_share() -> None:
         placed(*GOOD).assert_failures_at_most(0.0)
     with pytest.raises(ValueError, match="not at 1.5"):
         placed(*GOOD).assert_failures_at_most(1.5)
+
+
+@pytest.mark.parametrize("cause", ["RepetitionTimeout", "WorkerHung", "Diverged"])
+def test_every_cause_is_a_failure(cause: str) -> None:
+    result = ResultSet([*records("placed", [1.0] * 3), failed(3, cause)], METRICS)
+    assert [record.seed for record in result.failures] == [1003]
+    assert result.failure_interval().mean == 0.25
+    with pytest.raises(AssertionError, match=f"1 of 4 repetitions failed: 1 x {cause} in settle"):
+        result.assert_no_failures()

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.measure.results import ResultSet
-from pytest_simbench.measure.speed import POWER, without_speed
+from pytest_simbench.measure.speed import POWER, control, without_speed
 from pytest_simbench.records.record import Record
 from tests.records.build import METRICS, record
 
@@ -69,3 +69,15 @@ def test_a_repetition_without_a_control_leaves_nothing_to_compare_with() -> None
     assert without_speed("rtf", results(old), made()) is None
     assert without_speed("rtf", made(), results([*made().records[:2], old[2]])) is None
     assert without_speed("rtf", results([]), made()) is None
+
+
+def test_each_cost_has_its_control() -> None:
+    """CPU seconds that of CPU seconds, stepping that without waiting, the rest that as it was."""
+    stepping = {"control_wall": 3e-4, "control_waited": 1e-4, "control_cpu": 1.9e-4}
+    whole, none = record(1, stepping=stepping), record(1, stepping={})
+    found = {name: control(whole, name) for name in POWER}
+    assert found == pytest.approx(
+        {"rtf": 2e-4, "cpu_cost": 1.9e-4, "start": 3e-4, "end": 3e-4, "total": 3e-4}
+    )
+    assert not any(control(none, name) for name in POWER)
+    assert control(record(1, stepping={**stepping, "control_waited": 1.0}), "rtf") == 0.0

@@ -172,3 +172,25 @@ def test_a_file_with_something_else_in_it(tmp_path: Path, wrong: dict[str, objec
     np.savez(path, **{k: v for k, v in arrays.items() if v is not None})  # type: ignore[arg-type]
     with pytest.raises(ValueError, match=f"{path} holds no motion of pytest-simbench"):
         Sample.load(path)
+
+
+def test_an_agreement_on_the_wire() -> None:
+    first = sample("a", TIMES, [0.2, 0.2, 0.2, 0.2])
+    second = replace(sample("b", TIMES, [0.2, 0.2, 0.2015, 0.2]), counts={"n": 0.5})
+    assert agreement(first, second).to_wire() == {
+        "first": "a",
+        "second": "b",
+        "partings": {
+            "0.001": {"time": 0.3, "body": "moving", "position": (0.2, 0.0, 0.0)},
+            "0.01": None,
+        },
+        "commands_part": None,
+        "until": 0.4,
+        "same_outcome": False,
+    }
+
+
+def test_what_was_run_otherwise_is_told() -> None:
+    first = sample("a", TIMES, [0.2] * 4)
+    with pytest.raises(ValueError, match=r"^a ran \('t', 1\), b ran \('u', 2\)$"):
+        agreement(first, replace(first, label="b", task="u", seed=2))

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.client.world import Motion
-from pytest_simbench.repeatability.motions import difference, gaps
+from pytest_simbench.repeatability.motions import _first_difference, difference, gaps
 
 NAMES = ("a", "b")
 
@@ -109,3 +109,17 @@ def test_where_they_part() -> None:
     between = gaps(circling(0.02), second)
     assert between.first_beyond(0.001) == (1 + 25 + 10, 0)
     assert between.first_beyond(0.01) is None
+
+
+def test_where_an_episode_ends_or_changes_its_cubes() -> None:
+    """Told by the time of the last sample that both have."""
+    long, short = circling(0.1, (0.5, 0.7, 0.2)), circling(0.1, (0.5, 0.7))
+    for first, second in ((long, short), (short, long)):
+        found = difference(first, second, NAMES)
+        assert found is not None
+        assert (found.first, found.body) == (pytest.approx(1.2), "")
+    other = circling(0.1)
+    other[2] = Motion(other[2].time, other[2].joints, other[2].bodies[:, :1])
+    assert _first_difference(circling(0.1), other) == (pytest.approx(0.5), None)
+    other[0] = Motion(other[0].time, other[0].joints, other[0].bodies[:, :1])
+    assert _first_difference(circling(0.1), other) == (0.0, None)

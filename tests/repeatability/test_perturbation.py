@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import find, given, settings
 from hypothesis import strategies as st
+from hypothesis.errors import NoSuchExample
 
 from pytest_simbench.repeatability.perturbation import (
     QUANTITIES,
@@ -139,3 +140,14 @@ def test_there_and_back(steps: int, name: str) -> None:
     assert back.body("cube_03").pose.as_array() == pytest.approx(
         TOWER.body("cube_03").pose.as_array(), abs=1e-12
     )
+
+
+def test_the_smallest_delay_is_one_step() -> None:
+    """It is never negative, and never more than its bound."""
+    strategy = perturbations(THROW, {"delay": 0.003})
+    assert [find(strategy, lambda found, n=n: found[0].steps == n)[0].steps for n in (1, 2, 3)] == [
+        1, 2, 3,
+    ]  # fmt: skip
+    for steps in (-1, 0, 4):
+        with pytest.raises(NoSuchExample):
+            find(strategy, lambda found, n=steps: found[0].steps == n)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.worker.control import MOST_AT_ONCE, SHARE, Clock, Control
+from pytest_simbench.worker.control import MOST_AT_ONCE, SHARE, Clock, Control, workload
 
 
 @contextmanager
@@ -47,6 +47,11 @@ def test_where_the_kernel_does_not_tell_nothing_was_waited(tmp_path: Path) -> No
     before, waited = clock()
     assert waited == 0.0
     assert clock()[0] > before
+
+
+def test_the_workload_stays_the_same() -> None:
+    """Its time is compared with that of runs of earlier versions: this much arithmetic, no more."""
+    assert workload() == pytest.approx(2997.9)  # sum of k k mod 7 for k < 1500, root of 0.81
 
 
 def test_the_control_takes_its_share_and_no_more() -> None:

@@ -104,6 +104,12 @@ def test_signs_of_life_come_while_it_steps(monkeypatch: pytest.MonkeyPatch) -> N
     assert all(0.0 < at <= 0.6 + 1e-9 for at in beats)
 
 
+def test_what_is_quick_gives_no_sign_of_life() -> None:
+    beats: list[float] = []
+    stepping(Toy(), beats.append).wait(1.0, None)
+    assert beats == []
+
+
 def test_each_step_gets_its_own_command_and_a_wait_none() -> None:
     toy = Toy()
     stepper = stepping(toy)

@@ -1,0 +1,469 @@
+"""What repeatability makes of runs that are known: attacks, sensitivity, search, wire forms.
+
+The modules' own tests do the same with engines.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pytest_simbench.client.errors import Where, WorkerError, WorkerExited
+from pytest_simbench.repeatability.attack import Attack, Trial, divergence, effect
+from pytest_simbench.repeatability.episode import Episode, changed, scaled_jitter
+from pytest_simbench.repeatability.motions import Difference
+from pytest_simbench.repeatability.perturbation import Perturbation, described
+from pytest_simbench.repeatability.replay_result import Again, Replay
+from pytest_simbench.repeatability.search import Finding, bounds_in_words, search, to_wire
+from pytest_simbench.repeatability.stability import Sensitivity, Stability, sensitivity, stability
+from pytest_simbench.tasks import Jitter
+from pytest_simbench.tasks.base import Outcome
+from pytest_simbench.tasks.moments import Moment
+from tests.repeatability.scripted import METRICS, Scripted, episode, motion, operation
+
+search_module = sys.modules[search.__module__]
+
+ALL = {"standing": 1.0, "lost": 0.0, "height": 0.3}
+Perturbed = tuple[Perturbation, ...]
+
+
+def shift(perturbed: Perturbed) -> float:
+    """Displacement of cube a in x [m]."""
+    return sum(p.amount for p in perturbed if p.quantity == "x" and p.body == "a")
+
+
+def moved(x: float, metrics: dict[str, float | None] = ALL, **details: object) -> Episode:
+    """Cube a starts `x` farther than 0.1 and goes 0.2 + 3 x; cube b stays."""
+    motions = [motion([0.0], [0.1 + x], [0.5]), motion([0.5, 1.0], [0.2, 0.3 + 4 * x], [0.5, 0.5])]
+    return episode(metrics, motions, [operation("wait", "fall", 1.0)], details)
+
+
+def dead(perturbed: Perturbed) -> WorkerError:
+    return WorkerExited("it is gone", Where("sim", "headless"))
+
+
+def test_how_far_a_cube_goes_another_way() -> None:
+    """Its displacement at the start does not count: 4 x - x."""
+    assert divergence(moved(0.0), moved(0.001)) == pytest.approx(0.003)
+    assert divergence(moved(0.0), moved(-0.001)) == pytest.approx(0.003)
+    nobody = episode(ALL, [motion([0.0]), motion([1.0])])
+    assert divergence(nobody, nobody) == 0.0
+
+
+def test_an_attack_remembers_and_ends() -> None:
+    step = [(Perturbation("x", n, "a"),) for n in range(4)]
+
+    def run(perturbed: Perturbed) -> Episode:
+        if shift(perturbed) > 1.5e-4:
+            return moved(shift(perturbed), {**ALL, "standing": 0.5, "lost": 1.0})
+        return moved(shift(perturbed))
+
+    experiment = Scripted(run)
+    attack = Attack(experiment, 2)  # type: ignore[arg-type]
+    assert [asked[0] for asked in experiment.asked] == [()]
+    assert not attack.exhausted
+    harmless, harmful = attack.trial(step[1]), attack.trial(step[2])
+    assert harmless == Trial(pytest.approx(3e-4), kept=1.0)  # type: ignore[arg-type]
+    assert harmful is not None
+    assert (harmful.changed, harmful.kept, harmful.crash) == (("standing", "lost"), 0.5, "")
+    assert harmful.effect == "changes standing from 100 % to 50 %"
+    assert harmful.differs
+    assert not Trial(1.0).differs
+    assert attack.exhausted
+    assert attack.trial(step[3]) is None
+    assert attack.trial(step[2]) is harmful
+    assert len(experiment.asked) == 3
+    attack.examples = 3
+    assert attack.trial(step[3]) is not None
+    assert list(attack.trials) == step[1:]
+    assert list(attack.tapes) == step[2:]
+
+
+def test_a_crash_keeps_nothing() -> None:
+    def run(perturbed: Perturbed) -> Episode:
+        if perturbed:
+            raise dead(perturbed)
+        return moved(0.0)
+
+    trial = Attack(Scripted(run), 1).trial((Perturbation("x", 1, "a"),))  # type: ignore[arg-type]
+    assert trial == Trial(1.0, (), "ends in WorkerExited", "WorkerExited: it is gone", 0.0)
+    assert trial is not None
+    assert trial.differs
+
+
+@pytest.mark.parametrize(
+    ("after", "kept"),
+    [
+        ({"standing": 1.0, "lost": 1.0}, 1.0),
+        ({"standing": 0.25, "lost": 0.0}, 0.5),
+        ({"standing": None, "lost": 0.0}, 0.0),
+    ],
+)
+def test_what_is_kept_is_of_what_could_be_lost(after: dict[str, float | None], kept: float) -> None:
+    """Of counts that are good when high, and were not 0; never more than all."""
+    experiment = Scripted(lambda p: moved(0.0, after if p else {"standing": 0.5, "lost": 0.0}))
+    trial = Attack(experiment, 1).trial((Perturbation("x", 1, "a"),))  # type: ignore[arg-type]
+    assert trial is not None
+    assert trial.kept == kept
+
+
+def test_effects_of_what_is_none() -> None:
+    task = Scripted(lambda p: moved(0.0)).task
+    before, after = Outcome({"standing": 1.0}), Outcome({"standing": None})
+    assert effect(task, before, after, ["standing"]) == "changes standing from 100 % to none"
+    assert effect(task, after, before, ["standing"]) == "changes standing from none to 100 %"
+    some = Outcome({}, {"toppled": ["a"]})
+    more = Outcome({}, {"toppled": ["a", "b"]})
+    assert effect(task, some, more, ["standing"]) == "topples b"
+    assert effect(task, more, some, ["standing"]) == "saves b from toppling"
+    assert effect(task, some, some, ["standing"]) == "changes standing from none to none"
+    assert effect(task, some, more, []) == ""
+
+
+def test_what_counts_as_changed() -> None:
+    assert changed({"a": 1.0, "b": None, "c": 0.5}, {"a": 1.0, "b": 0.0}) == ["b", "c"]
+    assert scaled_jitter(2.0) == Jitter(2 * Jitter().distance, 2 * Jitter().angle)
+
+
+GROWING = [
+    # at 0.1 s after the first motion began, at 0.2 s, the cube is 1, 2, ... displacements away
+    ([0.0], [1.0]),
+    ([0.2, 0.4], [1.0, 2.0]),
+    ([0.5, 0.9, 1.4], [3.0, 4.0, 6.0]),
+    ([2.0, 6.0], [5.0, 1.0]),
+]
+TAPE = [
+    operation("wait", "settle", 0.4),
+    operation("follow", "swing", 1.0),
+    operation("wait", "swing", 4.6),
+]
+
+
+def growing(perturbed: Perturbed) -> Episode:
+    x = shift(perturbed)
+    return episode(
+        ALL, [motion(t, [0.1 + x * g for g in way], [0.5] * len(t)) for t, way in GROWING], TAPE
+    )
+
+
+@pytest.mark.parametrize("steps", [2, -2])
+def test_growth_per_displacement(steps: int) -> None:
+    """From the end of the settling on, at 0.4 s, with the commands of the unperturbed run."""
+    experiment = Scripted(growing)
+    perturbation = Perturbation("x", steps, "a")
+    moments = [Moment("swung", "swing", 1), Moment("at first", "settle"), Moment("never", "swim")]
+    found = sensitivity(experiment, perturbation, moments)  # type: ignore[arg-type]
+    assert experiment.asked == [((), None), ((perturbation,), TAPE)]
+    assert found.simulator == "sim"
+    assert found.perturbation == f"{0.1 * steps:g} mm in x of a"
+    assert found.ratio == {
+        0.1: pytest.approx(3.0),
+        1.0: pytest.approx(6.0),
+        5.0: pytest.approx(1.0),
+        20.0: None,
+    }
+    assert found.largest == pytest.approx(6.0)
+    assert found.until == {
+        "swung": pytest.approx(6.0),
+        "at first": pytest.approx(1.0),
+        "never": None,
+    }
+    assert found.sentence == (
+        f"mm per mm after {0.1 * steps:g} mm in x of a: 3 at 0.1 s, 6 at 1 s, 1 at 5 s, "
+        "6 until swung, 1 until at first; most 6"
+    )
+    assert found.to_wire() == {
+        "perturbation": found.perturbation,
+        "ratio": {
+            "0.1": found.ratio[0.1],
+            "1": found.ratio[1.0],
+            "5": found.ratio[5.0],
+            "20": None,
+        },
+        "until": found.until,
+        "largest": found.largest,
+        "sentence": found.sentence,
+    }
+
+
+def test_a_world_that_is_left_alone_begins_at_once() -> None:
+    """No motion, so times count from 0."""
+
+    def run(perturbed: Perturbed) -> Episode:
+        found = growing(perturbed)
+        return episode(ALL, found.motions, [operation("wait", "fall", 1.0)] * 3)
+
+    found = sensitivity(Scripted(run), Perturbation("x", 1, "a"))  # type: ignore[arg-type]
+    assert found.ratio[0.1] == pytest.approx(1.0)
+    assert found.ratio[1.0] == pytest.approx(6.0)
+
+
+def test_only_what_comes_before_is_judged() -> None:
+    grown = Sensitivity("sim", "it", {0.1: 1.0, 5.0: 4.0, 20.0: None}, 9.0, {"a": 2.0, "b": None})
+    grown.assert_below(4.5, until=5.0)
+    grown.assert_below(2.5, until="a")
+    with pytest.raises(AssertionError) as caught:
+        grown.assert_below(4.0, until=5.0)
+    assert str(caught.value) == f"sim: {grown.sentence}; expected below 4 until 5 s"
+    with pytest.raises(AssertionError) as caught:
+        grown.assert_below(9.0, until="b")
+    assert str(caught.value) == "sim: the task never came to b"
+    with pytest.raises(ValueError, match="^no moment is named 'c'; there are: a, b$"):
+        grown.assert_below(9.0, until="c")
+    with pytest.raises(ValueError, match="^no moment is named 'c'; there are: none$"):
+        Sensitivity("sim", "it", {}, 9.0).assert_below(9.0, until="c")
+
+
+def test_no_growth_is_told_of_what_is_no_displacement() -> None:
+    experiment = Scripted(growing)
+    with pytest.raises(ValueError, match="^sensitivity is told per millimetre, not for 1 deg of"):
+        sensitivity(experiment, Perturbation("yaw", 10, "a"))  # type: ignore[arg-type]
+    assert not experiment.asked
+
+
+def toppling(perturbed: Perturbed) -> Episode:
+    """Beyond 0.5 mm one of four falls, beyond 0.8 mm another."""
+    x = abs(shift(perturbed))
+    fallen = ["one"] * (x > 4.5e-4) + ["two"] * (x > 7.5e-4)
+    return moved(shift(perturbed), {**ALL, "standing": 1 - len(fallen) / 4}, toppled=fallen)
+
+
+def test_stability_of_a_known_world() -> None:
+    experiment = Scripted(toppling)
+    found = stability(experiment, {"x": 1e-3}, examples=12, at_most=1)  # type: ignore[arg-type]
+    assert len(experiment.asked) == 13
+    trials = [toppling(asked[0]).counts["standing"] for asked in experiment.asked[1:]]
+    assert list(found.kept) == trials
+    assert found.unchanged == trials.count(1.0)
+    assert (found.simulator, found.bounds) == ("sim", "1 mm in x")
+    worst = min(experiment.asked[1:], key=lambda asked: toppling(asked[0]).counts["standing"] or 0)
+    assert min(trials) < 1.0
+    names = {0.75: "topples one", 0.5: "topples one and two"}
+    assert found.worst == f"{worst[0][0]} {names[min(trials)]}"
+    assert found.share.mean == pytest.approx(np.mean(trials))
+    assert found.same.mean == pytest.approx(found.unchanged / 12)
+    again = stability(Scripted(toppling), {"x": 1e-3}, examples=12, at_most=1)  # type: ignore[arg-type]
+    assert again == found
+    other = Scripted(toppling)
+    stability(other, {"x": 1e-3}, examples=12, at_most=1, random_seed=1)  # type: ignore[arg-type]
+    assert other.asked != experiment.asked
+
+
+def test_what_a_stability_says() -> None:
+    kept = [1.0, 0.5, 1.0, 1.0, 1.0]
+    found = Stability("sim", kept, 4, "1 mm in x", "it topples one")
+    low, high = (100 * end for end in (found.share.low, found.share.high))
+    assert found.sentence == (
+        f"kept 90 % [{low:.0f}, {high:.0f}] within 1 mm in x; the same outcome in 4 of 5; worst: "
+        "it topples one"
+    )
+    assert found.to_wire() == {
+        "kept": kept,
+        "unchanged": 4,
+        "bounds": "1 mm in x",
+        "worst": "it topples one",
+        "sentence": found.sentence,
+    }
+    with pytest.raises(AssertionError) as caught:
+        Stability("sim", [0.0] * 9, 0, "1 mm in x", "").assert_kept_at_least(0.9)
+    assert str(caught.value).startswith("sim: at least 90 % should be kept, but kept 0 % [0, ")
+    assert "worst" not in str(caught.value)
+
+
+def test_a_search_of_a_known_world(monkeypatch: pytest.MonkeyPatch) -> None:
+    """0.5 mm topples one, and less does nothing."""
+    monkeypatch.setattr(
+        "pytest_simbench.repeatability.search._kept_example", lambda attack, smallest: "replay me"
+    )
+    experiment = Scripted(toppling)
+    found = search(experiment, {"x": 2e-3}, examples=40, at_once=1)  # type: ignore[arg-type]
+    assert found.smallest is not None
+    assert [(p.quantity, abs(p.steps), p.body) for p in found.smallest] == [("x", 5, "a")]
+    assert found.effect == "topples one"
+    assert found.confirmed is True
+    assert found.first is not None
+    tried = [asked[0] for asked in experiment.asked]
+    assert tried[0] == ()
+    first = next(k for k, p in enumerate(tried) if abs(shift(p)) > 4.5e-4)
+    assert (tried[first], found.examples) == (found.first, first)
+    # the base, and the two runs that confirm, are no trials
+    assert tried[-2:] == [(), found.smallest]
+    assert found.runs == len(tried) - 3
+    assert (found.bounds, found.replay) == ("2 mm in x", "replay me")
+    assert found.before == "standing 1.0, lost 0.0"
+    found.assert_found()
+    found.assert_not_below("x", 4e-4)
+    found.assert_not_below("yaw", 1.0)
+    with pytest.raises(AssertionError) as caught:
+        found.assert_not_below("x", 6e-4)
+    assert str(caught.value) == (
+        f"sim: {found.smallest[0]} topples one, though it should bear 0.6 mm\nreplay it: replay me"
+    )
+
+
+def test_a_search_that_finds_nothing_makes_all_its_runs() -> None:
+    """One in six perturbs one thing alone, the others up to a dozen."""
+    experiment = Scripted(lambda perturbed: moved(0.0))
+    found = search(experiment, {"x": 2e-3, "y": 2e-3}, examples=18)  # type: ignore[arg-type]
+    assert (found.smallest, found.first, found.examples) == (None, None, 0)
+    assert found.runs == len(experiment.asked) - 1 <= 18
+    assert (found.effect, found.replay, found.confirmed) == ("", "", False)
+    alone = [len(asked[0]) for asked in experiment.asked[1:]]
+    assert set(alone[:3]) == {1}
+    assert max(alone[3:]) > 1
+    assert found.sentence == (
+        f"nothing within 2 mm in x, 2 mm in y changed the outcome in {found.runs} examples"
+    )
+    with pytest.raises(AssertionError, match="^sim: nothing within 2 mm in x, 2 mm in y changed"):
+        found.assert_found()
+    with pytest.raises(LookupError, match="^no perturbation of x was found: nothing within"):
+        found.amount("x")
+    assert to_wire(found) == {
+        "sentence": found.sentence, "smallest": None, "effect": "", "examples": 0,
+        "runs": found.runs,
+        "confirmed": False, "first": None, "bounds": found.bounds, "before": found.before,
+        "replay": "",
+    }  # fmt: skip
+
+
+def test_shrinking_has_its_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "pytest_simbench.repeatability.search._kept_example", lambda attack, smallest: ""
+    )
+    experiment = Scripted(toppling)
+    found = search(experiment, {"x": 2e-3}, examples=40, shrinks=2, at_once=1)  # type: ignore[arg-type]
+    assert found.runs <= found.examples + 2
+
+
+def test_several_count_together() -> None:
+    both = (Perturbation("x", 3, "a"), Perturbation("x", -2, "b"), Perturbation("yaw", 1, "a"))
+    found = Finding("sim", both, "topples it", 3, 9, True, None, "", "", "")
+    assert found.amount("x") == pytest.approx(5e-4)
+    assert found.sentence == (
+        "0.3 mm in x of a and -0.2 mm in x of b and 0.1 deg of yaw of a topples it"
+    )
+    found.assert_not_below("x", 1.0)  # with something else perturbed it says nothing of x
+    assert to_wire(found)["smallest"] == [
+        {"quantity": "x", "steps": 3, "body": "a"},
+        {"quantity": "x", "steps": -2, "body": "b"},
+        {"quantity": "yaw", "steps": 1, "body": "a"},
+    ]
+
+
+def test_bounds_in_words() -> None:
+    experiment = Scripted(toppling)
+    assert bounds_in_words(experiment, {"x": 1e-3, "mass": 0.1}) == (  # type: ignore[arg-type]
+        "1 mm in x, 10 % in mass"
+    )
+    assert bounds_in_words(experiment, None) == (  # type: ignore[arg-type]
+        "1 mm in x, 1 mm in y, 1 deg in yaw, 10 % in mass, 20 % in friction"
+    )
+
+
+PARTED = Difference(1.25, "a", {1.0: 0.0012, 5.0: None}, 0.02)
+
+
+@pytest.mark.parametrize(
+    ("again", "identical", "text"),
+    [
+        (Again("w"), True, "bit-identical"),
+        (Again("w", left_at=2.5, claimed=False), True, "bit-identical"),
+        (Again("w", skipped="no window"), False, "no window"),
+        (Again("w", failure="WorkerExited: gone"), False, "WorkerExited: gone"),
+        (
+            Again("w", PARTED, ("placed", "hit")),
+            False,
+            "first differs at t = 1.25 s (a), then 1.2 mm 1 s later, 20 mm at most; changed "
+            "placed, hit",
+        ),
+        (
+            Again("w", Difference(1.0, "", {}, 0.0)),
+            False,
+            "first differs at t = 1.00 s (robot), 0 mm at most",
+        ),
+    ],
+)
+def test_running_again_in_words_and_on_the_wire(again: Again, identical: bool, text: str) -> None:
+    assert (again.identical, again.text) == (identical, text)
+    assert Again.from_wire(again.to_wire()) == again
+    wire = again.to_wire()
+    assert wire["identical"] is identical
+    del wire["claimed"]
+    assert Again.from_wire(wire).claimed
+
+
+def test_what_a_claim_of_determinism_means() -> None:
+    fine, skipped = Again("reset"), Again("window", skipped="none here")
+    parted, hidden = Again("fresh", PARTED), Again("restored", PARTED, claimed=False)
+    broken = Again("window", failure="WorkerExited: gone", claimed=False)
+    first = moved(0.0)
+    Replay("sim", True, first, (fine, skipped, hidden)).assert_as_claimed()
+    for claims, ways, bad, head in (
+        (True, (fine, parted), (parted,), "claims to be deterministic, but"),
+        (False, (fine, hidden, broken), (broken,), "could not run again"),
+        (True, (parted, broken), (parted, broken), "claims to be deterministic, but"),
+    ):
+        with pytest.raises(AssertionError) as caught:
+            Replay("sim", claims, first, ways).assert_as_claimed()
+        lines = [f"sim {head}", *(f"  {again.way}: {again.text}" for again in bad)]
+        assert str(caught.value) == "\n".join(lines)
+    wire = Replay("sim", True, first, (fine, parted)).to_wire()
+    assert wire == {
+        "claims": True,
+        "counts": {"standing": 1.0, "lost": 0.0},
+        "again": [fine.to_wire(), parted.to_wire()],
+    }
+
+
+def test_the_metrics_that_count() -> None:
+    assert [m.name for m in METRICS if m.bounded] == list(moved(0.0).counts)
+
+
+def test_the_smallest_is_kept_as_an_example(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """With its own scene and commands, and the line that replays it; none where it crashed, or
+    where the folder takes none."""
+    kept: list[Any] = []
+    experiment = Scripted(toppling)
+    case = experiment.handle.case
+    experiment.handle.constructed = {"versions": {"sim": "1"}}
+
+    def write(*arguments: Any) -> Path:
+        kept.append(arguments)
+        return tmp_path / "example.json"
+
+    def command(path: Path, of: Any, scene: Any) -> str:
+        assert of is case
+        return f"replay {path.name} of {scene.body('a').pose.position[0]:.4f}"
+
+    monkeypatch.setattr(search_module, "write_example", write)
+    monkeypatch.setattr(search_module, "replay_command", command)
+    found = search(experiment, {"x": 2e-3}, examples=40, at_once=1)  # type: ignore[arg-type]
+    assert found.smallest is not None
+    x = shift(found.smallest)
+    assert found.replay == f"replay example.json of {x:.4f}"
+    ((of, name, scene, tape, versions),) = kept
+    assert (of, name) == (case, "smallest-scripted-sim-headless")
+    assert scene.body("a").pose.position[0] == pytest.approx(x)
+    assert (tape, versions) == (moved(0.0).tape, {"sim": "1"})
+    assert to_wire(found)["first"] == described(found.first or ())
+    found.assert_not_below("x", found.amount("x"))
+
+    def full(*arguments: Any) -> Path:
+        raise OSError("no space")
+
+    monkeypatch.setattr(search_module, "write_example", full)
+    assert search(experiment, {"x": 2e-3}, examples=40, at_once=1).replay == ""  # type: ignore[arg-type]
+
+    def crashing(perturbed: Perturbed) -> Episode:
+        if abs(shift(perturbed)) > 4.5e-4:
+            raise dead(perturbed)
+        return moved(0.0)
+
+    crash = search(Scripted(crashing), {"x": 2e-3}, examples=40, at_once=1)  # type: ignore[arg-type]
+    assert (crash.effect, crash.replay) == ("ends in WorkerExited", "")
