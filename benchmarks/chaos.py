@@ -37,8 +37,8 @@ from pytest_simbench.client.display import Displays
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.repeater import Repeater
+from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.record_file import RecordFile, read_records
 from pytest_simbench.report.summary import summarise
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, cube
@@ -206,11 +206,11 @@ def ctrl_c(times: int, after: float) -> Iterator[None]:
 def one(case: Case, fault: Fault, number: int, rng: random.Random, tally: Tally) -> None:
     """One repetition with one fault, in this process."""
     kept: list[Record] = []
-    file = RecordFile(case.folder / "records.jsonl")
+    folder = RunFolder(case.folder)
 
     def keep(record: Record) -> None:
         kept.append(record)
-        file.append(record)
+        folder.append(record)
 
     times = {"Ctrl-C": 1, "Ctrl-C three times": 3}.get(fault.name, 0)
     title = f"{number} {case.simulator} {fault.name}"
@@ -265,7 +265,7 @@ def killed(engine: str, number: int, title: str, rng: random.Random, tally: Tall
     tally.check(not left("CHAOS_RUN", mark, 5.0, tally), f"{title}: processes were left behind")
     records = folder / "out" / "records.jsonl"
     if records.is_file():
-        reading = read_records(records)
+        reading = RunFolder.of(records).read()
         numbers = [record.repetition for record in reading.records]
         tally.check(numbers == list(range(1, len(numbers) + 1)), f"{title}: records {numbers}")
         tally.check(all(r.ok for r in reading.records), f"{title}: a record is not ok")
@@ -293,7 +293,7 @@ def left(variable: str, value: str, patience: float, tally: Tally) -> int:
 
 def check_tables(folder: Path, tally: Tally) -> None:
     """The table's counts are those of what happened."""
-    reading = read_records(folder)
+    reading = RunFolder(folder).read()
     tally.check(not reading.problems, f"records: {reading.problems}")
     tally.check(len(reading.records) == tally.truth.total(), f"{len(reading.records)} records")
     (summary,) = summarise(reading.records, {"falling": Falling().metrics})

@@ -29,7 +29,7 @@ from pytest_simbench.measure.comparison import (
 from pytest_simbench.measure.limits import FAILURES, Limit
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.speed import without_speed
-from pytest_simbench.records.differences import differences
+from pytest_simbench.records.configuration import differences
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import by_test
 from pytest_simbench.tasks.metrics import Metric

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,12 @@ from pytest_simbench.measure.limits import Limit, LimitError, parse_limits
 from pytest_simbench.plugin import options
 from pytest_simbench.records.baseline import (
     FORMS,
-    Baseline,
     BaselineError,
     from_benchmarks,
     read_baseline,
 )
-from pytest_simbench.records.record import Record
+from pytest_simbench.records.configuration import other_meanings
+from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.text import for_terminal
 from pytest_simbench.tasks.metrics import Metric, UnknownMetric
 
@@ -30,16 +31,19 @@ class Comparison:
         limits: how much worse each metric may get; none: a table and no failures.
     """
 
-    def __init__(self, baseline: Baseline, limits: Sequence[Limit] = ()) -> None:
+    def __init__(self, baseline: Reading, limits: Sequence[Limit] = ()) -> None:
         self.baseline = baseline
         self.limits = tuple(limits)
         self._report: Any = None
 
-    def make(self, records: Iterable[Record], metrics: Mapping[str, Sequence[Metric]]) -> None:
-        """Compare; `metrics` are those of each task, by its name."""
+    def make(self, run: Reading) -> None:
+        """Compare with this run, which says what the metrics mean."""
         from pytest_simbench.measure.gate import run_gate
 
-        self._report = run_gate(self.baseline.records, records, self.limits, metrics)
+        metrics = {**self.baseline.metrics, **run.metrics}
+        report = run_gate(self.baseline.records, run.records, self.limits, metrics)
+        other = other_meanings(self.baseline.tasks, run.tasks)
+        self._report = replace(report, differences=(*other, *report.differences))
 
     @property
     def failed(self) -> bool:
@@ -80,18 +84,20 @@ def prepare(config: pytest.Config, saved: list[dict[str, Any]]) -> Comparison | 
         pytest.UsageError: no baseline, a malformed one, a malformed limit, an unknown metric.
     """
     text = options.value(config, "sim_compare_fail")
+    typed = config.getoption("sim_compare_fail") is not None
     try:
-        baseline = _baseline(config, saved, needed=config.getoption("sim_compare_fail") is not None)
+        baseline = _baseline(config, saved, needed=typed)
         if baseline is None:
             return None
-        return Comparison(baseline, _limits(text, baseline) if text is not None else ())
+        limits = _limits(text, baseline, typed=typed) if text is not None else ()
+        return Comparison(baseline, limits)
     except BaselineError as error:
         raise pytest.UsageError(str(error)) from None
     except (LimitError, UnknownMetric) as error:
         raise pytest.UsageError(f"--sim-compare-fail: {error}") from None
 
 
-def _baseline(config: pytest.Config, saved: list[dict[str, Any]], needed: bool) -> Baseline | None:
+def _baseline(config: pytest.Config, saved: list[dict[str, Any]], needed: bool) -> Reading | None:
     given = options.value(config, "sim_baseline")
     if given:
         return read_baseline(Path(config.invocation_params.dir, given))
@@ -119,11 +125,16 @@ def _name(saved: Mapping[str, Any]) -> str:
     return f"the run saved {when} UTC" + (f", commit {commit}" if commit else "")
 
 
-def _limits(text: str, baseline: Baseline) -> tuple[Limit, ...]:
-    """The limits, on metrics of our own tasks or of any other that the baseline has."""
-    from pytest_simbench.tasks import Stacking, Throwing
+def _limits(text: str, baseline: Reading, *, typed: bool) -> tuple[Limit, ...]:
+    """The limits, each on a metric that the baseline has.
 
-    metrics = {metric.name: metric for task in (Stacking(), Throwing()) for metric in task.metrics}
-    for name in baseline.metric_names:  # a task of another package: its kind is known later
+    The ini file's hold for other runs too: what this baseline does not have is not compared, and
+    the summary says so.
+    """
+    metrics = {metric.name: metric for found in baseline.metrics.values() for metric in found}
+    names = [name for record in baseline.records for name in record.metrics]
+    if not typed:
+        names += [part.partition(":")[0].strip() for part in text.split(",")]
+    for name in dict.fromkeys(names):  # an older run does not say what kind of number it is
         metrics.setdefault(name, Metric(name, name, better="lower"))
     return parse_limits(text, metrics.values())

@@ -211,16 +211,13 @@ def repeat(
 @pytest.fixture
 def threshold(request: pytest.FixtureRequest) -> Callable[[str, float], float]:
     """`threshold("placed", 0.9)`: the suite's value, unless `--sim-threshold` changes it."""
-    if hasattr(request.config, "workerinput"):  # an xdist worker must not fail while collecting
-        from pytest_simbench.plugin.thresholds import problem
-
-        found = problem(request.config, request.session.items)
-        if found:
-            pytest.fail(found, pytrace=False)
     given = options.value(request.config, "sim_threshold")
+    this = run(request.config)
 
     def choose(metric: str, default: float) -> float:
-        return float(given.get(metric, arguments.checked_threshold(metric, default)))
+        value = float(given.get(metric, arguments.checked_threshold(metric, default)))
+        this.ask(request.node.nodeid, metric, value)
+        return value
 
     return choose
 

@@ -106,8 +106,13 @@ def pytest_benchmark_compare_machine_info(config: pytest.Config, compared_benchm
 
 @pytest.hookimpl(tryfirst=True)  # before xdist starts its workers
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Complain of a bad baseline or limit, or of a run folder, before anything runs."""
+    """Complain of a bad baseline, limit, threshold or run folder before anything runs."""
     config = session.config
+    if options.given(config, "sim_threshold"):
+        from pytest_simbench.plugin.thresholds import bad_value
+
+        if wrong := bad_value(options.value(config, "sim_threshold")):
+            raise pytest.UsageError(wrong)
     named = any(options.given(config, name) for name in ("sim_output", "sim_resume"))
     if named and not (hasattr(config, "workerinput") or config.option.collectonly):
         run(config).claim()
@@ -129,6 +134,11 @@ def pytest_cmdline_main(config: pytest.Config) -> int | None:
         from pytest_simbench.plugin.merge import merge_runs
 
         return merge_runs(config)
+    if options.given(config, "sim_report"):
+        options.values(config)
+        from pytest_simbench.plugin.merge import report_runs
+
+        return report_runs(config)
     if not options.given(config, "sim_list"):
         return None
     from pytest_simbench.report.simulators import list_simulators
@@ -174,12 +184,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.hookimpl(tryfirst=True)  # before -k and -m leave out tests
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    problems = config.stash.get(PROBLEMS, [])
-    if options.given(config, "sim_threshold") and not hasattr(config, "workerinput"):
-        from pytest_simbench.plugin.thresholds import problem
-
-        problems += filter(None, [problem(config, items)])
-    if problems:
+    if problems := config.stash.get(PROBLEMS, []):
         raise pytest.UsageError("\n".join(dict.fromkeys(problems)))
     timed = [item for item in items if "simbench_rounds" in _fixtures(item)]
     if timed:
@@ -221,7 +226,7 @@ def pytest_configure_node(node: Any) -> None:
     """Tell an xdist worker which run folder all of them share, and why it cannot be used."""
     this = run(node.config)
     this.problem = this.problem or this.occupied()
-    node.workerinput["simbench_folder"] = str(this.folder.absolute())
+    node.workerinput["simbench_folder"] = str(this.folder.path.absolute())
     node.workerinput["simbench_problem"] = this.problem
 
 
@@ -253,7 +258,7 @@ def pytest_runtest_makereport(item: pytest.Item, call: Any) -> Any:
         this = run(item.config)
         lines = this.of_test(item.nodeid)
         if lines:
-            outcome.get_result().simbench = {"records": lines, "tasks": this.declared()}
+            outcome.get_result().simbench = lines
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
@@ -262,27 +267,28 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
         _received.append(found)
 
 
-_received: list[dict[str, Any]] = []
-"""Records and tasks that came with reports; taken over when the session ends."""
+_received: list[list[str]] = []
+"""Records that came with reports; taken over when the session ends."""
 
 
 @pytest.hookimpl(trylast=True)  # xdist has heard all its workers then
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Compare with the baseline; a metric that is worse than allowed fails the run."""
+    """Compare with the baseline; a metric that is worse than allowed fails the run, and so does a
+    threshold of a metric that no test has."""
     config = session.config
     for found in _received:
-        run(config).receive(found["records"])
-        run(config).receive_declared(found["tasks"])
+        run(config).receive(found)
     _received.clear()
     if RUN not in config.stash or hasattr(config, "workerinput"):
         return
     this = run(config)
     this.complete()
-    if COMPARISON in config.stash and this.records:
+    if COMPARISON in config.stash and this.reading.records:
         comparison = config.stash[COMPARISON]
-        comparison.make(this.records, this.metrics)
+        comparison.make(this.reading)
         if comparison.failed and session.exitstatus == pytest.ExitCode.OK:
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
+    this.check_thresholds(session)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

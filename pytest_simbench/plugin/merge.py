@@ -1,97 +1,187 @@
-"""`--sim-merge RUN...`: join runs with different seeds into one run folder, and exit.
+"""`--sim-merge RUN...`: merge runs with different seeds into one run folder, and exit.
+`--sim-report RUN...`: show runs again, from their folders alone, and exit.
 
-The runs may come from anybody: of their folders only the records and the files beside them that
-records name are read, nothing outside, and every file written has a name of ours.
+The runs may come from anybody: of their folders only the records, what their numbers mean, and the
+files beside them that records name are read, nothing outside, and every file written has a name of
+ours.
 """
 
 from __future__ import annotations
 
 import os
 import shutil
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from pytest_simbench.plugin import options
-from pytest_simbench.records.folder import Claim, FolderError, holds_run, inside, new_name
-from pytest_simbench.records.joining import Joined, JoinError, join
-from pytest_simbench.records.record import Record, RecordError
-from pytest_simbench.records.record_file import RECORDS_NAME, RecordFile, read_records
+from pytest_simbench.records.folder import RECORDS, TASKS, Reading, RunFolder
+from pytest_simbench.records.merging import Merged, MergeError, merge, merge_tasks
+from pytest_simbench.records.paths import FolderError, new_name
+from pytest_simbench.records.record import RecordError
+from pytest_simbench.records.text import for_terminal
+
+if TYPE_CHECKING:
+    from pytest_simbench.report.summary import TaskSummary
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Runs that a user named.
+
+    Attributes:
+        folders: of each, by its name.
+        readings: what each holds, by its name.
+    """
+
+    folders: dict[str, RunFolder]
+    readings: dict[str, Reading]
+
+    @property
+    def problems(self) -> list[str]:
+        """What is wrong with them, one sentence each."""
+        return [text for reading in self.readings.values() for text in reading.problems]
+
+    @classmethod
+    def named(cls, config: pytest.Config, option: str) -> Runs:
+        """Those that an option names.
+
+        Raises:
+            pytest.UsageError: one cannot be read, or is named twice.
+        """
+        flag = options.option(option).flag
+        folders: dict[str, RunFolder] = {}
+        readings: dict[str, Reading] = {}
+        files: set[Path] = set()
+        for name in options.value(config, option):
+            path = Path(config.invocation_params.dir, name)
+            file = (path / RECORDS if path.is_dir() else path).resolve()
+            if file in files:
+                raise pytest.UsageError(f"{flag} {name}: the run is given twice")
+            folders[name] = RunFolder.of(path)
+            try:
+                readings[name] = folders[name].read()
+            except RecordError as error:
+                raise pytest.UsageError(f"{flag} {name}: {error}") from None
+            files.add(file)
+        return cls(folders, readings)
+
+    def merged(self, flag: str) -> tuple[list[Merged], Reading]:
+        """Their records as those of one run: with where each comes from, and to be shown.
+
+        Raises:
+            pytest.UsageError: they are not parts of one run, or hold nothing.
+        """
+        try:
+            records = merge({name: found.records for name, found in self.readings.items()})
+            tasks = merge_tasks({name: found.tasks for name, found in self.readings.items()})
+        except MergeError as error:
+            raise pytest.UsageError(f"{flag}: {error}") from None
+        if not records:
+            raise pytest.UsageError(f"{flag}: none of the runs holds a repetition that ended")
+        return records, Reading(records=tuple(item.record for item in records), tasks=tasks)
 
 
 def merge_runs(config: pytest.Config) -> int:
-    """Join the runs, print the result, and return the exit code.
+    """Merge the runs, print the result, and return the exit code.
 
     Raises:
         pytest.UsageError: a run that cannot be read, runs that are not parts of one, or a folder
             that already holds a run or cannot be written to.
     """
-    runs: dict[str, list[Record]] = {}
-    folders: dict[str, Path] = {}
-    files: set[Path] = set()
-    problems: list[str] = []
-    for name in config.getoption("sim_merge"):
-        path = Path(config.invocation_params.dir, name)
-        file = (path / RECORDS_NAME if path.is_dir() else path).resolve()
-        if file in files:
-            raise pytest.UsageError(f"--sim-merge {name}: the run is given twice")
-        try:
-            reading = read_records(path)
-        except RecordError as error:
-            raise pytest.UsageError(f"--sim-merge {name}: {error}") from None
-        runs[name] = list(reading.records)
-        problems += reading.problems
-        files.add(file)
-        folders[name] = path if path.is_dir() else path.parent
+    from pytest_simbench.report.files import write_report
+
+    runs = Runs.named(config, "sim_merge")
+    records, whole = runs.merged("--sim-merge")
+    folder = _claimed(config)
     try:
-        joined = join(runs)
-    except JoinError as error:
-        raise pytest.UsageError(f"--sim-merge: {error}") from None
-    if not joined:
-        raise pytest.UsageError("--sim-merge: none of the runs holds a repetition that ended")
-    claim = _claim(config)
-    try:
-        records, copied = _copy(joined, folders, claim.folder)
-        problems += copied + _write(records, claim.folder)
-        print(_report(claim.folder, records, problems))
+        for task in whole.tasks.values():
+            folder.describe(task)
+        refused = _copy(records, runs.folders, folder)
+        unsaved = folder.flush()
+        written = write_report(folder)
+        shown = folder.path if written.complete and not unsaved else None
+        _print(written.summaries, [*runs.problems, *refused, *unsaved, *written.problems], shown)
     finally:
-        claim.close()
+        folder.close()
     return 0
 
 
-def _claim(config: pytest.Config) -> Claim:
+def report_runs(config: pytest.Config) -> int:
+    """Show runs again: print the tables, write the report, and return the exit code.
+
+    One run's report is written into its folder, or into `--sim-output`; that of several, which are
+    merged for it, into `--sim-output` alone.
+
+    Raises:
+        pytest.UsageError: a run that cannot be read, or runs that are not parts of one.
+    """
+    from pytest_simbench.report.files import Written, in_order, summaries_of, write_files
+
+    runs = Runs.named(config, "sim_report")
+    (first, folder), *others = runs.folders.items()
+    whole = runs.merged("--sim-report")[1] if others else runs.readings[first]
+    if not whole.records:
+        raise pytest.UsageError(f"--sim-report {first}: it holds no repetition")
+    given = options.value(config, "sim_output") if options.given(config, "sim_output") else None
+    target = None if others else folder.path
+    if given:
+        target = Path(config.invocation_params.dir, given)
+        if RunFolder(target).holds_run and target.resolve() != folder.path.resolve():
+            raise pytest.UsageError(
+                f"--sim-report: {target} holds another run; give another --sim-output"
+            )
+    summaries = summaries_of(whole)
+    written = Written()
+    if target is not None:
+        written = write_files(target, summaries, in_order(whole.records))
+    _print(summaries, [*runs.problems, *written.problems], target if written.complete else None)
+    return 0 if written.complete else 1
+
+
+def _print(summaries: Sequence[TaskSummary], problems: list[str], folder: Path | None) -> None:
+    from pytest_simbench.report.tables import render_run
+
+    print(render_run(summaries, shutil.get_terminal_size().columns, folder))
+    for problem in problems:
+        print(for_terminal(problem))
+
+
+def _claimed(config: pytest.Config) -> RunFolder:
     given = options.value(config, "sim_output")
-    folder = (
+    folder = RunFolder(
         Path(config.invocation_params.dir, given)
         if given
         else new_name(config.rootpath / ".simbench", "-merged")
     )
     try:
-        claim = Claim(folder)
-        inside(folder, RECORDS_NAME)
+        folder.claim()
+        for name in (RECORDS, TASKS):
+            folder.inside(name)
     except FolderError as error:
+        folder.release()
         raise pytest.UsageError(f"--sim-merge: {error}") from None
-    if holds_run(folder):
-        claim.close()
+    if folder.holds_run:
+        folder.release()
         raise pytest.UsageError(
-            f"--sim-merge: {folder} already holds a run; give another --sim-output"
+            f"--sim-merge: {folder.path} already holds a run; give another --sim-output"
         )
-    return claim
+    return folder
 
 
-def _copy(
-    joined: list[Joined], folders: dict[str, Path], to: Path
-) -> tuple[list[Record], list[str]]:
-    """Logs and traces under the names that they have in the whole.
+def _copy(records: list[Merged], folders: dict[str, RunFolder], to: RunFolder) -> list[str]:
+    """Write the records, with their logs and traces under the names that they have in the whole.
 
     Returns:
-        The records, which name the copies; and what was refused, one sentence each.
+        What was refused, one sentence each.
     """
     from pytest_simbench.experiment.identity import file_stem_of
 
-    records, refused = [], []
-    for item in joined:
+    refused: dict[str, None] = {}
+    for item in records:
         stem, folder = file_stem_of(item.record), folders[item.run]
         details = dict(item.record.details)
         if log := item.was.details.get("log") or "":
@@ -101,21 +191,21 @@ def _copy(
             (f"traces/{file_stem_of(item.was)}.npz", f"traces/{stem}.npz"),
         ):
             try:
-                if source and _copied(inside(folder, source), to, target) and source == log:
+                if source and _copied(folder.inside(source), to, target) and source == log:
                     details["log"] = target
             except FolderError as error:
-                refused.append(f"not copied: {error}")
-        records.append(replace(item.record, details=details))
-    return records, list(dict.fromkeys(refused))
+                refused.setdefault(f"not copied: {error}")
+        to.append(replace(item.record, details=details))
+    return list(refused)
 
 
-def _copied(source: Path, folder: Path, target: str) -> bool:
+def _copied(source: Path, folder: RunFolder, target: str) -> bool:
     """Copy an ordinary file; a log that is missing makes no result wrong.
 
     Raises:
         FolderError: the target would lie outside of the folder.
     """
-    path = inside(folder, target)
+    path = folder.inside(target)
     try:
         if not source.is_file():
             return False
@@ -126,29 +216,3 @@ def _copied(source: Path, folder: Path, target: str) -> bool:
     except OSError:
         return False
     return True
-
-
-def _write(records: list[Record], folder: Path) -> list[str]:
-    """The records; what could not be written, one sentence each."""
-    file = RecordFile(folder / RECORDS_NAME)
-    for record in records:
-        file.append(record)
-    report = file.close()
-    return [*report.problems, *report.unsaved]
-
-
-def _report(folder: Path, records: list[Record], problems: list[str]) -> str:
-    from pytest_simbench.report.files import write_report
-    from pytest_simbench.report.matrix import with_wins
-    from pytest_simbench.report.summary import summarise
-    from pytest_simbench.report.tables import render_run
-    from pytest_simbench.tasks import Stacking, Throwing
-
-    tasks = (Stacking(), Throwing())
-    metrics = {task.name: task.metrics for task in tasks}
-    references = {task.name: task.references for task in tasks}
-    summaries = with_wins(summarise(records, metrics, references), records)
-    written = write_report(folder, summaries, records)
-    shown = folder if written.complete else None
-    text = render_run(summaries, shutil.get_terminal_size().columns, shown)
-    return "\n".join([text, *problems, *written.problems])

@@ -130,6 +130,9 @@ OPTIONS = (
     Option("--sim-merge", Files(), "join runs with different seeds (--sim-seed), made on several "
            "machines for instance, into one in --sim-output, and exit", metavar="RUN", ini=False,
            arguments={"nargs": "+", "action": "store"}),
+    Option("--sim-report", Files(), "print the tables and write the report of runs again, from "
+           "their folders alone, and exit; several are merged, and written where --sim-output says",
+           metavar="RUN", ini=False, arguments={"nargs": "+", "action": "store"}),
     Option("--sim-list", Flag(), "list the known simulators and exit", False, "--sims", ini=False),
     Option("--sim-install", Words(), "make the environment of a simulator that needs one of its "
            "own, and exit", metavar="NAME", ini=False),

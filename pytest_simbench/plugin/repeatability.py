@@ -5,6 +5,7 @@ Registered by the plugin; heavy imports happen late.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -130,8 +131,8 @@ def _keep(case: Case, kind: str, experiment: Experiment, result: Mapping[str, An
         constructed.get("versions", {}),
         result,
     )
-    with suppress(OSError):  # a full disk must not hide the result itself
-        append(case.folder, line)
+    for problem in append(case.folder, line).problems:  # a full disk hides no result
+        warnings.warn(problem, stacklevel=2)
 
 
 class Perturber:
@@ -207,7 +208,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     config = terminalreporter.config
     if RUN not in config.stash and not config.pluginmanager.has_plugin("dsession"):
         return
-    folder = run(config).folder
+    folder = run(config).folder.path
     from pytest_simbench.records.repeatability import NAME
 
     if not (folder / NAME).is_file():
@@ -217,12 +218,15 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     from pytest_simbench.report.repeatability import render_markdown, render_terminal, tables
 
     try:
-        found = tables(read(folder), agreements(folder))
+        lines = read(folder)
+        found = tables(lines.items, agreements(folder))
     except ValueError as error:
         terminalreporter.write_line(for_terminal(str(error)))
         return
     terminalreporter.write_sep("=", "repeatability")
     terminalreporter.write_line(render_terminal(found, terminalreporter._tw.fullwidth))
+    for problem in (*lines.problems, *lines.refused):
+        terminalreporter.write_line(for_terminal(problem))
     terminalreporter.write_line(for_terminal(f"\nresults on repeatability: {folder / NAME}"))
     with suppress(OSError):
         (folder / MARKDOWN_NAME).write_text(render_markdown(found), encoding="utf-8")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from math import isfinite
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,8 @@ from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.plugin import options
 from pytest_simbench.plugin.selection import number_mark
 from pytest_simbench.plugin.worker_clock import worker_clock
-from pytest_simbench.records import saved
+from pytest_simbench.records import baseline
+from pytest_simbench.records.description import Description
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.text import in_one_line
 
@@ -41,16 +42,18 @@ class Repeating:
         self.case = case
         self.this = run
         self.results: list[ResultSet] = []
+        self.described: dict[str, Description] = {}
         self._may_resume = False
 
     def __call__(self, task: Task) -> ResultSet:
         """Run a task's repetitions, as many as options and marks say."""
         task = self.case.protocol.version_of(task)
-        self.this.declare(task)
         wanted = options.repetitions(self.node.config)
         fixed = wanted if isinstance(wanted, int) else None
         case = replace(self.case, attempt=self.this.begin(self.case, task))
         found = self._recorded(case, task, fixed)
+        self.this.describe(task)
+        self.described[task.name] = Description.of(task)
         if isinstance(wanted, options.Auto):
             plan = Plan.up_to(wanted.limit)
             first = self._up_to(plan.looks[0], case, task, found)
@@ -91,7 +94,7 @@ class Repeating:
                 self._check_versions(case, task)
             self.this.begin_lines()
             jobs = options.value(self.node.config, "sim_jobs")
-            repeater = Repeater(case, jobs, self.this.progress, self.this.keep)
+            repeater = Repeater(case, jobs, self.this.progress, self.this.folder.append)
             found |= {r.repetition: r for r in repeater.run(task, missing).records}
         return [found[k] for k in sorted(found)]
 
@@ -110,7 +113,7 @@ class Repeating:
         for result in self.results:
             self.node.user_properties.extend(_properties(result))
         if self.results and benchmark is not None:
-            _benchmark(benchmark, self.results)
+            _benchmark(benchmark, self.results, self.described.values())
 
 
 def _properties(result: ResultSet) -> Iterator[tuple[str, float]]:
@@ -127,7 +130,7 @@ def _properties(result: ResultSet) -> Iterator[tuple[str, float]]:
                 yield f"{name}.high", found.high
 
 
-def _benchmark(benchmark: Any, results: list[ResultSet]) -> None:
+def _benchmark(benchmark: Any, results: list[ResultSet], described: Iterable[Description]) -> None:
     """Hand the finished repetitions to pytest-benchmark as rounds of worker seconds.
 
     pytest-benchmark has one result for a test: rounds are those of its first task. The records are
@@ -155,7 +158,9 @@ def _benchmark(benchmark: Any, results: list[ResultSet]) -> None:
             "metrics": {name: result.values(name) for name in result.metrics},
             "seeds": [record.seed for record in result.ok],
             "costs": {name: [record.cost(name) for record in result.ok] for name in SAVED_COSTS},
-            saved.KEY: saved.to_extra_info(r for found in results for r in found.records),
+            baseline.KEY: baseline.to_extra_info(
+                (r for found in results for r in found.records), described
+            ),
         }
     )
     benchmark.pedantic(advance, rounds=len(result.ok), iterations=1, warmup_rounds=0)

@@ -9,10 +9,15 @@ from typing import TYPE_CHECKING
 import pytest
 
 from pytest_simbench.plugin import options
-from pytest_simbench.records.configuration import agree, task_parameters
-from pytest_simbench.records.differences import differences
+from pytest_simbench.records.configuration import (
+    agree,
+    differences,
+    other_meanings,
+    task_parameters,
+)
+from pytest_simbench.records.description import Description
+from pytest_simbench.records.folder import RECORDS, RunFolder
 from pytest_simbench.records.record import Record, RecordError
-from pytest_simbench.records.record_file import RECORDS_NAME, read_records, repair
 from pytest_simbench.records.series import configurations, short
 
 if TYPE_CHECKING:
@@ -38,13 +43,13 @@ def folder_to_resume(config: pytest.Config) -> Path | None:
         )
     if given or output:
         folder = Path(config.invocation_params.dir, given or output)
-        if not (folder / RECORDS_NAME).is_file():
+        if not (folder / RECORDS).is_file():
             raise pytest.UsageError(
-                f"there is no run to resume in {folder} (it has no {RECORDS_NAME}); write "
+                f"there is no run to resume in {folder} (it has no {RECORDS}); write "
                 "--sim-resume=RUN with the folder of a run"
             )
         return folder
-    runs = sorted(config.rootpath.glob(f".simbench/*/{RECORDS_NAME}"), key=_begun)
+    runs = sorted(config.rootpath.glob(f".simbench/*/{RECORDS}"), key=_begun)
     if not runs:
         raise pytest.UsageError(
             f"there is no run to resume in {config.rootpath / '.simbench'}; write "
@@ -70,31 +75,34 @@ class Resumed:
 
     Attributes:
         records: all of them, interrupted ones too.
-        problems: damaged lines, one sentence each: those repetitions are run again.
+        tasks: what their metrics mean, by the name of their task.
 
     Raises:
         pytest.UsageError: its records cannot be read.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: RunFolder) -> None:
         self.folder = folder
         try:
-            reading = read_records(folder)
+            reading = folder.read()
         except RecordError as error:
             raise pytest.UsageError(f"--sim-resume: {error}") from None
         self.records = reading.every
-        self.problems = reading.problems
+        self.tasks = reading.tasks
+        self._problems = reading.problems
         self._taken: set[int] = set()
 
-    def repair(self) -> None:
-        """Write the records anew without damaged lines; for one process alone."""
+    def repair(self) -> list[str]:
+        """Write the records anew without damaged lines; for one process alone.
+
+        Returns:
+            The damaged lines, whose repetitions are run again, and where they are kept.
+        """
         try:
-            kept = repair(self.folder)
+            kept = self.folder.repair()
         except OSError as error:  # the lines are left out by every reader
-            self.problems += (f"{self.folder} could not be repaired ({error.strerror})",)
-        else:
-            if kept is not None:
-                self.problems += (f"the damaged records are kept in {kept}",)
+            return [*self._problems, f"{self.folder.path} could not be repaired ({error.strerror})"]
+        return [*self._problems, *(f"the damaged lines are kept in {path}" for path in kept)]
 
     def take(self, case: Case, task: Task, wanted: int | None) -> dict[int, Record]:
         """By repetition what came to an end of these repetitions; interrupted ones are run again.
@@ -123,6 +131,9 @@ class Resumed:
             same = [record for record in of_test if id(record) not in self._taken]
         self._taken |= {id(record) for record in same}
         found = [] if all(agree(r, now, "resume") for r in same) else self._differences(same, now)
+        if same and task.name in self.tasks:
+            ours = {task.name: Description.of(task)}
+            found += other_meanings(self.tasks, ours, "resume")
         found += _seeds(same, case.seed)
         if wanted is not None and any(record.repetition > wanted for record in same):
             most = max(record.repetition for record in same)
@@ -167,8 +178,8 @@ class Resumed:
 
     def _sentence(self, case: Case, found: list[str]) -> str:
         return (
-            f"{short(case.test)} of the run {self.folder} is not resumed, since its repetitions "
-            f"would not be comparable: {'; '.join(found)}"
+            f"{short(case.test)} of the run {self.folder.path} is not resumed, since its "
+            f"repetitions would not be comparable: {'; '.join(found)}"
         )
 
 

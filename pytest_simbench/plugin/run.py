@@ -13,16 +13,16 @@ import pytest
 
 from pytest_simbench.client.display import Displays
 from pytest_simbench.plugin import options
+from pytest_simbench.records.folder import Reading, RunFolder
+from pytest_simbench.records.paths import FolderError, new_name
+from pytest_simbench.records.record import Record
 from pytest_simbench.records.text import for_terminal
 
 if TYPE_CHECKING:
     from pytest_simbench.experiment.case import Case
     from pytest_simbench.plugin.resume import Resumed
-    from pytest_simbench.records.folder import Claim
-    from pytest_simbench.records.record import Record
     from pytest_simbench.report.progress import Progress
     from pytest_simbench.tasks.base import Task
-    from pytest_simbench.tasks.metrics import Metric
 
 RUNS = ".simbench"
 """Where runs without an `--sim-output` lie, in pytest's root folder."""
@@ -32,26 +32,24 @@ class Run:
     """One pytest invocation, or one xdist worker's share of it.
 
     Attributes:
-        folder: of this run; made by `use`, before the first test that needs it.
+        folder: of this run; claimed by `use`, before the first test that needs it.
         problem: why the folder cannot be used, as a sentence, for tests that need it.
-        records: made or received by this process; all of the run once it is complete.
+        reading: what the folder holds once the run is `complete`; empty before.
+        mistake: in what was typed, found when the tests had ended; one sentence.
         resumed: the interrupted run that this one completes, if it does.
     """
 
     def __init__(self, config: pytest.Config) -> None:
         self.config = config
         self._shared_by: dict[str, Any] | None = getattr(config, "workerinput", None)
-        self.folder = self._choose_folder()
+        self.folder = RunFolder(self._choose_path())
         self.problem: str = (self._shared_by or {}).get("simbench_problem", "")
         self.displays = Displays()
-        self.records: list[Record] = []
-        self._claim: Claim | None = None
+        self.reading = Reading()
+        self.mistake = ""
         self._attempts: Counter[tuple[str, str, str]] = Counter()
-        self._file: Any = None
         self._lock = threading.Lock()
         self._progress: Progress | None = None
-        self._metrics: dict[str, list[Metric]] = {}
-        self._references: dict[str, dict[str, float]] = {}
         self._problems: list[str] = []
         self.resumed: Resumed | None = None
         if config.getoption("sim_resume") is not None:
@@ -59,7 +57,7 @@ class Run:
 
             self.resumed = Resumed(self.folder)
 
-    def _choose_folder(self) -> Path:
+    def _choose_path(self) -> Path:
         if self._shared_by is not None and "simbench_folder" in self._shared_by:
             return Path(self._shared_by["simbench_folder"])
         if self.config.getoption("sim_resume") is not None:
@@ -71,8 +69,6 @@ class Run:
         given = options.value(self.config, "sim_output")
         if given:
             return Path(self.config.invocation_params.dir, given)
-        from pytest_simbench.records.folder import new_name
-
         return new_name(self.config.rootpath / RUNS)
 
     def claim(self) -> None:
@@ -82,22 +78,18 @@ class Run:
             pytest.UsageError: it holds another run, another run is under way in it, or it cannot
                 be written to.
         """
-        if self._claim is not None:
+        if self.folder.claimed:
             return
-        from pytest_simbench.records.folder import Claim, FolderError, holds_run
-
         try:
-            self._claim = Claim(self.folder, shared=self._shared_by is not None)
+            self.folder.claim(shared=self._shared_by is not None)
         except FolderError as error:
             raise pytest.UsageError(str(error)) from None
         if self._shared_by is not None:
             return
         if self.resumed is not None:
-            self.resumed.repair()
-            self._problems += self.resumed.problems
-        elif holds_run(self.folder):
-            self._claim.close()
-            self._claim = None
+            self._problems += self.resumed.repair()
+        elif self.folder.holds_run:
+            self.folder.release()
             raise pytest.UsageError(self.occupied())
 
     def occupied(self) -> str:
@@ -105,13 +97,12 @@ class Run:
 
         For xdist's controller, which does not know whether any test needs the folder.
         """
-        from pytest_simbench.records.folder import holds_run
-
-        if self._claim is not None or self.resumed is not None or not holds_run(self.folder):
+        folder = self.folder
+        if folder.claimed or self.resumed is not None or not folder.holds_run:
             return ""
         return (
-            f"{self.folder} already holds a run; complete that one with --sim-resume="
-            f"{self.folder}, or give another --sim-output"
+            f"{folder.path} already holds a run; complete that one with --sim-resume="
+            f"{folder.path}, or give another --sim-output"
         )
 
     def use(self) -> Path:
@@ -123,7 +114,7 @@ class Run:
                 self.problem = str(error)
         if self.problem:
             pytest.fail(self.problem, pytrace=False)
-        return self.folder
+        return self.folder.path
 
     @property
     def progress(self) -> Progress:
@@ -157,16 +148,6 @@ class Run:
             with capture.global_and_fixture_disabled():
                 reporter.ensure_newline()
 
-    def keep(self, record: Record) -> None:
-        """Keep a record in memory and in the run folder; called as each repetition ends."""
-        from pytest_simbench.records.record_file import RECORDS_NAME, RecordFile
-
-        with self._lock:
-            self.records.append(record)
-            if self._file is None:
-                self._file = RecordFile(self.folder / RECORDS_NAME)
-            self._file.append(record)
-
     def begin(self, case: Case, task: Task) -> int:
         """How often this process has begun these repetitions, with this time.
 
@@ -186,68 +167,57 @@ class Run:
         if self.resumed is None:
             return {}
         found = self.resumed.take(case, task, wanted)
-        self.records += found.values()
+        self.folder.take_over(found.values())
         return found
 
-    def declare(self, task: Task) -> None:
-        """Remember a task's metrics and references for the report."""
-        self._metrics.setdefault(task.name, list(task.metrics))
-        self._references.setdefault(task.name, dict(task.references))
+    def describe(self, task: Task) -> None:
+        """Before a task is performed: write what its numbers mean.
+
+        The test fails where `--sim-threshold` gives one of its metrics a value that can never fail.
+        """
+        self.folder.describe(task)
+        from pytest_simbench.plugin.thresholds import bad_value
+
+        if wrong := bad_value(self._thresholds, task.metrics):
+            pytest.fail(wrong, pytrace=False)
+
+    def ask(self, test: str, metric: str, value: float) -> None:
+        """Write a threshold that a test asked for."""
+        from pytest_simbench.records.description import Threshold
+
+        self.use()
+        self.folder.ask(Threshold(test, metric, value))
 
     @property
-    def metrics(self) -> dict[str, list[Metric]]:
-        """The metrics of each task that was performed, by its name."""
-        return self._metrics
+    def _thresholds(self) -> dict[str, float]:
+        """Those on the command line: the ini file's hold for other tests too."""
+        given = options.given(self.config, "sim_threshold")
+        return options.value(self.config, "sim_threshold") if given else {}
 
-    def declared(self) -> dict[str, Any]:
-        """What was declared, as plain data, to travel with a report."""
-        return {
-            name: {"metrics": [m.to_wire() for m in found], "references": self._references[name]}
-            for name, found in self._metrics.items()
-        }
+    def check_thresholds(self, session: pytest.Session) -> None:
+        """When all tests have ended: fail the run for a threshold of a metric that none has."""
+        ended = session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED)
+        if not ended or session.shouldstop or session.shouldfail:
+            return  # some tests have not run, and may know it
+        if self._thresholds and (self.reading.records or self.reading.thresholds):
+            from pytest_simbench.plugin.thresholds import problem
 
-    def receive_declared(self, tasks: dict[str, Any]) -> None:
-        """Take over what an xdist worker declared."""
-        from pytest_simbench.tasks.metrics import Metric
-
-        for name, found in tasks.items():
-            self._metrics.setdefault(name, [Metric(**item) for item in found["metrics"]])
-            self._references.setdefault(name, dict(found["references"]))
+            self.mistake = problem(self._thresholds, self.reading)
+            if self.mistake:
+                session.exitstatus = pytest.ExitCode.USAGE_ERROR
 
     def of_test(self, test: str) -> list[str]:
-        """Records of one test as JSON lines, to travel with its report."""
-        return [r.to_json() for r in self.records if r.test == test]
+        """Records of one test as JSON lines, to travel with its report: the disk may be full."""
+        return [r.to_json() for r in self.folder.own if r.test == test]
 
     def receive(self, lines: Iterable[str]) -> None:
         """Take over records that came with a report, from an xdist worker for instance."""
-        from pytest_simbench.records.record import Record
-
-        self.records += [Record.from_json(line) for line in lines]
-
-    def _read_folder(self) -> list[Record]:
-        """Records that other processes wrote; what is wrong with them becomes a problem."""
-        from pytest_simbench.records.record_file import RECORDS_NAME, RecordError, scan
-
-        path = self.folder / RECORDS_NAME
-        if not path.is_file():
-            return []
-        try:
-            reading = scan(path)
-        except RecordError as error:
-            self._problems.append(str(error))
-            return []
-        self._problems += [*reading.problems, *reading.refused]
-        return list(reading.every)
+        self.folder.take_over(Record.from_json(line) for line in lines)
 
     def complete(self) -> None:
-        """Gather what other processes recorded; called when all tests have ended."""
-        from pytest_simbench.records.series import settled
-
-        if (self.records or self._shared()) and not self.problem:
-            # Those in memory come last: they are there although the disk may be full.
-            self.records = settled([*self._read_folder(), *self.records])
-        if self.records:
-            self._declare_known()
+        """Read what all processes wrote; called when all tests have ended."""
+        if (self.folder.claimed or self._shared()) and not self.problem:
+            self.reading = self.folder.scan()
 
     def summarise(self, reporter: pytest.TerminalReporter, comparison: str = "") -> None:
         """Print the tables and write the report files.
@@ -256,53 +226,34 @@ class Run:
             reporter: prints.
             comparison: with a baseline, as Markdown, for the summary page of a CI job.
         """
-        if not self.records:
+        if self.mistake:
+            reporter.write_line(f"ERROR: {for_terminal(self.mistake)}", red=True)
+        if not self.reading.records:
             return
         from pytest_simbench.report import markdown
         from pytest_simbench.report.files import write_report
         from pytest_simbench.report.github import append_summary
-        from pytest_simbench.report.matrix import with_wins
-        from pytest_simbench.report.summary import summarise
         from pytest_simbench.report.tables import render_run
 
-        records = sorted(self.records, key=lambda r: (r.test, r.repetition))
-        summaries = with_wins(summarise(records, self._metrics, self._references), records)
-        written = write_report(self.folder, summaries, records)
-        unsaved = self._unsaved()
-        problems = [*self._problems, *written.problems]
-        problems.append(append_summary("\n".join([comparison, markdown.render_run(summaries)])))
+        written = write_report(self.folder, self.reading)
+        unsaved = self.folder.flush()
+        problems = [*self._problems, *self.reading.problems, *self.reading.refused]
+        problems += written.problems
+        page = markdown.render_run(written.summaries)
+        problems.append(append_summary("\n".join([comparison, page])))
         reporter.write_sep("=", "simulator comparison")
         whole = written.complete and not unsaved
-        folder = self.folder if whole else None
-        reporter.write_line(render_run(summaries, reporter._tw.fullwidth, folder))
+        folder = self.folder.path if whole else None
+        reporter.write_line(render_run(written.summaries, reporter._tw.fullwidth, folder))
         if not whole:
-            problems.insert(0, f"\nwhat could be written is in {self.folder}")
+            problems.insert(0, f"\nwhat could be written is in {self.folder.path}")
         for line in [*map(for_terminal, filter(None, problems)), *unsaved]:
             reporter.write_line(line)
 
     def _shared(self) -> bool:
         return self.config.pluginmanager.has_plugin("dsession")
 
-    def _declare_known(self) -> None:
-        """Metrics of our own tasks; an xdist controller performed none itself."""
-        names = {record.task for record in self.records} - set(self._metrics)
-        if names:
-            from pytest_simbench.tasks import Stacking, Throwing
-
-            for task in (Stacking(), Throwing()):
-                if task.name in names:
-                    self.declare(task)
-
-    def _unsaved(self) -> list[str]:
-        if self._file is None:
-            return []
-        report = self._file.close()
-        return [*report.problems, *report.unsaved]
-
     def close(self) -> None:
         """End what the run started."""
         self.displays.close()
-        if self._file is not None:
-            self._file.close()
-        if self._claim is not None:
-            self._claim.close()
+        self.folder.close()

@@ -1,57 +1,45 @@
-"""Is every metric of `--sim-threshold` one that a threshold can be of, and can it fail?"""
+"""Is every metric of `--sim-threshold` one that a threshold can be of, and can it fail?
+
+What the tests measure is known when they have described it: a name that nobody knows is told at the
+end of the run, a value that can never fail as soon as the kind of its metric is known.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from types import CodeType
+from collections.abc import Iterable, Mapping
 
-import pytest
+from pytest_simbench.measure.limits import FAILURES, LimitError, check_gate
+from pytest_simbench.records.folder import Reading
+from pytest_simbench.repeatability.stability import KEPT
+from pytest_simbench.tasks.metrics import COSTS, Metric, UnknownMetric
 
-from pytest_simbench.plugin import options
+OF_EVERY_TASK = (*COSTS, FAILURES, KEPT)
+"""What thresholds may be of besides the metrics of tasks."""
 
 
-def problem(config: pytest.Config, items: Iterable[pytest.Item]) -> str:
-    """What is wrong with `--sim-threshold`, once the tests are known; else nothing.
-
-    Valid are the metrics of our own tasks, the costs, `failures`, and every name that stands in the
-    code or the parameters of a collected test that asks for a `threshold`: tests of other packages
-    have metrics of their own. The ini file, which holds for tests that were not collected this
-    time too, is not checked.
-    """
-    if not options.given(config, "sim_threshold"):
-        return ""
-    asking = [item for item in items if "threshold" in getattr(item, "fixturenames", ())]
-    given = options.value(config, "sim_threshold")
-    unknown = given.keys() - {text for item in asking for text in _texts(item)}
-    from pytest_simbench.measure.limits import FAILURES, LimitError, check_gate
-    from pytest_simbench.repeatability.stability import KEPT
-    from pytest_simbench.tasks import Stacking, Throwing
-    from pytest_simbench.tasks.metrics import COSTS, Metric, UnknownMetric
-
-    tasks = (Stacking(), Throwing())
-    all_metrics = (*COSTS, FAILURES, KEPT, *(m for task in tasks for m in task.metrics))
-    known = {metric.name: metric for metric in all_metrics}
-    for name in sorted(unknown - known.keys()):
-        return f"--sim-threshold={name}={given[name]:g}: {UnknownMetric(name, known)}"
-    for name, value in given.items():
+def bad_value(given: Mapping[str, float], metrics: Iterable[Metric] = OF_EVERY_TASK) -> str:
+    """A sentence when a threshold of one of these metrics cannot be, or can never fail."""
+    for metric in metrics:
         try:
-            check_gate(known.get(name, Metric(name, name, better=None)), value)
+            if metric.name in given:
+                check_gate(metric, given[metric.name])
         except LimitError as error:
-            return f"--sim-threshold={name}={value:g}: {error}"
+            return f"{_typed(metric.name, given)}: {error}"
     return ""
 
 
-def _texts(item: pytest.Item) -> Iterator[str]:
-    """The texts in a test's code and parameters; a metric's name is one of them."""
-    parameters = getattr(getattr(item, "callspec", None), "params", {})
-    yield from (value for value in parameters.values() if isinstance(value, str))
-    code = getattr(getattr(item, "function", None), "__code__", None)
-    yield from _constants(code) if code else ()
+def problem(given: Mapping[str, float], run: Reading) -> str:
+    """What is wrong with thresholds, once the tests have run; else nothing.
+
+    Valid are the metrics of the tasks that were performed, the costs, `failures`, and every name
+    that a test asked a threshold of.
+    """
+    metrics = [*OF_EVERY_TASK, *(m for found in run.metrics.values() for m in found)]
+    known = {metric.name for metric in metrics} | {asked.metric for asked in run.thresholds}
+    for name in sorted(given.keys() - known):
+        return f"{_typed(name, given)}: {UnknownMetric(name, known)}"
+    return bad_value(given, metrics)
 
 
-def _constants(code: CodeType) -> Iterator[str]:
-    for constant in code.co_consts:
-        if isinstance(constant, str):
-            yield constant
-        elif isinstance(constant, CodeType):
-            yield from _constants(constant)
+def _typed(name: str, given: Mapping[str, float]) -> str:
+    return f"--sim-threshold={name}={given[name]:g}"

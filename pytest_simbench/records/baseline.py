@@ -1,19 +1,27 @@
-"""The run to compare with: from a run folder, a record file, or a file of pytest-benchmark."""
+"""A run to compare with: a run folder, a record file, or a file of pytest-benchmark.
+
+pytest-benchmark saves what a test gives it as `extra_info`: there the records lie, and what their
+numbers mean. What all repetitions share (settings, versions, machine) is written once. Left out is
+what no comparison reads: a task's details and the tails of logs.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pytest_simbench.records.record import Record, RecordError
-from pytest_simbench.records.record_file import RECORDS_NAME, read_records
-from pytest_simbench.records.saved import KEY, from_extra_info
+from pytest_simbench.records.description import Description, DescriptionError
+from pytest_simbench.records.folder import RECORDS, Reading, RunFolder
+from pytest_simbench.records.record import SCHEMA, Record, RecordError
 from pytest_simbench.records.series import settled
 
-FORMS = f"a run folder, its {RECORDS_NAME}, or a file written with --benchmark-json"
+KEY = "simbench"
+"""Where a run lies in a benchmark's `extra_info`."""
+
+FORMS = f"a run folder, its {RECORDS}, or a file written with --benchmark-json"
 """What a baseline may be, for messages."""
 
 
@@ -21,27 +29,7 @@ class BaselineError(ValueError):
     """A baseline that cannot be used; the message says why and what would be one."""
 
 
-@dataclass(frozen=True)
-class Baseline:
-    """A saved run.
-
-    Attributes:
-        name: where it comes from, as the user reads it.
-        records: at least one.
-        problems: lines that could not be read, one sentence each.
-    """
-
-    name: str
-    records: tuple[Record, ...]
-    problems: tuple[str, ...] = ()
-
-    @property
-    def metric_names(self) -> tuple[str, ...]:
-        """The metrics that any of its repetitions has."""
-        return tuple(dict.fromkeys(name for r in self.records for name in r.metrics))
-
-
-def read_baseline(path: Path) -> Baseline:
+def read_baseline(path: Path) -> Reading:
     """The run at `path`.
 
     Raises:
@@ -53,12 +41,12 @@ def read_baseline(path: Path) -> Baseline:
     if saved is not None:
         return from_benchmarks(saved, str(path))
     try:
-        reading = read_records(path)
+        reading = RunFolder.of(path).read()
     except RecordError as error:
         raise BaselineError(f"the baseline cannot be read: {error}; give {FORMS}") from None
     if not reading.records:
         raise BaselineError(f"the baseline {path} holds no repetition; give {FORMS}")
-    return Baseline(str(path), reading.records, reading.problems)
+    return replace(reading, name=str(path))
 
 
 def _benchmark_file(path: Path) -> dict[str, Any] | None:
@@ -72,7 +60,7 @@ def _benchmark_file(path: Path) -> dict[str, Any] | None:
     return data if isinstance(data, dict) and "benchmarks" in data else None
 
 
-def from_benchmarks(saved: Mapping[str, Any], name: str) -> Baseline:
+def from_benchmarks(saved: Mapping[str, Any], name: str) -> Reading:
     """The run in the content of a pytest-benchmark file; benchmarks of other tests are left out.
 
     Raises:
@@ -82,6 +70,8 @@ def from_benchmarks(saved: Mapping[str, Any], name: str) -> Baseline:
     if not isinstance(benchmarks, list):
         raise BaselineError(f"the baseline {name} is malformed: 'benchmarks' is not a list")
     records: list[Record] = []
+    tasks: dict[str, Description] = {}
+    problems: list[str] = []
     for benchmark in benchmarks:
         extra = benchmark.get("extra_info") if isinstance(benchmark, Mapping) else None
         if not isinstance(extra, Mapping) or KEY not in extra:
@@ -89,6 +79,7 @@ def from_benchmarks(saved: Mapping[str, Any], name: str) -> Baseline:
         where = f"{name}, {benchmark.get('fullname', 'a benchmark without a name')}"
         try:
             records += from_extra_info(extra[KEY], where)
+            tasks |= _tasks(extra[KEY], where, problems)
         except RecordError as error:
             raise BaselineError(f"the baseline cannot be read: {error}; give {FORMS}") from None
     if not records:
@@ -96,4 +87,62 @@ def from_benchmarks(saved: Mapping[str, Any], name: str) -> Baseline:
             f"the baseline {name} holds no repetition of a simulator that this version can "
             f"compare; give {FORMS}"
         )
-    return Baseline(name, tuple(settled(records)))
+    return Reading(name, tuple(settled(records)), tasks, problems=tuple(problems))
+
+
+def _tasks(data: Mapping[str, Any], where: str, problems: list[str]) -> dict[str, Description]:
+    """What the numbers of a benchmark mean; older files do not tell."""
+    found = {}
+    listed = data.get("tasks") or []
+    for item in listed if isinstance(listed, list) else [listed]:
+        try:
+            task = Description.from_dict(item, f"{where}: {KEY!r}")
+        except DescriptionError as error:
+            problems.append(str(error))
+        else:
+            found[task.task] = task
+    return found
+
+
+def to_extra_info(records: Iterable[Record], tasks: Iterable[Description] = ()) -> dict[str, Any]:
+    """`{"schema", "tasks": [...], "shared": {...}, "repetitions": [{...}, ...]}`, plain data."""
+    rows = [_slim(record) for record in records]
+    shared = {
+        key: value
+        for key, value in (rows[0].items() if rows else ())
+        if all(key in row and row[key] == value for row in rows)
+    }
+    repetitions = [{k: v for k, v in row.items() if k not in shared} for row in rows]
+    return {
+        "schema": SCHEMA,
+        "tasks": [task.to_dict() for task in tasks],
+        "shared": shared,
+        "repetitions": repetitions,
+    }
+
+
+def from_extra_info(data: Any, where: str) -> list[Record]:
+    """The records in what `to_extra_info` made; `where` names it in messages.
+
+    Raises:
+        RecordError: it is something else, or holds what is no record.
+    """
+    shared = data.get("shared") if isinstance(data, Mapping) else None
+    repetitions = data.get("repetitions") if isinstance(data, Mapping) else None
+    if not isinstance(shared, Mapping) or not isinstance(repetitions, list):
+        raise RecordError(f"{where}: {KEY!r} does not hold repetitions of pytest-simbench")
+    records = []
+    for number, row in enumerate(repetitions, start=1):
+        if not isinstance(row, Mapping):
+            raise RecordError(f"{where}: repetition {number} is not an object")
+        whole = {"schema": data.get("schema", SCHEMA), **shared, **row}
+        records.append(Record.from_dict(whole, f"{where}: repetition {number}"))
+    return records
+
+
+def _slim(record: Record) -> dict[str, Any]:
+    data = record.to_dict()
+    del data["schema"], data["details"]
+    if data["error"]:
+        data["error"] = {**data["error"], "log_tail": ""}
+    return data

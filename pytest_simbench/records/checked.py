@@ -80,6 +80,17 @@ def number(value: Any, where: str, least: float = -math.inf) -> None:
         raise CheckError(f"{where!r} must be at least {least:g}, not {value:g}")
 
 
+def one_of(value: Any, where: str, valid: tuple[Any, ...]) -> None:
+    """One of a few values.
+
+    Raises:
+        CheckError: it is something else.
+    """
+    if value not in valid:
+        shown = ", ".join(map(str, valid))
+        raise CheckError(f"{where!r} is {short(value)}, none of {shown}")
+
+
 def numbers(value: Mapping[str, Any], where: str) -> None:
     """Numbers by name.
 

@@ -9,10 +9,11 @@ is a decision (`tests/records/test_configuration.py`).
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
+from pytest_simbench.records.description import Description
 from pytest_simbench.records.record import Record, plain
 
 Use = Literal["pool", "resume", "merge", "compare"]
@@ -79,6 +80,19 @@ PARTS: tuple[Part, ...] = (
     ),
     _part("extra", "", "of a newer plugin: not known what it means"),
 )  # fmt: skip
+
+MEANING: tuple[Part, ...] = (
+    _part("name", "", "tells metrics apart"),
+    _part("unit", "resume merge compare", "metres and millimetres are no series"),
+    _part("kind", "resume merge compare", "a share and a length are no series"),
+    _part("better", "resume merge compare", "worse would be better in a part of the records"),
+    _part("of", "", "follows from the task's parameters, which must be equal"),
+    *(
+        _part(name, "", "for the reader only; the last one holds")
+        for name in ("title", "study", "doc", "resolution")
+    ),
+)
+"""The same for what a folder says of a metric; within one folder there is one meaning."""
 
 
 def equal_to(use: Use) -> tuple[str, ...]:
@@ -168,3 +182,73 @@ def _flat(key: str, value: Any) -> Iterator[tuple[str, Any]]:
             yield from _flat(f"{key}.{name}", item)
     else:
         yield key, plain(value)
+
+
+Runs = Mapping[str, tuple[Sequence[Record], Sequence[Record]]]
+
+
+def differences(runs: Runs, use: Use = "compare", fields: Sequence[str] | None = None) -> list[str]:
+    """One sentence for each value that differs, with the tests it differs in.
+
+    What a side cannot know (a repetition that failed at its start has no versions) is no
+    difference.
+
+    Args:
+        runs: for each test the records before and now.
+        use: what for; says which fields must be equal.
+        fields: look at these alone.
+    """
+    found: dict[str, list[str]] = {}
+    for test, (before, now) in runs.items():
+        old, new = _each_value(before, use), _each_value(now, use)
+        for key in [*old, *(key for key in new if key not in old)]:
+            if fields is not None and field_of(key) not in fields:
+                continue
+            if (key not in old and _unknown(before, key)) or (
+                key not in new and _unknown(now, key)
+            ):
+                continue
+            first, second = old.get(key, ["absent"]), new.get(key, ["absent"])
+            if first != second:
+                sentence = f"{key} was {' or '.join(first)}, is {' or '.join(second)}"
+                found.setdefault(sentence, []).append(test)
+    return [
+        f"{sentence} ({'every test' if len(tests) == len(runs) > 1 else ', '.join(tests)})"
+        for sentence, tests in found.items()
+    ]
+
+
+def other_meanings(
+    before: Mapping[str, Description], now: Mapping[str, Description], use: Use = "compare"
+) -> list[str]:
+    """One sentence for each metric that both runs have and that means something else in one.
+
+    Args:
+        before, now: what the runs say of their tasks, by name.
+        use: what for.
+    """
+    found = []
+    for task in (name for name in now if name in before):
+        old = {metric.name: metric for metric in before[task].metrics}
+        for metric in (m for m in now[task].metrics if m.name in old):
+            for name in (part.name for part in MEANING if use in part.equal_to):
+                was, is_ = getattr(old[metric.name], name), getattr(metric, name)
+                if was != is_:
+                    found.append(
+                        f"{name} of the metric {metric.name} of {task} was {text(was)}, is "
+                        f"{text(is_)}"
+                    )
+    return found
+
+
+def _unknown(records: Sequence[Record], key: str) -> bool:
+    return all(field_of(key) in partial(record) for record in records)
+
+
+def _each_value(records: Sequence[Record], use: Use) -> dict[str, list[str]]:
+    """The different values of each key in a set of records, as JSON, sorted."""
+    found: dict[str, set[str]] = {}
+    for record in records:
+        for key, value in values(record, use).items():
+            found.setdefault(key, set()).add(text(value))
+    return {key: sorted(known) for key, known in found.items()}

@@ -1,154 +1,289 @@
-"""A run folder: one run each, never two at once, and nothing outside of it."""
+"""The run folder: what is recorded of a run, and what its numbers mean, written and read back.
+
+    records.jsonl      a line for each repetition (`record`)
+    tasks.jsonl        what each task's metrics and references mean (`description`); of several
+                       lines of one task the last one holds
+    thresholds.jsonl   thresholds that tests asked for
+    repeatability.jsonl, logs, traces, report.md, ...
+
+Report, merge, resume, baseline and gate need the folder alone, never the code that made it.
+"""
 
 from __future__ import annotations
 
-import errno
-import fcntl
-import os
-import secrets
-import tempfile
-from contextlib import suppress
-from datetime import datetime
+import json
+import threading
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-HOLD_RESULTS = ("records.jsonl", "repeatability.jsonl")
+from pytest_simbench.records import lines
+from pytest_simbench.records.claim import Claim
+from pytest_simbench.records.description import Description, Threshold
+from pytest_simbench.records.lines import DAMAGED, LARGEST_LINE, Found, LinesFile, UnreadableError
+from pytest_simbench.records.paths import FolderError, inside
+from pytest_simbench.records.record import Record, RecordError
+from pytest_simbench.records.series import settled
+
+if TYPE_CHECKING:
+    from pytest_simbench.tasks.base import Task
+    from pytest_simbench.tasks.metrics import Metric
+
+RECORDS = "records.jsonl"
+TASKS = "tasks.jsonl"
+THRESHOLDS = "thresholds.jsonl"
+
+HOLD_RESULTS = (RECORDS, "repeatability.jsonl")
 """Files that make a folder one that holds a run."""
 
-PROBE = 64 * 1024
-"""Bytes that a folder must be able to take before a run begins: some twenty records."""
+NOUNS = {RECORDS: "record", TASKS: "description of a task", THRESHOLDS: "threshold"}
 
 
-class FolderError(ValueError):
-    """A folder that cannot be used; the message is a whole sentence."""
+@dataclass(frozen=True)
+class Reading:
+    """What a run holds.
 
-
-def new_name(parent: Path, ending: str = "") -> Path:
-    """A folder of this moment which no other run has: `2026-07-01_12-00-00-1f3a9c7e`."""
-    stamp = datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
-    return parent / f"{stamp}-{secrets.token_hex(4)}{ending}"
-
-
-def holds_run(folder: Path) -> bool:
-    """Whether something was recorded in it."""
-    for name in HOLD_RESULTS:
-        with suppress(OSError):
-            if (folder / name).stat().st_size > 0:
-                return True
-    return False
-
-
-def inside(folder: Path, name: str) -> Path:
-    """The path of a file named in a folder, when it lies in it, also after following links.
-
-    Raises:
-        FolderError: it leads out of the folder.
+    Attributes:
+        name: where it comes from, as the user reads it.
+        records: those that count, in their order, see `series.settled`.
+        tasks: what the metrics mean, by the name of their task.
+        thresholds: that tests asked for.
+        problems: damaged lines and descriptions that cannot be used, one sentence each; they are
+            left out.
+        refused: whole lines that are no records of ours, one sentence each.
+        every: also records that do not count: earlier attempts, interrupted repetitions that were
+            run again.
     """
-    try:
-        root = folder.resolve()
-        path = (root / name).resolve()
-    except (OSError, ValueError, RuntimeError):  # a NUL byte, a link to itself
-        raise FolderError(f"{name!r} of the run {folder} is no file's name") from None
-    if path == root or root not in path.parents:
-        raise FolderError(f"{name!r} of the run {folder} leads out of its folder")
-    return root / name
+
+    name: str = ""
+    records: tuple[Record, ...] = ()
+    tasks: Mapping[str, Description] = field(default_factory=dict)
+    thresholds: tuple[Threshold, ...] = ()
+    problems: tuple[str, ...] = ()
+    refused: tuple[str, ...] = ()
+    every: tuple[Record, ...] = ()
+
+    @property
+    def metrics(self) -> dict[str, tuple[Metric, ...]]:
+        """The metrics of each task, by its name."""
+        return {name: task.metrics for name, task in self.tasks.items()}
+
+    @property
+    def references(self) -> dict[str, Mapping[str, float]]:
+        """The references of each task, by its name."""
+        return {name: task.references for name, task in self.tasks.items()}
 
 
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file, or leave what was there: never half of it. A link of that name is replaced.
+class RunFolder:
+    """One run's folder.
 
-    Raises:
-        OSError: it cannot be written.
-    """
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(content)
-        part.replace(path)
-    except OSError:
-        with suppress(OSError):
-            part.unlink()
-        raise
-
-
-class Claim:
-    """A folder that this process writes a run to; until `close` no other run may use it.
-
-    The claim is a lock on the folder itself: it ends with the process, however that ends. A file
-    system without locks (some network drives) gives none, and two runs could meet there.
+    To write, `claim` it first. What a full disk or a lost folder does not take stays in this
+    object and is read back from it.
 
     Args:
-        folder: made if it is not there.
-        shared: one of several processes of one run (xdist's workers).
+        path: of the folder.
+        records: name of its record file.
 
-    Raises:
-        FolderError: it cannot be written to, or another run is under way in it.
+    Attributes:
+        path: the same.
+        own: records that this process made or took over, as they came.
     """
 
-    def __init__(self, folder: Path, *, shared: bool = False) -> None:
-        self.folder = folder
-        self._lock: int | None = None
-        self._made = not os.path.lexists(folder)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            self._lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-        except OSError as error:
-            raise FolderError(
-                f"the run folder {folder} cannot be made ({_reason(folder, error)}); give another "
-                "--sim-output"
-            ) from None
-        try:
-            self._take(shared)
-            if not shared:
-                _probe(folder)
-        except FolderError:
-            self.close()
-            raise
+    def __init__(self, path: Path, records: str = RECORDS) -> None:
+        self.path = path
+        self.own: list[Record] = []
+        self._records = records
+        self._claim: Claim | None = None
+        self._files: dict[str, LinesFile] = {}
+        self._spare = lines.spare_folder()
+        self._described: dict[str, Description] = {}
+        self._asked: dict[Threshold, None] = {}
+        self._written: set[str] = set()
+        self._lock = threading.RLock()
 
-    def _take(self, shared: bool) -> None:
-        assert self._lock is not None
-        kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
-        try:
-            fcntl.flock(self._lock, kind | fcntl.LOCK_NB)
-        except BlockingIOError:
-            if not shared:  # else it is the controller of this run that holds it
-                raise FolderError(
-                    f"another run is under way in {self.folder}; wait for it, or give another "
-                    "--sim-output"
-                ) from None
-        except OSError as error:
-            if error.errno not in (errno.ENOTSUP, errno.ENOLCK, errno.EBADF, errno.EINVAL):
-                raise FolderError(
-                    f"the run folder {self.folder} cannot be locked ({error.strerror})"
-                ) from None
+    @classmethod
+    def of(cls, path: Path) -> RunFolder:
+        """The folder that a user means by its path, or by that of its record file."""
+        return cls(path.parent, path.name) if path.is_file() else cls(path)
 
-    def close(self) -> None:
+    def inside(self, name: str) -> Path:
+        """The path of a file of this folder.
+
+        Raises:
+            FolderError: it leads out of the folder.
+        """
+        return inside(self.path, name)
+
+    @property
+    def holds_run(self) -> bool:
+        """Whether something was recorded in it."""
+        return any(_size(self.path / name) for name in HOLD_RESULTS)
+
+    @property
+    def claimed(self) -> bool:
+        """Whether this process may write to it."""
+        return self._claim is not None
+
+    def claim(self, *, shared: bool = False) -> None:
+        """Make it this run's own until `close`.
+
+        Args:
+            shared: one of several processes of one run (xdist's workers).
+
+        Raises:
+            FolderError: it cannot be written to, or another run is under way in it.
+        """
+        if self._claim is None:
+            self._claim = Claim(self.path, shared=shared)
+
+    def release(self) -> None:
         """Give it up; a folder made for nothing goes away."""
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
-            if self._made:
-                with suppress(OSError):
-                    self.folder.rmdir()
+        if self._claim is not None:
+            self._claim.close()
+            self._claim = None
+
+    def close(self) -> tuple[str, ...]:
+        """Write what waits, and give the folder up; may be called again.
+
+        Returns:
+            What was not written here and where it is, as lines for the terminal.
+        """
+        told = self.flush()
+        self.release()
+        return told
+
+    def flush(self) -> tuple[str, ...]:
+        """Try once more to write what waits, else elsewhere; the lines that `close` returns."""
+        with self._lock:
+            found = [file.close() for file in self._files.values()]
+        return tuple(text for part in found for text in (*part.problems, *part.unsaved))
+
+    def append(self, record: Record) -> None:
+        """Keep a record, on the disk before this returns if that can be. Never raises OSError."""
+        line = record.to_json()
+        if len(line) >= LARGEST_LINE:  # no reader would take it
+            kept = {key: record.details[key] for key in ("log",) if key in record.details}
+            note = f"{len(line)} bytes, more than a record may have"
+            line = replace(record, details={**kept, "left_out": note}).to_json()
+        with self._lock:
+            self.own.append(record)
+            self._write(self._records, line)
+
+    def take_over(self, records: Iterable[Record]) -> None:
+        """Count records that another process wrote as this one's."""
+        with self._lock:
+            self.own += records
+
+    def describe(self, task: Task | Description) -> None:
+        """Write what a task's numbers mean, unless the folder says so already."""
+        found = task if isinstance(task, Description) else Description.of(task)
+        with self._lock:
+            line = json.dumps(found.to_dict())
+            if line in self._written:
+                return
+            self._written.add(line)
+            self._described[found.task] = found
+            if self._tasks().get(found.task) != found:
+                self._write(TASKS, line)
+
+    def ask(self, threshold: Threshold) -> None:
+        """Write a threshold that a test asked for."""
+        with self._lock:
+            self._asked.setdefault(threshold)
+            line = json.dumps(threshold.to_dict())
+            if line not in self._written:
+                self._written.add(line)
+                self._write(THRESHOLDS, line)
+
+    def _write(self, name: str, line: str) -> None:
+        if name not in self._files:
+            noun = NOUNS.get(name, "record")
+            self._files[name] = LinesFile(self.path / name, self._spare, noun)
+        self._files[name].append(line)
+
+    def read(self) -> Reading:
+        """What the folder holds. Damaged lines are left out, each with a problem.
+
+        Raises:
+            RecordError: there are no records, a whole line is none, or every line is damaged.
+        """
+        found = self.scan()
+        if found.refused:
+            raise RecordError(found.refused[0])
+        if found.problems and not found.every:
+            raise RecordError(found.problems[0].replace(DAMAGED, ""))
+        return found
+
+    def scan(self) -> Reading:
+        """The same, with what is wrong told instead of raised."""
+        path = self.path / self._records
+        try:
+            found = self._found()
+        except RecordError as error:
+            lost = self.own and not path.exists()  # the folder is gone, and was told of
+            found = Found(refused=() if lost else (str(error),))
+        problems = list(found.problems)
+        # Those in memory come last: they are there although the disk may be full.
+        records = settled([*found.items, *self.own])
+        tasks = {**self._tasks(problems), **self._described}
+        asked = dict.fromkeys([*self._parsed(THRESHOLDS, Threshold, problems), *self._asked])
+        name = str(self.path if self._records == RECORDS else path)
+        return Reading(
+            name, tuple(records), tasks, tuple(asked), tuple(problems), found.refused, found.items
+        )
+
+    def _tasks(self, problems: list[str] | None = None) -> dict[str, Description]:
+        found = self._parsed(TASKS, Description, [] if problems is None else problems)
+        return {task.task: task for task in found}
+
+    def _parsed(self, name: str, kind: Any, problems: list[str]) -> tuple[Any, ...]:
+        """The items of a file beside the records, which may be missing."""
+        if self._records != RECORDS or not (self.path / name).exists():
+            return ()
+        try:
+            found = lines.read(self.inside(name), kind.from_dict)
+        except (FolderError, UnreadableError) as error:
+            problems.append(str(error))
+            return ()
+        problems += [*found.problems, *found.refused]
+        return found.items
+
+    def repair(self) -> tuple[Path, ...]:
+        """Write its files anew without damaged lines; the old ones stay beside them.
+
+        Returns:
+            The copies of the damaged files.
+
+        Raises:
+            OSError: the folder cannot be written to.
+        """
+        names = [name for name in (self._records, TASKS, THRESHOLDS) if _size(self.path / name)]
+        repaired = [lines.repair(self.inside(name)) for name in names]
+        return tuple(kept for kept in repaired if kept is not None)
+
+    def _found(self) -> Found[Record]:
+        """The lines of the record file.
+
+        Raises:
+            RecordError: it cannot be read.
+        """
+        path = self.path / self._records
+        try:
+            # What a user names may be a link; what a folder holds leads nowhere else.
+            path = self.inside(RECORDS) if self._records == RECORDS else path
+            return lines.read(path, Record.from_dict)
+        except FolderError as error:
+            raise RecordError(f"cannot read records: {error}") from None
+        except UnreadableError as error:
+            raise RecordError(
+                f"cannot read records from {path} ({error.reason}); give a run folder or its "
+                f"{RECORDS}"
+            ) from None
 
 
-def _probe(folder: Path) -> None:
-    """Write some bytes, for space and permission."""
+def _size(path: Path) -> int:
     try:
-        with tempfile.TemporaryFile(dir=folder) as file:
-            file.write(bytes(PROBE))
-            file.flush()
-            os.fsync(file.fileno())
-    except OSError as error:
-        raise FolderError(
-            f"the run folder {folder} cannot be written to ({error.strerror}); give another "
-            "--sim-output"
-        ) from None
-
-
-def _reason(folder: Path, error: OSError) -> str:
-    """What is in the way, by name."""
-    for path in (folder, *folder.parents):
-        if os.path.islink(path) and not os.path.exists(path):
-            return f"{path} is a link to nothing"
-        if os.path.exists(path):
-            return error.strerror or str(error) if path.is_dir() else f"{path} is a file"
-    return error.strerror or str(error)
+        return path.stat().st_size
+    except OSError:
+        return 0

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from pytest_simbench.simulator.files import read_file, read_json
+from pytest_simbench.records import checked, lines
+from pytest_simbench.records.lines import Found, LinesFile, Unwritten
+from pytest_simbench.records.paths import inside
 
 NAME = "repeatability.jsonl"
 SCHEMA = 1
-
-LARGEST = 256 * 2**20
-"""Of the file [bytes]; a line has about 1 kB."""
 
 
 @dataclass(frozen=True)
@@ -48,48 +46,45 @@ class Line:
         return f"{self.simulator} {self.mode} {self.profile}"
 
 
-def append(folder: Path, line: Line) -> None:
-    """Write one line to the run folder, whole or not at all, beside other processes' lines.
-
-    Raises:
-        OSError: the folder cannot be written to.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    text = json.dumps({"schema": SCHEMA, **vars(line)}) + "\n"
-    descriptor = os.open(
-        folder / NAME, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o666
-    )
-    try:
-        os.write(descriptor, text.encode("ascii"))
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+def append(folder: Path, line: Line) -> Unwritten:
+    """Write one line to the run folder, else elsewhere; what it returns says where. Never raises
+    OSError."""
+    file = LinesFile(folder / NAME, noun="result on repeatability")
+    file.append(json.dumps({"schema": SCHEMA, **vars(line)}))
+    return file.close()
 
 
-def read(folder: Path) -> list[Line]:
+def read(folder: Path) -> Found[Line]:
     """The lines of a run, in the order of their tests' ids; none when there is no file.
 
     Raises:
-        ValueError: a line that is none of ours; names file and line.
+        UnreadableError: there is one, and it cannot be read.
     """
     path = folder / NAME
-    if not path.is_file():
-        return []
-    lines = []
-    for number, text in enumerate(read_file(path, LARGEST).splitlines(), start=1):
-        try:
-            data = read_json(text)
-            schema = data.pop("schema")
-            line = Line(**data)
-            fine = _is_line(line)
-        except (ValueError, KeyError, TypeError, AttributeError):
-            fine = False
-        if not fine:
-            raise ValueError(f"{path}, line {number}: not a result on repeatability")
-        if schema != SCHEMA:
-            raise ValueError(f"{path}, line {number}: schema {schema!r:.20}, this reads {SCHEMA}")
-        lines.append(line)
-    return sorted(lines, key=lambda line: (line.kind, line.task, line.test))
+    if not path.exists():
+        return Found()
+    found = lines.read(inside(folder, NAME), _line)
+    items = sorted(found.items, key=lambda line: (line.kind, line.task, line.test))
+    return replace(found, items=tuple(items))
+
+
+def _line(data: dict[str, Any], where: str) -> Line:
+    """The result in an object.
+
+    Raises:
+        ValueError: it is none of ours.
+    """
+    schema = data.pop("schema", None)
+    try:
+        line = Line(**checked.plain(data))
+        fine = _is_line(line)
+    except (ValueError, KeyError, TypeError, AttributeError):
+        fine = False
+    if not fine:
+        raise ValueError(f"{where}: not a result on repeatability")
+    if schema != SCHEMA:
+        raise ValueError(f"{where}: schema {checked.short(schema)}, this reads {SCHEMA}")
+    return line
 
 
 def _is_line(line: Line) -> bool:

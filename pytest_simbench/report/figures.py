@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pytest_simbench.records.folder import write_whole
 from pytest_simbench.records.names import file_name
+from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.text import for_figure
 from pytest_simbench.report.answer import short_labels
 from pytest_simbench.report.pooling import Spread

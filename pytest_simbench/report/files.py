@@ -5,16 +5,18 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
 
-from pytest_simbench.records.folder import write_whole
+from pytest_simbench.records.folder import Reading, RunFolder
+from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.text import for_csv
 from pytest_simbench.report import markdown
 from pytest_simbench.report.figures import FiguresUnavailable, write_figures
-from pytest_simbench.report.summary import PHASES, TaskSummary
+from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.summary import PHASES, TaskSummary, summarise
 from pytest_simbench.tasks.metrics import COSTS
 
 MARKDOWN_NAME = "report.md"
@@ -33,13 +35,42 @@ class Written:
     Attributes:
         problems: one sentence each.
         complete: whether every file was written; pictures that need matplotlib are not missed.
+        summaries: what the report tells of each task.
     """
 
     problems: tuple[str, ...] = ()
     complete: bool = True
+    summaries: tuple[TaskSummary, ...] = ()
 
 
-def write_report(
+def write_report(folder: RunFolder, reading: Reading | None = None) -> Written:
+    """Write all files from what a run folder holds, into it.
+
+    Args:
+        folder: of the run.
+        reading: of it, where it has been read already.
+
+    Raises:
+        RecordError: its records cannot be read.
+    """
+    reading = reading or folder.read()
+    records = in_order(reading.records)
+    summaries = summaries_of(reading)
+    return replace(write_files(folder.path, summaries, records), summaries=tuple(summaries))
+
+
+def summaries_of(reading: Reading) -> list[TaskSummary]:
+    """What a run tells of each task."""
+    records = in_order(reading.records)
+    return with_wins(summarise(records, reading.metrics, reading.references), records)
+
+
+def in_order(records: Sequence[Record]) -> list[Record]:
+    """By test and repetition, however many processes wrote them."""
+    return sorted(records, key=lambda r: (r.test, r.repetition))
+
+
+def write_files(
     folder: Path,
     summaries: Sequence[TaskSummary],
     records: Sequence[Record],

@@ -13,8 +13,8 @@ from pytest_simbench.experiment.sequential import Plan, SequentialResultSet
 from pytest_simbench.measure import intervals
 from pytest_simbench.measure.results import InconclusiveWarning
 from pytest_simbench.measure.verdicts import ERROR, Verdict, at_least
+from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.record_file import read_records
 from pytest_simbench.tasks.metrics import Metric
 from tests.records.build import METRICS, failed, record
 
@@ -103,7 +103,9 @@ def test_false_alarms_of_yes_and_no_stay_below_one_in_twenty(rate: float) -> Non
 def test_false_alarms_of_real_shares_stay_below_one_in_twenty(simulator: str) -> None:
     path = Path(__file__).parents[1] / "measure" / "stacking_records.jsonl"
     pool = [
-        r.metrics["at_end"] or 0.0 for r in read_records(path).records if r.simulator == simulator
+        r.metrics["at_end"] or 0.0
+        for r in RunFolder.of(path).read().records
+        if r.simulator == simulator
     ]
     rng = np.random.default_rng(7)
     truth = float(np.mean(pool))

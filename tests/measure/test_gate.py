@@ -13,11 +13,11 @@ import pytest
 from pytest_simbench.measure import comparison, gate
 from pytest_simbench.measure.gate import GateReport, run_gate
 from pytest_simbench.measure.limits import Limit, parse_limits
+from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.record_file import read_records
 from tests.records.build import METRICS, failed, record
 
-REAL = read_records(Path(__file__).with_name("stacking_records.jsonl")).records
+REAL = RunFolder.of(Path(__file__).with_name("stacking_records.jsonl")).read().records
 """20 stacking repetitions of MuJoCo and 21 of PyBullet, as recorded, without their details."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -12,6 +13,10 @@ from textwrap import dedent
 from xml.etree import ElementTree
 
 import pytest
+
+import pytest_simbench.tasks  # noqa: F401 - pytester would import native modules a second time
+from pytest_simbench.records.description import Description
+from pytest_simbench.tasks.metrics import Metric
 
 TEST = """
     import os
@@ -134,8 +139,13 @@ def test_bad_input_is_one_sentence(
     pytester: pytest.Pytester, request: pytest.FixtureRequest, arguments: list[str], message: str
 ) -> None:
     records = Path(request.config.rootpath, "tests/measure/stacking_records.jsonl")
-    text = records.read_text().splitlines()[0].replace('"placed"', '"landed"')
-    pytester.path.joinpath("good").write_text(text + "\n")
+    good = pytester.mkdir("good")
+    first_line = records.read_text().splitlines()[0]
+    good.joinpath("records.jsonl").write_text(first_line + "\n")
+    metrics = [Metric("landed", "landed", better="lower"), Metric("landing_x", "x", better=None),
+               Metric("placed", "placed", kind="share", of=15)]  # fmt: skip
+    said = Description("stacking", tuple(metrics)).to_dict()
+    good.joinpath("tasks.jsonl").write_text(json.dumps(said) + "\n")
     pytester.path.joinpath("text").write_text("no record\n")
     pytester.path.joinpath("empty").write_text("")
     pytester.path.joinpath("other.json").write_text('{"benchmarks": [{"fullname": "t"}]}')
@@ -152,7 +162,14 @@ def test_bad_input_is_one_sentence(
 def test_a_limit_of_another_package_s_share_that_nothing_can_exceed_fails_the_run(
     pytester: pytest.Pytester, baseline: Path
 ) -> None:
-    """That `landed` is a share is known only when its task has run."""
+    """A run of before descriptions were kept: that `landed` is a share is known only when its
+    task has run. Else it is known before."""
+    result = pytester.runpytest_subprocess(
+        *ARGUMENTS, "--sim-baseline=base", "--sim-compare-fail=landed:5"
+    )
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["*landed:5 can never be exceeded: landed lies between 0*"])
+    (baseline / "base/tasks.jsonl").unlink()
     result = pytester.runpytest_subprocess(
         *ARGUMENTS, "--sim-baseline=base", "--sim-compare-fail=landed:5"
     )

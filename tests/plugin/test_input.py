@@ -49,18 +49,14 @@ TEST = """
             "--sim-threshold=placed=x: the value must be a finite number",
         ),
         (
-            ["--sim-threshold=placed=90"],
-            "--sim-threshold=placed=90: placed is a share, so its threshold lies between 0 and 1, "
-            "not at 90; did you mean 0.9?",
+            ["--sim-threshold=failures=90"],
+            "--sim-threshold=failures=90: failures is a share, so its threshold lies between 0 and "
+            "1, not at 90; did you mean 0.9?",
         ),
         (
-            ["--sim-threshold=hit=0"],
-            "--sim-threshold=hit=0: hit is always at least 0, so that this threshold can never "
+            ["--sim-threshold=rtf=0"],
+            "--sim-threshold=rtf=0: rtf is always at least 0, so that this threshold can never "
             "fail",
-        ),
-        (
-            ["--sim-threshold=plased=1"],
-            "--sim-threshold=plased=1: no metric is named 'plased'; did you mean 'placed'? valid *",
         ),
     ],
     ids=lambda value: value[0] if isinstance(value, list) else "",
@@ -144,35 +140,3 @@ def test_overlapping_cubes(pytester: pytest.Pytester) -> None:
     )
     result = pytester.runpytest_subprocess("--sim=mujoco")
     result.stdout.fnmatch_lines(["*scene 's': 'a' and 'b' overlap by 50.0 mm; move one of them"])
-
-
-THRESHOLD = """
-    import pytest
-    from tests.tiny import Falling
-
-    @pytest.mark.parametrize("name", ["landed"])
-    def test_falling(repeat, threshold, name):
-        repeat(Falling()).assert_at_least(name, threshold(name, 0.0))
-
-    def test_other(threshold):
-        assert threshold("own_metric", 1.0) == 2.0
-"""
-
-
-def test_a_threshold_of_a_third_party_s_metric_is_known_by_its_test(
-    pytester: pytest.Pytester,
-) -> None:
-    pytester.makepyfile(THRESHOLD)
-    result = pytester.runpytest_subprocess(
-        "--sim=mujoco", "--reps=5", "--sim-threshold=landed=0.9,own_metric=2"
-    )
-    result.assert_outcomes(passed=2)
-    result.stdout.fnmatch_lines(["*inconclusive whether at least 90 %*"])
-
-
-def test_an_unknown_threshold_under_xdist(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(THRESHOLD)
-    result = pytester.runpytest_subprocess("--sim=mujoco", "-n2", "--sim-threshold=landet=1")
-    result.assert_outcomes(errors=2)
-    result.stdout.fnmatch_lines(["--sim-threshold=landet=1: no metric is named 'landet'; *"])
-    assert "Traceback" not in result.stdout.str()

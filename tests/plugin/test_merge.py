@@ -12,15 +12,15 @@ import pytest
 import pytest_simbench.tasks  # noqa: F401 - pytester would import native modules a second time
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.plugin.merge import merge_runs
+from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.record_file import RecordFile, read_records
 from tests.records.build import record
 
 
 def saved(folder: Path, seed: int, log: str, **changes: object) -> Record:
     """A run of one repetition."""
     found = record(1, seed=seed, details={"log": log}, **changes)
-    RecordFile(folder / "records.jsonl").append(found)
+    RunFolder(folder).append(found)
     return found
 
 
@@ -38,7 +38,7 @@ def test_logs_and_traces_are_copied_under_names_of_ours(pytester: pytest.Pyteste
             file.write_text(f"{path} of {name}")
     assert merge(pytester, "a", "b") == 0
     whole = pytester.path / "whole"
-    logs = [r.details["log"] for r in read_records(whole).records]
+    logs = [r.details["log"] for r in RunFolder(whole).read().records]
     assert [(whole / log).read_text() for log in logs] == [
         "logs/x-1.log of a",
         "logs/x-1.log of b",
@@ -69,7 +69,7 @@ def test_a_record_leads_nowhere(
     assert victim.read_text() == "secret"
     assert {path.name for path in pytester.path.glob("[!.]*")} == {"a", "victim.log", "whole"}
     whole = pytester.path / "whole"
-    (found,) = read_records(whole).records
+    (found,) = RunFolder(whole).read().records
     assert found.details["log"] == ""
     kept = {path.name for path in whole.rglob("*") if path.suffix not in (".png", "")}
     assert kept == {"records.jsonl", "report.md", "report.csv"}
@@ -94,7 +94,7 @@ def test_nothing_is_written_out_of_the_destination(pytester: pytest.Pytester, li
 
 
 def test_a_run_that_is_written_to_is_no_destination(pytester: pytest.Pytester) -> None:
-    from pytest_simbench.records.folder import Claim
+    from pytest_simbench.records.claim import Claim
 
     saved(pytester.path / "a", 1, "")
     claim = Claim(pytester.path / "whole")
@@ -132,7 +132,7 @@ def test_foreign_records_of_wrong_types_are_one_sentence(pytester: pytest.Pytest
 
 def test_a_mixture_is_refused(pytester: pytest.Pytester) -> None:
     first = saved(pytester.path / "a", 1, "")
-    RecordFile(pytester.path / "a/records.jsonl").append(
+    RunFolder(pytester.path / "a").append(
         replace(first, seed=2, repetition=2, settings={"timestep": 0.5})
     )
     with pytest.raises(pytest.UsageError, match="a holds several configurations: settings.timest"):

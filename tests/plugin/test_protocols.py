@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pytest_simbench.records.record_file import read_records
+from pytest_simbench.records.folder import RunFolder
 
 SUITE = """
 from dataclasses import dataclass, replace
@@ -31,6 +31,6 @@ def test_the_protocols_version_is_run(
         "--sim=mujoco", "--reps=1", f"--protocol={protocol}", "--sim-output=out"
     )
     result.assert_outcomes(passed=1)
-    (record,) = read_records(pytester.path / "out").records
+    (record,) = RunFolder(pytester.path / "out").read().records
     assert record.settings["task.duration"] == duration
     assert record.stepping["simulated"] == pytest.approx(duration)

@@ -15,8 +15,8 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.identity import expected
 from pytest_simbench.experiment.protocol import PROTOCOLS
 from pytest_simbench.plugin.resume import NotResumed, Resumed
+from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.record_file import RecordFile
 from tests.tiny import Falling
 
 Save = Callable[..., Resumed]
@@ -27,10 +27,11 @@ def save(tmp_path: Path) -> Save:
     """A run folder with these records, to be resumed."""
 
     def saved(*records: Record) -> Resumed:
-        file = RecordFile(tmp_path / "records.jsonl")
+        (tmp_path / "records.jsonl").touch()
+        folder = RunFolder(tmp_path)
         for record in records:
-            assert file.append(record)
-        return Resumed(tmp_path)
+            folder.append(record)
+        return Resumed(RunFolder(tmp_path))
 
     return saved
 
@@ -203,7 +204,7 @@ def test_on_the_command_line(pytester: pytest.Pytester) -> None:
         [
             "falling: 3 repetitions, protocol fast",
             "*records.jsonl:2: the line is damaged and left out: it holds NUL bytes",
-            "the damaged records are kept in *records.jsonl.damaged-1",
+            "the damaged lines are kept in *records.jsonl.damaged-1",
         ]
     )
     again = path.read_bytes().splitlines(keepends=True)
@@ -213,9 +214,9 @@ def test_on_the_command_line(pytester: pytest.Pytester) -> None:
 
 def test_a_newer_schema_is_one_sentence(pytester: pytest.Pytester, case: Case, save: Save) -> None:
     resumed = save(*ended(case, Falling(), 1))
-    path = resumed.folder / "records.jsonl"
+    path = resumed.folder.path / "records.jsonl"
     path.write_text(path.read_text().replace('"schema": 1', '"schema": 9'))
-    result = pytester.runpytest_subprocess("--sim=mujoco", f"--sim-resume={resumed.folder}")
+    result = pytester.runpytest_subprocess("--sim=mujoco", f"--sim-resume={resumed.folder.path}")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     result.stderr.fnmatch_lines(
         ["ERROR: --sim-resume: *records.jsonl:1: schema 9 was written by a newer pytest-simbench*"]

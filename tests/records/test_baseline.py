@@ -7,10 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.records.baseline import BaselineError, from_benchmarks, read_baseline
+from pytest_simbench.records.baseline import (
+    KEY,
+    BaselineError,
+    from_benchmarks,
+    from_extra_info,
+    read_baseline,
+    to_extra_info,
+)
+from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Record, RecordError
-from pytest_simbench.records.record_file import RecordFile
-from pytest_simbench.records.saved import KEY, from_extra_info, to_extra_info
 
 from .build import failed, record
 
@@ -50,21 +56,20 @@ def test_every_form_gives_the_same_records(tmp_path: Path, form: str) -> None:
         extra = [{}, {KEY: to_extra_info(RUN)}]
         path.write_text(json.dumps({"benchmarks": [{"extra_info": item} for item in extra]}))
     else:
-        file = RecordFile(tmp_path / "records.jsonl")
+        folder = RunFolder(tmp_path)
         for item in RUN:
-            assert file.append(item)
+            folder.append(item)
         path = tmp_path / "records.jsonl" if form == "records" else tmp_path
     found = read_baseline(path)
     assert found.name == str(path)
     assert [without_details(r) for r in found.records] == [without_details(r) for r in RUN]
-    assert found.metric_names == ("placed", "hit")
 
 
 @pytest.mark.parametrize(
     ("content", "message"),
     [
         ("", "holds no repetition"),
-        ("[1, 2]", "cannot be read: .*:1: a record is a JSON object, not list"),
+        ("[1, 2]", "cannot be read: .*:1: a line is a JSON object, not list"),
         ('{"test": "t"}', "cannot be read: .*:1: the record has no 'task'"),
         ('{"benchmarks": {}}', "malformed: 'benchmarks' is not a list"),
         ('{"benchmarks": [3, {"extra_info": 4}]}', "holds no repetition of a simulator"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pytest_simbench.records.differences import differences
+from pytest_simbench.records.configuration import differences
 
 from .build import record
 

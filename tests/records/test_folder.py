@@ -1,161 +1,169 @@
-"""A run folder: one run each, never two at once, and nothing outside of it."""
+"""The run folder: what it holds, and what is wrong with what it holds."""
 
 from __future__ import annotations
 
+import json
 import os
-import re
-import subprocess
-import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from pytest_simbench.records.folder import (
-    Claim,
-    FolderError,
-    holds_run,
-    inside,
-    new_name,
-    write_whole,
-)
+from pytest_simbench.records.folder import RECORDS, RunFolder
+from pytest_simbench.records.lines import LARGEST_LINE
+from pytest_simbench.records.record import RecordError
 
-
-def test_runs_of_one_second_have_different_folders(tmp_path: Path) -> None:
-    names = [new_name(tmp_path).name for _ in range(500)]
-    assert len(set(names)) == 500
-    assert all(name[:10].count("-") == 2 for name in names)
-    pattern = r"\d{4}-\d\d-\d\d_\d\d-\d\d-\d\d-[0-9a-f]{8}"
-    assert all(re.fullmatch(pattern, name) for name in names)
-    assert re.fullmatch(rf"{pattern}\.part", new_name(tmp_path, ".part").name)
-    assert new_name(tmp_path).parent == tmp_path
-
-
-def test_a_folder_is_one_run_at_a_time(tmp_path: Path) -> None:
-    folder = tmp_path / "a" / "run"
-    claim = Claim(folder)
-    with pytest.raises(FolderError, match=f"another run is under way in {folder}; wait for it"):
-        Claim(folder)
-    claim.close()
-    Claim(folder).close()
-
-
-def test_another_process_is_refused_and_a_dead_one_holds_nothing(tmp_path: Path) -> None:
-    code = """
-import sys, time
-from pathlib import Path
-from pytest_simbench.records.folder import Claim
-claim = Claim(Path(sys.argv[1]))
-print("mine", flush=True)
-time.sleep(600)
-"""
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE, text=True
-    )
-    assert process.stdout is not None
-    assert process.stdout.readline() == "mine\n"
-    with pytest.raises(FolderError, match="another run is under way"):
-        Claim(tmp_path)
-    process.kill()
-    process.wait()
-    Claim(tmp_path).close()
-
-
-def test_the_processes_of_one_run_share_it(tmp_path: Path) -> None:
-    workers = [Claim(tmp_path, shared=True) for _ in range(2)]
-    with pytest.raises(FolderError, match="another run is under way"):
-        Claim(tmp_path)  # somebody resumes it meanwhile
-    for worker in workers:
-        worker.close()
-    controller = Claim(tmp_path)
-    Claim(tmp_path, shared=True).close()
-    controller.close()
-
-
-def test_a_folder_made_for_nothing_goes_away(tmp_path: Path) -> None:
-    Claim(tmp_path / "new").close()
-    assert not (tmp_path / "new").exists()
-    (tmp_path / "old").mkdir()
-    Claim(tmp_path / "old").close()
-    assert (tmp_path / "old").exists()
-
-
-@pytest.mark.parametrize("kind", ["file", "through", "link", "loop", "refused", "long"])
-def test_what_can_be_no_folder_is_one_sentence(tmp_path: Path, kind: str) -> None:
-    (tmp_path / "file").touch()
-    (tmp_path / "link").symlink_to(tmp_path / "nowhere")
-    (tmp_path / "loop").symlink_to(tmp_path / "loop")
-    path, message = {
-        "file": (tmp_path / "file", f"{tmp_path}/file is a file"),
-        "through": (tmp_path / "file" / "a" / "b", f"{tmp_path}/file is a file"),
-        "link": (tmp_path / "link" / "a", f"{tmp_path}/link is a link to nothing"),
-        "loop": (tmp_path / "loop", f"{tmp_path}/loop is a link to nothing"),
-        "refused": (Path("/proc/nothing"), "No such file or directory"),
-        "long": (tmp_path / ("x" * 300), "File name too long"),
-    }[kind]
-    with pytest.raises(FolderError) as caught:
-        Claim(path)
-    expected = f"the run folder {path} cannot be made ({message}); give another --sim-output"
-    assert str(caught.value) == expected
-
-
-def test_no_space_is_noticed_before_anything_runs(tmp_path: Path) -> None:
-    """The file-size limit of a child process refuses a write as a full disk does."""
-    code = """
-import resource, signal, sys
-from pathlib import Path
-from pytest_simbench.records.folder import Claim
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
-Claim(Path(sys.argv[1]))
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=False
-    )
-    assert "FolderError: the run folder" in done.stderr
-    assert "cannot be written to (File too large); give another --sim-output" in done.stderr
-    assert list(tmp_path.iterdir()) == []
+from .build import failed, record
 
 
 def test_what_holds_a_run(tmp_path: Path) -> None:
-    assert not holds_run(tmp_path / "nowhere")
+    assert not RunFolder(tmp_path / "nowhere").holds_run
     (tmp_path / "records.jsonl").touch()
     (tmp_path / "other.txt").write_text("x")
-    assert not holds_run(tmp_path)
+    assert not RunFolder(tmp_path).holds_run
     (tmp_path / "repeatability.jsonl").write_text("x")
-    assert holds_run(tmp_path)
+    assert RunFolder(tmp_path).holds_run
 
 
 @pytest.mark.parametrize(
-    "name", ["../victim", "/etc/passwd", "a/../../victim", "out", "through/victim", "", ".", "a\0b"]
+    ("change", "message"),
+    [
+        ({"seed": "7"}, "'seed' must be int, not str"),
+        ({"repetition": True}, "'repetition' must be int, not bool"),
+        ({"metrics": None}, "'metrics' must be dict, not NoneType"),
+        ({"metrics": {"placed": "many"}}, "metric 'placed' must be a number, not 'many'"),
+        ({"status": "fine"}, "status 'fine' is none of ok, failed, interrupted"),
+        ({"error": {"message": "x"}}, "'error' has no 'type'"),
+        ({"schema": 99}, "schema 99 was written by a newer pytest-simbench"),
+    ],
 )
-def test_nothing_leads_out_of_a_folder(tmp_path: Path, name: str) -> None:
+def test_a_wrong_value_is_named_with_file_and_line(
+    change: dict[str, Any], message: str, tmp_path: Path
+) -> None:
+    path = tmp_path / RECORDS
+    wrong = json.dumps({**record().to_dict(), **change})
+    path.write_text(record().to_json() + "\n" + wrong + "\n")
+    with pytest.raises(RecordError) as caught:
+        RunFolder.of(path).read()
+    assert str(caught.value).startswith(f"{path}:2: {message}")
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("[1, 2]", "a line is a JSON object, not list"),
+        ("hello", "not JSON"),
+        ("{} x", "not JSON"),
+    ],
+)
+def test_a_line_that_is_no_record_is_named(line: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / RECORDS
+    path.write_text(line + "\n")
+    with pytest.raises(RecordError, match=message) as caught:
+        RunFolder(tmp_path).read()
+    assert f"{path}:1" in str(caught.value)
+
+
+def test_a_missing_file_is_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(RecordError, match="No such file or directory"):
+        RunFolder(tmp_path).read()
+
+
+def test_appended_records_are_read_back(tmp_path: Path) -> None:
+    path = tmp_path / "run" / RECORDS
+    folder = RunFolder(path.parent)
+    written = [record(0), failed(1), record(2)]
+    for item in written:
+        folder.append(item)
+    assert path.read_bytes().count(b"\n") == 3  # on the disk before closing
+    assert not folder.close()
+    assert RunFolder(path.parent).read().records == tuple(written)
+
+
+def test_a_line_written_twice_counts_once(tmp_path: Path) -> None:
+    path = tmp_path / RECORDS
+    for _ in range(2):
+        RunFolder(path.parent).append(record(5))
+    assert len(RunFolder.of(path).read().records) == 1
+
+
+def test_a_record_too_long_to_be_read_keeps_all_but_its_details(tmp_path: Path) -> None:
+    path = tmp_path / RECORDS
+    details = {"log": "logs/a.log", "poses": "x" * LARGEST_LINE}
+    RunFolder(path.parent).append(record(1, details=details, metrics={"placed": 0.5}))
+    (found,) = RunFolder.of(path).read().records
+    assert found.metrics == {"placed": 0.5}
+    assert found.details["log"] == "logs/a.log"
+    assert "more than a record may have" in found.details["left_out"]
+
+
+@pytest.mark.parametrize("kind", ["fifo", "device", "link out"])
+def test_only_an_ordinary_file_in_the_folder_is_read(tmp_path: Path, kind: str) -> None:
     run = tmp_path / "run"
     run.mkdir()
-    (tmp_path / "victim").touch()
-    (run / "out").symlink_to(tmp_path / "victim")
-    (run / "through").symlink_to(tmp_path)
-    with pytest.raises(FolderError):
-        inside(run, name)
+    path = run / RECORDS
+    (tmp_path / "other").write_text(record(1).to_json() + "\n")
+    if kind == "fifo":
+        os.mkfifo(path)
+    else:
+        path.symlink_to({"device": "/dev/zero", "link out": tmp_path / "other"}[kind])
+    with pytest.raises(RecordError, match=r"no ordinary file|leads out of its folder"):
+        RunFolder(run).read()
 
 
-def test_what_lies_inside_is_found_also_where_the_folder_is_a_link(tmp_path: Path) -> None:
-    run = tmp_path / "run"
-    (run / "logs").mkdir(parents=True)
-    (run / "logs" / "a.log").touch()
-    (tmp_path / "link").symlink_to(run)
-    for folder in (run, tmp_path / "link"):
-        assert inside(folder, "logs/a.log").is_file()
-        assert not inside(folder, "logs/missing.log").exists()
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"test": 3}, "'test' must be str, not int"),
+        ({"test": "x" * 5000}, "'test' has 5000 characters, at most 2000 are read"),
+        ({"jitter": -1}, "'jitter' must be at least 0"),
+        ({"attempt": 0}, "'attempt' must be at least 1"),
+        ({"repetition": -3}, "'repetition' must be at least 0"),
+        ({"seed": 10**400}, "'seed' is larger than any number of ours"),
+        ({"metrics": {"placed": 10**400}}, "'metrics.placed' is larger than any number"),
+        ({"seconds": {"total": "long"}}, "'seconds.total' must be a number, not 'long'"),
+        ({"stepping": {"wall": [1]}}, "'stepping.wall' must be a number"),
+        ({"timeline": {"start": {}}}, "'timeline.start' must be a number"),
+        ({"limits": {"timeout": "x"}}, "'limits.timeout' must be a number"),
+        ({"resources": {"rss_mb": 3}}, "'resources.rss_mb' must be dict, not int"),
+        ({"resources": {"samples": "x"}}, "'resources.samples' must be a number"),
+        ({"resources": {"samples": -1}}, "'resources.samples' must be at least 0"),
+        ({"resources": {"phases": {"load": {"rss_mb": {"mean": "x"}}}}}, "'resources.phases.load."),
+        ({"versions": {"engine": 3}}, "'versions.engine' must be str, not int"),
+        ({"details": {"log": ["a"]}}, "'details.log' must be str, not list"),
+        ({"details": {"untested": {}}}, "'details.untested' must be str, not dict"),
+        ({"deviations": [3]}, "'deviations' must be str, not int"),
+        ({"error": {"type": "E", "message": 3}}, "'error.message' must be str, not int"),
+        ({"schema": 0}, "schema 0 "),
+        ({"schema": "x" * 999}, "schema 'xxxx"),
+    ],
+)
+def test_foreign_records_of_wrong_types_are_refused(
+    tmp_path: Path, change: dict[str, Any], message: str
+) -> None:
+    path = tmp_path / RECORDS
+    wrong = json.dumps({**record().to_dict(), **change})
+    path.write_text(record().to_json() + "\n" + wrong + "\n")
+    with pytest.raises(RecordError) as caught:
+        RunFolder.of(path).read()
+    assert str(caught.value).startswith(f"{path}:2: {message}")
+    assert len(str(caught.value)) < 400
+    assert len(RunFolder.of(path).scan().records) == 1
 
 
-def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
-    path = tmp_path / "report.md"
-    path.symlink_to(tmp_path / "victim")
-    write_whole(path, b"new")
-    assert path.read_bytes() == b"new"
-    assert not (tmp_path / "victim").exists()
-    (tmp_path / "folder").mkdir()
-    with pytest.raises(OSError, match="directory"):
-        write_whole(tmp_path / "folder", b"new")
-    assert {p.name for p in tmp_path.iterdir()} == {"report.md", "folder"}
-    assert os.path.isdir(tmp_path / "folder")
+def test_infinite_numbers_and_deep_nests_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / RECORDS
+    good = record(details={"a": 1}).to_json()
+    deep = "[" * 60 + "]" * 60
+    for text, message in ((deep, "nested more than 32"), ("1e999", "must be a finite number")):
+        path.write_text(good.replace('{"a": 1}', f'{{"a": {text}}}') + "\n")
+        with pytest.raises(RecordError, match=rf":1: .*{message}"):
+            RunFolder.of(path).read()
+
+
+def test_a_text_that_no_file_takes_can_be_written_again(tmp_path: Path) -> None:
+    path = tmp_path / RECORDS
+    RunFolder(path.parent).append(record(details={"note": "\ud800 x"}))
+    path.write_text(path.read_text().replace("? x", "\\udfff x"))
+    (found,) = RunFolder.of(path).read().records
+    assert found.details["note"].encode("utf-8") == b"? x"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from pytest_simbench.records.lines import Found
 from pytest_simbench.records.repeatability import NAME, Line, append, read
 from pytest_simbench.repeatability.motions import Difference
 from pytest_simbench.repeatability.replay_result import Again
@@ -28,10 +29,10 @@ LINE = Line(
 
 def test_kept_and_read_back(tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    assert read(folder) == []
+    assert read(folder).items == ()
     append(folder, LINE)
     append(folder, LINE)
-    assert read(folder) == [LINE, LINE]
+    assert read(folder).items == (LINE, LINE)
     assert LINE.label == "mujoco headless tuned"
 
 
@@ -41,7 +42,7 @@ REPLAY = replace(LINE, kind="replay", result={"claims": True, "again": [AGAIN]})
 
 def test_a_replay_is_read_back(tmp_path: Path) -> None:
     append(tmp_path, REPLAY)
-    assert read(tmp_path) == [REPLAY]
+    assert read(tmp_path).items == (REPLAY,)
 
 
 @pytest.mark.parametrize(
@@ -65,37 +66,46 @@ def test_a_replay_is_read_back(tmp_path: Path) -> None:
 )
 def test_a_line_with_something_else_in_it(tmp_path: Path, line: Line) -> None:
     append(tmp_path, line)
-    with pytest.raises(ValueError, match="line 1: not a result on repeatability"):
-        read(tmp_path)
+    assert read(tmp_path) == Found(refused=(f"{tmp_path / NAME}:1: not a result on repeatability",))
 
 
 def test_no_number_is_infinite(tmp_path: Path) -> None:
     append(
         tmp_path, replace(REPLAY, result={"claims": True, "again": [{**AGAIN, "first": math.inf}]})
     )
-    with pytest.raises(ValueError, match="line 1: not a result on repeatability"):
-        read(tmp_path)
+    assert read(tmp_path).items == ()
+    (problem,) = read(tmp_path).problems
+    assert "Infinity is no number in JSON" in problem
 
 
 @pytest.mark.parametrize(
-    "text", ["{}", "nonsense", "[1]", '{"schema": 1, "kind": "x"}', "[" * 99999]
+    "text", ["{}", "nonsense", "[1]", '{"schema": 1, "kind": "x"}', "[" * 99999, '{"schema": 1, "t']
 )
-def test_something_else(tmp_path: Path, text: str) -> None:
+def test_something_else_loses_no_other_line(tmp_path: Path, text: str) -> None:
     append(tmp_path, LINE)
     with (tmp_path / NAME).open("a") as file:
-        file.write(text + "\n")
-    with pytest.raises(ValueError, match="line 2: not a result on repeatability"):
-        read(tmp_path)
+        file.write(text)  # torn: no end of the line
+    append(tmp_path, LINE)
+    found = read(tmp_path)
+    assert found.items == (LINE, LINE)
+    (problem,) = (*found.problems, *found.refused)
+    assert problem.startswith(f"{tmp_path / NAME}:2: ")
+    assert len(problem) < 400
+
+
+def test_a_full_disk_keeps_the_result_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "spare"))
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / NAME).symlink_to("/dev/full")
+    told = append(tmp_path / "run", LINE)
+    assert told.fallback is not None
+    assert read(told.fallback.parent).items == (LINE,)
 
 
 def test_a_newer_schema(tmp_path: Path) -> None:
     append(tmp_path, LINE)
     path = tmp_path / NAME
     path.write_text(path.read_text().replace('"schema": 1', '"schema": 2'))
-    with pytest.raises(ValueError, match="line 1: schema 2, this reads 1"):
-        read(tmp_path)
-
-
-def test_the_folder_is_made_with_those_above_it(tmp_path: Path) -> None:
-    append(tmp_path / "a" / "b", LINE)
-    assert read(tmp_path / "a" / "b") == [LINE]
+    assert read(tmp_path) == Found(refused=(f"{path}:1: schema 2, this reads 1",))

@@ -14,7 +14,7 @@ import pytest
 
 from pytest_simbench.report import markdown
 from pytest_simbench.report.figures import FiguresUnavailable, write_figures
-from pytest_simbench.report.files import Written, csv_of, write_report
+from pytest_simbench.report.files import Written, csv_of, write_files
 from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.summary import summarise
 
@@ -71,7 +71,7 @@ def test_csv_has_one_line_per_repetition() -> None:
 def test_report_folder(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
     records = stacking_run() + throwing_run()
-    assert write_report(tmp_path, summarise(records, METRICS, REFERENCES), records) == Written()
+    assert write_files(tmp_path, summarise(records, METRICS, REFERENCES), records) == Written()
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "report.csv",
         "report.md",
@@ -109,7 +109,7 @@ def test_without_matplotlib_one_line_says_so(
     summaries = summarise(records, METRICS)
     with pytest.raises(FiguresUnavailable, match=r"pip install 'pytest-simbench\[figures\]'"):
         write_figures(tmp_path, summaries)
-    written = write_report(tmp_path, summaries, records)
+    written = write_files(tmp_path, summaries, records)
     assert written.complete
     (line,) = written.problems
     assert line.startswith("no pictures: matplotlib is missing")

@@ -12,7 +12,7 @@ from pytest_simbench.records.record import Failure, Record
 from pytest_simbench.records.repeatability import Line
 from pytest_simbench.report import changes, markdown, tables
 from pytest_simbench.report.capabilities import capability_markdown, capability_table
-from pytest_simbench.report.files import csv_of, write_report
+from pytest_simbench.report.files import csv_of, write_files
 from pytest_simbench.report.github import VARIABLE, append_summary
 from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.progress import Progress
@@ -99,7 +99,7 @@ def test_pictures_stay_in_their_folder(text: str, tmp_path: Path) -> None:
     folder.mkdir(parents=True)
     all_ = [*records(text), *(replace(r, task=f"{text} ") for r in records(text))]
     with mpl.rc_context({"text.parse_math": True}):
-        write_report(folder, summarise(all_, declared(text)), all_)
+        write_files(folder, summarise(all_, declared(text)), all_)
     files = {path for path in tmp_path.rglob("*") if path.is_file()}
     assert {path.parent for path in files} == {folder}
     assert sum(path.suffix == ".png" for path in files) == 6
@@ -111,7 +111,7 @@ def test_a_formula_in_a_label_is_no_formula(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
     (tmp_path / "run").mkdir()
     found = records(r"$\nonsense{$")
-    written = write_report(tmp_path / "run", summarise(found, declared(r"$\nonsense{$")), found)
+    written = write_files(tmp_path / "run", summarise(found, declared(r"$\nonsense{$")), found)
     assert written.problems == ()
 
 

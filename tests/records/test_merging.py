@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.records.joining import JoinError, join
+from pytest_simbench.records.merging import MergeError, merge
 from pytest_simbench.records.record import Record
 
 from .build import record
@@ -31,12 +31,12 @@ def test_shards_in_any_order_make_the_straight_run(cuts: list[int], seed: int) -
     ends = [0, *sorted(cuts), 30]
     parts = [(f"run {i}", shard(whole, a, b)) for i, (a, b) in enumerate(pairwise(ends))]
     Random(seed).shuffle(parts)
-    assert [item.record for item in join(dict(parts))] == whole
+    assert [item.record for item in merge(dict(parts))] == whole
 
 
 def test_each_record_tells_where_its_files_are() -> None:
     whole = [replace(r, details={"log": f"logs/{r.seed}.log"}) for r in straight(3)]
-    found = join({"a": shard(whole, 0, 2), "b": shard(whole, 2, 3)})
+    found = merge({"a": shard(whole, 0, 2), "b": shard(whole, 2, 3)})
     assert [(item.run, item.record.details["log"]) for item in found] == [
         ("a", "logs/2022.log"),
         ("a", "logs/2023.log"),
@@ -44,7 +44,7 @@ def test_each_record_tells_where_its_files_are() -> None:
     ]
 
 
-def test_a_test_that_repeats_two_tasks_is_joined_task_by_task() -> None:
+def test_a_test_that_repeats_two_tasks_is_merged_task_by_task() -> None:
     def parts(first: int) -> list[Record]:
         runs = straight(2, first)
         return [
@@ -52,34 +52,34 @@ def test_a_test_that_repeats_two_tasks_is_joined_task_by_task() -> None:
             *(replace(r, settings={"task.towers": 4}) for r in runs),
         ]
 
-    found = join({"b": parts(2024), "a": parts(2022)})
+    found = merge({"b": parts(2024), "a": parts(2022)})
     numbers = [(i.record.settings["task.towers"], i.record.repetition) for i in found]
     assert numbers == [(t, k) for t in (3, 4) for k in (1, 2, 3, 4)]
 
 
 def test_a_run_of_two_configurations_is_refused() -> None:
     mixed = [*straight(2), *(replace(r, settings={"timestep": 0.01}) for r in straight(2, 2024))]
-    with pytest.raises(JoinError, match=r"a holds several configurations: settings.timestep was"):
-        join({"a": mixed})
+    with pytest.raises(MergeError, match=r"a holds several configurations: settings.timestep was"):
+        merge({"a": mixed})
 
 
 def test_the_last_attempt_is_the_only_one_of_the_whole() -> None:
     again = [replace(r, attempt=2) for r in straight(2)]
-    assert [item.record.attempt for item in join({"a": again})] == [1, 1]
+    assert [item.record.attempt for item in merge({"a": again})] == [1, 1]
 
 
 def test_what_was_interrupted_is_left_out_and_may_be_in_the_other_part() -> None:
     whole = straight(4)
     cut = [*whole[:2], replace(whole[2], status="interrupted")]
-    assert [i.record for i in join({"a": cut, "b": shard(whole, 2, 4)})] == whole
+    assert [i.record for i in merge({"a": cut, "b": shard(whole, 2, 4)})] == whole
 
 
 def test_the_path_of_the_test_file_does_not_matter() -> None:
     a = [replace(r, test="suites/test_s.py::test_s[e]") for r in straight(2)]
     b = [replace(r, test="../x/test_s.py::test_s[e]") for r in straight(2, first=2024)]
-    assert {item.record.test for item in join({"a": a, "b": b})} == {"suites/test_s.py::test_s[e]"}
+    assert {item.record.test for item in merge({"a": a, "b": b})} == {"suites/test_s.py::test_s[e]"}
     both = [*a, *(replace(r, test="other.py::test_s[e]") for r in straight(2))]
-    assert len({item.record.test for item in join({"a": both})}) == 2
+    assert len({item.record.test for item in merge({"a": both})}) == 2
 
 
 @pytest.mark.parametrize(
@@ -91,8 +91,8 @@ def test_the_path_of_the_test_file_does_not_matter() -> None:
     ],
 )
 def test_overlaps_are_refused(first: int, message: str) -> None:
-    with pytest.raises(JoinError, match=message):
-        join({"a": straight(3), "b": straight(3, first)})
+    with pytest.raises(MergeError, match=message):
+        merge({"a": straight(3), "b": straight(3, first)})
 
 
 @pytest.mark.parametrize(
@@ -107,42 +107,22 @@ def test_differences_are_refused_and_named(name: str) -> None:
     }.get(name, "x")
     ours = [replace(r, scene="s", limits={"timeout": 4.0}) for r in straight(3)]
     other = [replace(r, **{name: value}) for r in straight(3, 3000)]
-    with pytest.raises(JoinError, match=f"a and b are not parts of one run: {name}.* was "):
-        join({"a": ours, "b": other})
+    with pytest.raises(MergeError, match=f"a and b are not parts of one run: {name}.* was "):
+        merge({"a": ours, "b": other})
 
 
-def test_what_failed_before_it_knew_its_settings_may_be_joined() -> None:
+def test_what_failed_before_it_knew_its_settings_may_be_merged() -> None:
     dead = [
         replace(r, status="failed", settings={}, versions={}, metrics={}) for r in straight(2, 2025)
     ]
-    assert len(join({"a": straight(3), "b": dead})) == 5
+    assert len(merge({"a": straight(3), "b": dead})) == 5
 
 
 def test_machines_may_differ() -> None:
     other = [replace(r, host={"cpu": "another"}) for r in straight(3, 2025)]
-    assert len(join({"a": straight(3), "b": other})) == 6
+    assert len(merge({"a": straight(3), "b": other})) == 6
 
 
 def test_a_seed_twice_in_one_run_is_refused() -> None:
-    with pytest.raises(JoinError, match="a has 1 of its seeds of test_stacking.* twice"):
-        join({"a": [*straight(2), straight(1)[0]]})
-
-
-def test_what_a_run_without_a_good_repetition_knows_counts() -> None:
-    """Its failures' settings, which must be the others' all the same."""
-    whole = straight(4)
-    bad = [replace(r, status="failed") for r in whole[2:]]
-    assert len(join({"a": whole[:2], "b": bad})) == 4
-    assert len(join({"b": bad, "a": whole[:2]})) == 4
-    other = [replace(r, settings={"timestep": 0.5}) for r in bad]
-    for runs in ({"a": whole[:2], "b": other}, {"b": other, "a": whole[:2]}):
-        with pytest.raises(JoinError, match="a and b|b and a") as caught:
-            join(runs)
-        assert "settings.timestep" in str(caught.value)
-
-
-def test_the_whole_has_the_test_id_of_the_first_run() -> None:
-    first, second = straight(1), [replace(r, seed=2023) for r in straight(1)]
-    here = [replace(r, test=f"a/t.py::{r.test}") for r in first]
-    assert {item.record.test for item in join({"a": here, "b": second})} == {here[0].test}
-    assert {item.record.test for item in join({"b": second, "a": here})} == {second[0].test}
+    with pytest.raises(MergeError, match="a has 1 of its seeds of test_stacking.* twice"):
+        merge({"a": [*straight(2), straight(1)[0]]})

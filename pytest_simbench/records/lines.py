@@ -1,4 +1,8 @@
-"""The file of a run's records: appended to by several processes, flushed, never lost."""
+"""JSON-lines files of a run folder: appended to by several processes, flushed, never lost.
+
+One writer and one reader for all of them. A line is a JSON object. What a crash, a full disk or a
+power loss does to a line takes no other line with it.
+"""
 
 from __future__ import annotations
 
@@ -7,43 +11,40 @@ import json
 import os
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Generic, TypeVar
 
-from pytest_simbench.records.folder import FolderError, inside
-from pytest_simbench.records.record import Failure, Record, RecordError
-from pytest_simbench.records.series import settled
-
-__all__ = [
-    "RECORDS_NAME",
-    "CloseReport",
-    "Failure",
-    "Reading",
-    "Record",
-    "RecordError",
-    "RecordFile",
-    "read_records",
-    "repair",
-    "scan",
-]
-
-RECORDS_NAME = "records.jsonl"
-"""Name of the record file in a run folder."""
+T = TypeVar("T")
 
 LARGEST_LINE = 16 * 1024 * 1024
 """Bytes; a record has a few thousand, with a trace of every cube's poses some hundred thousand."""
 
+DAMAGED = "the line is damaged and left out: "
+
+
+class UnreadableError(ValueError):
+    """A file that cannot be read; the message is a whole sentence.
+
+    Attributes:
+        reason: why, in a few words.
+    """
+
+    def __init__(self, path: Path, reason: str) -> None:
+        super().__init__(f"{path} cannot be read ({reason})")
+        self.reason = reason
+
 
 @dataclass(frozen=True)
-class CloseReport:
-    """What became of records that could not be written; empty and false when all were.
+class Unwritten:
+    """What became of lines that could not be written; empty and false when all were.
 
     Attributes:
         problems: one sentence each, for the terminal.
         fallback: the file that holds what the run folder could not take, or None.
-        unsaved: the JSON lines that no file holds: print them.
+        unsaved: the lines that no file holds: print them.
     """
 
     problems: tuple[str, ...] = ()
@@ -54,59 +55,62 @@ class CloseReport:
         return bool(self.problems)
 
 
-class RecordFile:
-    """Appends records to a file as they are made, each with one write call and an fsync.
+def spare_folder() -> Path:
+    """A name for a folder in the system's temporary folder, for what a run folder cannot take."""
+    return Path(tempfile.gettempdir(), f"simbench-{os.getpid()}-{os.urandom(3).hex()}")
+
+
+class LinesFile:
+    """Appends lines to a file as they are made, each with one write call and an fsync.
 
     Several processes may append to one file (O_APPEND: the kernel places each write at the end).
-    It is opened anew for each record, so that a fork or a long run holds no descriptor. Where
-    writing fails (disk full, folder gone) the record is kept in memory and tried again with the
-    next one and when closing; then it goes to `fallback`, else it is handed back as a line.
+    It is opened anew for each line, so that a fork or a long run holds no descriptor. Where
+    writing fails (disk full, folder gone) the line is kept in memory and tried again with the
+    next one and when closing; then it goes to a file of the same name in `fallback`, else it is
+    handed back.
 
     Args:
-        path: the file; its folder is made when the first record comes.
-        fallback: folder for what `path` cannot take; default: the system's temporary folder.
+        path: the file; its folder is made when the first line comes.
+        fallback: folder for what `path` cannot take; default: `spare_folder()`.
+        noun: what a line is, for messages.
     """
 
-    def __init__(self, path: Path | str, fallback: Path | str | None = None) -> None:
+    def __init__(self, path: Path | str, fallback: Path | None = None, noun: str = "line") -> None:
         self.path = Path(path)
         self._fallback = fallback
+        self._noun = noun
         self._pending: list[str] = []
         self._reason: OSError | None = None
 
     @property
     def pending(self) -> int:
-        """How many records wait in memory because they could not be written."""
+        """How many lines wait in memory because they could not be written."""
         return len(self._pending)
 
-    def append(self, record: Record) -> bool:
-        """Write a record; False when it has to wait in memory. Never raises OSError."""
-        line = record.to_json()
-        if len(line) >= LARGEST_LINE:  # no reader would take it
-            kept = {key: record.details[key] for key in ("log",) if key in record.details}
-            note = f"{len(line)} bytes, more than a record may have"
-            line = replace(record, details={**kept, "left_out": note}).to_json()
+    def append(self, line: str) -> bool:
+        """Write a line of ASCII; False when it has to wait in memory. Never raises OSError."""
         self._pending.append(line)
         return self._flush(self.path)
 
-    def close(self) -> CloseReport:
+    def close(self) -> Unwritten:
         """Try once more to write what waits, then elsewhere; may be called again."""
         if not self._pending or self._flush(self.path):
-            return CloseReport()
-        count = f"{len(self._pending)} record{'s' if len(self._pending) > 1 else ''}"
+            return Unwritten()
+        count = f"{len(self._pending)} {self._noun}{'s' if len(self._pending) > 1 else ''}"
         lost = f"{count} could not be written to {self.path} ({self._why()})"
-        folder = Path(self._fallback or tempfile.gettempdir())
-        fallback = folder / f"simbench-{os.getpid()}-{os.urandom(3).hex()}.jsonl"
+        folder = self._fallback or spare_folder()
+        fallback = folder / self.path.name
         if self._flush(fallback):
-            return CloseReport((f"{lost}; they are in {fallback}",), fallback)
+            return Unwritten((f"{lost}; they are in {fallback}",), fallback)
         unsaved, self._pending = tuple(self._pending), []
         problem = f"{lost} nor to {folder} ({self._why()}); they follow, one a line: save them"
-        return CloseReport((problem,), None, unsaved)
+        return Unwritten((problem,), None, unsaved)
 
     def _why(self) -> str:
         return str((self._reason and self._reason.strerror) or self._reason)
 
     def _flush(self, path: Path) -> bool:
-        """Write what waits to `path`; a record leaves the memory once it is on the disk."""
+        """Write what waits to `path`; a line leaves the memory once it is on the disk."""
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             is_new = not path.exists()
@@ -149,74 +153,56 @@ def _sync_folder(folder: Path) -> None:
             os.close(descriptor)
 
 
-DAMAGED = "the line is damaged and left out: "
-
-
 @dataclass(frozen=True)
-class Reading:
-    """What a record file held.
+class Found(Generic[T]):
+    """What a file held.
 
     Attributes:
-        records: those that count, in the order of the file, see `series.settled`.
+        items: in the order of the file.
         problems: damaged lines (a crash, a full disk, a power loss), one sentence each; they are
             left out.
-        refused: whole lines that are no records of ours, one sentence each.
-        every: also what does not count: earlier attempts, interrupted repetitions run again.
+        refused: whole lines that are none of ours, one sentence each.
     """
 
-    records: tuple[Record, ...] = ()
+    items: tuple[T, ...] = ()
     problems: tuple[str, ...] = ()
     refused: tuple[str, ...] = ()
-    every: tuple[Record, ...] = ()
 
 
-def read_records(path: Path | str) -> Reading:
-    """The records in a file, or in `records.jsonl` of a run folder.
+def read(path: Path, make: Callable[[dict[str, Any], str], T]) -> Found[T]:
+    """The lines of a file.
 
-    Damaged lines are left out, each with a problem.
-
-    Raises:
-        RecordError: there is no such file, a whole line is not a record, or every line is damaged.
-    """
-    found = scan(path)
-    if found.refused:
-        raise RecordError(found.refused[0])
-    if found.problems and not found.every:
-        raise RecordError(found.problems[0].replace(DAMAGED, ""))
-    return found
-
-
-def scan(path: Path | str) -> Reading:
-    """The same, with what is no record of ours told instead of raised.
+    Args:
+        path: of an ordinary file.
+        make: turns an object and its place, for messages, into an item, or raises ValueError.
 
     Raises:
-        RecordError: there is no such file.
+        UnreadableError: there is no such file.
     """
-    records: list[Record] = []
+    items: list[T] = []
     problems: list[str] = []
     refused: list[str] = []
-    for line in _lines(_file_of(Path(path))):
+    for line in _lines(path):
         if line.problem:
             problems.append(f"{line.where}: {DAMAGED}{line.problem}")
         for data in line.found:
             try:
-                records.append(Record.from_dict(data, line.where))
-            except RecordError as error:
+                items.append(make(data, line.where))
+            except ValueError as error:
                 refused.append(str(error))
-    return Reading(tuple(settled(records)), tuple(problems), tuple(refused), tuple(records))
+    return Found(tuple(items), tuple(problems), tuple(refused))
 
 
-def repair(path: Path | str) -> Path | None:
-    """Write a record file anew without its damaged lines; the old one stays beside it.
+def repair(path: Path) -> Path | None:
+    """Write a file anew without its damaged lines; the old one stays beside it.
 
     Returns:
         The copy of the damaged file; None when nothing is damaged.
 
     Raises:
-        RecordError: there is no such file.
+        UnreadableError: there is no such file.
         OSError: the folder cannot be written to.
     """
-    path = _file_of(Path(path))
     lines = list(_lines(path))
     if not any(line.problem for line in lines):
         return None
@@ -236,40 +222,20 @@ def repair(path: Path | str) -> Path | None:
     return kept
 
 
-def _file_of(path: Path) -> Path:
-    """The record file that a path means: itself, or the one of a run folder."""
-    try:
-        if path.is_dir():
-            path = inside(path, RECORDS_NAME)
-        mode = path.stat().st_mode
-        if not stat.S_ISREG(mode):
-            raise RecordError(f"cannot read records from {path}: it is no ordinary file")
-    except FolderError as error:
-        raise RecordError(f"cannot read records: {error}") from None
-    except OSError as error:
-        raise RecordError(_unreadable(path, error)) from None
-    return path
-
-
-def _unreadable(path: Path, error: OSError) -> str:
-    return (
-        f"cannot read records from {path} ({error.strerror}); give a run folder "
-        f"or its {RECORDS_NAME}"
-    )
-
-
 @dataclass(frozen=True)
 class _Line:
-    """A line of a record file: the JSON objects in it, and what is wrong with it if anything is."""
+    """A line of a file: the JSON objects in it, and what is wrong with it if anything is."""
 
     where: str
-    found: tuple[dict[str, object], ...] = ()
+    found: tuple[dict[str, Any], ...] = ()
     problem: str = ""
 
 
 def _lines(path: Path) -> Iterator[_Line]:
     """The lines that are not empty."""
     try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise UnreadableError(path, "it is no ordinary file")
         with path.open("rb") as file:
             number = 0
             while content := file.readline(LARGEST_LINE):
@@ -283,7 +249,7 @@ def _lines(path: Path) -> Iterator[_Line]:
                 elif content.strip():
                     yield _line(where, content)
     except OSError as error:
-        raise RecordError(_unreadable(path, error)) from None
+        raise UnreadableError(path, error.strerror or str(error)) from None
 
 
 def _line(where: str, content: bytes) -> _Line:
@@ -300,7 +266,7 @@ def _line(where: str, content: bytes) -> _Line:
         if isinstance(data, dict):
             found.append(data)
         else:
-            why = why or f"a record is a JSON object, not {type(data).__name__}"
+            why = why or f"a line is a JSON object, not {type(data).__name__}"
     return _Line(where, tuple(found), why)
 
 

@@ -6,19 +6,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
-from pytest_simbench.records.configuration import task_parameters
-from pytest_simbench.records.differences import differences
+from pytest_simbench.records.configuration import differences, other_meanings, task_parameters
+from pytest_simbench.records.description import Description
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import by_test, configurations
 
 
-class JoinError(ValueError):
+class MergeError(ValueError):
     """Runs that make no single one; the message says why."""
 
 
 @dataclass(frozen=True)
-class Joined:
-    """A record of the joined run.
+class Merged:
+    """A record of the merged run.
 
     Attributes:
         record: under its new number.
@@ -31,7 +31,7 @@ class Joined:
     was: Record
 
 
-def join(runs: Mapping[str, Sequence[Record]]) -> list[Joined]:
+def merge(runs: Mapping[str, Sequence[Record]]) -> list[Merged]:
     """The records of all runs as of one, by test and seed.
 
     Repetition k of the whole has the k-th seed from the smallest of its test, as in a straight run.
@@ -42,14 +42,14 @@ def join(runs: Mapping[str, Sequence[Record]]) -> list[Joined]:
         runs: records by the name of their run.
 
     Raises:
-        JoinError: a seed is there twice, or settings or versions differ.
+        MergeError: a seed is there twice, or settings or versions differ.
     """
     ended = [[r for r in run if r.status != "interrupted"] for run in runs.values()]
     tests: dict[str, dict[str, list[Record]]] = {}
     for name, groups in zip(runs, by_test(ended, apart=_task_parameters), strict=True):
         for test, found in groups.items():
             tests.setdefault(test, {})[name] = found
-    joined: list[Joined] = []
+    merged: list[Merged] = []
     for test, parts in tests.items():
         _check(test, parts)
         every = [(record, name) for name, run in parts.items() for record in run]
@@ -58,8 +58,32 @@ def join(runs: Mapping[str, Sequence[Record]]) -> list[Joined]:
         for record, name in sorted(every, key=lambda item: item[0].seed):
             number = record.seed - first + 1
             ours = replace(record, test=id_, repetition=number, attempt=1)
-            joined.append(Joined(ours, name, record))
-    return joined
+            merged.append(Merged(ours, name, record))
+    return merged
+
+
+def merge_tasks(runs: Mapping[str, Mapping[str, Description]]) -> dict[str, Description]:
+    """What the numbers of all runs mean.
+
+    Args:
+        runs: the descriptions of each run, by task, by the name of the run.
+
+    Raises:
+        MergeError: a metric means one thing in one run and another in another.
+    """
+    found: dict[str, Description] = {}
+    first: dict[str, str] = {}
+    for name, tasks in runs.items():
+        for task in tasks:
+            said = other_meanings({task: found.get(task, tasks[task])}, tasks, "merge")
+            if said:
+                raise MergeError(
+                    f"{first[task]} and {name} are not parts of one run: {'; '.join(said)} (the "
+                    f"first is {first[task]})"
+                )
+            first.setdefault(task, name)
+        found |= tasks
+    return found
 
 
 def _task_parameters(records: Sequence[Record]) -> list[list[Record]]:
@@ -75,16 +99,16 @@ def _check(test: str, parts: Mapping[str, Sequence[Record]]) -> None:
         groups = configurations(run)
         if len(groups) > 1:
             other = "; ".join(differences({test: (groups[0], groups[1])}, "merge"))
-            raise JoinError(f"{name} holds several configurations: {other}")
+            raise MergeError(f"{name} holds several configurations: {other}")
         twice = len(run) - len({record.seed for record in run})
         if twice:
-            raise JoinError(f"{name} has {twice} of its seeds of {test} twice")
+            raise MergeError(f"{name} has {twice} of its seeds of {test} twice")
     for (a, first), (b, second) in combinations(parts.items(), 2):
         shared = sorted({r.seed for r in first} & {r.seed for r in second})
         if shared:
             seeds = f"seed {shared[0]}" if len(shared) == 1 else f"{len(shared)} seeds"
             span = "" if len(shared) == 1 else f" ({shared[0]} to {shared[-1]})"
-            raise JoinError(
+            raise MergeError(
                 f"{a} and {b} overlap: both have {seeds}{span} of {test}; give each machine seeds "
                 "of its own with --sim-seed"
             )
@@ -92,6 +116,6 @@ def _check(test: str, parts: Mapping[str, Sequence[Record]]) -> None:
         known = [r for r in first if r.ok] or first, [r for r in second if r.ok] or second
         other_found = differences({test: known}, "merge")
         if other_found:
-            raise JoinError(
+            raise MergeError(
                 f"{a} and {b} are not parts of one run: {'; '.join(other_found)} (the first is {a})"
             )

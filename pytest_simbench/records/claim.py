@@ -1,0 +1,100 @@
+"""A claim on a run folder: never two runs in one."""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+
+from pytest_simbench.records.paths import FolderError
+
+PROBE = 64 * 1024
+"""Bytes that a folder must be able to take before a run begins: some twenty records."""
+
+
+class Claim:
+    """A folder that this process writes a run to; until `close` no other run may use it.
+
+    The claim is a lock on the folder itself: it ends with the process, however that ends. A file
+    system without locks (some network drives) gives none, and two runs could meet there.
+
+    Args:
+        folder: made if it is not there.
+        shared: one of several processes of one run (xdist's workers).
+
+    Raises:
+        FolderError: it cannot be written to, or another run is under way in it.
+    """
+
+    def __init__(self, folder: Path, *, shared: bool = False) -> None:
+        self.folder = folder
+        self._lock: int | None = None
+        self._made = not os.path.lexists(folder)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        except OSError as error:
+            raise FolderError(
+                f"the run folder {folder} cannot be made ({_reason(folder, error)}); give another "
+                "--sim-output"
+            ) from None
+        try:
+            self._take(shared)
+            if not shared:
+                _probe(folder)
+        except FolderError:
+            self.close()
+            raise
+
+    def _take(self, shared: bool) -> None:
+        assert self._lock is not None
+        kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
+        try:
+            fcntl.flock(self._lock, kind | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if not shared:  # else it is the controller of this run that holds it
+                raise FolderError(
+                    f"another run is under way in {self.folder}; wait for it, or give another "
+                    "--sim-output"
+                ) from None
+        except OSError as error:
+            if error.errno not in (errno.ENOTSUP, errno.ENOLCK, errno.EBADF, errno.EINVAL):
+                raise FolderError(
+                    f"the run folder {self.folder} cannot be locked ({error.strerror})"
+                ) from None
+
+    def close(self) -> None:
+        """Give it up; a folder made for nothing goes away."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+            if self._made:
+                with suppress(OSError):
+                    self.folder.rmdir()
+
+
+def _probe(folder: Path) -> None:
+    """Write some bytes, for space and permission."""
+    try:
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(bytes(PROBE))
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        raise FolderError(
+            f"the run folder {folder} cannot be written to ({error.strerror}); give another "
+            "--sim-output"
+        ) from None
+
+
+def _reason(folder: Path, error: OSError) -> str:
+    """What is in the way, by name."""
+    for path in (folder, *folder.parents):
+        if os.path.islink(path) and not os.path.exists(path):
+            return f"{path} is a link to nothing"
+        if os.path.exists(path):
+            return error.strerror or str(error) if path.is_dir() else f"{path} is a file"
+    return error.strerror or str(error)

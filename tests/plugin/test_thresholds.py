@@ -1,0 +1,90 @@
+"""`--sim-threshold`: its names and values are held against what the tests that ran measure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+TEST = """
+    import pytest
+    from tests.tiny import Falling
+
+    @pytest.mark.parametrize("name", ["landed"])
+    def test_falling(repeat, threshold, name):
+        repeat(Falling(duration=0.2)).assert_at_least(name, threshold(name, 0.0))
+
+    def test_other(threshold):
+        assert threshold("own_metric", 1.0) == 2.0
+"""
+
+
+def test_what_a_task_measures_and_what_a_test_asks_for_are_known(
+    pytester: pytest.Pytester,
+) -> None:
+    pytester.makepyfile(TEST)
+    for more in ([], ["-n2"]):
+        result = pytester.runpytest_subprocess(
+            "--sim=mujoco", "--reps=5", "--sim-threshold=landed=0.9,own_metric=2", *more
+        )
+        result.assert_outcomes(passed=1, failed=1)  # nothing has landed so soon
+        assert result.ret == pytest.ExitCode.TESTS_FAILED
+        result.stdout.fnmatch_lines(["*landed is 0 % on average*which is below 90 %"])
+
+
+@pytest.mark.parametrize("arguments", [[], ["-n2"]], ids=["plain", "xdist"])
+def test_a_name_that_no_test_knows_is_told_at_the_end(
+    pytester: pytest.Pytester, arguments: list[str]
+) -> None:
+    pytester.makepyfile(TEST.replace("== 2.0", "== 1.0"))
+    arguments = ["--sim=mujoco", "--reps=1", "--sim-threshold=landet=1", *arguments]
+    result = pytester.runpytest_subprocess(*arguments)
+    result.assert_outcomes(passed=2)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stdout.fnmatch_lines(
+        [
+            "ERROR: --sim-threshold=landet=1: no metric is named 'landet'; did you mean 'landed'? "
+            "valid names: *failures, *landed, *own_metric*",
+        ]
+    )
+    assert result.stdout.str().count("no metric is named") == 1
+    assert "Traceback" not in result.stdout.str() + result.stderr.str()
+
+
+def test_tests_that_did_not_run_may_know_a_name(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        """
+        from tests.tiny import Falling
+
+        def test_falling(repeat):
+            repeat(Falling(duration=0.2)).assert_at_most("landed", -1)
+
+        def test_other(threshold):
+            assert threshold("own_metric", 1.0) == 2.0
+        """
+    )
+    result = pytester.runpytest_subprocess(
+        "--sim=mujoco", "--reps=1", "-x", "--sim-threshold=own_metric=2"
+    )
+    result.assert_outcomes(failed=1)
+    assert "no metric is named" not in result.stdout.str()
+
+
+@pytest.mark.parametrize(
+    ("threshold", "message"),
+    [
+        ("landed=90", "landed is a share, so its threshold lies between 0 and 1, not at 90; did *"),
+        ("landed=0", "landed is always at least 0, so that this threshold can never fail"),
+    ],
+)
+def test_a_value_that_can_never_fail_is_told_before_a_repetition_runs(
+    pytester: pytest.Pytester, threshold: str, message: str
+) -> None:
+    pytester.makepyfile(TEST)
+    result = pytester.runpytest_subprocess(
+        "--sim=mujoco", "--sim-output=o", f"--sim-threshold={threshold}", "-k", "falling"
+    )
+    result.assert_outcomes(failed=1, deselected=1)
+    result.stdout.fnmatch_lines([f"--sim-threshold={threshold}: {message}"])
+    assert not Path(pytester.path, "o", "records.jsonl").exists()
+    assert "Traceback" not in result.stdout.str() + result.stderr.str()

@@ -1,0 +1,52 @@
+"""Paths of a run folder: nothing leads out of it, no file is half written."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from pytest_simbench.records.paths import FolderError, inside, new_name, write_whole
+
+
+def test_runs_of_one_second_have_different_folders(tmp_path: Path) -> None:
+    names = [new_name(tmp_path).name for _ in range(500)]
+    assert len(set(names)) == 500
+    assert all(name[:10].count("-") == 2 for name in names)
+
+
+@pytest.mark.parametrize(
+    "name", ["../victim", "/etc/passwd", "a/../../victim", "out", "through/victim", "", ".", "a\0b"]
+)
+def test_nothing_leads_out_of_a_folder(tmp_path: Path, name: str) -> None:
+    run = tmp_path / "run"
+    run.mkdir()
+    (tmp_path / "victim").touch()
+    (run / "out").symlink_to(tmp_path / "victim")
+    (run / "through").symlink_to(tmp_path)
+    with pytest.raises(FolderError):
+        inside(run, name)
+
+
+def test_what_lies_inside_is_found_also_where_the_folder_is_a_link(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    (run / "logs").mkdir(parents=True)
+    (run / "logs" / "a.log").touch()
+    (tmp_path / "link").symlink_to(run)
+    for folder in (run, tmp_path / "link"):
+        assert inside(folder, "logs/a.log").is_file()
+        assert not inside(folder, "logs/missing.log").exists()
+
+
+def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    path = tmp_path / "report.md"
+    path.symlink_to(tmp_path / "victim")
+    write_whole(path, b"new")
+    assert path.read_bytes() == b"new"
+    assert not (tmp_path / "victim").exists()
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(OSError, match="directory"):
+        write_whole(tmp_path / "folder", b"new")
+    assert {p.name for p in tmp_path.iterdir()} == {"report.md", "folder"}
+    assert os.path.isdir(tmp_path / "folder")
