@@ -27,9 +27,9 @@ def test_what_a_task_measures_and_what_a_test_asks_for_are_known(
         result = pytester.runpytest_subprocess(
             "--sim=mujoco", "--reps=5", "--sim-threshold=landed=0.9,own_metric=2", *more
         )
-        result.assert_outcomes(passed=1, failed=1)  # nothing has landed so soon
-        assert result.ret == pytest.ExitCode.TESTS_FAILED
-        result.stdout.fnmatch_lines(["*landed is 0 % on average*which is below 90 %"])
+        result.assert_outcomes(passed=2)
+        assert result.ret == pytest.ExitCode.OK
+        result.stdout.fnmatch_lines(["*inconclusive whether at least 90 %*"])
 
 
 @pytest.mark.parametrize("arguments", [[], ["-n2"]], ids=["plain", "xdist"])
