@@ -1,5 +1,5 @@
-"""What must be equal: the one table of what records share when they are pooled, resumed, merged or
-compared, each line with its reason.
+"""What must be equal: the one table of what records share when they are pooled, ranked, resumed,
+merged or compared, each line with its reason; and in what two runs differ, as sentences.
 
 A score is the score of a configuration. Two repetitions belong to one configuration when nothing
 differs of what this table says of *pool*. Every field of a record has its line, so that a new field
@@ -16,9 +16,10 @@ from typing import Any, Literal, NamedTuple
 from pytest_simbench.records.description import Description
 from pytest_simbench.records.record import Record, plain
 
-Use = Literal["pool", "resume", "merge", "compare"]
-"""`pool`: in one row of a table. `resume`: in a run that is gone on with. `merge`: in runs that are
-joined. `compare`: named before a comparison with a baseline."""
+Use = Literal["twin", "pool", "rank", "resume", "merge", "compare"]
+"""`twin`: of two records of one configuration of which the later one counts. `pool`: in one row of
+a table. `rank`: in two rows of which one may beat the other. `resume`: in a run that is gone on
+with. `merge`: in runs that are merged. `compare`: named before a comparison with a baseline."""
 
 
 @dataclass(frozen=True)
@@ -44,16 +45,25 @@ EVERYWHERE = "pool resume merge compare"
 
 PARTS: tuple[Part, ...] = (
     # What is repeated: records are found by these, so they never differ within a group.
-    _part("test", "", "tells groups apart; joined runs may have it under another path"),
-    _part("task", "", "tells groups apart"),
-    _part("simulator", "", "tells groups apart"),
-    _part("mode", "", "tells groups apart; headless and GUI are compared by a test of their own"),
+    _part("test", "twin", "tells groups apart; merged runs may have it under another path"),
+    _part("task", "twin", "tells groups apart"),
+    _part("simulator", "twin", "tells groups apart; simulators are what is ranked"),
+    _part("mode", "twin rank", "tells groups apart; modes are compared by a test of their own"),
     # The configuration.
-    _part("profile", EVERYWHERE, "names the settings"),
-    _part("settings", EVERYWHERE, "another time step or another tower is another experiment"),
-    _part("protocol", EVERYWHERE, "real time and smoke versions measure something else"),
-    _part("jitter", EVERYWHERE, "a larger disturbance is a harder task"),
-    _part("scene", EVERYWHERE, "a task whose code changed builds another world by the same name"),
+    _part("profile", f"{EVERYWHERE} rank", "names the settings"),
+    _part(
+        "settings",
+        f"{EVERYWHERE} rank",
+        "another time step or another tower is another experiment; simulators that are ranked "
+        "share the task's parameters alone",
+    ),
+    _part("protocol", f"{EVERYWHERE} rank", "real time and smoke versions measure something else"),
+    _part("jitter", f"{EVERYWHERE} rank", "a larger disturbance is a harder task"),
+    _part(
+        "scene",
+        f"{EVERYWHERE} rank",
+        "a task whose code changed builds another world by the same name",
+    ),
     _part("limits", EVERYWHERE, "a time-out decides which repetitions fail"),
     _part("versions", EVERYWHERE, "another engine, adapter or Python is another simulator"),
     # What the engine told of it.
@@ -68,8 +78,8 @@ PARTS: tuple[Part, ...] = (
     _part("contended", "compare", "a note under the table; a comparison of times says so"),
     _part("reused_worker", "compare", "the first of a worker's repetitions is never a reused one"),
     # Which repetition it is.
-    _part("repetition", "", "numbers the seeds of a run"),
-    _part("seed", "", "pairs repetitions; the first seed must be the same in a run resumed"),
+    _part("repetition", "twin", "numbers the seeds of a run"),
+    _part("seed", "twin", "pairs repetitions; the first seed must be the same in a run resumed"),
     _part("attempt", "", "the last of several attempts counts"),
     # Results.
     *(
@@ -117,6 +127,7 @@ def values(record: Record, use: Use) -> dict[str, Any]:
         for name in equal_to(use)
         for key, value in _flat(name, getattr(record, name))
         if not (name in NEW and value == "")
+        and not (use == "rank" and name == "settings" and not key.startswith(f"settings.{TASK}"))
     }
 
 

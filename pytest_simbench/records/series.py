@@ -6,14 +6,16 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 from pytest_simbench.records.configuration import (
-    TASK,
     Told,
     Use,
     agree,
+    equal_to,
     text,
     values,
 )
 from pytest_simbench.records.record import Record
+
+TWIN = equal_to("twin")
 
 
 def settled(records: Iterable[Record]) -> list[Record]:
@@ -25,14 +27,7 @@ def settled(records: Iterable[Record]) -> list[Record]:
     found: list[Record] = []
     places: dict[tuple[object, ...], list[int]] = {}
     for record in records:
-        key = (
-            record.test,
-            record.task,
-            record.simulator,
-            record.mode,
-            record.repetition,
-            record.seed,
-        )
+        key = tuple(getattr(record, name) for name in TWIN)
         twins = places.setdefault(key, [])
         for place in twins:
             if agree(found[place], record):
@@ -151,19 +146,12 @@ def _shown(value: object) -> str:
     return value if isinstance(value, str) else text(value)
 
 
-CONDITIONS = ("protocol", "jitter", "scene", f"settings.{TASK}")
-"""What a task demands, beginnings of keys: the settings of two simulators always differ."""
-
-
 def comparable(a: Series, b: Series) -> bool:
     """Whether one row may be said to beat the other: the same was asked of both."""
-    if a.subject[1:3] != b.subject[1:3]:
-        return False
     if a.label != b.label and a.subject[3:] != b.subject[3:]:
         return False
     first, second = (
-        {k: text(v) for k, v in told(row.records).items() if k.startswith(CONDITIONS)}
-        for row in (a, b)
+        {key: text(value) for key, value in told(row.records, "rank").items()} for row in (a, b)
     )
     return all(second.get(key, value) == value for key, value in first.items())
 

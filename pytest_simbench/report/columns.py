@@ -173,9 +173,16 @@ def title(summary: TaskSummary) -> str:
     return f"{summary.task}: {many} repetition{plural}{each}, protocol {summary.protocol}"
 
 
+UNDESCRIBED = (
+    "the run does not say what its metrics mean (an older pytest-simbench wrote it, or its tasks."
+    "jsonl is lost), so they are shown as plain numbers: no unit, and neither better nor worse"
+)
+
+
 def notes(summary: TaskSummary) -> list[str]:
-    """What a reader must know of single rows."""
-    return [f"{row.label}: {text}" for row in summary.rows for text in row.notes]
+    """What a reader must know of the metrics, and of single rows."""
+    found = [] if summary.described else [f"{summary.task}: {UNDESCRIBED}"]
+    return found + [f"{row.label}: {text}" for row in summary.rows for text in row.notes]
 
 
 def deviations(summaries: Sequence[TaskSummary]) -> list[tuple[str, str]]:

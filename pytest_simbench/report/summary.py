@@ -111,6 +111,7 @@ class TaskSummary:
         protocol: the protocol of its records; several are joined by commas.
         wins: which row beats which at what, by the rows' places; from `matrix.with_wins`.
         modes: whether headless and GUI agree, in sentences; from there too.
+        described: whether the run says what the metrics mean; else they are plain numbers.
     """
 
     task: str
@@ -120,6 +121,7 @@ class TaskSummary:
     protocol: str = ""
     wins: tuple[Win, ...] = ()
     modes: tuple[str, ...] = ()
+    described: bool = True
 
     @property
     def study(self) -> tuple[Metric, ...]:
@@ -152,11 +154,12 @@ def summarise(
         by_task.setdefault(record.task, []).append(record)
     summaries = []
     for task, found in by_task.items():
-        declared = tuple(metrics.get(task) or _undeclared(found))
+        declared = tuple(metrics[task] if task in metrics else _undeclared(found))
         rows = tuple(_row(r.records, declared, r.label, ends) for r in series(found))
         protocols = ", ".join(sorted({record.protocol for record in found}))
+        known = dict((references or {}).get(task, {}))
         summaries.append(
-            TaskSummary(task, declared, rows, dict((references or {}).get(task, {})), protocols)
+            TaskSummary(task, declared, rows, known, protocols, described=task in metrics)
         )
     return summaries
 

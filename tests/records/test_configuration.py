@@ -7,14 +7,30 @@ from typing import Any, get_args
 
 import pytest
 
-from pytest_simbench.records.configuration import PARTS, Use, agree, equal_to
+from pytest_simbench.records.configuration import (
+    MEANING,
+    PARTS,
+    Use,
+    agree,
+    differences,
+    equal_to,
+    other_meanings,
+)
+from pytest_simbench.records.description import Description
 from pytest_simbench.records.record import Record
+from pytest_simbench.tasks.metrics import Metric
 
 from .build import failed, record
 
 ANOTHER: dict[str, Any] = {
+    "test": "test_other[engine-headless]",
+    "task": "throwing",
+    "simulator": "other",
+    "mode": "gui",
+    "repetition": 7,
+    "seed": 77,
     "profile": "default",
-    "settings": {"timestep": 0.004},
+    "settings": {"timestep": 0.004, "task.towers": 4},
     "protocol": "paper",
     "jitter": 50.0,
     "scene": "another",
@@ -50,7 +66,40 @@ def test_a_configuration_is_equal_for_pooling_resuming_and_merging() -> None:
     configuration = {"profile", "settings", "protocol", "jitter", "scene", "limits", "versions"}
     assert set(equal_to("pool")) == set(equal_to("resume")) == configuration
     assert set(equal_to("merge")) == {*configuration, "deviations"}
-    assert set(equal_to("compare")) == set(ANOTHER)
+    circumstances = {"deviations", "host", "contended", "reused_worker"}
+    assert set(equal_to("compare")) == {*configuration, *circumstances}
+
+
+def test_simulators_are_ranked_where_the_same_was_asked_of_them() -> None:
+    ranked = {"mode", "profile", "settings", "protocol", "jitter", "scene"}
+    assert set(equal_to("rank")) == ranked
+    other = whole(simulator="b", versions={"b": "1"}, settings={"substeps": 4, "task.towers": 3})
+    ours = whole(settings={"timestep": 0.004, "task.towers": 3})
+    assert agree(ours, other, "rank")
+    assert not agree(ours, replace(other, settings={"task.towers": 4}), "rank")
+
+
+def test_every_field_of_a_metric_has_its_line_and_reason() -> None:
+    assert sorted(part.name for part in MEANING) == sorted(f.name for f in fields(Metric))
+    assert all(part.reason for part in MEANING)
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"unit": "mm"}, 'unit of the metric x of t was "m", is "mm"'),
+        ({"kind": "yes_no"}, 'kind of the metric x of t was "value", is "yes_no"'),
+        ({"better": None}, 'better of the metric x of t was "higher", is null'),
+        ({"title": "y"}, None),
+        ({"doc": "y"}, None),
+    ],
+)
+def test_other_meanings_are_named(change: dict[str, Any], named: str | None) -> None:
+    metric = Metric("x", "x", "m")
+    before = {"t": Description("t", (metric, Metric("gone", "gone")))}
+    now = {"t": Description("t", (replace(metric, **change),)), "new": Description("new")}
+    for use in ("resume", "merge", "compare"):
+        assert other_meanings(before, now, use) == ([named] if named else [])  # type: ignore[arg-type]
 
 
 def test_results_and_circumstances_are_no_configuration() -> None:
@@ -91,3 +140,36 @@ def test_a_failure_that_knows_its_settings_agrees_with_no_others() -> None:
         ({}, True),
     ):
         assert agree(ok, replace(dead, settings=settings)) is fits
+
+
+def test_equal_runs_differ_in_nothing() -> None:
+    assert differences({"t": ([record(0), record(1)], [record(5)])}) == []
+
+
+def test_settings_versions_machines_and_profile_are_named() -> None:
+    now = record(
+        0,
+        profile="default",
+        settings={"timestep": 0.004, "solver": {"iterations": 50}},
+        versions={"engine": "1.1"},
+        host={"cpu": "other", "cores": 2},
+    )
+    assert differences({"stack": ([record(0)], [now])}) == [
+        'profile was "tuned", is "default" (stack)',
+        "settings.timestep was 0.002, is 0.004 (stack)",
+        'versions.engine was "1.0", is "1.1" (stack)',
+        'host.cpu was "some", is "other" (stack)',
+        "settings.solver.iterations was absent, is 50 (stack)",
+    ]
+
+
+def test_a_difference_of_every_test_is_said_once() -> None:
+    old, new = [record(0)], [record(0, contended=True)]
+    found = differences({"a": (old, new), "b": (old, new), "c": (old, new)})
+    assert found == ["contended was false, is true (every test)"]
+    assert differences({"a": (old, new), "b": (old, old)})[0].endswith("(a)")
+
+
+def test_a_run_that_is_not_the_same_throughout_shows_all_its_values() -> None:
+    mixed = [record(0), record(1, jitter=1.0)]
+    assert differences({"t": (mixed, [record(0)])}) == ["jitter was 0.0 or 1.0, is 0.0 (t)"]

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from pytest_simbench.records.folder import RECORDS, RunFolder
+from pytest_simbench.records.description import Description, Threshold
+from pytest_simbench.records.folder import RECORDS, TASKS, THRESHOLDS, RunFolder
 from pytest_simbench.records.lines import LARGEST_LINE
+from pytest_simbench.records.paths import FolderError
 from pytest_simbench.records.record import RecordError
+from pytest_simbench.tasks.metrics import Metric
 
 from .build import failed, record
 
@@ -167,3 +171,120 @@ def test_a_text_that_no_file_takes_can_be_written_again(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace("? x", "\\udfff x"))
     (found,) = RunFolder.of(path).read().records
     assert found.details["note"].encode("utf-8") == b"? x"
+
+
+CAUGHT = Metric("caught", "caught", kind="share", of=7)
+SPILL = Metric("spill", "spilt", "ml", better="lower")
+POURING = Description("pouring", (CAUGHT, SPILL), {"spill": 0.1})
+
+
+def folder_with(path: Path, *tasks: Description) -> RunFolder:
+    folder = RunFolder(path)
+    folder.append(record(1, task="pouring", metrics={"caught": 0.5}))
+    for task in tasks:
+        folder.describe(task)
+    return RunFolder(path)
+
+
+def test_what_numbers_mean_is_read_back_and_written_once(tmp_path: Path) -> None:
+    folder = folder_with(tmp_path, POURING, POURING)
+    folder.describe(POURING)
+    assert len((tmp_path / TASKS).read_text().splitlines()) == 1
+    found = folder.read()
+    assert found.tasks == {"pouring": POURING}
+    assert found.metrics == {"pouring": (CAUGHT, SPILL)}
+    assert found.references == {"pouring": {"spill": 0.1}}
+    assert RunFolder.of(tmp_path / RECORDS).read().tasks == found.tasks
+
+
+def test_the_last_line_of_a_task_holds(tmp_path: Path) -> None:
+    other = Description("pouring", (CAUGHT,))
+    assert folder_with(tmp_path, POURING, other).read().tasks == {"pouring": other}
+    assert folder_with(tmp_path, POURING).read().tasks == {"pouring": POURING}
+
+
+def test_thresholds_are_read_back_each_once(tmp_path: Path) -> None:
+    folder = folder_with(tmp_path)
+    asked = [Threshold("t", "caught", 0.9), Threshold("u", "spill", 3.0)]
+    for threshold in [*asked, *asked]:
+        folder.ask(threshold)
+    assert RunFolder(tmp_path).read().thresholds == tuple(asked)
+    assert len((tmp_path / THRESHOLDS).read_text().splitlines()) == 2
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        (b'{"schema": 1, "task": "po', "the line is damaged and left out: not JSON"),
+        (b"\0\0\0", "the line is damaged and left out: it holds NUL bytes"),
+        (b'{"task": 3, "metrics": []}', "'task' must be str, not int"),
+        (b'{"task": "pouring", "metrics": 1}', "'metrics' must be list, not int"),
+        (b'{"schema": 9}', "schema 9 was written by a newer pytest-simbench"),
+    ],
+)
+def test_a_bad_description_is_told_and_takes_nothing_with_it(
+    tmp_path: Path, line: bytes, message: str
+) -> None:
+    folder_with(tmp_path, POURING)
+    with (tmp_path / TASKS).open("ab") as file:
+        file.write(line)
+    other = Description("baking")
+    folder_with(tmp_path, other)
+    found = RunFolder(tmp_path).read()
+    assert found.tasks == {"pouring": POURING, "baking": other}
+    (problem,) = found.problems
+    assert problem.startswith(f"{tmp_path / TASKS}:2: {message}")
+    assert found.records
+
+
+@pytest.mark.parametrize("kind", ["fifo", "folder", "link out"])
+def test_descriptions_are_an_ordinary_file_in_the_folder(tmp_path: Path, kind: str) -> None:
+    run = tmp_path / "run"
+    folder_with(run)
+    (tmp_path / "other").write_text(json.dumps(POURING.to_dict()) + "\n")
+    path = run / TASKS
+    if kind == "fifo":
+        os.mkfifo(path)
+    elif kind == "folder":
+        path.mkdir()
+    else:
+        path.symlink_to(tmp_path / "other")
+    found = RunFolder(run).read()
+    assert found.tasks == {}
+    (problem,) = found.problems
+    assert "no ordinary file" in problem or "leads out of its folder" in problem
+
+
+def test_a_lost_folder_is_read_from_memory(tmp_path: Path) -> None:
+    """What the disk does not take stays in the process, and goes where a run can be read again."""
+    (tmp_path / "run").touch()  # a file where the folder should be
+    folder = RunFolder(tmp_path / "run")
+    folder.append(record(1, task="pouring"))
+    folder.describe(POURING)
+    found = folder.scan()
+    assert [r.repetition for r in found.records] == [1]
+    assert found.tasks == {"pouring": POURING}
+    told = folder.close()
+    assert len(told) == 2
+    (spare,) = {Path(text.rpartition(" ")[2]).parent for text in told}
+    again = RunFolder(spare).read()
+    assert (again.records, again.tasks) == (found.records, found.tasks)
+    shutil.rmtree(spare)
+
+
+def test_records_of_another_process_are_not_counted_twice(tmp_path: Path) -> None:
+    folder = folder_with(tmp_path)
+    folder.take_over([record(1, task="pouring", metrics={"caught": 0.5}), record(2)])
+    assert [r.repetition for r in folder.read().records] == [1, 2]
+
+
+def test_a_claimed_folder_is_given_up(tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path / "run")
+    folder.claim()
+    folder.claim()  # once is enough
+    assert folder.claimed
+    with pytest.raises(FolderError, match="another run is under way"):
+        RunFolder(tmp_path / "run").claim()
+    assert folder.close() == ()
+    assert not folder.claimed
+    assert not (tmp_path / "run").exists()

@@ -1,0 +1,210 @@
+"""A task of another package keeps its meaning where that package is gone: the folder tells it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+PACKAGE = '''
+    """Pours seven drops: what only this package says of its numbers."""
+
+    import os
+    from dataclasses import dataclass
+    from typing import ClassVar
+
+    from pytest_simbench.scene import Pose, Scene
+    from pytest_simbench.tasks.base import Outcome, Task, cube
+    from pytest_simbench.tasks.metrics import Metric
+
+    @dataclass(frozen=True)
+    class Pouring(Task):
+        name: ClassVar[str] = "pouring"
+        study_timeout: ClassVar[float] = 60.0
+        references: ClassVar[dict] = {"spill": 0.125}
+
+        @property
+        def metrics(self):
+            return (
+                Metric("caught", "caught drops", kind="share", of=7, study=True),
+                Metric("spill", "spilt volume", os.environ.get("UNIT", "ml"), better="lower",
+                       resolution=0.01),
+                Metric("left", "way to the left", "m", better=None),
+            )
+
+        def scene(self, seed, jitter):
+            return Scene("pouring", (cube("glass", Pose.at(0.0, 0.0, 0.1), (1, 1, 1, 1)),))
+
+        def perform(self, world, seed, count):
+            world.mark("start")
+            world.wait(0.01)
+            world.mark("end")
+            spill = 2.5 + seed % 3 + float(os.environ.get("MORE", "0"))
+            return Outcome({"caught": (5 + seed % 3) / 7, "spill": spill, "left": seed / 1e4})
+'''
+TEST = """
+    from pouring import Pouring
+
+    def test_pouring(repeat):
+        repeat(Pouring()).assert_at_least("caught", 0.1)
+"""
+OTHER = """
+    from tests.tiny import Falling
+
+    def test_falling(repeat):
+        repeat(Falling(duration=0.01))
+"""
+
+
+def run(pytester: pytest.Pytester, *arguments: str, ret: int = 0) -> pytest.RunResult:
+    result = pytester.runpytest_subprocess("--sim=mujoco", "-p", "no:cacheprovider", *arguments)
+    assert "Traceback" not in result.stdout.str() + result.stderr.str()
+    assert result.ret == ret, result.stdout.str() + result.stderr.str()
+    return result
+
+
+@pytest.fixture
+def package(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("COLUMNS", "160")  # no table is cut
+    monkeypatch.syspath_prepend(pytester.path)
+    pytester.makepyfile(pouring=PACKAGE, test_it=TEST)
+    return pytester.path / "pouring.py"
+
+
+def report(folder: Path) -> dict[str, bytes]:
+    """The files of a report, taken out of its folder."""
+    found = {path.name: path.read_bytes() for path in folder.glob("report.*")}
+    for path in [*folder.glob("report.*"), *folder.glob("*.png")]:
+        path.unlink()
+    return found
+
+
+def told(text: str) -> None:
+    """Heading, unit, share in percent, interval and reference are there."""
+    assert "pouring: 9 repetitions, protocol fast" in text
+    assert "| caught drops % |" in text
+    assert "71 / 86 / 100 [77, 95]" in text
+    assert "| simulator | spilt volume ml | way to the left m |" in text
+    assert "| reference | 0.13 |  |" in text
+    assert "| 3.5 [2.8, 4.2] |" in text
+    assert "does not say" not in text
+
+
+def test_where_the_package_is_gone(
+    pytester: pytest.Pytester, package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run(pytester, "--reps=6", "--sim-output=a", "--benchmark-json=a.json").assert_outcomes(passed=1)
+    run(pytester, "--reps=3", "--sim-seed=2028", "--sim-output=b", "-n2").assert_outcomes(passed=1)
+    straight = report(Path("a"))
+    assert set(straight) == {"report.md", "report.csv"}
+    for path in (package, pytester.path / "test_it.py"):
+        path.unlink()
+    monkeypatch.setenv("PYTHONPATH", "")
+    elsewhere = pytester.mkdir("elsewhere")
+    for name in ("a", "b", "a.json"):
+        shutil.move(name, elsewhere / name)
+    monkeypatch.chdir(elsewhere)
+
+    shown = run(pytester, "--sim-report", "a").stdout.str()
+    assert "spilt volume ml" in shown
+    assert report(Path("a")) == straight
+
+    run(pytester, "--sim-merge", "b", "a", "--sim-output=whole").stdout.fnmatch_lines(
+        ["*caught drops %*", "*spilt volume ml*", "reference*0.13*"]
+    )
+    whole = report(Path("whole"))
+    told(whole["report.md"].decode())
+    before = sorted(path for path in Path(".").rglob("*") if path.is_file())
+    both = run(pytester, "--sim-report", "a", "b")  # nowhere to write
+    assert sorted(path for path in Path(".").rglob("*") if path.is_file()) == before
+    both.stdout.fnmatch_lines(["pouring: 9 repetitions*", "*spilt volume ml*", "reference*0.13*"])
+    run(pytester, "--sim-report", "a", "b", "--sim-output=both")
+    told(report(Path("both"))["report.md"].decode())
+
+    # Limits are known by name, unit and direction before anything has run.
+    for baseline in ("a", "a.json"):
+        limit = ["--sim-baseline", baseline, "--sim-compare-fail"]
+        for text, message in (
+            ("spil:1", "no metric is named 'spil'; did you mean 'spill'? valid *"),
+            ("left:1", "left can be neither better nor worse, so it has no limit; valid *"),
+            ("caught:5", "caught:5 can never be exceeded: caught lies between 0 and 100 %; *"),
+        ):
+            result = run(pytester, *limit, text, ret=pytest.ExitCode.USAGE_ERROR)
+            result.stderr.fnmatch_lines([f"ERROR: --sim-compare-fail: {message}"])
+
+
+def test_the_gate_and_a_resumed_run_know_it_too(
+    pytester: pytest.Pytester, package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run(pytester, "--reps=6", "--sim-output=a", "--benchmark-json=a.json").assert_outcomes(passed=1)
+    monkeypatch.setenv("MORE", "5")
+    result = run(pytester, "--reps=6", "--sim-baseline=a.json", "--sim-compare-fail=spill:1", ret=1)
+    result.stdout.fnmatch_lines(
+        [
+            "FAILED test_pouring[[]mujoco-headless[]]: spill rose from 3.5 ml to 8.5 ml (worse by "
+            "5 ml, limit 1 ml; p = *, 6 pairs)"
+        ]
+    )
+    monkeypatch.delenv("MORE")
+    # What a metric means is part of the configuration.
+    monkeypatch.setenv("UNIT", "l")
+    result = run(pytester, "--reps=6", "--sim-resume=a", ret=1)
+    message = 'unit of the metric spill of pouring was "ml", is "l"'
+    result.stdout.fnmatch_lines([f"test_pouring*would not be comparable: {message}"])
+    assert len(Path("a/tasks.jsonl").read_text().splitlines()) == 1
+    run(pytester, "--reps=1", "--sim-output=litres", "--sim-seed=3000")
+    result = run(pytester, "--sim-merge", "a", "litres", ret=pytest.ExitCode.USAGE_ERROR)
+    result.stderr.fnmatch_lines([f"ERROR: --sim-merge: a and litres are not*: {message} (*is a)"])
+    result = run(pytester, "--reps=1", "--sim-baseline=a")
+    result.stdout.fnmatch_lines(["different in the baseline*", f"*{message}*"])
+    monkeypatch.delenv("UNIT")
+    # Nothing is missing: judged and shown again, nothing is run or written twice.
+    lines = {name: Path("a", name).read_bytes() for name in ("records.jsonl", "tasks.jsonl")}
+    straight = Path("a/report.md").read_bytes()
+    run(pytester, "--reps=6", "--sim-resume=a").assert_outcomes(passed=1)
+    assert {name: Path("a", name).read_bytes() for name in lines} == lines
+    assert Path("a/report.md").read_bytes() == straight
+
+
+def test_a_run_of_before_is_shown_with_a_note(pytester: pytest.Pytester, package: Path) -> None:
+    run(pytester, "--reps=5", "--sim-output=a", "--benchmark-json=a.json")
+    Path("a/tasks.jsonl").unlink()
+    saved = json.loads(Path("a.json").read_text())
+    for benchmark in saved["benchmarks"]:
+        assert benchmark["extra_info"]["simbench"].pop("tasks")
+    Path("a.json").write_text(json.dumps(saved))
+    result = run(pytester, "--sim-report", "a")
+    result.stdout.fnmatch_lines(["*note: pouring: the run does not say what its metrics mean (*"])
+    for baseline in ("a", "a.json"):  # the run that is compared with it knows
+        result = run(
+            pytester, "--reps=5", f"--sim-baseline={baseline}", "--sim-compare-fail=spill:1"
+        )
+        result.stdout.fnmatch_lines(["*spill*3.3 ml*3.3 ml*passed, limit 1 ml*"])
+    package.unlink()
+    run(pytester, "--sim-merge", "a", "--sim-output=whole")
+    assert "does not say what its metrics mean" in Path("whole/report.md").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["none"], "--sim-report none: cannot read records from *none*No such file*"),
+        (["empty"], "--sim-report empty: it holds no repetition"),
+        (["bad"], "--sim-report bad: *bad/records.jsonl:1: not JSON*"),
+        (["a", "./a"], "--sim-report ./a: the run is given twice"),
+        (["a", "b"], "--sim-report: a and b overlap: both have seed 2022 of *"),
+        (["a", "--sim-output=b"], "--sim-report: *b holds another run; give another --sim-output"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_bad_input_is_one_sentence(
+    pytester: pytest.Pytester, request: pytest.FixtureRequest, arguments: list[str], message: str
+) -> None:
+    real = Path(request.config.rootpath, "tests/measure/stacking_records.jsonl")
+    first = real.read_text().splitlines()[0] + "\n"
+    for name, text in (("a", first), ("b", first), ("bad", "no record\n"), ("empty", "")):
+        pytester.mkdir(name).joinpath("records.jsonl").write_text(text)
+    result = run(pytester, "--sim-report", *arguments, ret=pytest.ExitCode.USAGE_ERROR)
+    result.stderr.fnmatch_lines([f"ERROR: {message}"])
