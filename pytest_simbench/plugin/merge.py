@@ -120,26 +120,41 @@ def report_runs(config: pytest.Config) -> int:
         pytest.UsageError: a run that cannot be read, or runs that are not parts of one.
     """
     from pytest_simbench.report.files import Written, in_order, summaries_of, write_files
+    from pytest_simbench.report.repeatability import render_terminal, write_tables
 
     runs = Runs.named(config, "sim_report")
+    target = _target(config, list(runs.folders.values()))
     (first, folder), *others = runs.folders.items()
     whole = runs.merged("--sim-report")[1] if others else runs.readings[first]
-    if not whole.records:
-        raise pytest.UsageError(f"--sim-report {first}: it holds no repetition")
-    given = options.value(config, "sim_output") if options.given(config, "sim_output") else None
-    target = None if others else folder.path
-    if given:
-        target = Path(config.invocation_params.dir, given)
-        if RunFolder(target).holds_run and target.resolve() != folder.path.resolve():
-            raise pytest.UsageError(
-                f"--sim-report: {target} holds another run; give another --sim-output"
-            )
-    summaries = summaries_of(whole)
-    written = Written()
-    if target is not None:
+    summaries, written = summaries_of(whole), Written()
+    if whole.records and target is not None:
         written = write_files(target, summaries, in_order(whole.records))
-    _print(summaries, [*runs.problems, *written.problems], target if written.complete else None)
+    tables, problems = ([], []) if others else write_tables(folder.path, target)
+    if not (whole.records or tables or problems):
+        raise pytest.UsageError(f"--sim-report {first}: it holds no repetition")
+    shown = target if written.complete else None
+    _print(summaries, [*runs.problems, *written.problems], shown)
+    if tables or problems:
+        width = shutil.get_terminal_size().columns
+        print("\n".join(["", render_terminal(tables, width), *map(for_terminal, problems)]))
     return 0 if written.complete else 1
+
+
+def _target(config: pytest.Config, folders: list[RunFolder]) -> Path | None:
+    """Where a report is written; None: nowhere.
+
+    Raises:
+        pytest.UsageError: that folder holds another run.
+    """
+    if not options.given(config, "sim_output"):
+        return folders[0].path if len(folders) == 1 else None
+    target = Path(config.invocation_params.dir, options.value(config, "sim_output"))
+    own = len(folders) == 1 and target.resolve() == folders[0].path.resolve()
+    if RunFolder(target).holds_run and not own:
+        raise pytest.UsageError(
+            f"--sim-report: {target} holds another run; give another --sim-output"
+        )
+    return target
 
 
 def _print(summaries: Sequence[TaskSummary], problems: list[str], folder: Path | None) -> None:

@@ -216,7 +216,7 @@ class Run:
 
     def complete(self) -> None:
         """Read what all processes wrote; called when all tests have ended."""
-        if (self.folder.claimed or self._shared()) and not self.problem:
+        if (self.folder.used or self._shared()) and not self.problem:
             self.reading = self.folder.scan()
 
     def summarise(self, reporter: pytest.TerminalReporter, comparison: str = "") -> None:

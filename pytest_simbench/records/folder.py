@@ -125,6 +125,11 @@ class RunFolder:
         """Whether this process may write to it."""
         return self._claim is not None
 
+    @property
+    def used(self) -> bool:
+        """Whether this process has kept or taken over anything of it."""
+        return bool(self.own or self._asked or self._described)
+
     def claim(self, *, shared: bool = False) -> None:
         """Make it this run's own until `close`.
 
@@ -272,6 +277,8 @@ class RunFolder:
         try:
             # What a user names may be a link; what a folder holds leads nowhere else.
             path = self.inside(RECORDS) if self._records == RECORDS else path
+            if self.holds_run and not path.exists():
+                return Found()  # of its kind a run without repetitions of tasks
             return lines.read(path, Record.from_dict)
         except FolderError as error:
             raise RecordError(f"cannot read records: {error}") from None

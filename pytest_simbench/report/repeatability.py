@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
-from pytest_simbench.records.repeatability import Line
+from pytest_simbench.records.paths import write_whole
+from pytest_simbench.records.repeatability import Line, read
 from pytest_simbench.records.text import for_markdown, for_terminal, in_one_line
-from pytest_simbench.repeatability.agreement import LIMITS, Agreement
+from pytest_simbench.repeatability.agreement import LIMITS, Agreement, agreements
 from pytest_simbench.repeatability.motions import GROWTH_TIMES
 from pytest_simbench.repeatability.replay_result import Again
 from pytest_simbench.report.grid import Column, fill, render
@@ -29,6 +31,34 @@ AGREEMENT = (
     "When the cubes of two simulators first differ by 1 mm / 1 cm, for the same seed; never: not "
     "while both episodes lasted"
 )
+
+
+MARKDOWN_NAME = "repeatability.md"
+
+
+def write_tables(folder: Path, to: Path | None = None) -> tuple[list[Table], list[str]]:
+    """The tables of what a run folder holds on repeatability, also as a file of Markdown.
+
+    Args:
+        folder: of the run.
+        to: the folder for the file; None: there is none.
+
+    Returns:
+        The tables, and one sentence for each thing that is wrong.
+    """
+    try:
+        found = read(folder)
+        shown = tables(found.items, agreements(folder))
+    except ValueError as error:
+        return [], [str(error)]
+    problems = [*found.problems, *found.refused]
+    if shown and to is not None:
+        path = to / MARKDOWN_NAME
+        try:
+            write_whole(path, render_markdown(shown).encode("utf-8", "replace"))
+        except OSError as error:
+            problems.append(f"{path} could not be written ({error.strerror or error})")
+    return shown, problems
 
 
 def tables(lines: Sequence[Line], agreements: Sequence[Agreement]) -> list[Table]:

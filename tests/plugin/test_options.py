@@ -29,6 +29,7 @@ PATHS = BAD.keys() - {"empty", "blank", "long", "long list", "NUL"}
 FINE = {
     "sim_jitter": {"zero"}, "sim_seed": {"zero"},
     "sim_output": PATHS, "sim_baseline": PATHS, "sim_resume": PATHS, "sim_merge": PATHS,
+    "sim_report": PATHS,
     "sim_gui": {"zero"}, "sim_headless": {"zero"}, "sim_fresh": {"zero"},
     "sim_strict": {"zero"},
 }  # fmt: skip
