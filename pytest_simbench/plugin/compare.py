@@ -137,4 +137,7 @@ def _limits(text: str, baseline: Reading, *, typed: bool) -> tuple[Limit, ...]:
         names += [part.partition(":")[0].strip() for part in text.split(",")]
     for name in dict.fromkeys(names):  # an older run does not say what kind of number it is
         metrics.setdefault(name, Metric(name, name, better="lower"))
-    return parse_limits(text, metrics.values())
+    try:
+        return parse_limits(text, metrics.values())
+    except UnknownMetric as error:
+        raise UnknownMetric(error.name, error.valid, " in the baseline") from None

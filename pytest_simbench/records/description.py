@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from math import isfinite
 from typing import TYPE_CHECKING, Any, get_args
 
 from pytest_simbench.records import checked
+from pytest_simbench.records.record import plain
 from pytest_simbench.tasks.metrics import Better, Kind, Metric
 
 if TYPE_CHECKING:
@@ -35,17 +37,16 @@ class Description:
 
     @classmethod
     def of(cls, task: Task) -> Description:
-        """What a task says of itself."""
-        return cls(task.name, tuple(task.metrics), dict(task.references))
+        """What a task says of itself; a reference that is no finite number is none."""
+        known = {name: value for name, value in task.references.items() if isfinite(value)}
+        return cls(task.name, tuple(task.metrics), known)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data."""
-        return {
-            "schema": SCHEMA,
-            "task": self.task,
-            "metrics": [metric.to_wire() for metric in self.metrics],
-            "references": dict(self.references),
-        }
+        metrics = [metric.to_wire() for metric in self.metrics]
+        data = {"task": self.task, "metrics": metrics, "references": self.references}
+        found: dict[str, Any] = plain({"schema": SCHEMA, **data})
+        return found
 
     @classmethod
     def from_dict(cls, data: Any, where: str = "description") -> Description:

@@ -37,7 +37,7 @@ THRESHOLDS = "thresholds.jsonl"
 HOLD_RESULTS = (RECORDS, "repeatability.jsonl")
 """Files that make a folder one that holds a run."""
 
-NOUNS = {RECORDS: "record", TASKS: "description of a task", THRESHOLDS: "threshold"}
+NOUNS = {RECORDS: "record", TASKS: "task description", THRESHOLDS: "threshold"}
 
 
 @dataclass(frozen=True)

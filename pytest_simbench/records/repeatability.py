@@ -49,7 +49,7 @@ class Line:
 def append(folder: Path, line: Line) -> Unwritten:
     """Write one line to the run folder, else elsewhere; what it returns says where. Never raises
     OSError."""
-    file = LinesFile(folder / NAME, noun="result on repeatability")
+    file = LinesFile(folder / NAME, noun="repeatability result")
     file.append(json.dumps({"schema": SCHEMA, **vars(line)}))
     return file.close()
 

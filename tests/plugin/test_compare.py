@@ -124,7 +124,8 @@ def test_limits_in_the_ini_file_wait_for_a_baseline_which_alone_fails_nothing(
         (["--sim-compare-fail=ram:5%,ram:6%"], "ram has two limits; give it one"),
         (
             ["--sim-compare-fail=lended:5%"],
-            "no metric is named 'lended'; did you mean 'landed'? valid names: *landed, *ram,*",
+            "no metric is named 'lended' in the baseline; did you mean 'landed'? valid names: "
+            "*landed, *ram,*",
         ),
         (["--sim-compare-fail=landing_x:5%"], "landing_x can be neither better nor worse*"),
         (["--sim-baseline=nowhere"], "there is no baseline *nowhere; give a run folder, its *"),

@@ -15,8 +15,10 @@ from pytest_simbench.records.baseline import (
     read_baseline,
     to_extra_info,
 )
+from pytest_simbench.records.description import Description
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Record, RecordError
+from pytest_simbench.tasks.metrics import Metric
 
 from .build import failed, record
 
@@ -115,3 +117,27 @@ def test_an_empty_result_is_saved_as_such() -> None:
     assert from_extra_info(to_extra_info([]), "x") == []
     with pytest.raises(RecordError, match="x: 'simbench' does not hold repetitions"):
         from_extra_info({"shared": {}}, "x")
+
+
+SAID = Description("stacking", (Metric("placed", "placed", kind="share", of=15),), {"placed": 1.0})
+
+
+def test_a_saved_benchmark_says_what_its_numbers_mean() -> None:
+    extra = json.loads(json.dumps(to_extra_info(RUN, [SAID])))
+    found = from_benchmarks({"benchmarks": [{"extra_info": {KEY: extra}}]}, "x")
+    assert found.tasks == {"stacking": SAID}
+    assert found.problems == ()
+    del extra["tasks"]  # of before
+    found = from_benchmarks({"benchmarks": [{"extra_info": {KEY: extra}}]}, "x")
+    assert (found.tasks, found.problems, len(found.records)) == ({}, (), len(RUN))
+
+
+@pytest.mark.parametrize("said", [3, [3], {"task": "t"}, [{"task": "t", "metrics": [1]}]])
+def test_what_is_no_description_is_told_and_the_records_are_read(said: object) -> None:
+    extra = {**to_extra_info(RUN), "tasks": said}
+    saved = {"benchmarks": [{"fullname": "t", "extra_info": {KEY: extra}}]}
+    found = from_benchmarks(saved, "x")
+    assert len(found.records) == len(RUN)
+    assert found.tasks == {}
+    (problem,) = found.problems
+    assert problem.startswith("x, t: 'simbench': ")

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+import math
+from typing import Any, ClassVar
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -22,6 +24,17 @@ def test_what_a_task_says_survives_its_line(task: Any) -> None:
     assert said.metrics == tuple(task.metrics)
     assert said.references == dict(task.references)
     assert Description.from_dict(json.loads(json.dumps(said.to_dict()))) == said
+
+
+def test_numpy_values_are_plain_and_what_is_no_number_is_no_reference() -> None:
+    class Baking:
+        name = "baking"
+        metrics = (Metric("x", "x", of=np.int64(3), resolution=np.float32(0.5)),)  # type: ignore
+        references: ClassVar = {"x": np.float32(0.25), "y": math.nan, "z": math.inf}
+
+    said = json.loads(json.dumps(Description.of(Baking()).to_dict()))  # type: ignore[arg-type]
+    metric = Metric("x", "x", of=3, resolution=0.5)
+    assert Description.from_dict(said) == Description("baking", (metric,), {"x": 0.25})
 
 
 def test_a_newer_plugin_may_say_more_of_a_metric() -> None:

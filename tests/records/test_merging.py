@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise
 from random import Random
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.records.merging import MergeError, merge
+from pytest_simbench.records.description import Description
+from pytest_simbench.records.merging import MergeError, merge, merge_tasks
 from pytest_simbench.records.record import Record
+from pytest_simbench.tasks.metrics import Metric
 
 from .build import record
 
@@ -126,3 +129,24 @@ def test_machines_may_differ() -> None:
 def test_a_seed_twice_in_one_run_is_refused() -> None:
     with pytest.raises(MergeError, match="a has 1 of its seeds of test_stacking.* twice"):
         merge({"a": [*straight(2), straight(1)[0]]})
+
+
+def test_what_the_numbers_mean_is_merged_and_the_last_wording_holds() -> None:
+    placed = Metric("placed", "placed", kind="share", of=15)
+    first = {"stacking": Description("stacking", (placed,))}
+    reworded = Description("stacking", (replace(placed, title="in place", of=6),))
+    second = {"stacking": reworded, "pouring": Description("pouring")}
+    assert merge_tasks({"a": first, "b": second, "c": {}}) == second
+    assert merge_tasks({"b": second, "a": first}) == {**second, **first}
+
+
+@pytest.mark.parametrize("change", [{"unit": "mm"}, {"better": "lower"}, {"kind": "yes_no"}])
+def test_numbers_of_another_meaning_are_refused(change: dict[str, Any]) -> None:
+    gap = Metric("gap", "gap", "m")
+    runs = {
+        "a": {"stacking": Description("stacking", (gap,))},
+        "b": {"stacking": Description("stacking", (replace(gap, **change),))},
+    }
+    (name,) = change
+    with pytest.raises(MergeError, match=rf"a and b are not.*: {name} of the metric gap of stack"):
+        merge_tasks(runs)
