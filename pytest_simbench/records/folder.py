@@ -12,8 +12,10 @@ Report, merge, resume, baseline and gate need the folder alone, never the code t
 from __future__ import annotations
 
 import json
+import os
 import threading
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -105,7 +107,7 @@ class RunFolder:
     @classmethod
     def of(cls, path: Path) -> RunFolder:
         """The folder that a user means by its path, or by that of its record file."""
-        return cls(path.parent, path.name) if path.is_file() else cls(path)
+        return cls(path.parent, path.name) if os.path.isfile(path) else cls(path)
 
     def inside(self, name: str) -> Path:
         """The path of a file of this folder.
@@ -216,8 +218,8 @@ class RunFolder:
         found = self.scan()
         if found.refused:
             raise RecordError(found.refused[0])
-        if found.problems and not found.every:
-            raise RecordError(found.problems[0].replace(DAMAGED, ""))
+        if not found.every and (damaged := self._found().problems):
+            raise RecordError(damaged[0].replace(DAMAGED, ""))
         return found
 
     def scan(self) -> Reading:
@@ -226,7 +228,7 @@ class RunFolder:
         try:
             found = self._found()
         except RecordError as error:
-            lost = self.own and not path.exists()  # the folder is gone, and was told of
+            lost = self.own and not os.path.exists(path)  # the folder is gone, and was told of
             found = Found(refused=() if lost else (str(error),))
         problems = list(found.problems)
         # Those in memory come last: they are there although the disk may be full.
@@ -244,7 +246,7 @@ class RunFolder:
 
     def _parsed(self, name: str, kind: Any, problems: list[str]) -> tuple[Any, ...]:
         """The items of a file beside the records, which may be missing."""
-        if self._records != RECORDS or not (self.path / name).exists():
+        if self._records != RECORDS or not os.path.exists(self.path / name):
             return ()
         try:
             found = lines.read(self.inside(name), kind.from_dict)
@@ -263,8 +265,10 @@ class RunFolder:
         Raises:
             OSError: the folder cannot be written to.
         """
-        names = [name for name in (self._records, TASKS, THRESHOLDS) if _size(self.path / name)]
-        repaired = [lines.repair(self.inside(name)) for name in names]
+        repaired = []
+        for name in (self._records, TASKS, THRESHOLDS, *HOLD_RESULTS[1:]):
+            with suppress(FolderError, UnreadableError):  # there is none that is read
+                repaired.append(lines.repair(self.inside(name)))
         return tuple(kept for kept in repaired if kept is not None)
 
     def _found(self) -> Found[Record]:
@@ -277,7 +281,7 @@ class RunFolder:
         try:
             # What a user names may be a link; what a folder holds leads nowhere else.
             path = self.inside(RECORDS) if self._records == RECORDS else path
-            if self.holds_run and not path.exists():
+            if self.holds_run and not os.path.exists(path):
                 return Found()  # of its kind a run without repetitions of tasks
             return lines.read(path, Record.from_dict)
         except FolderError as error:

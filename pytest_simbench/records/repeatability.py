@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -61,7 +62,7 @@ def read(folder: Path) -> Found[Line]:
         UnreadableError: there is one, and it cannot be read.
     """
     path = folder / NAME
-    if not path.exists():
+    if not os.path.exists(path):
         return Found()
     found = lines.read(inside(folder, NAME), _line)
     items = sorted(found.items, key=lambda line: (line.kind, line.task, line.test))

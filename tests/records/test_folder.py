@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -253,6 +254,25 @@ def test_descriptions_are_an_ordinary_file_in_the_folder(tmp_path: Path, kind: s
     assert found.tasks == {}
     (problem,) = found.problems
     assert "no ordinary file" in problem or "leads out of its folder" in problem
+    assert RunFolder(run).repair() == ()
+
+
+def test_damaged_descriptions_hide_no_records_and_are_repaired(tmp_path: Path) -> None:
+    folder_with(tmp_path, POURING)
+    for name in (TASKS, "repeatability.jsonl"):
+        with (tmp_path / name).open("ab") as file:
+            file.write(b'{"schema": 1')
+    assert len(RunFolder(tmp_path).read().problems) == 1
+    kept = RunFolder(tmp_path).repair()
+    assert [path.name for path in kept] == [
+        "tasks.jsonl.damaged-1",
+        "repeatability.jsonl.damaged-1",
+    ]
+    assert RunFolder(tmp_path).read() == replace(RunFolder(tmp_path).read(), problems=())
+    (tmp_path / RECORDS).write_text("")
+    (tmp_path / TASKS).write_text("{")
+    found = RunFolder(tmp_path).read()  # an empty run, whose records are not damaged
+    assert (found.records, len(found.problems)) == ((), 1)
 
 
 def test_a_lost_folder_is_read_from_memory(tmp_path: Path) -> None:
