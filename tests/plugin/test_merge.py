@@ -77,7 +77,7 @@ def test_a_record_leads_nowhere(
         assert "not copied: " in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("link", ["logs", "records.jsonl", "report.md"])
+@pytest.mark.parametrize("link", ["logs", "records.jsonl", "tasks.jsonl", "report.md"])
 def test_nothing_is_written_out_of_the_destination(pytester: pytest.Pytester, link: str) -> None:
     saved(pytester.path / "a", 1, "logs/x.log")
     (pytester.path / "a/logs").mkdir()
@@ -85,8 +85,8 @@ def test_nothing_is_written_out_of_the_destination(pytester: pytest.Pytester, li
     victim = pytester.mkdir("elsewhere")
     whole = pytester.mkdir("whole")
     (whole / link).symlink_to(victim if link == "logs" else victim / "new")
-    if link == "records.jsonl":
-        with pytest.raises(pytest.UsageError, match="'records.jsonl' of the run .* leads out"):
+    if link in ("records.jsonl", "tasks.jsonl"):
+        with pytest.raises(pytest.UsageError, match=f"'{link}' of the run .* leads out"):
             merge(pytester, "a")
     else:
         assert merge(pytester, "a") == 0
