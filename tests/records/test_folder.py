@@ -308,3 +308,29 @@ def test_a_claimed_folder_is_given_up(tmp_path: Path) -> None:
     assert folder.close() == ()
     assert not folder.claimed
     assert not (tmp_path / "run").exists()
+
+
+def test_a_nest_too_deep_is_told_without_its_depth(tmp_path: Path) -> None:
+    """What Python says of its stack is of no use to a reader of records."""
+    path = tmp_path / RECORDS
+    path.write_bytes(b"[" * 100_000 + b"\n" + record().to_json().encode() + b"\n")
+    (problem,) = RunFolder(tmp_path).read().problems
+    assert problem == f"{path}:1: the line is damaged and left out: not JSON (RecursionError)"
+
+
+def test_a_file_that_cannot_be_read_is_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / RECORDS
+    path.write_text(record().to_json() + "\n")
+
+    def refused(*args: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", refused)
+    with pytest.raises(RecordError) as caught:
+        RunFolder(tmp_path).read()
+    assert str(caught.value) == (
+        f"cannot read records from {path} (Permission denied); give a run folder or its "
+        "records.jsonl"
+    )

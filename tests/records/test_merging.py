@@ -150,3 +150,23 @@ def test_numbers_of_another_meaning_are_refused(change: dict[str, Any]) -> None:
     (name,) = change
     with pytest.raises(MergeError, match=rf"a and b are not.*: {name} of the metric gap of stack"):
         merge_tasks(runs)
+
+
+def test_what_a_run_without_a_good_repetition_knows_counts() -> None:
+    """Its failures' settings, which must be the others' all the same."""
+    whole = straight(4)
+    bad = [replace(r, status="failed") for r in whole[2:]]
+    assert len(merge({"a": whole[:2], "b": bad})) == 4
+    assert len(merge({"b": bad, "a": whole[:2]})) == 4
+    other = [replace(r, settings={"timestep": 0.5}) for r in bad]
+    for runs in ({"a": whole[:2], "b": other}, {"b": other, "a": whole[:2]}):
+        with pytest.raises(MergeError, match="a and b|b and a") as caught:
+            merge(runs)
+        assert "settings.timestep" in str(caught.value)
+
+
+def test_the_whole_has_the_test_id_of_the_first_run() -> None:
+    first, second = straight(1), [replace(r, seed=2023) for r in straight(1)]
+    here = [replace(r, test=f"a/t.py::{r.test}") for r in first]
+    assert {item.record.test for item in merge({"a": here, "b": second})} == {here[0].test}
+    assert {item.record.test for item in merge({"b": second, "a": here})} == {second[0].test}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,10 @@ def test_runs_of_one_second_have_different_folders(tmp_path: Path) -> None:
     names = [new_name(tmp_path).name for _ in range(500)]
     assert len(set(names)) == 500
     assert all(name[:10].count("-") == 2 for name in names)
+    pattern = r"\d{4}-\d\d-\d\d_\d\d-\d\d-\d\d-[0-9a-f]{8}"
+    assert all(re.fullmatch(pattern, name) for name in names)
+    assert re.fullmatch(rf"{pattern}\.part", new_name(tmp_path, ".part").name)
+    assert new_name(tmp_path).parent == tmp_path
 
 
 @pytest.mark.parametrize(

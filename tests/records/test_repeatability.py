@@ -109,3 +109,8 @@ def test_a_newer_schema(tmp_path: Path) -> None:
     path = tmp_path / NAME
     path.write_text(path.read_text().replace('"schema": 1', '"schema": 2'))
     assert read(tmp_path) == Found(refused=(f"{path}:1: schema 2, this reads 1",))
+
+
+def test_the_folder_is_made_with_those_above_it(tmp_path: Path) -> None:
+    append(tmp_path / "a" / "b", LINE)
+    assert read(tmp_path / "a" / "b").items == (LINE,)
