@@ -12,6 +12,7 @@ import pytest
 from pytest_simbench.client.world import Motion
 from pytest_simbench.repeatability.agreement import FOLDER, Sample, agreement, agreements
 from pytest_simbench.repeatability.episode import Experiment
+from tests.repeatability.scripted import episode, motion, operation
 
 
 def sample(label: str, times: Sequence[float], x: Sequence[float]) -> Sample:
@@ -194,3 +195,14 @@ def test_what_was_run_otherwise_is_told() -> None:
     first = sample("a", TIMES, [0.2] * 4)
     with pytest.raises(ValueError, match=r"^a ran \('t', 1\), b ran \('u', 2\)$"):
         agreement(first, replace(first, label="b", task="u", seed=2))
+
+
+def test_what_is_commanded_is_the_end_of_each_motion() -> None:
+    """And nothing where the world is left alone."""
+    tape = [operation("wait", "a", 0.5), operation("follow", "b", 0.2, np.array([0.3]))]
+    found = Sample.of(episode({}, [motion([0.0], [0.0], [0.5])] * 3, tape), "sim", "t", 7)
+    assert found.commands[0] is None
+    assert found.commands[1] is not None
+    assert found.commands[1].tolist() == [0.3]
+    assert (found.durations, found.bodies) == ([0.5, 0.2], ["a", "b"])
+    assert (found.label, found.task, found.seed) == ("sim", "t", 7)

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from pytest_simbench.client.errors import Where, WorkerError, WorkerExited
+from pytest_simbench.measure.results import InconclusiveWarning
 from pytest_simbench.repeatability.attack import Attack, Trial, divergence, effect
 from pytest_simbench.repeatability.episode import Episode, changed, scaled_jitter
 from pytest_simbench.repeatability.motions import Difference
@@ -20,7 +22,7 @@ from pytest_simbench.repeatability.perturbation import Perturbation, described
 from pytest_simbench.repeatability.replay_result import Again, Replay
 from pytest_simbench.repeatability.search import Finding, bounds_in_words, search, to_wire
 from pytest_simbench.repeatability.stability import Sensitivity, Stability, sensitivity, stability
-from pytest_simbench.tasks import Jitter
+from pytest_simbench.tasks import Jitter, Throwing
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.tasks.moments import Moment
 from tests.repeatability.scripted import METRICS, Scripted, episode, motion, operation
@@ -467,3 +469,17 @@ def test_the_smallest_is_kept_as_an_example(
 
     crash = search(Scripted(crashing), {"x": 2e-3}, examples=40, at_once=1)  # type: ignore[arg-type]
     assert (crash.effect, crash.replay) == ("ends in WorkerExited", "")
+
+
+def test_bounds_of_a_scene_with_a_robot() -> None:
+    scene = Throwing().scene(1, Jitter())
+    experiment = SimpleNamespace(scene=lambda: scene)
+    assert bounds_in_words(experiment, None).endswith(  # type: ignore[arg-type]
+        "20 % in friction, 20 % in squeeze, 20 ms in delay"
+    )
+
+
+def test_what_is_not_judged_warns_at_the_line_of_the_test() -> None:
+    with pytest.warns(InconclusiveWarning, match="not judged") as caught:
+        Stability("sim", [1.0] * 4, 4, "1 mm in x", "").assert_kept_at_least(0.9)
+    assert caught[0].filename == __file__
