@@ -57,3 +57,4 @@ def test_what_is_left_of_a_name_word_by_word() -> None:
     assert file_name("x" * 80) == "x" * 80
     assert re.fullmatch(r"a-0123456789-[0-9a-f]{10}", file_name("a-0123456789"))
     assert re.fullmatch(r"a-[0-9a-f]{10}", file_name("a", 1))
+    assert re.fullmatch(r"X_y_X-[0-9a-f]{10}", file_name("..X y X.-"))

@@ -90,3 +90,14 @@ def test_costs_are_read_from_the_record() -> None:
     assert (found.cost("start"), found.cost("end"), found.cost("total")) == (1.2, 9.0, 9.5)
     bare = record(stepping={"wall": 0.0, "simulated": 1.0}, resources={}, timeline={}, seconds={})
     assert all(bare.cost(name) is None for name in ("rtf", "cpu", "ram", "ram_peak", "start"))
+
+
+def test_what_is_no_record_is_told_word_by_word() -> None:
+    for line, said in (
+        ("[1]", "here: a record is a JSON object, not list"),
+        ("{", "here: not JSON (Expecting property name enclosed in double quotes: "),
+        ("{}", "here: the record has no 'test'"),
+    ):
+        with pytest.raises(RecordError) as caught:
+            Record.from_json(line, "here")
+        assert str(caught.value).startswith(said)

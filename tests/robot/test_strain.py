@@ -91,6 +91,18 @@ def test_a_jolt_shows_in_acceleration_and_torque() -> None:
     assert found.largest == max(found.acceleration, found.torque)
 
 
+def test_a_jolt_counts_over_10_ms_whatever_the_step() -> None:
+    """0.3 rad/s within 2 ms: 30 rad/s^2 over the span, twice the limit."""
+    for step in (0.001, 0.002):
+        time = step * np.arange(100)
+        velocity = np.zeros((100, 9))
+        velocity[:, 0] = 0.3 * np.clip((time - 0.05) / 0.002, 0, 1)
+        found = strain(MODEL, GRAVITY, time, motion(np.zeros((100, 9)), velocity))
+        assert found is not None
+        span = 2 * round(0.005 / step) * step
+        assert found.acceleration == pytest.approx(0.3 / span / 15, rel=1e-6)
+
+
 def test_too_short_to_tell() -> None:
     assert strain(MODEL, GRAVITY, np.zeros(1), still(1)) is None
     assert strain(MODEL, GRAVITY, 0.05 * np.arange(2), still(2)) is None

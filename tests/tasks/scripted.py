@@ -123,7 +123,7 @@ class ScriptedProcess:
         return {"stepping": {"wall": 0.0, "simulated": self.time}, "peak_rss_mb": None}
 
     def do_wait(self, duration: float, log_period: float | None) -> dict[str, Any]:
-        self._note("wait", duration, {"duration": duration})
+        self._note("wait", duration, {"duration": duration, "log_period": log_period})
         rows = np.repeat(self.commanded[None], 2, axis=0)
         return self._advance(duration, np.array([0.0, duration]), rows, log_period)
 

@@ -435,3 +435,10 @@ def test_phases_are_named() -> None:
     assert phases == ["settle start", "pick", "wind up", "throw", "settle"]
     assert TASK.name == "throwing"
     assert TASK.study_timeout == 600.0
+
+
+def test_the_throw_is_seen_at_every_step_and_the_settling_20_times_a_second() -> None:
+    _, process = thrown()
+    waits = [asked for asked in process.asked if asked.kind == "wait"]
+    seen = {asked.phase: (asked.duration, asked.arguments["log_period"]) for asked in waits}
+    assert (seen["throw"], seen["settle"]) == ((1.0, 0.0), (3.0, 0.05))
