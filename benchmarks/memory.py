@@ -16,6 +16,7 @@ import psutil
 
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.simulator.registry import registered
@@ -48,7 +49,7 @@ def main(repetitions: str = "200") -> None:
     case = Case("memory", "mujoco", "headless", "tuned", path, folder)
     me = psutil.Process()
     for number in range(1, int(repetitions) + 1):
-        Repetition(case, Falling(), number).run()
+        Repetition(Experiment(case, Falling()), number).run()
         if number in (1, 20, 50, 100, 150, 200) or number == int(repetitions):
             print(
                 f"after {number:3d}: {me.memory_info().rss / 1e6:.1f} MB, "

@@ -25,7 +25,8 @@ import psutil
 from pytest_simbench.client import bootstrap
 from pytest_simbench.client.environments import Environment, interpreter, missing
 from pytest_simbench.client.errors import Where
-from pytest_simbench.client.process import Launch, WorkerProcess
+from pytest_simbench.client.launch import Launch
+from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.timing import straight_move
@@ -92,9 +93,7 @@ def worker(name: str) -> tuple[float, float]:
         compile_timeout=info.compile_timeout if info.costly_start else 0.0,
     )
     process = WorkerProcess(launch, Where(name, "headless"))
-    process.request(
-        "construct", adapter=path, profile="tuned", changes={}, gui=False, real_time=False
-    )
+    process.construct()
     world = World(process, SCENE)
     trajectory = motion()
     assert process.pid is not None

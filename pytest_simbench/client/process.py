@@ -7,7 +7,6 @@ import importlib.util
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +29,7 @@ from pytest_simbench.client.errors import (
     WorkerStartError,
     exit_text,
 )
+from pytest_simbench.client.launch import Constructed, Launch
 from pytest_simbench.client.logs import shorten_log, tail_of_log
 from pytest_simbench.worker.text import named, readable
 from pytest_simbench.worker.wire import pack, unpack
@@ -42,32 +42,6 @@ EXIT_TIMEOUT = 2.0
 
 CLOSE_TIMEOUT = 10.0
 """For an engine to release what it holds [s]; then it is ended, and the record says so."""
-
-
-@dataclass(frozen=True)
-class Launch:
-    """How to start a worker.
-
-    Attributes:
-        adapter: `module:Class` of the simulator's adapter.
-        python: interpreter, None for pytest's own.
-        spec: whole execnet specification, which overrides `python` (another host).
-        environment: variables set in the worker's environment.
-        log: file that takes all of the worker's output, None to leave it alone.
-        start_timeout: for interpreter start and handshake, each [s].
-        stall_timeout: longest silence before the worker counts as hung [s].
-        compile_timeout: for `Simulator.compile` [s], if that is longer; 0 where there is nothing
-            to compile.
-    """
-
-    adapter: str
-    python: str | None = None
-    spec: str | None = None
-    environment: Mapping[str, str] = field(default_factory=dict)
-    log: Path | None = None
-    start_timeout: float = 60.0
-    stall_timeout: float = 60.0
-    compile_timeout: float = 0.0
 
 
 class WorkerProcess:
@@ -173,6 +147,40 @@ class WorkerProcess:
         except Exception:
             raise self._ended_by(ProtocolError, f"unreadable answer {answer!r:.80}") from None
         raise error
+
+    def construct(
+        self,
+        profile: str = "tuned",
+        changes: Mapping[str, Any] | None = None,
+        *,
+        gui: bool = False,
+        real_time: bool = False,
+        adapter: str | None = None,
+        timeout: float | None = None,
+    ) -> Constructed:
+        """Have the worker make its simulator; one that it made before is closed.
+
+        Args:
+            profile: of the adapter's settings.
+            changes: single settings that differ from the profile, by name.
+            gui: with a window.
+            real_time: whether stepping keeps step with the wall clock.
+            adapter: `module:Class`; default: the one that the worker was launched for.
+            timeout: for the whole request [s]; None: silence ends it after `stall_timeout`.
+
+        Raises:
+            WorkerError: as `request`.
+        """
+        answer = self.request(
+            "construct",
+            timeout=timeout,
+            adapter=adapter or self.launch.adapter,
+            profile=profile,
+            changes=dict(changes or {}),
+            gui=gui,
+            real_time=real_time,
+        )
+        return Constructed(**answer)
 
     def _unread(self) -> None:
         """Something came between two requests: the end, or what nobody asked for."""

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 from typing import Protocol as Interface
 
-from pytest_simbench.client.process import Launch
+from pytest_simbench.client.launch import Launch
 from pytest_simbench.experiment.protocol import PROTOCOLS, Protocol
 from pytest_simbench.records.names import file_name
+from pytest_simbench.records.series import short
 
 
 class Display(Interface):
@@ -87,7 +88,7 @@ class Case:
     @property
     def short_name(self) -> str:
         """The test's name without its file, fit for a file name; no other test has it."""
-        return file_name(self.test.rpartition("::")[2], self.test)
+        return file_name(short(self.test), self.test)
 
     def launch(self, name: str) -> Launch:
         """How to start a worker of this case; its log is `logs/NAME.log` in the run folder.

@@ -10,11 +10,13 @@ from itertools import count
 from typing import Any
 
 from pytest_simbench.client.errors import DisplayError, DisplayLost, Where, WorkerError
+from pytest_simbench.client.launch import Constructed
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.tape import TapedWorld
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.example import replay_command, write_example
+from pytest_simbench.records.series import short
 from pytest_simbench.scene import Scene
 
 EPISODE_TIMEOUT = 3600.0
@@ -34,12 +36,12 @@ class SimulatorHandle:
 
     Attributes:
         case: simulator, settings and limits.
-        constructed: settings and versions that the worker reported last.
+        constructed: the simulator that the worker made last.
     """
 
     def __init__(self, case: Case) -> None:
         self.case = case
-        self.constructed: dict[str, Any] = {}
+        self.constructed = Constructed()
         self._process: WorkerProcess | None = None
         self._open = False
 
@@ -92,13 +94,8 @@ class SimulatorHandle:
             except DisplayError as error:
                 raise DisplayLost(str(error), where) from None
         self._process.deadline = time.monotonic() + (case.timeout or EPISODE_TIMEOUT)
-        self.constructed = self._process.request(
-            "construct",
-            adapter=case.adapter,
-            profile=case.profile,
-            changes=dict(case.changes),
-            gui=case.mode == "gui",
-            real_time=False,
+        self.constructed = self._process.construct(
+            case.profile, case.changes, gui=case.mode == "gui"
         )
         return TapedWorld(self._process, scene, parity=parity, **options)
 
@@ -106,9 +103,9 @@ class SimulatorHandle:
         """Write the failing episode to the run folder."""
         case = self.case
         test = os.environ.get("PYTEST_CURRENT_TEST", case.short_name).rpartition(" ")[0]
-        name = f"{test.rpartition('::')[2] or 'episode'}-{case.simulator}-{case.mode}"
+        name = f"{short(test) or 'episode'}-{case.simulator}-{case.mode}"
         with suppress(OSError):  # a full disk must not hide the failure itself
-            path = write_example(case, name, scene, tape, self.constructed.get("versions"))
+            path = write_example(case, name, scene, tape, self.constructed.versions)
             error.add_note(f"replay this episode: {replay_command(path, case, scene)}")
 
     def close(self) -> None:

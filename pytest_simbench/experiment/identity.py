@@ -1,4 +1,4 @@
-"""What a case and a task say of their records before anything has run."""
+"""What an experiment says of its records before anything has run."""
 
 from __future__ import annotations
 
@@ -14,49 +14,62 @@ from typing import Any
 
 from pytest_simbench import __version__
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.records.names import file_name
-from pytest_simbench.records.record import Record
+from pytest_simbench.records.record import Record, Status
+from pytest_simbench.records.series import short
 from pytest_simbench.tasks.base import Jitter, Task
 
 
-def expected(case: Case, task: Task, number: int = 1) -> Record:
-    """The record of a repetition that has not begun: everything about it that is known here.
-
-    Settings are those of the adapter's profile with the case's changes; versions those installed
-    here or in the engine's own environment. What only a worker can tell is absent.
+def record_of(
+    experiment: Experiment,
+    number: int,
+    *,
+    status: Status = "interrupted",
+    settings: Mapping[str, Any],
+    versions: Mapping[str, str],
+    **found: Any,
+) -> Record:
+    """The record of a repetition: what the experiment says of it, and what was found besides.
 
     Args:
-        case: of the repetition.
-        task: as it is performed, its smallest version where the protocol asks for that.
+        experiment: that is repeated.
         number: of the repetition, from 1.
+        status: how it ended.
+        settings: of the simulator.
+        versions: of the packages that it runs on.
+        found: further fields of the record.
     """
+    case = experiment.case
     return Record(
         test=case.test,
-        task=task.name,
+        task=experiment.task.name,
         simulator=case.simulator,
         mode=case.mode,
         profile=case.profile,
         repetition=number,
-        seed=case.seed + number - 1,
-        status="interrupted",
+        seed=experiment.seed(number),
+        status=status,
         protocol=case.protocol.name,
         jitter=case.jitter,
-        settings={**settings(case), **task.parameters()},
-        versions={"pytest-simbench": __version__, **versions(case)},
-        scene=scene_digest(task),
-        limits=limits(case, task),
+        settings={**settings, **experiment.parameters},
+        versions={"pytest-simbench": __version__, **versions},
+        scene=scene_digest(experiment.task),
+        limits=experiment.limits,
         contended=case.contended,
         attempt=case.attempt,
+        **found,
     )
 
 
-def limits(case: Case, task: Task) -> dict[str, float | None]:
-    """Time-outs [s] and the limit of memory [MB]."""
-    return {
-        "timeout": case.timeout or task.study_timeout,
-        "stall_timeout": case.stall_timeout,
-        "memory_limit": case.memory_limit,
-    }
+def expected(experiment: Experiment, number: int = 1) -> Record:
+    """The record of a repetition that has not begun: everything about it that is known here.
+
+    Settings are those of the adapter's profile with the case's changes; versions those installed
+    here or in the engine's own environment. What only a worker can tell is absent.
+    """
+    case = experiment.case
+    return record_of(experiment, number, settings=settings(case), versions=versions(case))
 
 
 def settings(case: Case) -> dict[str, Any]:
@@ -125,9 +138,10 @@ def _content(path: str) -> str:
         return ""
 
 
-def file_stem(case: Case, task: Task, number: int) -> str:
+def file_stem(experiment: Experiment, number: int) -> str:
     """The name of a repetition's log and trace, without folder and ending; no other has it."""
-    return _stem(case.test, task.name, task.parameters(), number, case.attempt)
+    case, task = experiment.case, experiment.task
+    return _stem(case.test, task.name, experiment.parameters, number, case.attempt)
 
 
 def file_stem_of(record: Record) -> str:
@@ -138,5 +152,5 @@ def file_stem_of(record: Record) -> str:
 
 def _stem(test: str, task: str, of_task: Mapping[str, Any], number: int, attempt: int) -> str:
     told = json.dumps(of_task, sort_keys=True, default=list)
-    name = file_name(test.rpartition("::")[2], test, task, told)
+    name = file_name(short(test), test, task, told)
     return f"{name}-{number}" if attempt == 1 else f"{name}-{number}-attempt-{attempt}"

@@ -1,21 +1,20 @@
-"""All repetitions of a case, one after the other or side by side."""
+"""All repetitions of an experiment, one after the other or side by side."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import replace
 from typing import Protocol as Interface
 
 from pytest_simbench.client.errors import Unavailable, WorkerError, WorldParityError
-from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.experiment.workers import IdleWorkers
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.record import Record
-from pytest_simbench.tasks.base import Task
+from pytest_simbench.records.series import short
 
 
 class ProgressLine(Interface):
@@ -30,19 +29,23 @@ class ProgressLine(Interface):
 
 
 class Repeater:
-    """Runs a task's repetitions and hands each record over as it is made.
+    """Runs repetitions of an experiment and hands each record over as it is made.
 
     Args:
-        case: simulator, settings and limits.
+        experiment: what is repeated.
         jobs: how many workers run side by side.
         progress: the live line.
         keep: takes every record at once, before anything else can go wrong.
     """
 
     def __init__(
-        self, case: Case, jobs: int, progress: ProgressLine, keep: Callable[[Record], None]
+        self,
+        experiment: Experiment,
+        jobs: int,
+        progress: ProgressLine,
+        keep: Callable[[Record], None],
     ) -> None:
-        self.case = replace(case, contended=True) if jobs > 1 else case
+        self.experiment = experiment.in_case(contended=True) if jobs > 1 else experiment
         self.jobs = jobs
         self.progress = progress
         self.keep = keep
@@ -50,7 +53,7 @@ class Repeater:
         self._active: set[Repetition] = set()
         self._stopping = threading.Event()
 
-    def run(self, task: Task, numbers: Iterable[int]) -> ResultSet:
+    def run(self, numbers: Iterable[int]) -> ResultSet:
         """Run the repetitions of these numbers.
 
         Raises:
@@ -59,40 +62,37 @@ class Repeater:
             KeyboardInterrupt: after the records of what was running are kept.
         """
         numbers = list(numbers)
-        name = self.case.test.rpartition("::")[2]
+        name = short(self.experiment.case.test)
         self.progress.start_test(name, len(numbers), max(numbers, default=0))
         try:
             if self.jobs > 1 and len(numbers) > 1:
-                records = self._side_by_side(task, numbers)
+                records = self._side_by_side(numbers)
             else:
-                records = [self._one(task, number) for number in numbers]
+                records = [self._one(number) for number in numbers]
         finally:
             self._idle.close()
             self.progress.end_test()
-        return ResultSet(records, task.metrics)
+        return ResultSet(records, self.experiment.metrics)
 
-    def _one(self, task: Task, number: int) -> Record:
+    def _one(self, number: int) -> Record:
         with Interrupts() as interrupts:
-            record, error = self._kept(task, number, interrupts)
+            record, error = self._kept(number, interrupts)
         if error is not None and (
             isinstance(error, WorldParityError) or not isinstance(error, WorkerError)
         ):
             raise error
         return record
 
-    def _kept(
-        self, task: Task, number: int, interrupts: Interrupts
-    ) -> tuple[Record, BaseException | None]:
+    def _kept(self, number: int, interrupts: Interrupts) -> tuple[Record, BaseException | None]:
         """Run one repetition and keep its record."""
         progress = self.progress
         repetition = Repetition(
-            self.case,
-            task,
+            self.experiment,
             number,
             idle=self._idle,
             interrupts=interrupts,
             on_phase=progress.phase,
-            on_count=lambda done, total: progress.count(done, total, task.counted),
+            on_count=lambda done, total: progress.count(done, total, self.experiment.task.counted),
         )
         self._active.add(repetition)
         if self._stopping.is_set():  # this thread took it up just before it could be cancelled
@@ -106,12 +106,12 @@ class Repeater:
         progress.end_repetition(record.status, record.seconds["total"])
         return record, error
 
-    def _side_by_side(self, task: Task, numbers: list[int]) -> list[Record]:
+    def _side_by_side(self, numbers: list[int]) -> list[Record]:
         with (
             Interrupts() as interrupts,
             ThreadPoolExecutor(self.jobs, thread_name_prefix="simbench") as pool,
         ):
-            pending: set[Future[Record]] = {pool.submit(self._one, task, k) for k in numbers}
+            pending: set[Future[Record]] = {pool.submit(self._one, k) for k in numbers}
             done: list[Record] = []
             try:
                 while pending:

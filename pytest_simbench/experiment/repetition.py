@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench import __version__
 from pytest_simbench.client.errors import (
     DisplayError,
     DisplayLost,
@@ -21,22 +20,18 @@ from pytest_simbench.client.errors import (
     Where,
     WorkerError,
 )
+from pytest_simbench.client.launch import Constructed
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.resources import ResourceSampler
 from pytest_simbench.client.stopwatch import Stopwatch
 from pytest_simbench.client.world import Motion, World
-from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.identity import (
-    file_stem,
-    limits,
-    scene_digest,
-    settings,
-)
+from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.identity import file_stem, record_of, settings
 from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.workers import IdleWorkers
-from pytest_simbench.records.record import Failure, Record
+from pytest_simbench.records.record import Failure, Record, Status
 from pytest_simbench.simulator.choices import seeds_seen
-from pytest_simbench.tasks.base import Jitter, Outcome, Task
+from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.worker.text import LONGEST, named, readable, told
 
 TRACE_PERIOD = 0.02
@@ -49,8 +44,7 @@ class Repetition:
     Its worker is fresh, unless the case reuses workers and one is idle.
 
     Args:
-        case: simulator, settings and limits.
-        task: what to do, as it is: `Protocol.version_of` has been asked before.
+        experiment: the task, the simulator and its settings.
         number: of the repetition, from 1.
         idle: where workers come from and go to, if the case reuses them.
         interrupts: held from the moment that the task has ended or failed, so that the record
@@ -60,8 +54,7 @@ class Repetition:
 
     def __init__(
         self,
-        case: Case,
-        task: Task,
+        experiment: Experiment,
         number: int,
         *,
         idle: IdleWorkers | None = None,
@@ -69,10 +62,10 @@ class Repetition:
         on_phase: Callable[[str], None] = lambda name: None,
         on_count: Callable[[int, int], None] = lambda done, total: None,
     ) -> None:
-        self.case = case
-        self.task = task
+        self.experiment = experiment
+        self.case = case = experiment.case
         self.number = number
-        self.seed = case.seed + number - 1
+        self.seed = experiment.seed(number)
         self.where = Where(case.simulator, case.mode, number, self.seed)
         self.stopwatch = Stopwatch()
         self._idle = idle if idle is not None and case.reuses_worker else None
@@ -84,7 +77,7 @@ class Repetition:
         self._process: WorkerProcess | None = None
         self._sampler: ResourceSampler | None = None
         self._world: World | None = None
-        self._constructed: dict[str, Any] = {}
+        self._constructed = Constructed()
         self._stats: dict[str, Any] = {}
         self._closing: str | None = None
 
@@ -132,23 +125,22 @@ class Repetition:
         return DisplayLost(what, self.where, error.log_tail if error else "")
 
     def _perform(self) -> Outcome:
-        case, process = self.case, self._construct()
-        scene = self.task.scene(self.seed, _scaled(case.jitter))
+        process = self._construct()
         world = self._world = World(
             process,
-            scene,
+            self.experiment.scene(self.seed),
             stopwatch=self.stopwatch,
             on_phase=self._enter,
-            trace_period=None if case.trace == "off" else TRACE_PERIOD,
+            trace_period=None if self.case.trace == "off" else TRACE_PERIOD,
         )
-        outcome = self.task.perform(world, self.seed, self._on_count)
+        outcome = self.experiment.task.perform(world, self.seed, self._on_count)
         self._stats = world.stats()
         return outcome
 
     def _construct(self) -> WorkerProcess:
         """Launch the worker and give the simulator its settings."""
         case = self.case
-        deadline = time.monotonic() + (case.timeout or self.task.study_timeout)
+        deadline = time.monotonic() + self.experiment.timeout
         self._enter("launch")
         with self.stopwatch.measuring("launch"):
             process = self._worker(deadline)
@@ -157,11 +149,9 @@ class Repetition:
                 self._enter("before")
                 self._killed.wait(case.protocol.before)
                 self._enter("launch")
-            self._constructed = process.request(
-                "construct",
-                adapter=case.adapter,
-                profile=case.profile,
-                changes=dict(case.changes),
+            self._constructed = process.construct(
+                case.profile,
+                case.changes,
                 gui=case.mode == "gui",
                 real_time=case.protocol.real_time,
             )
@@ -176,7 +166,7 @@ class Repetition:
             self._made(process)
             return process
         try:
-            launch = self.case.launch(file_stem(self.case, self.task, self.number))
+            launch = self.case.launch(file_stem(self.experiment, self.number))
         except DisplayError as error:
             raise DisplayLost(str(error), self.where) from None
         return WorkerProcess(launch, self.where, deadline=deadline, made=self._made)
@@ -229,21 +219,19 @@ class Repetition:
         details = {**outcome.details, "log": self._log_name()}
         if seen := seeds_seen(case.adapter, case.profile):
             details["chosen_on"] = [seeds.to_wire() for seeds in seen]
-        if self._constructed.get("untested"):
-            details["untested"] = self._constructed["untested"]
+        if self._constructed.untested:
+            details["untested"] = self._constructed.untested
         if self._closing:
             details["closing"] = self._closing
-        return Record(
-            test=case.test,
-            task=self.task.name,
-            simulator=case.simulator,
-            mode=case.mode,
-            profile=case.profile,
-            repetition=self.number,
-            seed=self.seed,
+        return record_of(
+            self.experiment,
+            self.number,
             status=_status(error),
-            protocol=case.protocol.name,
-            jitter=case.jitter,
+            settings=self._constructed.settings or settings(case),
+            versions={
+                **({"python": self._process.python_version} if self._process else {}),
+                **self._constructed.versions,
+            },
             error=None if error is None else _failure(error, self.where),
             metrics=outcome.metrics,
             details=details,
@@ -251,21 +239,8 @@ class Repetition:
             stepping=stepping,
             timeline={} if self._world is None else self._world.timeline,
             resources=resources,
-            settings={
-                **(self._constructed.get("settings") or settings(case)),
-                **self.task.parameters(),
-            },
-            scene=scene_digest(self.task),
-            limits=limits(case, self.task),
-            attempt=case.attempt,
-            versions={
-                "pytest-simbench": __version__,
-                **({"python": self._process.python_version} if self._process else {}),
-                **self._constructed.get("versions", {}),
-            },
             host=host(),
             deviations=tuple(self._world.excused if self._world else ()),
-            contended=case.contended,
             reused_worker=self._reused,
         )
 
@@ -287,7 +262,7 @@ class Repetition:
         if world is None or not world.trace or (case.trace == "retain-on-failure" and not failed):
             return ""
         motion = Motion.joined(world.trace)
-        name = file_stem(case, self.task, self.number)
+        name = file_stem(self.experiment, self.number)
         folder = case.folder / "traces"
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -314,12 +289,7 @@ def group(phase: str) -> str:
     return " ".join(words[: next(counted, len(words))]) or phase
 
 
-def _scaled(jitter: float) -> Jitter:
-    one = Jitter()
-    return Jitter(one.distance * jitter, one.angle * jitter)
-
-
-def _status(error: BaseException | None) -> Any:
+def _status(error: BaseException | None) -> Status:
     """`interrupted` is what somebody ended from outside, and only that: it may be run again."""
     if error is None:
         return "ok"

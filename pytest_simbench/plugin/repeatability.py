@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pytest_simbench.experiment.case import Case
     from pytest_simbench.experiment.handle import SimulatorHandle
     from pytest_simbench.plugin.run import Run
-    from pytest_simbench.repeatability.episode import Experiment
+    from pytest_simbench.repeatability.episode import Episodes
     from pytest_simbench.repeatability.replay_result import Replay
     from pytest_simbench.repeatability.search import Finding
     from pytest_simbench.repeatability.stability import Sensitivity, Stability
@@ -38,8 +38,10 @@ def replay(request: pytest.FixtureRequest, simbench_case: Case) -> Callable[[Tas
     Takes `moments=` in place of those that the task declares. The first run's motion is kept for
     the comparison between simulators.
     """
+    from pytest_simbench.experiment.experiment import Experiment
     from pytest_simbench.repeatability import replay as replaying
     from pytest_simbench.repeatability.agreement import FOLDER, Sample
+    from pytest_simbench.repeatability.episode import Episodes
     from pytest_simbench.simulator.info import Capability
     from pytest_simbench.simulator.registry import adapter
 
@@ -48,9 +50,9 @@ def replay(request: pytest.FixtureRequest, simbench_case: Case) -> Callable[[Tas
         case = simbench_case
         info = adapter(case.simulator).info
         with _Handles() as handle:
-            experiment = _experiment(case, handle(case), task)
+            episodes = Episodes(Experiment(case, task), handle(case))
             result = replaying.replay(
-                experiment,
+                episodes,
                 claims=Capability.DETERMINISTIC in info.capabilities,
                 capabilities=info.capabilities,
                 fresh=handle(case),
@@ -59,9 +61,9 @@ def replay(request: pytest.FixtureRequest, simbench_case: Case) -> Callable[[Tas
                 **options,
             )
         with suppress(OSError):
-            sample = Sample.of(result.first, _label(case), experiment.task.name, case.seed)
+            sample = Sample.of(result.first, _label(case), episodes.task.name, case.seed)
             sample.save(case.folder / FOLDER / f"{case.short_name}.npz")
-        _keep(case, "replay", experiment, result.to_wire())
+        _keep("replay", episodes, result.to_wire())
         return result
 
     return replay_task
@@ -104,31 +106,24 @@ def _other_mode(
     return handle(replace(case, mode=other, display=this.displays if other == "gui" else None))
 
 
-def _experiment(case: Case, handle: SimulatorHandle, task: Task) -> Experiment:
-    from pytest_simbench.repeatability.episode import Experiment, scaled_jitter
-
-    chosen = case.protocol.version_of(task)
-    return Experiment(handle, chosen, case.seed, scaled_jitter(case.jitter))
-
-
 def _label(case: Case) -> str:
     return f"{case.simulator} {case.mode} {case.profile}"
 
 
-def _keep(case: Case, kind: str, experiment: Experiment, result: Mapping[str, Any]) -> None:
+def _keep(kind: str, episodes: Episodes, result: Mapping[str, Any]) -> None:
     from pytest_simbench.records.repeatability import Line, append
 
-    constructed = experiment.handle.constructed
+    case, constructed = episodes.experiment.case, episodes.handle.constructed
     line = Line(
         kind,
         case.test,
         case.simulator,
         case.mode,
         case.profile,
-        experiment.task.name,
+        episodes.task.name,
         case.seed,
-        {**constructed.get("settings", {}), **experiment.task.parameters()},
-        constructed.get("versions", {}),
+        {**constructed.settings, **episodes.experiment.parameters},
+        constructed.versions,
         result,
     )
     for problem in append(case.folder, line).problems:  # a full disk hides no result
@@ -138,33 +133,32 @@ def _keep(case: Case, kind: str, experiment: Experiment, result: Mapping[str, An
 class Perturber:
     """One task in one simulator, to be perturbed; what `perturb(task)` gives."""
 
-    def __init__(self, case: Case, experiment: Experiment, strict: bool = False) -> None:
-        self.case = case
+    def __init__(self, episodes: Episodes, strict: bool = False) -> None:
+        self.episodes = episodes
         self.strict = strict
-        self.experiment = experiment
 
     @property
     def task(self) -> Task:
         """The task that is run: the version that `--protocol` asks for."""
-        return self.experiment.task
+        return self.episodes.task
 
     def search(self, bounds: Mapping[str, float] | None = None, **options: Any) -> Finding:
         """The smallest perturbation that changes the outcome, see `search.search`."""
         from pytest_simbench.repeatability import search
 
-        finding = search.search(self.experiment, bounds, **options)
-        _keep(self.case, "search", self.experiment, search.to_wire(finding))
+        finding = search.search(self.episodes, bounds, **options)
+        _keep("search", self.episodes, search.to_wire(finding))
         return finding
 
     def stability(self, bounds: Mapping[str, float] | None = None, **options: Any) -> Stability:
         """What random perturbations leave, see `stability.stability`."""
         from pytest_simbench.repeatability import stability
 
-        if self.case.protocol.smallest:
+        if self.episodes.experiment.case.protocol.smallest:
             options["examples"] = min(5, options.get("examples", 5))
-        result = stability.stability(self.experiment, bounds, **options)
+        result = stability.stability(self.episodes, bounds, **options)
         result = replace(result, strict=self.strict)
-        _keep(self.case, "stability", self.experiment, result.to_wire())
+        _keep("stability", self.episodes, result.to_wire())
         return result
 
     def sensitivity(self, body: str, steps: int = 1, **options: Any) -> Sensitivity:
@@ -174,8 +168,8 @@ class Perturber:
         from pytest_simbench.repeatability.perturbation import Perturbation
 
         displaced = Perturbation("x", steps, body)
-        result = stability.sensitivity(self.experiment, displaced, **options)
-        _keep(self.case, "sensitivity", self.experiment, result.to_wire())
+        result = stability.sensitivity(self.episodes, displaced, **options)
+        _keep("sensitivity", self.episodes, result.to_wire())
         return result
 
 
@@ -187,6 +181,9 @@ def perturb(
 
     All examples run in the session's worker (one of the test's own where it has `sim_settings`).
     """
+    from pytest_simbench.experiment.experiment import Experiment
+    from pytest_simbench.repeatability.episode import Episodes
+
     with _Handles() as handles:
         own = handles(simbench_case) if sim_settings else None
         handle = own or request.getfixturevalue("simbench_handle")
@@ -195,7 +192,7 @@ def perturb(
 
         def perturb_task(task: Task) -> Perturber:
             checked_task(task, "perturb")
-            return Perturber(simbench_case, _experiment(simbench_case, handle, task), strict)
+            return Perturber(Episodes(Experiment(simbench_case, task), handle), strict)
 
         yield perturb_task
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.sequential import Plan, SequentialResultSet
 from pytest_simbench.measure.results import ResultSet
@@ -47,63 +47,62 @@ class Repeating:
 
     def __call__(self, task: Task) -> ResultSet:
         """Run a task's repetitions, as many as options and marks say."""
-        task = self.case.protocol.version_of(task)
+        experiment = Experiment(self.case, task)
         wanted = options.repetitions(self.node.config)
         fixed = wanted if isinstance(wanted, int) else None
-        case = replace(self.case, attempt=self.this.begin(self.case, task))
-        found = self._recorded(case, task, fixed)
-        self.this.describe(task)
-        self.described[task.name] = Description.of(task)
+        experiment = experiment.in_case(attempt=self.this.begin(experiment))
+        found = self._recorded(experiment, fixed)
+        self.this.describe(experiment.task)
+        self.described[experiment.task.name] = Description.of(experiment.task)
         if isinstance(wanted, options.Auto):
             plan = Plan.up_to(wanted.limit)
-            first = self._up_to(plan.looks[0], case, task, found)
+            first = self._up_to(plan.looks[0], experiment, found)
             result: ResultSet = SequentialResultSet(
                 first,
-                task.metrics,
+                experiment.metrics,
                 plan,
-                lambda number: self._up_to(number, case, task, found),
+                lambda number: self._up_to(number, experiment, found),
             )
         else:
-            number = wanted or number_mark(self.node, "reps") or case.protocol.repetitions
-            result = ResultSet(self._up_to(int(number), case, task, found), task.metrics)
+            number = wanted or number_mark(self.node, "reps") or self.case.protocol.repetitions
+            result = ResultSet(self._up_to(int(number), experiment, found), experiment.metrics)
         result.strict = options.value(self.node.config, "sim_strict")
         self.results.append(result)
         return result
 
-    def _recorded(self, case: Case, task: Task, wanted: int | None) -> dict[int, Record]:
+    def _recorded(self, experiment: Experiment, wanted: int | None) -> dict[int, Record]:
         """By repetition what the run that is completed has of these; now of this run."""
         from pytest_simbench.plugin.resume import NotResumed
 
         try:
-            return self.this.take(case, task, wanted)
+            return self.this.take(experiment, wanted)
         except NotResumed as refusal:
             pytest.fail(str(refusal), pytrace=False)
 
-    def _up_to(self, number: int, case: Case, task: Task, found: dict[int, Record]) -> list[Record]:
+    def _up_to(self, number: int, experiment: Experiment, found: dict[int, Record]) -> list[Record]:
         """Records of all repetitions from 1 to `number`, and of what a resumed run has beyond.
 
         Args:
             number: of repetitions wanted.
-            case: with its attempt.
-            task: to perform where one is missing.
+            experiment: to repeat where one is missing; its case has the attempt.
             found: the records so far, by repetition; takes the new ones.
         """
         missing = [k for k in range(1, number + 1) if k not in found]
         if missing:
             if self.this.resumed is not None and not self._may_resume:
-                self._check_versions(case, task)
+                self._check_versions(experiment)
             self.this.begin_lines()
             jobs = options.value(self.node.config, "sim_jobs")
-            repeater = Repeater(case, jobs, self.this.progress, self.this.folder.append)
-            found |= {r.repetition: r for r in repeater.run(task, missing).records}
+            repeater = Repeater(experiment, jobs, self.this.progress, self.this.folder.append)
+            found |= {r.repetition: r for r in repeater.run(missing).records}
         return [found[k] for k in sorted(found)]
 
-    def _check_versions(self, case: Case, task: Task) -> None:
+    def _check_versions(self, experiment: Experiment) -> None:
         from pytest_simbench.plugin.resume import NotResumed
 
         assert self.this.resumed is not None
         try:
-            self.this.resumed.check_versions(case, task)
+            self.this.resumed.check_versions(experiment)
         except NotResumed as refusal:
             pytest.fail(str(refusal), pytrace=False)
         self._may_resume = True

@@ -22,7 +22,7 @@ from pytest_simbench.records.series import configurations, short
 
 if TYPE_CHECKING:
     from pytest_simbench.experiment.case import Case
-    from pytest_simbench.tasks.base import Task
+    from pytest_simbench.experiment.experiment import Experiment
 
 
 def folder_to_resume(config: pytest.Config) -> Path | None:
@@ -104,15 +104,14 @@ class Resumed:
             return [*self._problems, f"{self.folder.path} could not be repaired ({error.strerror})"]
         return [*self._problems, *(f"the damaged lines are kept in {path}" for path in kept)]
 
-    def take(self, case: Case, task: Task, wanted: int | None) -> dict[int, Record]:
+    def take(self, experiment: Experiment, wanted: int | None) -> dict[int, Record]:
         """By repetition what came to an end of these repetitions; interrupted ones are run again.
 
         Settings, seeds, versions and whatever else `records.configuration` lists are held against
         what the options say now, without starting a worker.
 
         Args:
-            case: as asked for now.
-            task: as it will be performed.
+            experiment: as asked for now.
             wanted: repetitions that the user asked for by number; None: as many as it takes.
 
         Raises:
@@ -120,17 +119,18 @@ class Resumed:
         """
         from pytest_simbench.experiment.identity import expected
 
-        now = expected(case, task)
+        case, now = experiment.case, expected(experiment)
         of_test = [
             record
             for record in self.records
-            if (record.test, record.task, record.attempt) == (case.test, task.name, case.attempt)
+            if (record.test, record.task, record.attempt) == (now.test, now.task, now.attempt)
         ]
         same = [record for record in of_test if task_parameters(record) == task_parameters(now)]
         if not same:  # a task that this test repeats besides, or one that was changed
             same = [record for record in of_test if id(record) not in self._taken]
         self._taken |= {id(record) for record in same}
         found = [] if all(agree(r, now, "resume") for r in same) else self._differences(same, now)
+        task = experiment.task
         if same and task.name in self.tasks:
             ours = {task.name: Description.of(task)}
             found += other_meanings(self.tasks, ours, "resume")
@@ -142,25 +142,25 @@ class Resumed:
             raise NotResumed(self._sentence(case, found))
         return {r.repetition: r for r in same if r.status != "interrupted"}
 
-    def check_versions(self, case: Case, task: Task) -> None:
+    def check_versions(self, experiment: Experiment) -> None:
         """Before repetitions are added: ask a worker for what only it can tell.
 
         Args:
-            case: as asked for now.
-            task: to be performed.
+            experiment: as asked for now.
 
         Raises:
             NotResumed: the versions are not those of the run.
         """
         # A repetition that failed at its start knows neither settings nor versions.
         ended = [r for r in self.records if r.ok]
-        of_test = [r for r in ended if (r.test, r.task) == (case.test, task.name)]
+        case = experiment.case
+        of_test = [r for r in ended if (r.test, r.task) == (case.test, experiment.task.name)]
         others = [r for r in ended if (r.simulator, r.mode) == (case.simulator, case.mode)]
         if not of_test and not others:
             return
         from pytest_simbench.experiment.repetition import Repetition
 
-        now, error = Repetition(case, task, 0).probe()
+        now, error = Repetition(experiment, 0).probe()
         if error is not None:
             raise error
         # Another test of the same simulator has a task and settings of its own.

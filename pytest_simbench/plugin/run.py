@@ -19,7 +19,7 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.records.text import for_terminal
 
 if TYPE_CHECKING:
-    from pytest_simbench.experiment.case import Case
+    from pytest_simbench.experiment.experiment import Experiment
     from pytest_simbench.plugin.resume import Resumed
     from pytest_simbench.report.progress import Progress
     from pytest_simbench.tasks.base import Task
@@ -148,17 +148,18 @@ class Run:
             with capture.global_and_fixture_disabled():
                 reporter.ensure_newline()
 
-    def begin(self, case: Case, task: Task) -> int:
+    def begin(self, experiment: Experiment) -> int:
         """How often this process has begun these repetitions, with this time.
 
         More than once when a plugin reruns a failed test, or a test repeats a task twice.
         """
 
-        key = (case.test, task.name, json.dumps(task.parameters(), default=str))
+        case, told = experiment.case, json.dumps(experiment.parameters, default=str)
+        key = (case.test, experiment.task.name, told)
         self._attempts[key] += 1
         return self._attempts[key]
 
-    def take(self, case: Case, task: Task, wanted: int | None) -> dict[int, Record]:
+    def take(self, experiment: Experiment, wanted: int | None) -> dict[int, Record]:
         """By repetition what the run that is completed has recorded; of this run from now on.
 
         Raises:
@@ -166,7 +167,7 @@ class Run:
         """
         if self.resumed is None:
             return {}
-        found = self.resumed.take(case, task, wanted)
+        found = self.resumed.take(experiment, wanted)
         self.folder.take_over(found.values())
         return found
 

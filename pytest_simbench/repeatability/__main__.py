@@ -69,7 +69,7 @@ def _replay(example: Example) -> None:
     handle = SimulatorHandle(case)
     try:
         with handle.episode(scene) as world:
-            for line in _differences(example.versions, handle.constructed["versions"]):
+            for line in _differences(example.versions, handle.constructed.versions):
                 print(in_one_line(line))
             world.play(example.tape)
             print(f"{case.simulator} {case.mode} {case.profile}, t = {world.time:.3f} s")

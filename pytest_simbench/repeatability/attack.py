@@ -9,7 +9,7 @@ import numpy as np
 
 from pytest_simbench.client.errors import WorkerError
 from pytest_simbench.client.tape import Tape
-from pytest_simbench.repeatability.episode import Episode, Experiment, changed
+from pytest_simbench.repeatability.episode import Episode, Episodes, changed
 from pytest_simbench.repeatability.perturbation import Perturbation
 from pytest_simbench.tasks.base import Outcome, Task
 
@@ -48,15 +48,15 @@ class Attack:
     not deterministic cannot make Hypothesis find its examples flaky.
 
     Args:
-        experiment: to be perturbed.
+        episodes: to be perturbed.
         examples: how many runs it may take, the unperturbed one not counted; more may be allowed
             later.
     """
 
-    def __init__(self, experiment: Experiment, examples: int) -> None:
-        self.experiment = experiment
+    def __init__(self, episodes: Episodes, examples: int) -> None:
+        self.episodes = episodes
         self.examples = examples
-        self.base: Episode = experiment.run()
+        self.base: Episode = episodes.run()
         self.trials: dict[Perturbations, Trial] = {}
         self.tapes: dict[Perturbations, Tape] = {}
 
@@ -75,14 +75,14 @@ class Attack:
     def run(self, perturbed: Perturbations) -> Trial:
         """Run it, whether it was run before or not."""
         try:
-            episode = self.experiment.run(perturbed)
+            episode = self.episodes.run(perturbed)
         except WorkerError as error:
             kind = type(error).__name__
             return Trial(1.0, effect=f"ends in {kind}", crash=f"{kind}: {error.what}", kept=0.0)
         found = changed(self.base.counts, episode.counts)
         if found:
             self.tapes[perturbed] = episode.tape
-        task = self.experiment.task
+        task = self.episodes.task
         return Trial(
             divergence(self.base, episode),
             tuple(found),

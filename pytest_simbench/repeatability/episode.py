@@ -1,4 +1,4 @@
-"""One task, one seed, one simulator: run as often as it takes, changed or not."""
+"""One experiment, one seed: run as often as it takes, changed or not."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import Any
 
 from pytest_simbench.client.tape import Operation, Tape, TapedWorld
 from pytest_simbench.client.world import Motion
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.repeatability.perturbation import Perturbation, controller_delay, perturbed
 from pytest_simbench.scene import Scene
-from pytest_simbench.tasks.base import Jitter, Outcome, Task
+from pytest_simbench.tasks.base import Outcome, Task
 
 PERIOD = 0.02
 """Sampling of joints and bodies [s]. Comparisons bit by bit see these samples, and the
@@ -40,24 +41,25 @@ class Episode:
 
 
 @dataclass(frozen=True)
-class Experiment:
-    """A task with a seed in a simulator.
+class Episodes:
+    """The first seed of an experiment, run as often as it takes, changed or not.
 
     Attributes:
-        handle: of the simulator; its worker is reused from run to run.
-        task: what is run, as it is (no smaller version of it).
-        seed: of the cubes' start, their order, and the planner.
-        jitter: of the cubes' start.
+        experiment: what is run; it has the seed.
+        handle: of its simulator; one worker serves all runs.
     """
 
+    experiment: Experiment
     handle: SimulatorHandle
-    task: Task
-    seed: int
-    jitter: Jitter
+
+    @property
+    def task(self) -> Task:
+        """The version of the task that the experiment runs."""
+        return self.experiment.task
 
     def scene(self) -> Scene:
-        """The scene of this seed, not perturbed."""
-        return self.task.scene(self.seed, self.jitter)
+        """The scene of the first seed, not perturbed."""
+        return self.experiment.scene(self.experiment.seed())
 
     def run(
         self,
@@ -86,7 +88,7 @@ class Experiment:
             "delay": controller_delay(perturbations),
         }
         with (handle or self.handle).episode(scene, **options) as world:
-            outcome = self.task.perform(world, self.seed, lambda done, total: None)
+            outcome = self.task.perform(world, self.experiment.seed(), lambda done, total: None)
         return Episode(
             outcome,
             counts(self.task, outcome),
@@ -106,9 +108,3 @@ def counts(task: Task, outcome: Outcome) -> dict[str, float | None]:
 def changed(before: Mapping[str, float | None], after: Mapping[str, float | None]) -> list[str]:
     """Names of the counts that are not the same."""
     return [name for name, value in before.items() if after.get(name) != value]
-
-
-def scaled_jitter(scale: float) -> Jitter:
-    """The tasks' start jitter times a factor, as `--jitter` means it."""
-    one = Jitter()
-    return Jitter(one.distance * scale, one.angle * scale)

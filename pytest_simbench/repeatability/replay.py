@@ -15,7 +15,7 @@ from functools import partial
 from pytest_simbench.client.errors import Unavailable, WorkerError
 from pytest_simbench.client.tape import Operation, TapedWorld
 from pytest_simbench.experiment.handle import SimulatorHandle
-from pytest_simbench.repeatability.episode import Episode, Experiment, changed
+from pytest_simbench.repeatability.episode import Episode, Episodes, changed
 from pytest_simbench.repeatability.motions import difference
 from pytest_simbench.repeatability.replay_result import Again, Replay
 from pytest_simbench.scene import Box, Pose, Scene
@@ -36,7 +36,7 @@ ANOTHER = Scene(
 
 
 def replay(
-    experiment: Experiment,
+    episodes: Episodes,
     *,
     claims: bool,
     capabilities: frozenset[Capability],
@@ -48,7 +48,7 @@ def replay(
     """Run an experiment and run it again in every way.
 
     Args:
-        experiment: its handle should not have been used before.
+        episodes: its handle should not have been used before.
         claims: whether the adapter claims determinism.
         capabilities: of the simulator.
         fresh: a handle of the same case, for a process of its own.
@@ -60,16 +60,16 @@ def replay(
     Raises:
         WorkerError: in the first run; later ones are results.
     """
-    simulator = experiment.handle.case.simulator
-    moments = experiment.task.moments if moments is None else moments
-    first = experiment.run()
-    mode = "headless" if experiment.handle.case.mode == "gui" else "with a window"
+    simulator = episodes.handle.case.simulator
+    moments = episodes.task.moments if moments is None else moments
+    first = episodes.run()
+    mode = "headless" if episodes.handle.case.mode == "gui" else "with a window"
     elsewhere = [_Elsewhere("fresh process", fresh), _Elsewhere(mode, other_mode)]
-    with _side_by_side(jobs - 1, elsewhere, experiment, first) as started:
+    with _side_by_side(jobs - 1, elsewhere, episodes, first) as started:
         results = [
-            _again("after a reset", first, lambda: experiment.run(play=first.tape)),
-            _again("after another episode", first, lambda: _after_another(experiment, first)),
-            *_restored_at(moments, capabilities, experiment, first),
+            _again("after a reset", first, lambda: episodes.run(play=first.tape)),
+            _again("after another episode", first, lambda: _after_another(episodes, first)),
+            *_restored_at(moments, capabilities, episodes, first),
         ]
         results += [again() for again in started]
     if not claims:
@@ -84,11 +84,11 @@ class _Elsewhere:
     way: str
     handle: SimulatorHandle | str
 
-    def run(self, experiment: Experiment, first: Episode) -> Again:
+    def run(self, episodes: Episodes, first: Episode) -> Again:
         handle = self.handle
         if isinstance(handle, str):
             return Again(self.way, skipped=handle)
-        return _again(self.way, first, lambda: experiment.run(play=first.tape, handle=handle))
+        return _again(self.way, first, lambda: episodes.run(play=first.tape, handle=handle))
 
     def end(self) -> None:
         if isinstance(self.handle, SimulatorHandle):
@@ -97,14 +97,14 @@ class _Elsewhere:
 
 @contextmanager
 def _side_by_side(
-    threads: int, ways: Sequence[_Elsewhere], experiment: Experiment, first: Episode
+    threads: int, ways: Sequence[_Elsewhere], episodes: Episodes, first: Episode
 ) -> Iterator[list[Callable[[], Again]]]:
     """Functions that give the results, from that many threads (0: when they are called)."""
     if threads < 1:
-        yield [partial(way.run, experiment, first) for way in ways]
+        yield [partial(way.run, episodes, first) for way in ways]
         return
     with ThreadPoolExecutor(threads, thread_name_prefix="simbench-replay") as pool:
-        futures = [pool.submit(way.run, experiment, first) for way in ways]
+        futures = [pool.submit(way.run, episodes, first) for way in ways]
         try:
             yield [future.result for future in futures]
         except BaseException:
@@ -120,18 +120,18 @@ def _side_by_side(
 def _restored_at(
     moments: Sequence[Moment],
     capabilities: frozenset[Capability],
-    experiment: Experiment,
+    episodes: Episodes,
     first: Episode,
 ) -> Iterator[Again]:
     if not moments:
-        yield Again("restored", skipped=f"the task {experiment.task.name!r} declares no moments")
+        yield Again("restored", skipped=f"the task {episodes.task.name!r} declares no moments")
     for moment in moments:
         way = f"restored {moment.name}"
         if Capability.SAVE_RESTORE not in capabilities:
-            simulator = experiment.handle.case.simulator
+            simulator = episodes.handle.case.simulator
             yield Again(way, skipped=f"{simulator} cannot save and restore")
         else:
-            restored = _restored(way, moment, experiment, first)
+            restored = _restored(way, moment, episodes, first)
             yield replace(restored, claimed=Capability.EXACT_RESTORE in capabilities)
 
 
@@ -150,14 +150,14 @@ def _again(way: str, first: Episode, run: Callable[[], Episode]) -> Again:
     )
 
 
-def _after_another(experiment: Experiment, first: Episode) -> Episode:
+def _after_another(episodes: Episodes, first: Episode) -> Episode:
     """Another scene in the same process, then the experiment."""
-    with experiment.handle.episode(ANOTHER) as world:
+    with episodes.handle.episode(ANOTHER) as world:
         world.wait(0.5)
-    return experiment.run(play=first.tape)
+    return episodes.run(play=first.tape)
 
 
-def _restored(way: str, moment: Moment, experiment: Experiment, first: Episode) -> Again:
+def _restored(way: str, moment: Moment, episodes: Episodes, first: Episode) -> Again:
     """Save at a moment, go on for a while, restore, and carry on."""
     counter = _Counter(moment)
 
@@ -168,7 +168,7 @@ def _restored(way: str, moment: Moment, experiment: Experiment, first: Episode) 
             world.perform(Operation("wait", {"duration": ASTRAY}))
             world.restore("replay")
 
-    result = _again(way, first, lambda: experiment.run(play=first.tape, before=before))
+    result = _again(way, first, lambda: episodes.run(play=first.tape, before=before))
     if not counter.done and not result.failure:
         return Again(way, skipped=f"the task never came to {moment.phase}")
     return result

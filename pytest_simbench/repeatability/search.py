@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 from pytest_simbench.experiment.example import replay_command, write_example
 from pytest_simbench.repeatability.attack import Attack, Perturbations
-from pytest_simbench.repeatability.episode import Episode, Experiment
+from pytest_simbench.repeatability.episode import Episode, Episodes
 from pytest_simbench.repeatability.perturbation import Perturbation, described, perturbations
 from pytest_simbench.repeatability.perturbation import perturbed as perturbed_scene
 
@@ -113,7 +113,7 @@ class Finding:
 
 
 def search(
-    experiment: Experiment,
+    episodes: Episodes,
     bounds: Mapping[str, float] | None = None,
     *,
     examples: int = EXAMPLES,
@@ -127,7 +127,7 @@ def search(
     once.
 
     Args:
-        experiment: to be perturbed.
+        episodes: to be perturbed.
         bounds: largest changes by quantity, see `perturbation.perturbations`.
         examples: runs of the simulator until it gives up.
         shrinks: further runs to make smaller what it found.
@@ -138,9 +138,9 @@ def search(
         WorkerError: in the unperturbed run.
         ValueError: bounds that make no sense.
     """
-    scene = experiment.scene()
+    scene = episodes.scene()
     perturbations(scene, bounds)  # complain of bad bounds before anything runs
-    attack = Attack(experiment, examples)
+    attack = Attack(episodes, examples)
     failing: list[Perturbations] = []
     for several in (1,) if at_once == 1 else (1, at_once):
         attack.examples = examples if several == at_once else -(-examples // ALONE)
@@ -151,14 +151,14 @@ def search(
     # The last failing example is the smallest: Hypothesis asks for it once more at the end.
     smallest = failing[-1] if failing else None
     return Finding(
-        experiment.handle.case.simulator,
+        episodes.handle.case.simulator,
         smallest,
         attack.trials[smallest].effect if smallest else "",
         list(attack.trials).index(failing[0]) + 1 if failing else 0,
         len(attack.trials),
         smallest is not None and _confirmed(attack, smallest),
         failing[0] if failing else None,
-        bounds_in_words(experiment, bounds),
+        bounds_in_words(episodes, bounds),
         _outcome(attack.base),
         _kept_example(attack, smallest) if smallest else "",
     )
@@ -203,13 +203,13 @@ def _failing(
 
 def _kept_example(attack: Attack, smallest: Perturbations) -> str:
     """The line that replays the smallest perturbation, from its file in the run folder."""
-    experiment = attack.experiment
+    episodes = attack.episodes
     tape = attack.tapes.get(smallest)
     if tape is None:  # it crashed: its episode wrote its own file
         return ""
-    case, versions = experiment.handle.case, experiment.handle.constructed.get("versions")
-    name = f"smallest-{experiment.task.name}-{case.simulator}-{case.mode}"
-    scene = perturbed_scene(experiment.scene(), smallest)
+    case, versions = episodes.handle.case, episodes.handle.constructed.versions
+    name = f"smallest-{episodes.task.name}-{case.simulator}-{case.mode}"
+    scene = perturbed_scene(episodes.scene(), smallest)
     try:
         return replay_command(write_example(case, name, scene, tape, versions), case, scene)
     except OSError:
@@ -223,11 +223,11 @@ def _confirmed(attack: Attack, smallest: Perturbations) -> bool:
     return not again.differs and trial.differs and trial.effect == before.effect
 
 
-def bounds_in_words(experiment: Experiment, bounds: Mapping[str, float] | None) -> str:
+def bounds_in_words(episodes: Episodes, bounds: Mapping[str, float] | None) -> str:
     """The largest changes as text, for instance "1 mm in x, 10 % in mass"."""
     from pytest_simbench.repeatability.perturbation import QUANTITIES
 
-    robot = experiment.scene().robot is not None
+    robot = episodes.scene().robot is not None
     limits = bounds or {q.name: q.bound for q in QUANTITIES.values() if robot or q.of != "robot"}
     parts = []
     for name, bound in limits.items():

@@ -11,7 +11,7 @@ from pytest_simbench.measure.intervals import Interval, interval, proportion
 from pytest_simbench.measure.results import InconclusiveWarning
 from pytest_simbench.measure.verdicts import Verdict, at_least, confidence, judge
 from pytest_simbench.repeatability.attack import Attack, Perturbations
-from pytest_simbench.repeatability.episode import Experiment
+from pytest_simbench.repeatability.episode import Episodes
 from pytest_simbench.repeatability.motions import gaps
 from pytest_simbench.repeatability.perturbation import (
     QUANTITIES,
@@ -96,7 +96,7 @@ class Stability:
 
 
 def stability(
-    experiment: Experiment,
+    episodes: Episodes,
     bounds: Mapping[str, float] | None = None,
     *,
     examples: int = 20,
@@ -109,7 +109,7 @@ def stability(
     a uniform draw would bring them.
 
     Args:
-        experiment: to be perturbed.
+        episodes: to be perturbed.
         bounds: largest changes by quantity, see `perturbation.perturbations`.
         examples: how many runs, each with another perturbation.
         at_most: how many perturbations at once.
@@ -121,11 +121,11 @@ def stability(
     import hypothesis
     from hypothesis import Phase, given, settings
 
-    attack = Attack(experiment, examples)
+    attack = Attack(episodes, examples)
 
     @hypothesis.seed(random_seed)
     @settings(max_examples=examples, deadline=None, database=None, phases=(Phase.generate,))
-    @given(perturbations(experiment.scene(), bounds, at_most=at_most))
+    @given(perturbations(episodes.scene(), bounds, at_most=at_most))
     def drawn(perturbed: Perturbations) -> None:
         attack.trial(perturbed)
 
@@ -134,10 +134,10 @@ def stability(
     worst = min(trials, key=lambda perturbed: trials[perturbed].kept)
     lost = trials[worst].kept < 1
     return Stability(
-        experiment.handle.case.simulator,
+        episodes.handle.case.simulator,
         tuple(trial.kept for trial in trials.values()),
         sum(not trial.differs for trial in trials.values()),
-        bounds_in_words(experiment, bounds),
+        bounds_in_words(episodes, bounds),
         f"{described(worst)} {trials[worst].effect}" if lost else "",
     )
 
@@ -208,14 +208,14 @@ class Sensitivity:
 
 
 def sensitivity(
-    experiment: Experiment, perturbation: Perturbation, moments: Sequence[Moment] | None = None
+    episodes: Episodes, perturbation: Perturbation, moments: Sequence[Moment] | None = None
 ) -> Sensitivity:
     """Displace one cube by a little and send the same commands.
 
     The commands are those of the unperturbed run, so what grows is the simulator's own.
 
     Args:
-        experiment: to be perturbed.
+        episodes: to be perturbed.
         perturbation: in x or y.
         moments: until which the growth is told; by default those that the task declares.
 
@@ -225,8 +225,8 @@ def sensitivity(
     """
     if QUANTITIES[perturbation.quantity].unit != "mm":
         raise ValueError(f"sensitivity is told per millimetre, not for {perturbation}")
-    base = experiment.run()
-    moved = experiment.run([perturbation], play=base.tape)
+    base = episodes.run()
+    moved = episodes.run([perturbation], play=base.tape)
     between, size = gaps(base.motions, moved.motions), abs(perturbation.amount)
     gap = between.largest() / size
     # Simulated time at which each operation of the tape begins [s].
@@ -234,12 +234,12 @@ def sensitivity(
     began = next((t for t, o in zip(starts, base.tape, strict=False) if o.kind == "follow"), 0.0)
     ratios = {time: between.after(began + time) for time in SENSITIVITY_TIMES}
     until: dict[str, float | None] = {}
-    for moment in experiment.task.moments if moments is None else moments:
+    for moment in episodes.task.moments if moments is None else moments:
         number = moment.place(base.tape)
         here = None if number is None else between.time <= starts[number] + 1e-9
         until[moment.name] = None if here is None else float(gap[here].max())
     return Sensitivity(
-        experiment.handle.case.simulator,
+        episodes.handle.case.simulator,
         str(perturbation),
         {time: None if value is None else value / size for time, value in ratios.items()},
         float(gap.max()),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from pytest_simbench.measure.gate import Change, GateReport
+from pytest_simbench.records.series import short
 from pytest_simbench.records.text import for_markdown, for_terminal
 from pytest_simbench.report import markdown
 from pytest_simbench.report.grid import Column, fill, render
@@ -21,7 +22,7 @@ def columns(report: GateReport) -> list[Column]:
     if not rows:
         return []
     return [
-        Column("test", [[change.test.rpartition("::")[2]] for change, _ in rows], left=True),
+        Column("test", [[short(change.test)] for change, _ in rows], left=True),
         Column("metric", [[_name(change)] for change, _ in rows], left=True),
         Column("baseline", [[change.metric.format(change.comparison.first)] for change, _ in rows]),
         Column("now", [[change.metric.format(change.comparison.second)] for change, _ in rows]),

@@ -15,7 +15,8 @@ import pytest
 
 from pytest_simbench.client.environments import Environment, interpreter
 from pytest_simbench.client.errors import BadState, Diverged, Where, WorkerError
-from pytest_simbench.client.process import Launch, WorkerProcess
+from pytest_simbench.client.launch import Constructed, Launch
+from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.scene import Scene
 from pytest_simbench.simulator import Capability, Settings, Simulator
@@ -123,18 +124,11 @@ class Subject:
 
     def construct(
         self, process: WorkerProcess, changes: Mapping[str, Any] | None = None, gui: bool = False
-    ) -> dict[str, Any]:
-        """Have the process make the simulator; the answer holds its settings and versions."""
-        answer: dict[str, Any] = process.request(
-            "construct",
-            timeout=TIMEOUT,
-            adapter=self.adapter,
-            profile=self.profile,
-            changes=dict(changes or {}),
-            gui=gui,
-            real_time=False,
+    ) -> Constructed:
+        """Have the process make the simulator, whichever one the process was started for."""
+        return process.construct(
+            self.profile, changes, gui=gui, adapter=self.adapter, timeout=TIMEOUT
         )
-        return answer
 
     @contextmanager
     def world(

@@ -20,6 +20,7 @@ from pytest_simbench.client.display import Displays
 from pytest_simbench.client.errors import DisplayError
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.tasks.base import Count, Outcome
 from tests.client.test_reaper import gone
@@ -107,7 +108,7 @@ def test_the_repetition_whose_display_died_fails_and_the_next_has_another(
     from tests.conftest import ADAPTERS
 
     case = replace(case, mode="gui", display=displays, simulator=engine, adapter=ADAPTERS[engine])
-    records = [Repetition(case, Blinded(), number).run()[0] for number in (1, 2)]
+    records = [Repetition(Experiment(case, Blinded()), number).run()[0] for number in (1, 2)]
     assert [record.status for record in records] == ["failed", "ok"]
     error = records[0].error
     assert error is not None

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.tasks import LeaningTowers
 
@@ -21,7 +22,7 @@ from pytest_simbench.tasks import LeaningTowers
 )
 def test_a_world_that_cannot_be_is_not_scored(case: Case, ghost: str, message: str) -> None:
     case = replace(case, adapter=f"tests.client.ghosts:{ghost}")
-    record, _ = Repetition(case, LeaningTowers(margins=(0.015,)), 1).run()
+    record, _ = Repetition(Experiment(case, LeaningTowers(margins=(0.015,))), 1).run()
     assert record.status == "failed"
     assert record.error is not None
     assert (record.error.type, record.error.phase) == ("Diverged", "settle")

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.records.record import Record
@@ -30,7 +31,7 @@ def run(case: Case, adapter: str | None = None, number: int = 1) -> Record:
     if adapter is not None:
         case = faulty(case, adapter)
     before = workers()
-    record, _ = Repetition(case, Falling(), number).run()
+    record, _ = Repetition(Experiment(case, Falling()), number).run()
     assert Record.from_json(record.to_json()) == Record.from_json(record.to_json())
     assert not workers() - before, "a worker was left behind"
     return record
@@ -153,7 +154,7 @@ def test_another_world_stops_the_run(engine: Case) -> None:
     case = faulty(engine, "WrongGravity")
 
     with pytest.raises(Exception, match=f"gravity: scene .*-9.80665.*{case.simulator} .*-20"):
-        Repeater(case, 1, Silent(), kept.append).run(Falling(), range(1, 4))  # type: ignore[arg-type]
+        Repeater(Experiment(case, Falling()), 1, Silent(), kept.append).run(range(1, 4))  # type: ignore[arg-type]
     assert [record.error.type for record in kept if record.error] == ["WorldParityError"]
 
 

@@ -16,6 +16,7 @@ import pytest
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.repeater import Repeater
@@ -60,7 +61,7 @@ def at_most(seconds: float) -> Iterator[None]:
 
 
 def failure(case: Case, task: Falling | None = None) -> tuple[str, str, str]:
-    record, _ = Repetition(case, task or Falling(), 1).run()
+    record, _ = Repetition(Experiment(case, task or Falling()), 1).run()
     assert record.status == "failed"
     assert record.error is not None
     return record.error.type, record.error.phase, record.error.message
@@ -109,7 +110,7 @@ def test_a_connection_that_is_none(case: Case, fault: str, kind: str) -> None:
 
 
 def test_a_worker_that_does_not_close(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
-    record, _ = Repetition(unruly(case, "StopsClosing"), Falling(), 1).run()
+    record, _ = Repetition(Experiment(unruly(case, "StopsClosing"), Falling()), 1).run()
     assert record.status == "ok"
     assert record.details["closing"] == "the worker did not close within 10 s"
 
@@ -128,7 +129,7 @@ def test_the_limits_are_those_given(case: Case, limit: float) -> None:
     launch = replace(case, stall_timeout=limit).launch("limits")
     assert (launch.start_timeout, launch.stall_timeout) == (limit, limit)
     made: list[WorkerProcess] = []
-    repetition = Repetition(replace(case, timeout=limit), Falling(), 1)
+    repetition = Repetition(Experiment(replace(case, timeout=limit), Falling()), 1)
     keep = repetition._made
     repetition._made = lambda process: (keep(process), made.append(process))  # type: ignore
     before = time.monotonic()
@@ -157,7 +158,7 @@ def kept(case: Case, task: Falling, jobs: int = 1, last: int = 1) -> tuple[list[
     """Records of a run, and whether Ctrl-C got out of it."""
     records: list[Record] = []
     try:
-        Repeater(case, jobs, Silent(), records.append).run(task, range(1, last + 1))  # type: ignore[arg-type]
+        Repeater(Experiment(case, task), jobs, Silent(), records.append).run(range(1, last + 1))  # type: ignore[arg-type]
     except KeyboardInterrupt:
         return records, True
     return records, False
@@ -224,7 +225,7 @@ def test_an_interrupt_while_the_record_is_kept(case: Case) -> None:
         records.append(record)
 
     with pytest.raises(KeyboardInterrupt):
-        Repeater(case, 1, Silent(), keep).run(Falling(), [1, 2])  # type: ignore[arg-type]
+        Repeater(Experiment(case, Falling()), 1, Silent(), keep).run([1, 2])  # type: ignore[arg-type]
     assert [record.status for record in records] == ["ok"]
 
 
@@ -256,8 +257,9 @@ def test_a_time_out_is_a_failure_also_while_the_run_is_interrupted(case: Case) -
             if name == "fall":
                 repeater._stopping.set()  # Ctrl-C came, and has not reached this worker yet
 
-    repeater = Repeater(replace(case, timeout=3.0), 2, Stopping(), records.append)  # type: ignore[arg-type]
-    repeater.run(Falling(1e6), [1])
+    experiment = Experiment(replace(case, timeout=3.0), Falling(1e6))
+    repeater = Repeater(experiment, 2, Stopping(), records.append)  # type: ignore[arg-type]
+    repeater.run([1])
     assert [(r.status, r.error and r.error.type) for r in records] == [
         ("failed", "RepetitionTimeout")
     ]

@@ -15,6 +15,7 @@ import pytest
 
 from pytest_simbench.client import reaper
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from tests.client.test_limits import unruly
 from tests.conftest import workers
@@ -42,7 +43,7 @@ def lives(pid: int) -> bool:
 def test_children_of_an_engine(case: Case, tmp_path: Path, fault: str, status: str) -> None:
     ids = tmp_path / "ids"
     case = unruly(case, fault, environment={"UNRULY": str(ids)}, stall_timeout=20.0)
-    record, _ = Repetition(case, Falling(), 1).run()
+    record, _ = Repetition(Experiment(case, Falling()), 1).run()
     assert record.status == status
     pids = [int(line) for line in ids.read_text().split()]
     assert len(pids) == 3

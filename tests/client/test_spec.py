@@ -16,8 +16,10 @@ import psutil
 import pytest
 
 from pytest_simbench.client.errors import Where
-from pytest_simbench.client.process import Launch, WorkerProcess
+from pytest_simbench.client.launch import Launch
+from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from tests.tiny import Falling
 
@@ -58,8 +60,8 @@ def host(tmp_path: Path) -> Iterator[str]:
 
 
 def test_another_host(case: Case, host: str) -> None:
-    local, _ = Repetition(case, Falling(), 1).run()
-    remote, error = Repetition(replace(case, spec=host), Falling(), 1).run()
+    local, _ = Repetition(Experiment(case, Falling()), 1).run()
+    remote, error = Repetition(Experiment(replace(case, spec=host), Falling()), 1).run()
     assert error is None
     assert remote.metrics == local.metrics
     assert remote.versions == local.versions
@@ -81,7 +83,9 @@ def test_a_host_without_this_run_folder(case: Case, tmp_path: Path) -> None:
 
 def test_an_unknown_host(case: Case) -> None:
     spec = "ssh=-o ConnectTimeout=2 no-such-host.invalid//python=python3"
-    record, _ = Repetition(replace(case, spec=spec, stall_timeout=10.0), Falling(), 1).run()
+    record, _ = Repetition(
+        Experiment(replace(case, spec=spec, stall_timeout=10.0), Falling()), 1
+    ).run()
     assert record.error is not None
     assert record.error.type == "WorkerStartError"
     assert "no-such-host.invalid" in record.error.message
@@ -89,6 +93,6 @@ def test_an_unknown_host(case: Case) -> None:
 
 def test_a_popen_specification(case: Case) -> None:
     spec = f"popen//execmodel=main_thread_only//python={sys.executable}"
-    record, error = Repetition(replace(case, spec=spec), Falling(), 1).run()
+    record, error = Repetition(Experiment(replace(case, spec=spec), Falling()), 1).run()
     assert (record.status, error) == ("ok", None)
     assert record.resources["rss_mb"]["peak"] > 20

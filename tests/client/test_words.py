@@ -13,6 +13,7 @@ import pytest
 from pytest_simbench.client.errors import Unavailable, exit_text
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.tasks.base import Count, Outcome
 from pytest_simbench.worker.text import LONGEST, LONGEST_LOGGED, named, readable
@@ -42,7 +43,7 @@ def raising(case: Case, fault: str) -> Case:
 )
 def test_the_cause_arrives(case: Case, fault: str, kind: str, message: str) -> None:
     began = time.monotonic()
-    record, _ = Repetition(raising(case, fault), Falling(), 1).run()
+    record, _ = Repetition(Experiment(raising(case, fault), Falling()), 1).run()
     assert time.monotonic() - began < 10.0
     assert record.status == "failed"
     assert record.error is not None
@@ -56,13 +57,13 @@ def test_the_cause_arrives(case: Case, fault: str, kind: str, message: str) -> N
 
 
 def test_the_log_holds_more_of_a_long_message(case: Case) -> None:
-    Repetition(raising(case, "huge"), Falling(), 1).run()
+    Repetition(Experiment(raising(case, "huge"), Falling()), 1).run()
     (log,) = (case.folder / "logs").iterdir()
     assert LONGEST_LOGGED <= log.stat().st_size < 2 * LONGEST_LOGGED
 
 
 def test_an_adapter_s_own_kind_of_an_error_of_ours(case: Case) -> None:
-    _, error = Repetition(raising(case, "derived"), Falling(), 1).run()
+    _, error = Repetition(Experiment(raising(case, "derived"), Falling()), 1).run()
     assert isinstance(error, Unavailable)
 
 
@@ -75,7 +76,7 @@ def test_an_adapter_s_own_kind_of_an_error_of_ours(case: Case) -> None:
     ],
 )
 def test_ends_of_a_process(case: Case, fault: str, phase: str, message: str) -> None:
-    record, _ = Repetition(unruly(case, fault, stall_timeout=20.0), Falling(), 1).run()
+    record, _ = Repetition(Experiment(unruly(case, fault, stall_timeout=20.0), Falling()), 1).run()
     assert record.error is not None
     assert (record.error.type, record.error.phase) == ("WorkerExited", phase)
     assert record.error.message == message
@@ -95,7 +96,7 @@ class Failing(Falling):
 
 @pytest.mark.parametrize("fault", ["surrogate", "huge", "no_text"])
 def test_a_task_that_fails_is_recorded_too(case: Case, fault: str) -> None:
-    record, _ = Repetition(case, Failing(fault=fault), 1).run()
+    record, _ = Repetition(Experiment(case, Failing(fault=fault)), 1).run()
     assert record.status == "failed"
     assert record.error is not None
     record.error.message.encode("utf-8")
@@ -107,7 +108,7 @@ def test_a_signal_before_the_handshake_is_named(case: Case, tmp_path: Path, name
     python = tmp_path / "python"
     python.write_text(f"#!/bin/sh\nkill -{name} $$\n")
     python.chmod(0o755)
-    record, _ = Repetition(replace(case, python=str(python)), Falling(), 1).run()
+    record, _ = Repetition(Experiment(replace(case, python=str(python)), Falling()), 1).run()
     assert record.error is not None
     assert (record.error.type, record.error.phase) == ("WorkerExited", "launch")
     assert record.error.message == f"the worker was killed by SIG{name}"
@@ -117,7 +118,7 @@ def test_an_interpreter_that_ends_says_how_and_why(case: Case, tmp_path: Path) -
     python = tmp_path / "python"
     python.write_text("#!/bin/sh\necho no such library >&2\nexit 127\n")
     python.chmod(0o755)
-    record, _ = Repetition(replace(case, python=str(python)), Falling(), 1).run()
+    record, _ = Repetition(Experiment(replace(case, python=str(python)), Falling()), 1).run()
     assert record.error is not None
     assert record.error.type == "WorkerStartError"
     assert "it exited with status 127" in record.error.message
@@ -131,7 +132,7 @@ def test_a_path_with_two_slashes(case: Case) -> None:
     python = sys.executable.replace("/", "//")
     environment = {"SOMETHING": "a//b"}
     record, _ = Repetition(
-        replace(case, python=python, environment=environment), Falling(), 1
+        Experiment(replace(case, python=python, environment=environment), Falling()), 1
     ).run()
     assert record.status == "ok"
 

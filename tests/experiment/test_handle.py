@@ -37,7 +37,7 @@ def test_one_worker_for_all_episodes(handle: SimulatorHandle) -> None:
             world.wait(0.1)
             pids.add(world.process.pid)
     assert len(pids) == 1
-    assert handle.constructed["settings"]["timestep"] == 0.001
+    assert handle.constructed.settings["timestep"] == 0.001
 
 
 def test_two_episodes_at_once_are_an_error(handle: SimulatorHandle) -> None:

@@ -10,9 +10,10 @@ import pytest
 
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.protocol import PROTOCOLS
 from pytest_simbench.experiment.repetition import Repetition, group
-from pytest_simbench.tasks.base import Count, Outcome
+from pytest_simbench.tasks.base import Count, Outcome, Task
 from tests.tiny import Falling
 
 
@@ -31,7 +32,9 @@ class Versions(Falling):
 
 def test_paper_runs_in_real_time_and_records_before(case: Case) -> None:
     paper = replace(PROTOCOLS["paper"], before=1.0)
-    record, error = Repetition(replace(case, protocol=paper), Falling(duration=1.5), 1).run()
+    record, error = Repetition(
+        Experiment(replace(case, protocol=paper), Falling(duration=1.5)), 1
+    ).run()
     assert error is None
     began, ended = record.timeline["start"], record.timeline["end"]
     assert began > 1.0
@@ -42,37 +45,50 @@ def test_paper_runs_in_real_time_and_records_before(case: Case) -> None:
 
 def test_phases_follow_each_other(case: Case) -> None:
     phases: list[str] = []
-    Repetition(case, Falling(), 1, on_phase=phases.append).run()
+    Repetition(Experiment(case, Falling()), 1, on_phase=phases.append).run()
     assert [name for k, name in enumerate(phases) if phases[k - 1 : k] != [name]] == [
         *("launch", "load", "launch", "task", "fall", "task"),
     ]
 
 
 def test_fast_does_not_wait(case: Case) -> None:
-    record, _ = Repetition(case, Falling(duration=100.0), 1).run()
+    record, _ = Repetition(Experiment(case, Falling(duration=100.0)), 1).run()
     assert record.timeline["end"] - record.timeline["start"] < 50.0
 
 
-def test_each_protocol_has_its_version_of_a_task() -> None:
-    found = {name: each.version_of(Versions()) for name, each in PROTOCOLS.items()}
-    assert found == {
+def test_each_protocol_has_its_version_of_a_task(case: Case) -> None:
+    def version(name: str, task: Task) -> Task:
+        return Experiment(replace(case, protocol=PROTOCOLS[name]), task).task
+
+    assert {name: version(name, Versions()) for name in PROTOCOLS} == {
         "fast": Versions(version="as asked for"),
         "paper": Versions(version="the study's"),
         "smoke": Versions(version="the smallest"),
     }
     tiny = Falling(duration=0.1)  # a task with one version only
-    assert all(each.version_of(tiny) == tiny for each in PROTOCOLS.values())
+    assert all(version(name, tiny) == tiny for name in PROTOCOLS)
 
 
-def test_a_repetition_runs_the_task_that_it_is_given(case: Case) -> None:
-    """The version has been chosen before: asked twice, a version of a version would be run."""
-    for protocol in PROTOCOLS.values():
-        assert Repetition(replace(case, protocol=protocol), Versions(), 1).task == Versions()
+@dataclass(frozen=True)
+class Halved(Falling):
+    """A task of which the smallest version of the smallest version is a smaller one."""
+
+    def smoke(self) -> Halved:
+        return replace(self, duration=self.duration / 2)
+
+
+def test_the_version_is_chosen_once_whatever_becomes_of_the_case(case: Case) -> None:
+    experiment = Experiment(replace(case, protocol=PROTOCOLS["smoke"]), Halved(duration=0.4))
+    again = experiment.in_case(attempt=2).in_case(contended=True)
+    assert again.task == experiment.task == Halved(duration=0.2)
+    record, _ = Repetition(again, 1).run()
+    assert record.settings["task.duration"] == 0.2
+    assert record.stepping["simulated"] == pytest.approx(0.2)
 
 
 def test_a_record_says_what_it_was(case: Case) -> None:
     case = replace(case, changes={"timestep": "0.002"}, seed=7, jitter=0.5)
-    record, _ = Repetition(case, Falling(), 3).run()
+    record, _ = Repetition(Experiment(case, Falling()), 3).run()
     assert (record.seed, record.repetition, record.jitter) == (9, 3, 0.5)
     assert record.settings["timestep"] == 0.002
     assert record.settings["task.duration"] == 0.6
@@ -95,7 +111,7 @@ class Placed(Falling):
 
 
 def starts(case: Case, jitter: float, number: int) -> np.ndarray:
-    record, error = Repetition(replace(case, jitter=jitter), Placed(), number).run()
+    record, error = Repetition(Experiment(replace(case, jitter=jitter), Placed()), number).run()
     assert error is None
     return np.array(record.details["starts"])
 
@@ -144,5 +160,5 @@ class Settling(Falling):
 
 
 def test_settling_before_and_after_are_sampled_apart(case: Case) -> None:
-    record, _ = Repetition(case, Settling(), 1).run()
+    record, _ = Repetition(Experiment(case, Settling()), 1).run()
     assert {"settle start", "settle"} <= set(record.resources["phases"])

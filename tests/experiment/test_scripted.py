@@ -11,6 +11,7 @@ import pytest
 
 from pytest_simbench.client.errors import RepetitionTimeout
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.records.record import Record
 from pytest_simbench.scene import Pose
@@ -23,8 +24,8 @@ TOWERS = LeaningTowers(margins=(0.01,))
 class ScriptedRepetition(Repetition):
     """Its worker is a script."""
 
-    def __init__(self, case: Case, task: Task, number: int, *script: Mishap) -> None:
-        super().__init__(case, task, number)
+    def __init__(self, experiment: Experiment, number: int, *script: Mishap) -> None:
+        super().__init__(experiment, number)
         self.process = ScriptedProcess(script)
 
     def _worker(self, deadline: float) -> Any:
@@ -35,7 +36,7 @@ class ScriptedRepetition(Repetition):
 
 
 def run(case: Case, task: Task, *script: Mishap) -> Record:
-    repetition = ScriptedRepetition(case, task, 1, *script)
+    repetition = ScriptedRepetition(Experiment(case, task), 1, *script)
     record, _ = repetition.run()
     assert not repetition.process.pending
     return record
@@ -130,7 +131,9 @@ def test_the_scores_and_details_are_in_the_record(case: Case) -> None:
 @pytest.mark.parametrize("scale", [0.0, 1.0, 3.0])
 def test_the_start_is_disturbed_as_asked_for(case: Case, task: Task, scale: float) -> None:
     repetition = ScriptedRepetition(
-        replace(case, jitter=scale, seed=40), task, 3, Mishap("settle start", 0.0, fail(StopHere))
+        Experiment(replace(case, jitter=scale, seed=40), task),
+        3,
+        Mishap("settle start", 0.0, fail(StopHere)),
     )
     record, _ = repetition.run()
     assert (record.seed, record.jitter) == (42, scale)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.measure.gate import GateReport, run_gate
 from pytest_simbench.measure.limits import parse_limits
@@ -23,7 +24,8 @@ TASK = Falling(duration=15.0)
 def repetitions(case: Case) -> list[Record]:
     kept: list[Record] = []
     case = replace(case, timeout=600.0, stall_timeout=120.0)  # a machine that is very busy
-    Repeater(case, 1, Progress(lambda text: None, is_tty=False), kept.append).run(TASK, range(1, 7))
+    progress = Progress(lambda text: None, is_tty=False)
+    Repeater(Experiment(case, TASK), 1, progress, kept.append).run(range(1, 7))
     assert all(record.ok for record in kept)
     return kept
 

@@ -12,6 +12,7 @@ from pytest_simbench.client.errors import Where
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.experiment.workers import IdleWorkers
 from pytest_simbench.records.record import Record
@@ -38,7 +39,7 @@ def costly(case: Case, fault: str = "Costly", timeout: float = 60.0) -> Case:
 
 
 def run(case: Case, idle: IdleWorkers, number: int = 1) -> Record:
-    return Repetition(case, Falling(), number, idle=idle).run()[0]
+    return Repetition(Experiment(case, Falling()), number, idle=idle).run()[0]
 
 
 def results(record: Record) -> object:
@@ -69,10 +70,7 @@ def test_compiling_does_not_count_against_the_time_out(case: Case) -> None:
     case = costly(case)
     process = WorkerProcess(case.launch("deadline"), Where(case.simulator, case.mode))
     try:
-        process.request(
-            "construct", timeout=30.0, adapter=case.adapter, profile="tuned", changes={},
-            gui=False, real_time=False,
-        )  # fmt: skip
+        process.construct(timeout=30.0)
         process.deadline = before = time.monotonic() + 100.0
         World(process, Falling().scene(1, Jitter()))
         assert process.deadline >= before + COMPILE_SECONDS

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import expected
 from pytest_simbench.experiment.protocol import PROTOCOLS
 from pytest_simbench.plugin.resume import NotResumed, Resumed
@@ -39,7 +40,12 @@ def save(tmp_path: Path) -> Save:
 def ended(case: Case, task: Falling, *numbers: int, **changes: Any) -> list[Record]:
     """Records of repetitions that went well."""
     return [
-        replace(expected(case, task, k), status="ok", metrics={"landed": 1.0}, **changes)
+        replace(
+            expected(Experiment(case, task), k),
+            status="ok",
+            metrics={"landed": 1.0},
+            **changes,
+        )
         for k in numbers
     ]
 
@@ -47,9 +53,9 @@ def ended(case: Case, task: Falling, *numbers: int, **changes: Any) -> list[Reco
 def test_what_came_to_an_end_is_taken(case: Case, save: Save) -> None:
     task = Falling()
     cut = replace(ended(case, task, 3)[0], status="interrupted", metrics={})
-    found = save(*ended(case, task, 1, 2), cut).take(case, task, None)
+    found = save(*ended(case, task, 1, 2), cut).take(Experiment(case, task), None)
     assert sorted(found) == [1, 2]
-    assert save().take(replace(case, test="another[mujoco-headless]"), task, None) == {}
+    assert save().take(Experiment(replace(case, test="another[mujoco-headless]"), task), None) == {}
 
 
 @pytest.mark.parametrize(
@@ -73,7 +79,7 @@ def test_a_complete_run_is_held_against_the_options_without_a_worker(
 ) -> None:
     before = [replace(r, status=status) for r in ended(case, Falling(), 1, 2)]
     with pytest.raises(NotResumed) as refused:
-        save(*before).take(replace(case, **now), Falling(), None)
+        save(*before).take(Experiment(replace(case, **now), Falling()), None)
     assert fnmatch.fnmatch(
         str(refused.value),
         "test_x[[]mujoco-headless] of the run * is not resumed, since its repetitions would not be "
@@ -84,23 +90,25 @@ def test_a_complete_run_is_held_against_the_options_without_a_worker(
 def test_the_tasks_parameters_and_scene_are_compared(case: Case, save: Save) -> None:
     resumed = save(*ended(case, Falling(), 1))
     with pytest.raises(NotResumed, match=r"settings.task.duration was 0.6, is 9.0"):
-        resumed.take(case, Falling(duration=9.0), None)
+        resumed.take(Experiment(case, Falling(duration=9.0)), None)
     with pytest.raises(NotResumed, match=r"scene was "):
-        save(*ended(case, Falling(), 2, scene="of another task")).take(case, Falling(), None)
+        save(*ended(case, Falling(), 2, scene="of another task")).take(
+            Experiment(case, Falling()), None
+        )
 
 
 @pytest.mark.parametrize("name", ["mujoco", "pytest-simbench", "python"])
 def test_versions_that_are_known_here_are_compared(case: Case, save: Save, name: str) -> None:
-    versions = expected(case, Falling()).versions
+    versions = expected(Experiment(case, Falling())).versions
     assert name in versions
     old = ended(case, Falling(), 1, versions={**versions, name: "0.0.1"})
     with pytest.raises(NotResumed, match=f'versions.{name} was "0.0.1", is "'):
-        save(*old).take(case, Falling(), None)
+        save(*old).take(Experiment(case, Falling()), None)
 
 
 def test_versions_of_somebody_elses_interpreter_are_not_guessed(case: Case) -> None:
     other = replace(case, python="/somewhere/bin/python")
-    assert list(expected(other, Falling()).versions) == ["pytest-simbench"]
+    assert list(expected(Experiment(other, Falling())).versions) == ["pytest-simbench"]
 
 
 def test_fewer_repetitions_than_recorded_are_refused_and_more_are_not(
@@ -108,46 +116,46 @@ def test_fewer_repetitions_than_recorded_are_refused_and_more_are_not(
 ) -> None:
     resumed = save(*ended(case, Falling(), 1, 2, 3))
     with pytest.raises(NotResumed, match="--reps was 3 or more, is 2"):
-        resumed.take(case, Falling(), 2)
-    assert len(resumed.take(case, Falling(), 4)) == 3
-    assert len(resumed.take(case, Falling(), None)) == 3
+        resumed.take(Experiment(case, Falling()), 2)
+    assert len(resumed.take(Experiment(case, Falling()), 4)) == 3
+    assert len(resumed.take(Experiment(case, Falling()), None)) == 3
 
 
 def test_a_mixture_of_an_older_plugin_is_refused(case: Case, save: Save) -> None:
     coarse = replace(case, changes={"timestep": 0.004})
     resumed = save(*ended(coarse, Falling(), 1, 2), *ended(case, Falling(), 3, 4))
     with pytest.raises(NotResumed, match="settings.timestep was 0.004, is 0.001"):
-        resumed.take(case, Falling(), None)
+        resumed.take(Experiment(case, Falling()), None)
 
 
 def test_two_tasks_of_one_test_are_taken_one_by_one(case: Case, save: Save) -> None:
     first, second = Falling(duration=0.2), Falling(duration=0.1)
     resumed = save(*ended(case, first, 1, 2), *ended(case, second, 1))
-    assert [len(resumed.take(case, task, None)) for task in (first, second)] == [2, 1]
+    assert [len(resumed.take(Experiment(case, task), None)) for task in (first, second)] == [2, 1]
     begun = Resumed(resumed.folder)
     begun.records = tuple(ended(case, first, 1, 2))  # it had not come to the second task
-    assert [len(begun.take(case, task, None)) for task in (first, second)] == [2, 0]
+    assert [len(begun.take(Experiment(case, task), None)) for task in (first, second)] == [2, 0]
 
 
 def test_each_attempt_gets_its_own(case: Case, save: Save) -> None:
     again = replace(case, attempt=2)
     resumed = save(*ended(case, Falling(), 1, 2), *ended(again, Falling(), 1))
-    assert len(resumed.take(case, Falling(), None)) == 2
-    assert len(resumed.take(again, Falling(), None)) == 1
+    assert len(resumed.take(Experiment(case, Falling()), None)) == 2
+    assert len(resumed.take(Experiment(again, Falling()), None)) == 1
 
 
 def test_records_of_before_scene_and_limits_were_kept_go_on(case: Case, save: Save) -> None:
     old = ended(case, Falling(), 1, scene="", limits={})
-    assert len(save(*old).take(case, Falling(), None)) == 1
+    assert len(save(*old).take(Experiment(case, Falling()), None)) == 1
 
 
 def test_expected_is_what_the_worker_reports(case: Case) -> None:
     from pytest_simbench.experiment.repetition import Repetition
 
     case = replace(case, changes={"timestep": "0.002"})
-    record, error = Repetition(case, Falling(duration=0.01), 1).run()
+    record, error = Repetition(Experiment(case, Falling(duration=0.01)), 1).run()
     assert error is None
-    now = expected(case, Falling(duration=0.01)).to_dict()
+    now = expected(Experiment(case, Falling(duration=0.01))).to_dict()
     for name in ("settings", "scene", "limits", "profile", "protocol", "jitter", "versions"):
         assert record.to_dict()[name] == now[name]
 
@@ -155,21 +163,25 @@ def test_expected_is_what_the_worker_reports(case: Case) -> None:
 def test_a_start_that_fails_still_records_its_settings(case: Case) -> None:
     from pytest_simbench.experiment.repetition import Repetition
 
-    record, error = Repetition(replace(case, python="/nowhere/python"), Falling(), 1).run()
+    record, error = Repetition(
+        Experiment(replace(case, python="/nowhere/python"), Falling()), 1
+    ).run()
     assert error is not None
     assert record.status == "failed"
-    assert record.to_dict()["settings"] == expected(case, Falling()).to_dict()["settings"]
+    assert (
+        record.to_dict()["settings"] == expected(Experiment(case, Falling())).to_dict()["settings"]
+    )
 
 
 def test_a_time_out_failed_and_is_not_run_again(case: Case, save: Save) -> None:
     from pytest_simbench.experiment.repetition import Repetition
 
     case = replace(case, timeout=3.0)
-    record, error = Repetition(case, Falling(duration=1e5), 1).run()
+    record, error = Repetition(Experiment(case, Falling(duration=1e5)), 1).run()
     assert error is not None
     assert record.error is not None
     assert (record.status, record.error.type) == ("failed", "RepetitionTimeout")
-    assert list(save(record).take(case, Falling(duration=1e5), None)) == [1]
+    assert list(save(record).take(Experiment(case, Falling(duration=1e5)), None)) == [1]
 
 
 TEST = """

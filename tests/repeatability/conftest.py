@@ -10,8 +10,9 @@ import pytest
 
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.handle import SimulatorHandle
-from pytest_simbench.repeatability.episode import Experiment
+from pytest_simbench.repeatability.episode import Episodes
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.tasks import Jitter, LeaningTowers
 from pytest_simbench.tasks.base import Count, Outcome, Task, cube, generators
@@ -67,18 +68,25 @@ def handle_of(case: Case) -> Iterator[Callable[..., SimulatorHandle]]:
         handle.close()
 
 
+def first_seed(
+    handle: SimulatorHandle, task: Task, *, seed: int = 1, jitter: float = 1.0
+) -> Episodes:
+    """Episodes of a task in the case of a handle."""
+    return Episodes(Experiment(replace(handle.case, seed=seed, jitter=jitter), task), handle)
+
+
 @pytest.fixture
-def towers(handle_of: Callable[..., SimulatorHandle]) -> Callable[..., Experiment]:
+def towers(handle_of: Callable[..., SimulatorHandle]) -> Callable[..., Episodes]:
     """One leaning tower in a simulator."""
 
-    def make(name: str = "mujoco", margin: float = 0.008) -> Experiment:
+    def make(name: str = "mujoco", margin: float = 0.008) -> Episodes:
         task = LeaningTowers(margins=(margin,), settle=1.5)
-        return Experiment(handle_of(name), task, 1, Jitter())
+        return first_seed(handle_of(name), task)
 
     return make
 
 
 @pytest.fixture
-def tumbling(handle_of: Callable[..., SimulatorHandle]) -> Callable[..., Experiment]:
+def tumbling(handle_of: Callable[..., SimulatorHandle]) -> Callable[..., Episodes]:
     """Falling cubes in a simulator."""
-    return lambda name="mujoco": Experiment(handle_of(name), Tumbling(), 1, Jitter())
+    return lambda name="mujoco": first_seed(handle_of(name), Tumbling())

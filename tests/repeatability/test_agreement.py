@@ -11,7 +11,7 @@ import pytest
 
 from pytest_simbench.client.world import Motion
 from pytest_simbench.repeatability.agreement import FOLDER, Sample, agreement, agreements
-from pytest_simbench.repeatability.episode import Experiment
+from pytest_simbench.repeatability.episode import Episodes
 from tests.repeatability.scripted import episode, motion, operation
 
 
@@ -129,7 +129,7 @@ def test_kept_and_read_back(tmp_path: Path) -> None:
 
 
 def test_engines_with_the_same_law_agree_until_things_collide(
-    tumbling: Callable[..., Experiment],
+    tumbling: Callable[..., Episodes],
 ) -> None:
     """Falling is the same everywhere; from the first contact on, engines go their own ways. The
     steps are 1 ms and 1/240 s and the first-order integrators differ by g h t / 2 on the way."""

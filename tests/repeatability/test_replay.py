@@ -8,12 +8,13 @@ from dataclasses import replace
 import pytest
 
 from pytest_simbench.experiment.handle import SimulatorHandle
-from pytest_simbench.repeatability.episode import Experiment
+from pytest_simbench.repeatability.episode import Episodes
 from pytest_simbench.repeatability.motions import Difference
 from pytest_simbench.repeatability.replay import replay
 from pytest_simbench.repeatability.replay_result import Again, Replay
 from pytest_simbench.simulator import Capability
-from pytest_simbench.tasks import Jitter, Moment, Throwing
+from pytest_simbench.tasks import Moment, Throwing
+from tests.repeatability.conftest import first_seed
 
 EVERYTHING = frozenset(Capability)
 MOMENTS = (Moment("in flight", "fly"),)
@@ -28,7 +29,7 @@ WAYS = (
 
 @pytest.fixture
 def replayed(
-    tumbling: Callable[..., Experiment], handle_of: Callable[..., SimulatorHandle]
+    tumbling: Callable[..., Episodes], handle_of: Callable[..., SimulatorHandle]
 ) -> Callable[..., Replay]:
     """Falling cubes, run again in a simulator that claims to be deterministic."""
 
@@ -133,7 +134,7 @@ def test_failure_to_run_again_is_a_failure_without_a_claim(
 
 
 def test_what_cannot_be_done_is_told(
-    tumbling: Callable[..., Experiment], handle_of: Callable[..., SimulatorHandle]
+    tumbling: Callable[..., Episodes], handle_of: Callable[..., SimulatorHandle]
 ) -> None:
     def run(capabilities: frozenset[Capability], moment: Moment) -> Again:
         result = replay(
@@ -152,7 +153,7 @@ def test_what_cannot_be_done_is_told(
 
 
 def test_a_task_without_moments_is_restored_nowhere(
-    tumbling: Callable[..., Experiment], handle_of: Callable[..., SimulatorHandle]
+    tumbling: Callable[..., Episodes], handle_of: Callable[..., SimulatorHandle]
 ) -> None:
     result = replay(
         tumbling(),
@@ -168,9 +169,9 @@ def test_a_task_without_moments_is_restored_nowhere(
 def test_a_throw_with_the_cube_in_the_grip_and_after_the_swing(
     handle_of: Callable[..., SimulatorHandle],
 ) -> None:
-    experiment = Experiment(handle_of(), replace(Throwing(), settle=0.5), 2022, Jitter())
+    episodes = first_seed(handle_of(), replace(Throwing(), settle=0.5), seed=2022)
     result = replay(
-        experiment,
+        episodes,
         claims=True,
         capabilities=EVERYTHING,
         fresh=handle_of(),
@@ -184,7 +185,7 @@ def test_a_throw_with_the_cube_in_the_grip_and_after_the_swing(
 
 
 def test_side_by_side_gives_the_same(
-    tumbling: Callable[..., Experiment], handle_of: Callable[..., SimulatorHandle]
+    tumbling: Callable[..., Episodes], handle_of: Callable[..., SimulatorHandle]
 ) -> None:
     def run(jobs: int) -> Replay:
         return replay(
@@ -204,7 +205,7 @@ def test_side_by_side_gives_the_same(
 
 
 def test_an_interrupt_ends_what_runs_side_by_side(
-    tumbling: Callable[..., Experiment],
+    tumbling: Callable[..., Episodes],
     handle_of: Callable[..., SimulatorHandle],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from pytest_simbench.client.world import World
 from pytest_simbench.measure.results import InconclusiveWarning
-from pytest_simbench.repeatability.episode import Experiment
+from pytest_simbench.repeatability.episode import Episodes
 from pytest_simbench.repeatability.motions import gaps
 from pytest_simbench.repeatability.perturbation import Perturbation
 from pytest_simbench.repeatability.stability import (
@@ -23,10 +23,10 @@ from pytest_simbench.robot.panda import panda
 from pytest_simbench.scene import Scene, Trajectory
 from pytest_simbench.tasks import Jitter, Moment
 from pytest_simbench.tasks.base import Count, Outcome
-from tests.repeatability.conftest import Tumbling
+from tests.repeatability.conftest import Tumbling, first_seed
 
 
-def test_within_the_margin_all_is_kept(towers: Callable[..., Experiment]) -> None:
+def test_within_the_margin_all_is_kept(towers: Callable[..., Episodes]) -> None:
     result = stability(towers(), {"x": 0.001, "mass": 0.05}, examples=8)
     assert list(result.kept) == [1.0] * 8
     assert (result.unchanged, result.worst) == (8, "")
@@ -48,7 +48,7 @@ def test_few_runs_are_not_judged() -> None:
         result.assert_kept_at_least(0.9)
 
 
-def test_beyond_it_towers_fall(towers: Callable[..., Experiment]) -> None:
+def test_beyond_it_towers_fall(towers: Callable[..., Episodes]) -> None:
     result = stability(towers(margin=0.003), {"x": 0.012}, examples=20)
     assert 0 < result.unchanged < 20
     assert min(result.kept) == 0.0
@@ -57,13 +57,13 @@ def test_beyond_it_towers_fall(towers: Callable[..., Experiment]) -> None:
         result.assert_kept_at_least(0.97)
 
 
-def test_a_crash_keeps_nothing(towers: Callable[..., Experiment]) -> None:
+def test_a_crash_keeps_nothing(towers: Callable[..., Episodes]) -> None:
     result = stability(towers("Brittle"), {"friction": 0.2}, examples=10)
     assert set(result.kept) == {0.0, 1.0}
     assert "ends in WorkerExited" in result.worst
 
 
-def test_a_tower_that_stands_keeps_the_displacement(towers: Callable[..., Experiment]) -> None:
+def test_a_tower_that_stands_keeps_the_displacement(towers: Callable[..., Episodes]) -> None:
     """Nothing slides and nothing falls: a millimetre stays a millimetre."""
     result = sensitivity(towers(margin=0.015), Perturbation("x", 5, "cube_04"))
     assert result.ratio[0.1] == pytest.approx(1.0, abs=0.1)
@@ -72,7 +72,7 @@ def test_a_tower_that_stands_keeps_the_displacement(towers: Callable[..., Experi
     result.assert_below(1.2, until=1.0)
 
 
-def test_falling_cubes_part(tumbling: Callable[..., Experiment]) -> None:
+def test_falling_cubes_part(tumbling: Callable[..., Episodes]) -> None:
     result = sensitivity(tumbling(), Perturbation("x", 1, "cube_1"))
     assert result.ratio[0.1] == pytest.approx(1.0, abs=0.3)
     assert result.largest > 3
@@ -92,13 +92,13 @@ class Peeking(Tumbling):
 
 
 def test_the_same_commands_are_sent_whatever_the_task_would_plan(
-    tumbling: Callable[..., Experiment],
+    tumbling: Callable[..., Episodes],
 ) -> None:
     """Were the waits planned anew, the falling cubes would be 8 mm apart: 80 mm per mm."""
-    experiment = replace(tumbling(), task=Peeking(), jitter=Jitter(0.0, 0.0))
-    base, moved = (experiment.run([Perturbation("x", n, "cube_1")] if n else []) for n in (0, 1))
+    episodes = first_seed(tumbling().handle, Peeking(), jitter=0.0)
+    base, moved = (episodes.run([Perturbation("x", n, "cube_1")] if n else []) for n in (0, 1))
     assert base.tape[1].duration != moved.tape[1].duration
-    assert sensitivity(experiment, Perturbation("x", 1, "cube_1")).largest < 1.5
+    assert sensitivity(episodes, Perturbation("x", 1, "cube_1")).largest < 1.5
 
 
 @dataclass(frozen=True)
@@ -120,14 +120,14 @@ class Late(Tumbling):
         return Outcome({"left": 0.0})
 
 
-def test_times_count_from_the_first_motion_of_the_task(tumbling: Callable[..., Experiment]) -> None:
+def test_times_count_from_the_first_motion_of_the_task(tumbling: Callable[..., Episodes]) -> None:
     """Nothing has happened at 0.1 s of a world that rests for 0.05 s first but what is told at
     0.05 s after the task began."""
-    experiment = replace(tumbling(), task=Late())
+    episodes = first_seed(tumbling().handle, Late())
     moments = (Moment("at first", "swing"), Moment("swung", "swing", 1), Moment("never", "swim"))
-    found = sensitivity(experiment, Perturbation("x", 1, "cube_1"), moments)
-    base = experiment.run()
-    moved = experiment.run([Perturbation("x", 1, "cube_1")], play=base.tape)
+    found = sensitivity(episodes, Perturbation("x", 1, "cube_1"), moments)
+    base = episodes.run()
+    moved = episodes.run([Perturbation("x", 1, "cube_1")], play=base.tape)
     between = gaps(base.motions, moved.motions)
     expected = between.after(0.05 + 0.1)
     assert expected is not None
@@ -162,6 +162,6 @@ def test_later_times_are_not_judged() -> None:
         grown.assert_below(2.0, until=5.0)
 
 
-def test_only_displacements(towers: Callable[..., Experiment]) -> None:
+def test_only_displacements(towers: Callable[..., Episodes]) -> None:
     with pytest.raises(ValueError, match="per millimetre, not for 1 % in the mass of cube_01"):
         sensitivity(towers(), Perturbation("mass", 1, "cube_01"))

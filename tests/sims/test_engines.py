@@ -29,14 +29,7 @@ def start(request: pytest.FixtureRequest, case: Case) -> Iterator[Callable[[Scen
     def begin(scene: Scene) -> World:
         worker = WorkerProcess(engine.launch("engine"), Where(engine.simulator, "headless"))
         workers.append(worker)
-        worker.request(
-            "construct",
-            adapter=engine.adapter,
-            profile="tuned",
-            changes={},
-            gui=False,
-            real_time=False,
-        )
+        worker.construct()
         return World(worker, scene)
 
     yield begin

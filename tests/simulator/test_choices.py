@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import pytest
 
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.markdown import render_task as written
@@ -73,7 +74,7 @@ def test_nothing_declared_is_nothing_said() -> None:
 
 
 def test_a_record_says_on_what_its_profile_was_chosen(case: Case) -> None:
-    made, _ = Repetition(case, Falling(), 1).run()
+    made, _ = Repetition(Experiment(case, Falling()), 1).run()
     declared = seeds_seen(case.adapter, case.profile)
     assert declared
     assert Record.from_json(made.to_json()).details["chosen_on"] == [

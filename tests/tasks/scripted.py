@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.client.errors import Where, WorkerError
+from pytest_simbench.client.launch import Constructed
 from pytest_simbench.client.world import World
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.scene import FloatArray, Pose, Scene
@@ -103,8 +104,8 @@ class ScriptedProcess:
     def log_tail(self) -> str:
         return ""
 
-    def do_construct(self, **arguments: Any) -> dict[str, Any]:
-        return {"settings": {"timestep": self.timestep}, "versions": {}, "untested": ""}
+    def construct(self, *arguments: Any, **more: Any) -> Constructed:
+        return Constructed({"timestep": self.timestep})
 
     def do_load(self, scene: dict[str, Any], parity: bool) -> dict[str, Any]:
         self.scene = Scene.from_wire(scene)

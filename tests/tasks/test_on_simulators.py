@@ -11,6 +11,7 @@ import pytest
 from pytest_simbench.client.display import Displays
 from pytest_simbench.client.errors import Unavailable
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.simulator import Capability
@@ -24,7 +25,7 @@ def any_case(request: pytest.FixtureRequest, case: Case) -> Case:
 
 
 def test_two_cubes_are_stacked(any_case: Case) -> None:
-    record, error = Repetition(any_case, Stacking().smoke(), 1).run()
+    record, error = Repetition(Experiment(any_case, Stacking().smoke()), 1).run()
     assert error is None
     assert record.metrics["at_end_strict"] == 1.0
     assert record.metrics["untouched_moved"] == 0.0
@@ -34,7 +35,7 @@ def test_two_cubes_are_stacked(any_case: Case) -> None:
 
 
 def test_the_throw_hits(any_case: Case) -> None:
-    record, error = Repetition(any_case, Throwing().smoke(), 1).run()
+    record, error = Repetition(Experiment(any_case, Throwing().smoke()), 1).run()
     assert error is None
     assert record.metrics["hit"] == 1.0
     assert record.metrics["lost_in_transit"] == 0.0
@@ -44,7 +45,9 @@ def test_the_throw_hits(any_case: Case) -> None:
 
 
 def test_the_same_seed_gives_the_same_outcome(any_case: Case) -> None:
-    first, second = (Repetition(any_case, Throwing().smoke(), 2).run()[0] for _ in range(2))
+    first, second = (
+        Repetition(Experiment(any_case, Throwing().smoke()), 2).run()[0] for _ in range(2)
+    )
     assert first.metrics == second.metrics
     assert first.details["projectile_end"] == second.details["projectile_end"]
 
@@ -61,7 +64,7 @@ class FarAway(Stacking):
 
 
 def test_unreachable_cubes_are_counted_and_the_task_goes_on(case: Case) -> None:
-    record, error = Repetition(case, FarAway(towers=1, levels=3, settle=0.5), 3).run()
+    record, error = Repetition(Experiment(case, FarAway(towers=1, levels=3, settle=0.5)), 3).run()
     assert error is None
     failed = record.details["failed_picks"]
     assert record.metrics["failed_picks"] == len(failed) >= 1
@@ -76,10 +79,10 @@ def test_with_a_window_the_outcome_is_the_same(case: Case, name: str) -> None:
     displays = Displays()
     with closing(displays):
         gui = replace(headless, mode="gui", display=displays)
-        with_window, error = Repetition(gui, throw, 1).run()
+        with_window, error = Repetition(Experiment(gui, throw), 1).run()
     if isinstance(error, Unavailable):  # a driver that this machine lacks: a skip with its reason
         raise error
     assert error is None
-    without, _ = Repetition(headless, throw, 1).run()
+    without, _ = Repetition(Experiment(headless, throw), 1).run()
     assert with_window.metrics == without.metrics
     assert with_window.details["projectile_end"] == without.details["projectile_end"]

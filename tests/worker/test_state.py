@@ -11,6 +11,7 @@ import pytest
 
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.records.record import Record
@@ -95,7 +96,7 @@ def test_found_when_the_world_is_loaded(case: Case, fault: str) -> None:
     message = EXPECTED[fault]
     for text, number in (("N-1", free - 1), ("N+1", free + 1), ("N", free)):
         message = message.replace(f"({text},", f"({number},")
-    record, _ = Repetition(misshapen(case, fault), Turning(), 1).run()
+    record, _ = Repetition(Experiment(misshapen(case, fault), Turning()), 1).run()
     assert record.error is not None
     assert (record.error.type, record.error.phase) == ("BadState", "load")
     assert message in record.error.message
@@ -115,7 +116,7 @@ def test_found_when_the_world_is_loaded(case: Case, fault: str) -> None:
     ],
 )
 def test_found_after_a_motion(case: Case, fault: str, kind: str, message: str) -> None:
-    record, _ = Repetition(misshapen(case, fault), Turning(), 1).run()
+    record, _ = Repetition(Experiment(misshapen(case, fault), Turning()), 1).run()
     assert record.error is not None
     assert (record.error.type, record.error.phase) == (kind, "turn")
     assert message in record.error.message
@@ -123,15 +124,15 @@ def test_found_after_a_motion(case: Case, fault: str, kind: str, message: str) -
 
 
 def test_an_honest_adapter_passes(case: Case) -> None:
-    record, error = Repetition(misshapen(case, "nothing"), Turning(), 1).run()
+    record, error = Repetition(Experiment(misshapen(case, "nothing"), Turning()), 1).run()
     assert error is None
     assert record.status == "ok"
 
 
 def test_it_ends_that_repetition_alone(case: Case) -> None:
     kept: list[Record] = []
-    repeater = Repeater(misshapen(case, "too few bodies"), 1, Silent(), kept.append)  # type: ignore[arg-type]
-    repeater.run(Falling(), [1, 2])
+    experiment = Experiment(misshapen(case, "too few bodies"), Falling())
+    Repeater(experiment, 1, Silent(), kept.append).run([1, 2])  # type: ignore[arg-type]
     assert [record.status for record in kept] == ["failed", "failed"]
 
 

@@ -1,0 +1,79 @@
+"""An experiment: a task in a case, that is what all repetitions of a test have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.scene import Scene
+from pytest_simbench.tasks.base import Jitter, Task
+from pytest_simbench.tasks.metrics import Metric
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A task in a case. A test asks for the task; the protocol may want another version of it.
+
+    Attributes:
+        case: simulator, mode, settings and limits.
+        asked: the task that the test asks for.
+    """
+
+    case: Case
+    asked: Task
+
+    @cached_property
+    def task(self) -> Task:
+        """The version of the task that the protocol wants. Nobody else asks the protocol: a version
+        of a version would be another one."""
+        return self.case.protocol.version_of(self.asked)
+
+    def in_case(self, **changes: Any) -> Experiment:
+        """The same task in a changed case."""
+        return replace(self, case=replace(self.case, **changes))
+
+    def seed(self, number: int = 1) -> int:
+        """Of a repetition, counted from 1."""
+        return self.case.seed + number - 1
+
+    @property
+    def jitter(self) -> Jitter:
+        """Of the cubes' start, as large as `--jitter` has it."""
+        one = Jitter()
+        return Jitter(one.distance * self.case.jitter, one.angle * self.case.jitter)
+
+    def scene(self, seed: int) -> Scene:
+        """The world that the task begins with."""
+        return self.task.scene(seed, self.jitter)
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]:
+        """What the task measures."""
+        return self.task.metrics
+
+    @property
+    def references(self) -> Mapping[str, float]:
+        """Metric name to the value of a perfect simulator, where there is one."""
+        return self.task.references
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Of the task, under their names in records."""
+        return self.task.parameters()
+
+    @property
+    def timeout(self) -> float:
+        """Of a repetition from launch [s]."""
+        return self.case.timeout or self.task.study_timeout
+
+    @property
+    def limits(self) -> dict[str, float | None]:
+        """Time-outs [s] and the limit of memory [MB]."""
+        return {
+            "timeout": self.timeout,
+            "stall_timeout": self.case.stall_timeout,
+            "memory_limit": self.case.memory_limit,
+        }
