@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
@@ -10,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench.plugin import arguments, options
-from pytest_simbench.plugin.hooks import is_conftest, run, selection
+from pytest_simbench.plugin import arguments, benchmark, options
+from pytest_simbench.plugin.session import session_of
+from pytest_simbench.plugin.spellings import is_conftest
 
 if TYPE_CHECKING:
     from pytest_simbench.client.display import Displays
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from pytest_simbench.experiment.case import Case
     from pytest_simbench.experiment.handle import SimulatorHandle
     from pytest_simbench.measure.results import ResultSet
+    from pytest_simbench.plugin.repeatability import Perturber
     from pytest_simbench.plugin.run import Run
+    from pytest_simbench.repeatability.replay_result import Replay
     from pytest_simbench.scene import Scene
     from pytest_simbench.tasks.base import Task
 
@@ -46,18 +48,14 @@ def beside(plugins: pytest.PytestPluginManager) -> ModuleType:
     A conftest's fixture hides ours where it holds, as always. Ours can be had under any name by
     an import in a conftest: `from pytest_simbench.plugin.fixtures import repeat as sim_repeat`.
     """
-    from pytest_simbench.plugin import repeatability
-
-    found = {**vars(repeatability), **globals()}
     module = ModuleType("pytest_simbench.plugin.fixtures_here", __doc__)
     others = [plugin for plugin in plugins.get_plugins() if not is_conftest(plugin)]
     for name in (*OWN, *SHARED):
         if name in OWN or not any(_is_fixture(getattr(other, name, None)) for other in others):
-            setattr(module, name, found[name])
-    rounds = benchmark_rounds if has_benchmark(plugins) else no_rounds
-    vars(module).update(
-        simbench_rounds=rounds, pytest_terminal_summary=repeatability.pytest_terminal_summary
-    )
+            setattr(module, name, globals()[name])
+    at_work = benchmark.has_benchmark(plugins)
+    rounds = benchmark.benchmark_rounds if at_work else benchmark.no_rounds
+    vars(module).update(simbench_rounds=rounds)
     return module
 
 
@@ -66,33 +64,6 @@ def _is_fixture(thing: object) -> bool:
         thing,
         "_pytestfixturefunction",  # pytest before 8.4
     )
-
-
-def has_benchmark(plugins: pytest.PytestPluginManager) -> bool:
-    """Whether pytest-benchmark is at work (it is not under `-p no:benchmark`)."""
-    module = sys.modules.get("pytest_benchmark.plugin")
-    return module is not None and plugins.is_registered(module)
-
-
-@pytest.fixture
-def benchmark_rounds(request: pytest.FixtureRequest, benchmark: Any) -> Any:
-    """What takes the repetitions as rounds: pytest-benchmark's fixture.
-
-    A test that is run again (pytest-rerunfailures) replaces the rounds of its first attempt, which
-    would else be in the saved file a second time. A conftest's own `benchmark` takes no rounds.
-    """
-    from pytest_benchmark.fixture import BenchmarkFixture
-
-    if not isinstance(benchmark, BenchmarkFixture):
-        return None
-    saved = getattr(getattr(request.config, "_benchmarksession", None), "benchmarks", [])
-    saved[:] = [rounds for rounds in saved if rounds.fullname != benchmark.fullname]
-    return benchmark
-
-
-@pytest.fixture
-def no_rounds() -> None:
-    """Nothing takes the repetitions as rounds."""
 
 
 @pytest.fixture(scope="session")
@@ -123,7 +94,7 @@ def sim_settings() -> dict[str, Any]:
 @pytest.fixture
 def output_path(request: pytest.FixtureRequest) -> Path:
     """The run folder; it exists when the fixture is used."""
-    return run(request.config).use()
+    return session_of(request.config).run.use()
 
 
 def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: Any) -> Case:
@@ -134,7 +105,8 @@ def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: A
 
     name, mode = sim_case
     info = adapter(name).info
-    chosen, this = selection(config), run(config)
+    session = session_of(config)
+    chosen, this = session.selection, session.run
     settings = more.pop("settings", {})
     return Case(
         test=test,
@@ -180,7 +152,7 @@ def simbench_case(
     from pytest_simbench.plugin.selection import number_mark
 
     given = options.value(request.config, "sim_timeout")
-    profile = selection(request.config).profile
+    profile = session_of(request.config).selection.profile
     return _case(
         request.config,
         sim_case,
@@ -195,24 +167,64 @@ def repeat(
     request: pytest.FixtureRequest, simbench_case: Case, simbench_rounds: Any
 ) -> Iterator[Callable[[Task], ResultSet]]:
     """Runs a task `--reps` times: `result = repeat(Stacking())`; each task once in a test."""
-    from pytest_simbench.plugin.repeating import Repeating
+    from pytest_simbench.plugin.repeat_fixture import RepeatFixture
 
-    repeating = Repeating(request.node, simbench_case, run(request.config))
+    repeat = RepeatFixture(request.node, simbench_case, session_of(request.config).run)
     done: list[Task] = []
 
     def perform(task: Task) -> ResultSet:
         arguments.once(arguments.checked_task(task, "repeat"), done)
-        return repeating(task)
+        return repeat(task)
 
     yield perform
-    repeating.finish(simbench_rounds)
+    repeat.finish(simbench_rounds)
+
+
+@pytest.fixture
+def replay(request: pytest.FixtureRequest, simbench_case: Case) -> Callable[..., Replay]:
+    """Runs the first seed of a task again in every way: `replay(Throwing())`.
+
+    Takes `moments=` in place of those that the task declares. The first run's motion is kept for
+    the comparison between simulators.
+    """
+    from pytest_simbench.plugin.repeatability import ReplayFixture
+
+    jobs = options.value(request.config, "sim_jobs")
+    run = ReplayFixture(simbench_case, session_of(request.config).run.displays, jobs)
+    return lambda task, **more: run(arguments.checked_task(task, "replay"), **more)
+
+
+@pytest.fixture
+def perturb(
+    request: pytest.FixtureRequest, simbench_case: Case, sim_settings: dict[str, Any]
+) -> Iterator[Callable[[Task], Perturber]]:
+    """Perturbs the first seed of a task: `perturb(LeaningTowers()).search({"x": 0.01})`.
+
+    All examples run in the session's worker (one of the test's own where it has `sim_settings`).
+    """
+    from pytest_simbench.experiment.experiment import Experiment
+    from pytest_simbench.experiment.handle import SimulatorHandle
+    from pytest_simbench.plugin.repeatability import Perturber
+    from pytest_simbench.repeatability.episode import Episodes
+
+    own = SimulatorHandle(simbench_case) if sim_settings else None
+    handle = own or request.getfixturevalue("simbench_handle")
+    strict = options.value(request.config, "sim_strict")
+
+    def perturb_task(task: Task) -> Perturber:
+        experiment = Experiment(simbench_case, arguments.checked_task(task, "perturb"))
+        return Perturber(Episodes(experiment, handle), strict)
+
+    yield perturb_task
+    if own is not None:
+        own.close()
 
 
 @pytest.fixture
 def threshold(request: pytest.FixtureRequest) -> Callable[[str, float], float]:
     """`threshold("placed", 0.9)`: the suite's value, unless `--sim-threshold` changes it."""
     given = options.value(request.config, "sim_threshold")
-    this = run(request.config)
+    this = session_of(request.config).run
 
     def choose(metric: str, default: float) -> float:
         value = float(given.get(metric, arguments.checked_threshold(metric, default)))

@@ -139,6 +139,9 @@ OPTIONS = (
 )  # fmt: skip
 """All options. Only their tests know them besides this table; docs/options.md is made of it."""
 
+COMMANDS = ("sim_install", "sim_merge", "sim_report", "sim_list")
+"""Options that do their work and exit, see `plugin.commands`."""
+
 _BY_NAME = {item.name: item for item in OPTIONS}
 
 OURS: pytest.StashKey[frozenset[str]] = pytest.StashKey()

@@ -35,6 +35,11 @@ def register(parser: pytest.Parser, config: pytest.Config) -> None:
     config.stash[OURS] = frozenset(ours)
 
 
+def is_conftest(plugin: object) -> bool:
+    """Whether a plugin is a conftest.py."""
+    return os.path.basename(getattr(plugin, "__file__", None) or "") == "conftest.py"
+
+
 def foreign(config: pytest.Config) -> list[str]:
     """What of our names on the command line belongs to others here, and how to write it; one
     sentence each."""

@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import ttest_ind
 
+from pytest_simbench.measure.__main__ import main
 from pytest_simbench.measure.intervals import Interval, interval, proportion
 from pytest_simbench.measure.power import (
     alike_rate,
     further_repetitions,
     least_supported,
-    main,
     passing_rate,
     repetitions_for_proportion,
     repetitions_to_detect,

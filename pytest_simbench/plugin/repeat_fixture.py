@@ -14,8 +14,8 @@ from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.sequential import Plan, SequentialResultSet
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.plugin import options
+from pytest_simbench.plugin.benchmark import worker_clock
 from pytest_simbench.plugin.selection import number_mark
-from pytest_simbench.plugin.worker_clock import worker_clock
 from pytest_simbench.records import baseline
 from pytest_simbench.records.description import Description
 from pytest_simbench.records.record import Record
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 SAVED_COSTS = ("rtf", "cpu", "ram", "ram_peak", "cpu_cost", "start", "end", "total")
 
 
-class Repeating:
-    """What the fixture `repeat` does.
+class RepeatFixture:
+    """What the fixture `repeat` does, called with a task.
 
     Args:
         node: the test.

@@ -1,4 +1,4 @@
-"""`pytest --sims`: the known simulators, what is here, what each can do and where it deviates."""
+"""Options that do their work and exit: `--sims`, `--sim-install`, `--sim-merge`, `--sim-report`."""
 
 from __future__ import annotations
 
@@ -7,11 +7,52 @@ from collections.abc import Iterator
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
+import pytest
+
+from pytest_simbench.plugin import options, spellings
+from pytest_simbench.plugin.session import session_of
 from pytest_simbench.records.text import for_terminal
 
 if TYPE_CHECKING:
     from pytest_simbench.plugin.selection import Selection
     from pytest_simbench.simulator.info import SimulatorInfo
+
+
+def run_command(config: pytest.Config) -> int:
+    """Do what the first such option on the command line asks for; the exit code.
+
+    Raises:
+        pytest.UsageError: what is wrong with the input; one sentence.
+    """
+    from pytest_simbench.plugin.merge import merge_runs, report_runs
+
+    options.values(config)
+    commands = dict(zip(options.COMMANDS, (_install, merge_runs, report_runs, _list), strict=True))
+    return next(do(config) for name, do in commands.items() if options.given(config, name))
+
+
+def _install(config: pytest.Config) -> int:
+    """`--sim-install`: make the environments of simulators that need one of their own."""
+    from pytest_simbench.client.environments import Environment
+    from pytest_simbench.simulator.errors import SimulatorError
+    from pytest_simbench.simulator.registry import adapter
+
+    try:
+        for name in options.value(config, "sim_install"):
+            environment = Environment.of(adapter(name).info)
+            if environment.problem:
+                environment.create()
+            print(f"{name}: {environment.info.title} {environment.version()} is ready")
+    except SimulatorError as error:
+        raise pytest.UsageError(str(error)) from None
+    return 0
+
+
+def _list(config: pytest.Config) -> int:
+    """`--sims`: the known simulators, what is here, what each can do and where it deviates."""
+    for line in [*_simulators(session_of(config).selection), *spellings.foreign(config)]:
+        print(line)
+    return 0
 
 
 def _width() -> int:
@@ -41,7 +82,7 @@ def _size(info: SimulatorInfo) -> str:
     return size + start
 
 
-def list_simulators(selection: Selection) -> Iterator[str]:
+def _simulators(selection: Selection) -> Iterator[str]:
     """Lines: the table of capabilities, then a paragraph for each registered simulator, also for
     those whose adapter is broken."""
     return map(for_terminal, _lines(selection))

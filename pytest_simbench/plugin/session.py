@@ -1,0 +1,195 @@
+"""What the plugin knows of one pytest run: one object a config, which hooks and fixtures ask.
+
+Imported at plugin load: standard library and pytest only; everything else is imported late.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from pytest_simbench.plugin import options
+
+if TYPE_CHECKING:
+    from pytest_simbench.plugin.compare import Comparison
+    from pytest_simbench.plugin.run import Run
+    from pytest_simbench.plugin.selection import Selection
+
+NAMING = ("sim_name", "sim_profile", "sim_set", "sim_python", "sim_spec")
+"""Options whose values name simulators: they are held against the adapters, which takes imports."""
+
+
+class SimSession:
+    """One pytest process, from its options to its summary. Also a plugin, for the hook that gets no
+    config.
+
+    Attributes:
+        config: of the process.
+        saved: contents of the pytest-benchmark files that `--benchmark-compare` chose.
+        problems: what is wrong with marks, found while tests are made of them; told when all are.
+        comparison: with the baseline, if there is one.
+    """
+
+    def __init__(self, config: pytest.Config) -> None:
+        self.config = config
+        self.saved: list[dict[str, Any]] = []
+        self.problems: list[str] = []
+        self.comparison: Comparison | None = None
+        self._received: list[str] = []
+
+    @cached_property
+    def selection(self) -> Selection:
+        """What the user asked for, checked once."""
+        from pytest_simbench.plugin.selection import select
+
+        return select(self.config)
+
+    @cached_property
+    def run(self) -> Run:
+        """The run of this process; it begins when somebody asks for it."""
+        from pytest_simbench.plugin.run import Run
+
+        return Run(self.config)
+
+    @property
+    def begun(self) -> bool:
+        """Whether anybody has asked for the run."""
+        return "run" in vars(self)
+
+    @property
+    def in_worker(self) -> bool:
+        """Whether this process is a worker of pytest-xdist."""
+        return hasattr(self.config, "workerinput")
+
+    @property
+    def _alone(self) -> bool:
+        """Whether this process runs tests, or leads those that do."""
+        return not (self.in_worker or self.config.option.collectonly)
+
+    def check_options(self) -> None:
+        """Complain of bad input before anything is collected."""
+        config = self.config
+        options.values(config)
+        if options.mentioned(config, NAMING) or any(
+            options.given(config, option.name) for option in options.OPTIONS
+        ):
+            _ = self.selection
+
+    def start(self) -> None:
+        """Complain of a bad baseline, limit, threshold or run folder before anything runs."""
+        config = self.config
+        if options.given(config, "sim_threshold"):
+            from pytest_simbench.plugin.thresholds import bad_value
+
+            if wrong := bad_value(options.value(config, "sim_threshold")):
+                raise pytest.UsageError(wrong)
+        named = any(options.given(config, name) for name in ("sim_output", "sim_resume"))
+        if named and self._alone:
+            self.run.claim()
+        asked = options.value(config, "sim_compare_fail") or options.value(config, "sim_baseline")
+        if not self.in_worker and (asked or self.saved):
+            from pytest_simbench.plugin.compare import prepare
+
+            self.comparison = prepare(config, self.saved)
+
+    def parametrize(self, metafunc: pytest.Metafunc) -> None:
+        """Make a test of each simulator and mode, as its marks say."""
+        from pytest_simbench.plugin.selection import NOTHING, number_mark, parameters
+
+        try:
+            for name in ("reps", "sim_timeout"):
+                number_mark(metafunc.definition, name)
+            chosen = parameters(metafunc, self.selection)
+        except pytest.UsageError as error:
+            if self.in_worker:  # the end of an xdist worker would be an internal error
+                raise
+            self.problems.append(str(error))
+            chosen = [NOTHING]
+        metafunc.parametrize("sim_case", chosen, indirect=True, scope="session")
+
+    def check_collected(self, items: list[pytest.Item]) -> None:
+        """Complain of marks, and have pytest-benchmark take the workers' seconds."""
+        if self.problems:
+            raise pytest.UsageError("\n".join(dict.fromkeys(self.problems)))
+        timed = [item for item in items if "simbench_rounds" in fixtures_of(item)]
+        if timed:
+            from pytest_simbench.plugin.benchmark import time_by_workers
+
+            time_by_workers(self.config.pluginmanager, timed)
+
+    def claim(self, items: Iterable[pytest.Item]) -> None:
+        """Complain of a run folder that the ini file names, if a test needs one, before it runs."""
+        if self._alone and any("sim_case" in fixtures_of(item) for item in items):
+            self.run.claim()
+
+    def tell_worker(self, node: Any) -> None:
+        """Tell an xdist worker which run folder all share, and why it cannot be used."""
+        run = self.run
+        run.problem = run.problem or run.occupied()
+        node.workerinput["simbench_folder"] = str(run.folder.path.absolute())
+        node.workerinput["simbench_problem"] = run.problem
+
+    def attach(self, test: str, report: Any) -> None:
+        """Have a test's records travel with its report, to an xdist controller for instance."""
+        if self.begun and (lines := self.run.of_test(test)):
+            report.simbench = lines
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Keep the records that came with a report until all tests have ended."""
+        self._received += getattr(report, "simbench", ())
+
+    def finish(self, session: pytest.Session) -> None:
+        """Compare with the baseline; a metric that is worse than allowed fails the run, and so does
+        a threshold of a metric that no test has."""
+        if self._received:
+            self.run.receive(self._received)
+        if not self.begun or self.in_worker:
+            return
+        self.run.complete()
+        if self.comparison is not None and self.run.reading.records:
+            self.comparison.make(self.run.reading)
+            if self.comparison.failed and session.exitstatus == pytest.ExitCode.OK:
+                session.exitstatus = pytest.ExitCode.TESTS_FAILED
+        self.run.check_thresholds(session)
+
+    def summarise(self, reporter: pytest.TerminalReporter) -> None:
+        """Print the tables, and write them to the run folder."""
+        if self.in_worker:  # an xdist worker has a reporter too, which nobody reads
+            return
+        if self.begun:
+            markdown = self.comparison.markdown() if self.comparison else ""
+            self.run.summarise(reporter, markdown)
+        if self.comparison:
+            reporter.write_sep("=", "comparison with the baseline")
+            reporter.write_line(self.comparison.text(reporter._tw.fullwidth))
+        if self.begun or self.config.pluginmanager.has_plugin("dsession"):
+            from pytest_simbench.records.repeatability import NAME
+
+            if (self.run.folder.path / NAME).is_file():
+                from pytest_simbench.plugin.repeatability import summarise
+
+                summarise(reporter, self.run.folder.path)
+
+    def close(self) -> None:
+        """End what the run started."""
+        if self.begun:
+            self.run.close()
+
+
+_SESSION = pytest.StashKey[SimSession]()
+
+
+def session_of(config: pytest.Config) -> SimSession:
+    """The one object of this config; it is made when it is first asked for."""
+    if _SESSION not in config.stash:
+        config.stash[_SESSION] = SimSession(config)
+    return config.stash[_SESSION]
+
+
+def fixtures_of(item: pytest.Item) -> Collection[str]:
+    """Names of the fixtures that a test uses."""
+    found: Collection[str] = getattr(item, "fixturenames", ())
+    return found

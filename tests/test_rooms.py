@@ -1,0 +1,48 @@
+"""The map of the house: which room may know which, and what no room may know."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from importlinter.cli import lint_imports
+
+import pytest_simbench
+from pytest_simbench.simulator.registry import adapter, registered
+
+TOP = Path(pytest_simbench.__file__).parent
+
+
+def test_rooms_know_only_those_below_them_and_there_are_no_circles(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The contracts in pyproject.toml. Imports inside functions and for type checking count."""
+    monkeypatch.chdir(TOP.parent)
+    assert lint_imports(no_cache=True) == 0, capsys.readouterr().out
+
+
+def imported(source: Path) -> Iterator[str]:
+    """Every module that a source file imports, wherever in the file."""
+    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def test_the_core_imports_no_simulator() -> None:
+    engines = {module for name in registered() for module in adapter(name).info.modules}
+    roots = {"sims", "suites", *(module.partition(".")[0] for module in engines)}
+    found = {
+        (str(source.relative_to(TOP)), name)
+        for source in TOP.rglob("*.py")
+        for name in imported(source)
+        if name.removeprefix("pytest_simbench.").partition(".")[0] in roots
+    }
+    assert not found
+
+
+def test_there_is_no_loose_module() -> None:
+    assert [path.name for path in TOP.glob("*.py")] == ["__init__.py"]
