@@ -97,14 +97,23 @@ def test_a_flag_of_a_conftest_before_a_path(pytester: pytest.Pytester) -> None:
     pytester.runpytest_subprocess("--sim", "tests").assert_outcomes(passed=1)
 
 
-def test_loaded_by_a_conftest(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
-    pytester.makeconftest(
-        "pytest_plugins = ['pytest_simbench.plugin.hooks']\n" + OWN.format(flags=["--gui"], ini=[])
-    )
+@pytest.mark.parametrize("autoload", [True, False])
+@pytest.mark.parametrize("place", ["conftest", "-p"])
+def test_loaded_by_name(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, place: str, autoload: bool
+) -> None:
+    """In a conftest or with -p, whether pytest has loaded us by itself or not."""
+    if not autoload:
+        monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    named = "pytest_plugins = ['pytest_simbench.plugin']\n" if place == "conftest" else ""
+    pytester.makeconftest(named + OWN.format(flags=["--gui"], ini=[]))
     pytester.makepyfile(FALLING)
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=2", "--gui")
+    early = ("-p", "pytest_simbench.plugin") if place == "-p" else ()
+    result = pytester.runpytest_subprocess(
+        *early, "--sim=mujoco", "--reps=2", "--gui", "-Werror::pytest.PytestAssertRewriteWarning"
+    )
     result.assert_outcomes(passed=1)
+    no_traceback(result)
 
 
 def test_without_pytest_benchmark(pytester: pytest.Pytester) -> None:
