@@ -19,7 +19,6 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.scene import Pose, Scene
-from pytest_simbench.simulator.registry import registered
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, cube
 from pytest_simbench.tasks.metrics import Metric
 
@@ -45,8 +44,7 @@ class Falling(Task):
 
 def main(repetitions: str = "200") -> None:
     folder = Path(tempfile.mkdtemp())
-    path = registered()["mujoco"].value
-    case = Case("memory", "mujoco", "headless", "tuned", path, folder)
+    case = Case.of("mujoco", test="memory", mode="headless", profile="tuned", folder=folder)
     me = psutil.Process()
     for number in range(1, int(repetitions) + 1):
         Repetition(Experiment(case, Falling()), number).run()

@@ -12,13 +12,12 @@ from pathlib import Path
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
-from pytest_simbench.simulator.registry import registered
 from pytest_simbench.tasks import Stacking
 
 
 def main(name: str = "mujoco", repetitions: str = "3") -> None:
     folder = Path(tempfile.mkdtemp())
-    case = Case("overhead", name, "headless", "tuned", registered()[name].value, folder)
+    case = Case.of(name, test="overhead", mode="headless", profile="tuned", folder=folder)
     for number in range(1, int(repetitions) + 1):
         record, error = Repetition(Experiment(case, Stacking()), number).run()
         if error is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import psutil
@@ -10,7 +9,7 @@ import pytest
 from hypothesis import settings
 
 from pytest_simbench.client import reaper
-from pytest_simbench.client.environments import Environment, interpreter, missing
+from pytest_simbench.client.environments import missing
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter, registered
@@ -43,15 +42,12 @@ def case_of(case: Case, name: str) -> Case:
     absent = missing(info)
     if absent:
         pytest.skip(absent)
-    return replace(
-        case,
-        simulator=name,
-        adapter=ADAPTERS[name],
+    return Case.of(
+        name,
         test=f"t[{name}-headless]",
-        python=interpreter(info),
-        environment=Environment.of(info).variables(),
-        costly_start=info.costly_start,
-        compile_timeout=info.compile_timeout,
+        mode=case.mode,
+        profile=case.profile,
+        folder=case.folder,
         stall_timeout=120.0 if info.costly_start else case.stall_timeout,
     )
 

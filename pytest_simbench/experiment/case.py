@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Any
 from typing import Protocol as Interface
 
+from pytest_simbench.client.environments import Environment, interpreter
 from pytest_simbench.client.launch import Launch
 from pytest_simbench.experiment.protocol import PROTOCOLS, Protocol
 from pytest_simbench.records.names import file_name
 from pytest_simbench.records.series import short
+from pytest_simbench.simulator.registry import adapter, registered
 
 
 class Display(Interface):
@@ -79,6 +81,29 @@ class Case:
     fresh: bool = False
     contended: bool = False
     attempt: int = 1
+
+    @classmethod
+    def of(cls, simulator: str, *, python: str | None = None, **more: Any) -> Case:
+        """A case of a registered simulator, as it is run on this machine.
+
+        Args:
+            simulator: its name.
+            python: interpreter of the worker; None for the engine's own, or this one.
+            more: further attributes; at least `test`, `mode`, `profile` and `folder`.
+
+        Raises:
+            SimulatorError: no such simulator, or its adapter is broken.
+        """
+        info = adapter(simulator).info
+        return cls(
+            simulator=simulator,
+            adapter=registered()[simulator].value,
+            python=python or interpreter(info),
+            environment=Environment.of(info).variables(),
+            costly_start=info.costly_start,
+            compile_timeout=info.compile_timeout,
+            **more,
+        )
 
     @property
     def reuses_worker(self) -> bool:

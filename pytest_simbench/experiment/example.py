@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.client.environments import Environment, interpreter, missing
+from pytest_simbench.client.environments import interpreter, missing
 from pytest_simbench.client.tape import ARRAYS, Operation
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.records.names import file_name
@@ -26,7 +26,7 @@ from pytest_simbench.robot.panda import panda
 from pytest_simbench.scene import Robot, Scene
 from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.files import FileError, read_file, read_json
-from pytest_simbench.simulator.registry import adapter, registered
+from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.simulator.settings import changed, profile
 
 FOLDER = "examples"
@@ -180,19 +180,15 @@ def _case(
     if absent:
         raise SimulatorError(absent)
     changed(profile(cls.profiles, given, name), changes, name)
-    return Case(
+    return Case.of(
+        name,
+        python=python,
         test=test,
-        simulator=name,
         mode=mode,
         profile=given,
-        adapter=registered()[name].value,
         folder=folder,
         changes=changes,
-        python=python or interpreter(cls.info),
         spec=spec,
-        environment=Environment.of(cls.info).variables(),
-        costly_start=cls.info.costly_start,
-        compile_timeout=cls.info.compile_timeout,
     )
 
 

@@ -20,7 +20,6 @@ class Protocol:
         repetitions: default of `--reps`.
         smallest: run the smallest version of each task.
         study: run each task by the reference study's own rules.
-        doc: one sentence for the help.
     """
 
     name: str
@@ -29,11 +28,9 @@ class Protocol:
     repetitions: int = 20
     smallest: bool = False
     study: bool = False
-    doc: str = ""
 
     def version_of(self, task: Task) -> Task:
-        """What is run when a test asks for `task`. Resolved once, where the test's task arrives;
-        everything behind that gets the version itself."""
+        """What is run when a test asks for `task`; `Experiment.task` asks, and nobody else."""
         if self.smallest:
             return task.smoke()
         return task.study() if self.study else task
@@ -42,18 +39,9 @@ class Protocol:
 PROTOCOLS = {
     protocol.name: protocol
     for protocol in (
-        Protocol("fast", doc="as fast as the simulators can"),
-        Protocol(
-            "paper",
-            real_time=True,
-            before=5.0,
-            study=True,
-            doc="as the reference study: its rules, real time, recorded from 5 s before to 60 s "
-            "after",
-        ),
-        Protocol(
-            "smoke", repetitions=1, smallest=True, doc="the smallest run that exercises every part"
-        ),
+        Protocol("fast"),
+        Protocol("paper", real_time=True, before=5.0, study=True),
+        Protocol("smoke", repetitions=1, smallest=True),
     )
 }
 """The study's time-outs (900 s, 600 s) are the tasks' own and hold in every protocol."""

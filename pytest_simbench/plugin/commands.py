@@ -61,17 +61,18 @@ def _width() -> int:
 
 def _here(selection: Selection, name: str) -> str:
     """Where a simulator is and which version."""
+    from pytest_simbench.client.environments import Environment, interpreter
     from pytest_simbench.simulator.registry import adapter
 
     info = adapter(name).info
     if name in selection.pythons or name in selection.specs:
         return f"in {selection.pythons.get(name) or selection.specs[name]}"
-    own = selection.python(name) is not None
+    own = Environment.of(info) if interpreter(info) else None
     try:
-        found = selection.environment(name).version() if own else version(info.distribution)
+        found = own.version() if own else version(info.distribution)
     except Exception:  # not there, or metadata that nobody can read
         found = None
-    place = f"in its own environment, {selection.environment(name).folder}" if own else "installed"
+    place = f"in its own environment, {own.folder}" if own else "installed"
     untested = "" if found == info.tested_version else ", UNTESTED"
     return f"version {found or 'unknown'}{untested}, {place}"
 

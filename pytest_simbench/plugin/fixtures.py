@@ -101,27 +101,21 @@ def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: A
     """What the options say of a simulator's repetitions."""
     from pytest_simbench.experiment.case import Case
     from pytest_simbench.experiment.protocol import PROTOCOLS
-    from pytest_simbench.simulator.registry import adapter, registered
 
     name, mode = sim_case
-    info = adapter(name).info
     session = session_of(config)
     chosen, this = session.selection, session.run
     settings = more.pop("settings", {})
-    return Case(
+    return Case.of(
+        name,
+        python=chosen.pythons.get(name),
         test=test,
-        simulator=name,
         mode=mode,
         profile=chosen.profile,
-        adapter=registered()[name].value,
         folder=this.use(),
         changes={**settings, **chosen.changes.get(name, {})},
-        python=chosen.python(name),
         spec=chosen.specs.get(name),
-        environment=chosen.environment(name).variables(),
         display=_display(this) if mode == "gui" else None,
-        costly_start=info.costly_start,
-        compile_timeout=info.compile_timeout,
         fresh=options.value(config, "sim_fresh"),
         protocol=PROTOCOLS[options.value(config, "sim_protocol")],
         stall_timeout=options.value(config, "sim_stall_timeout"),

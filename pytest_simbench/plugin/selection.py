@@ -12,7 +12,6 @@ from pytest_simbench.plugin.interpreters import checked_specification, interpret
 from pytest_simbench.plugin.values import BadValue, shown
 
 if TYPE_CHECKING:
-    from pytest_simbench.client.environments import Environment
     from pytest_simbench.simulator.info import SimulatorInfo
 
 MODES = ("headless", "gui")
@@ -60,18 +59,6 @@ class Selection:
         except SettingsError as error:
             return str(error)
         return None
-
-    def environment(self, name: str) -> Environment:
-        """The place of a simulator's own environment."""
-        from pytest_simbench.client.environments import Environment
-
-        return Environment.of(_info(name))
-
-    def python(self, name: str) -> str | None:
-        """Interpreter of a simulator's workers; None for this one."""
-        from pytest_simbench.client.environments import interpreter
-
-        return self.pythons.get(name) or interpreter(_info(name))
 
 
 def _info(name: str) -> SimulatorInfo:
