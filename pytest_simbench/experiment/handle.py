@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from itertools import count
 from typing import Any
@@ -13,7 +13,6 @@ from pytest_simbench.client.errors import DisplayError, DisplayLost, Where, Work
 from pytest_simbench.client.launch import Constructed
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.tape import TapedWorld
-from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.example import replay_command, write_example
 from pytest_simbench.records.series import short
@@ -66,7 +65,7 @@ class SimulatorHandle:
         self._open = True
         tape: list[Any] = []
         try:
-            world = self._start(scene, parity, options)
+            world = self.world(scene, parity=parity, **options)
             tape = world.tape
             yield world
         except BaseException as error:
@@ -78,12 +77,8 @@ class SimulatorHandle:
         finally:
             self._open = False
 
-    @contextmanager
-    def episodes(self) -> Iterator[Callable[[Scene], World]]:
-        """A function that starts worlds, one at a time."""
-        yield lambda scene: self._start(scene, True, {})
-
-    def _start(self, scene: Scene, parity: bool, options: dict[str, Any]) -> TapedWorld:
+    def world(self, scene: Scene, *, parity: bool = True, **options: Any) -> TapedWorld:
+        """A freshly loaded world, in place of the one before; arguments and errors as `episode`."""
         case = self.case
         if self._process is None or not self._process.alive:
             # The process id keeps the workers of pytest-xdist apart, which share a run folder.

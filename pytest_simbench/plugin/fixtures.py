@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -201,17 +202,16 @@ def perturb(
     from pytest_simbench.plugin.repeatability import Perturber
     from pytest_simbench.repeatability.episode import Episodes
 
-    own = SimulatorHandle(simbench_case) if sim_settings else None
-    handle = own or request.getfixturevalue("simbench_handle")
+    own = SimulatorHandle(simbench_case)  # without a worker until an episode starts
+    handle = own if sim_settings else request.getfixturevalue("simbench_handle")
     strict = options.value(request.config, "sim_strict")
 
     def perturb_task(task: Task) -> Perturber:
         experiment = Experiment(simbench_case, arguments.checked_task(task, "perturb"))
         return Perturber(Episodes(experiment, handle), strict)
 
-    yield perturb_task
-    if own is not None:
-        own.close()
+    with closing(own):
+        yield perturb_task
 
 
 @pytest.fixture
@@ -246,9 +246,9 @@ def simbench_handle(
     from pytest_simbench.experiment.handle import SimulatorHandle
 
     timeout = options.value(request.config, "sim_timeout")
-    handle = SimulatorHandle(_case(request.config, sim_case, "simulator", timeout=timeout))
-    yield handle
-    handle.close()
+    case = _case(request.config, sim_case, "simulator", timeout=timeout)
+    with closing(SimulatorHandle(case)) as handle:
+        yield handle
 
 
 @pytest.fixture
@@ -256,10 +256,8 @@ def sim(simbench_case: Case) -> Iterator[Callable[[Scene], World]]:
     """Loads a scene into a fresh world of the simulator: `world = sim(scene)`."""
     from pytest_simbench.experiment.handle import SimulatorHandle
 
-    handle = SimulatorHandle(simbench_case)
-    with handle.episodes() as start:
-        yield start
-    handle.close()
+    with closing(SimulatorHandle(simbench_case)) as handle:
+        yield handle.world
 
 
 @pytest.fixture
