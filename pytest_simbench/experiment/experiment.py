@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -53,11 +52,6 @@ class Experiment:
     def metrics(self) -> tuple[Metric, ...]:
         """What the task measures."""
         return self.task.metrics
-
-    @property
-    def references(self) -> Mapping[str, float]:
-        """Metric name to the value of a perfect simulator, where there is one."""
-        return self.task.references
 
     @property
     def parameters(self) -> dict[str, Any]:

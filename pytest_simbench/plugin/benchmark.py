@@ -6,10 +6,16 @@ Imported when tests are collected: standard library and pytest only.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import pytest
+
+if TYPE_CHECKING:
+    from pytest_simbench.measure.results import ResultSet
+    from pytest_simbench.records.description import Description
+
+SAVED_COSTS = ("rtf", "cpu", "ram", "ram_peak", "cpu_cost", "start", "end", "total")
 
 
 class WorkerClock:
@@ -59,3 +65,43 @@ def benchmark_rounds(request: pytest.FixtureRequest, benchmark: Any) -> Any:
 @pytest.fixture
 def no_rounds() -> None:
     """Nothing takes the repetitions as rounds."""
+
+
+def give_rounds(
+    benchmark: Any, results: Sequence[ResultSet], described: Iterable[Description]
+) -> None:
+    """Hand the finished repetitions to pytest-benchmark as rounds of worker seconds.
+
+    pytest-benchmark has one result for a test: rounds are those of its first task. The records are
+    of all its tasks.
+    """
+    from pytest_simbench.records import baseline
+
+    result = results[0]
+    if not result.ok:
+        return
+    seconds = iter([record.stepping["wall"] for record in result.ok])
+
+    def advance() -> None:
+        worker_clock.seconds += next(seconds, 0.0)
+
+    first = result.ok[0]
+    benchmark.extra_info.update(
+        {
+            "simulator": first.simulator,
+            "mode": first.mode,
+            "profile": first.profile,
+            "protocol": first.protocol,
+            "settings": dict(first.settings),
+            "versions": dict(first.versions),
+            "host": dict(first.host),
+            "failures": len(result.failures),
+            "metrics": {name: result.values(name) for name in result.metrics},
+            "seeds": [record.seed for record in result.ok],
+            "costs": {name: [record.cost(name) for record in result.ok] for name in SAVED_COSTS},
+            baseline.KEY: baseline.to_extra_info(
+                (r for found in results for r in found.records), described
+            ),
+        }
+    )
+    benchmark.pedantic(advance, rounds=len(result.ok), iterations=1, warmup_rounds=0)

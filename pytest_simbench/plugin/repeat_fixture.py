@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
+from contextlib import contextmanager
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +15,9 @@ from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.sequential import Plan, SequentialResultSet
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.plugin import options
-from pytest_simbench.plugin.benchmark import worker_clock
+from pytest_simbench.plugin.benchmark import give_rounds
+from pytest_simbench.plugin.resume import NotResumed
 from pytest_simbench.plugin.selection import number_mark
-from pytest_simbench.records import baseline
 from pytest_simbench.records.description import Description
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.text import in_one_line
@@ -24,8 +25,6 @@ from pytest_simbench.records.text import in_one_line
 if TYPE_CHECKING:
     from pytest_simbench.plugin.run import Run
     from pytest_simbench.tasks.base import Task
-
-SAVED_COSTS = ("rtf", "cpu", "ram", "ram_peak", "cpu_cost", "start", "end", "total")
 
 
 class RepeatFixture:
@@ -40,44 +39,34 @@ class RepeatFixture:
     def __init__(self, node: pytest.Item, case: Case, run: Run) -> None:
         self.node = node
         self.case = case
-        self.this = run
+        self.run = run
         self.results: list[ResultSet] = []
         self.described: dict[str, Description] = {}
         self._may_resume = False
 
     def __call__(self, task: Task) -> ResultSet:
         """Run a task's repetitions, as many as options and marks say."""
-        experiment = Experiment(self.case, task)
         wanted = options.repetitions(self.node.config)
-        fixed = wanted if isinstance(wanted, int) else None
-        experiment = experiment.in_case(attempt=self.this.begin(experiment))
-        found = self._recorded(experiment, fixed)
-        self.this.describe(experiment.task)
+        experiment = Experiment(self.case, task)
+        experiment = experiment.in_case(attempt=self.run.begin(experiment))
+        with _refusals_fail_the_test():
+            found = self.run.take(experiment, wanted if isinstance(wanted, int) else None)
+        self.run.describe(experiment.task)
         self.described[experiment.task.name] = Description.of(experiment.task)
+
+        def up_to(number: int) -> list[Record]:
+            return self._up_to(number, experiment, found)
+
         if isinstance(wanted, options.Auto):
             plan = Plan.up_to(wanted.limit)
-            first = self._up_to(plan.looks[0], experiment, found)
-            result: ResultSet = SequentialResultSet(
-                first,
-                experiment.metrics,
-                plan,
-                lambda number: self._up_to(number, experiment, found),
-            )
+            first = up_to(plan.looks[0])
+            result: ResultSet = SequentialResultSet(first, experiment.metrics, plan, up_to)
         else:
             number = wanted or number_mark(self.node, "reps") or self.case.protocol.repetitions
-            result = ResultSet(self._up_to(int(number), experiment, found), experiment.metrics)
+            result = ResultSet(up_to(int(number)), experiment.metrics)
         result.strict = options.value(self.node.config, "sim_strict")
         self.results.append(result)
         return result
-
-    def _recorded(self, experiment: Experiment, wanted: int | None) -> dict[int, Record]:
-        """By repetition what the run that is completed has of these; now of this run."""
-        from pytest_simbench.plugin.resume import NotResumed
-
-        try:
-            return self.this.take(experiment, wanted)
-        except NotResumed as refusal:
-            pytest.fail(str(refusal), pytrace=False)
 
     def _up_to(self, number: int, experiment: Experiment, found: dict[int, Record]) -> list[Record]:
         """Records of all repetitions from 1 to `number`, and of what a resumed run has beyond.
@@ -89,30 +78,30 @@ class RepeatFixture:
         """
         missing = [k for k in range(1, number + 1) if k not in found]
         if missing:
-            if self.this.resumed is not None and not self._may_resume:
-                self._check_versions(experiment)
-            self.this.begin_lines()
+            if self.run.resumed is not None and not self._may_resume:
+                with _refusals_fail_the_test():
+                    self.run.resumed.check_versions(experiment)
+                self._may_resume = True
+            self.run.begin_lines()
             jobs = options.value(self.node.config, "sim_jobs")
-            repeater = Repeater(experiment, jobs, self.this.progress, self.this.folder.append)
+            repeater = Repeater(experiment, jobs, self.run.progress, self.run.folder.append)
             found |= {r.repetition: r for r in repeater.run(missing).records}
         return [found[k] for k in sorted(found)]
-
-    def _check_versions(self, experiment: Experiment) -> None:
-        from pytest_simbench.plugin.resume import NotResumed
-
-        assert self.this.resumed is not None
-        try:
-            self.this.resumed.check_versions(experiment)
-        except NotResumed as refusal:
-            pytest.fail(str(refusal), pytrace=False)
-        self._may_resume = True
 
     def finish(self, benchmark: Any) -> None:
         """Tell pytest-benchmark, where there is one, and JUnit; called when the test has ended."""
         for result in self.results:
             self.node.user_properties.extend(_properties(result))
         if self.results and benchmark is not None:
-            _benchmark(benchmark, self.results, self.described.values())
+            give_rounds(benchmark, self.results, self.described.values())
+
+
+@contextmanager
+def _refusals_fail_the_test() -> Iterator[None]:
+    try:
+        yield
+    except NotResumed as refusal:
+        pytest.fail(str(refusal), pytrace=False)
 
 
 def _properties(result: ResultSet) -> Iterator[tuple[str, float]]:
@@ -127,39 +116,3 @@ def _properties(result: ResultSet) -> Iterator[tuple[str, float]]:
             if isfinite(found.half_width):
                 yield f"{name}.low", found.low
                 yield f"{name}.high", found.high
-
-
-def _benchmark(benchmark: Any, results: list[ResultSet], described: Iterable[Description]) -> None:
-    """Hand the finished repetitions to pytest-benchmark as rounds of worker seconds.
-
-    pytest-benchmark has one result for a test: rounds are those of its first task. The records are
-    of all its tasks.
-    """
-    result = results[0]
-    if not result.ok:
-        return
-    seconds = iter([record.stepping["wall"] for record in result.ok])
-
-    def advance() -> None:
-        worker_clock.seconds += next(seconds, 0.0)
-
-    first = result.ok[0]
-    benchmark.extra_info.update(
-        {
-            "simulator": first.simulator,
-            "mode": first.mode,
-            "profile": first.profile,
-            "protocol": first.protocol,
-            "settings": dict(first.settings),
-            "versions": dict(first.versions),
-            "host": dict(first.host),
-            "failures": len(result.failures),
-            "metrics": {name: result.values(name) for name in result.metrics},
-            "seeds": [record.seed for record in result.ok],
-            "costs": {name: [record.cost(name) for record in result.ok] for name in SAVED_COSTS},
-            baseline.KEY: baseline.to_extra_info(
-                (r for found in results for r in found.records), described
-            ),
-        }
-    )
-    benchmark.pedantic(advance, rounds=len(result.ok), iterations=1, warmup_rounds=0)
