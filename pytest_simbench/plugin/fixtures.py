@@ -28,19 +28,11 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.base import Task
 
 
-SHARED = (
-    "output_path",
-    "repeat",
-    "resources",
-    "sim",
-    "simulator",
-    "threshold",
-    "replay",
-    "perturb",
-)
-"""Names that other plugins use too (pytest-playwright has an `output_path`)."""
+OWN = ("sim_", "simbench_")
+"""How names begin that no other plugin has; pytest-playwright has an `output_path` too."""
 
-OWN = ("sim_case", "sim_name", "sim_mode", "sim_settings", "simbench_case", "simbench_handle")
+OF_CASES = ("fresh", "stall_timeout", "memory_limit", "seed", "jitter", "trace")
+"""Options of the same name as an attribute of `Case`, behind `sim_`."""
 
 
 def beside(plugins: pytest.PytestPluginManager) -> ModuleType:
@@ -51,9 +43,10 @@ def beside(plugins: pytest.PytestPluginManager) -> ModuleType:
     """
     module = ModuleType("pytest_simbench.plugin.fixtures_here", __doc__)
     others = [plugin for plugin in plugins.get_plugins() if not is_conftest(plugin)]
-    for name in (*OWN, *SHARED):
-        if name in OWN or not any(_is_fixture(getattr(other, name, None)) for other in others):
-            setattr(module, name, globals()[name])
+    for name, thing in globals().items():
+        taken = any(_is_fixture(getattr(other, name, None)) for other in others)
+        if _is_fixture(thing) and (name.startswith(OWN) or not taken):
+            setattr(module, name, thing)
     at_work = benchmark.has_benchmark(plugins)
     rounds = benchmark.benchmark_rounds if at_work else benchmark.no_rounds
     vars(module).update(simbench_rounds=rounds)
@@ -117,13 +110,8 @@ def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: A
         changes={**settings, **chosen.changes.get(name, {})},
         spec=chosen.specs.get(name),
         display=_display(this) if mode == "gui" else None,
-        fresh=options.value(config, "sim_fresh"),
         protocol=PROTOCOLS[options.value(config, "sim_protocol")],
-        stall_timeout=options.value(config, "sim_stall_timeout"),
-        memory_limit=options.value(config, "sim_memory_limit"),
-        seed=options.value(config, "sim_seed"),
-        jitter=options.value(config, "sim_jitter"),
-        trace=options.value(config, "sim_trace"),
+        **{name: options.value(config, f"sim_{name}") for name in OF_CASES},
         **more,
     )
 
