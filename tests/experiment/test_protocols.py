@@ -69,23 +69,6 @@ def test_each_protocol_has_its_version_of_a_task(case: Case) -> None:
     assert all(version(name, tiny) == tiny for name in PROTOCOLS)
 
 
-@dataclass(frozen=True)
-class Halved(Falling):
-    """A task of which the smallest version of the smallest version is a smaller one."""
-
-    def smoke(self) -> Halved:
-        return replace(self, duration=self.duration / 2)
-
-
-def test_the_version_is_chosen_once_whatever_becomes_of_the_case(case: Case) -> None:
-    experiment = Experiment(replace(case, protocol=PROTOCOLS["smoke"]), Halved(duration=0.4))
-    again = experiment.in_case(attempt=2).in_case(contended=True)
-    assert again.task == experiment.task == Halved(duration=0.2)
-    record, _ = Repetition(again, 1).run()
-    assert record.settings["task.duration"] == 0.2
-    assert record.stepping["simulated"] == pytest.approx(0.2)
-
-
 def test_a_record_says_what_it_was(case: Case) -> None:
     case = replace(case, changes={"timestep": "0.002"}, seed=7, jitter=0.5)
     record, _ = Repetition(Experiment(case, Falling()), 3).run()
