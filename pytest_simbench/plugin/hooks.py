@@ -100,7 +100,8 @@ def pytest_configure_node(node: Any) -> None:
     session_of(node.config).tell_worker(node)
 
 
-def _skipping_unavailable() -> Generator[None, Any, Any]:
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup() -> Generator[None, Any, Any]:
     """A test that asks for what this machine lacks is skipped, with the reason."""
     try:
         return (yield)
@@ -111,14 +112,7 @@ def _skipping_unavailable() -> Generator[None, Any, Any]:
         raise
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_setup(item: pytest.Item) -> Generator[None, Any, Any]:
-    return (yield from _skipping_unavailable())
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
-    return (yield from _skipping_unavailable())
+pytest_runtest_call = pytest_runtest_setup
 
 
 @pytest.hookimpl(hookwrapper=True)
