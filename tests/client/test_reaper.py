@@ -59,13 +59,14 @@ import sys, time
 from dataclasses import replace
 from pathlib import Path
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from tests.conftest import ADAPTERS
 from tests.tiny import Falling
 folder = Path(sys.argv[1])
 case = Case("t::t", "mujoco", "headless", "tuned", sys.argv[2], folder, stall_timeout=300.0,
             environment={"UNRULY": str(folder / "ids")})
-Repetition(case, Falling(1e6), 1).run()
+Repetition(Experiment(case, Falling(1e6)), 1).run()
 """
 
 

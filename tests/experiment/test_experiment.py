@@ -38,7 +38,7 @@ def test_seeds_count_on_from_the_case_s(case: Case) -> None:
     assert experiment.seed() == 40
 
 
-@pytest.mark.parametrize("scale", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("scale", [0.0, 0.5, 1.0, 2.0])
 def test_the_start_is_disturbed_by_the_case_s_jitter(case: Case, scale: float) -> None:
     experiment = Experiment(replace(case, jitter=scale), Falling())
     one = Jitter()

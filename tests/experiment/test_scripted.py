@@ -108,7 +108,7 @@ def test_a_world_that_times_out_has_failed_where_it_was(case: Case) -> None:
 def test_a_repetition_has_the_studys_time_out_or_the_users(
     case: Case, timeout: float | None, seconds: float
 ) -> None:
-    repetition = ScriptedRepetition(replace(case, timeout=timeout), TOWERS, 1)
+    repetition = ScriptedRepetition(Experiment(replace(case, timeout=timeout), TOWERS), 1)
     began = time.monotonic()
     record, _ = repetition.run()
     deadline = repetition.process.deadline

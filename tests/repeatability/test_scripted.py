@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 
 from pytest_simbench.client.errors import Where, WorkerError, WorkerExited
+from pytest_simbench.client.launch import Constructed
 from pytest_simbench.measure.results import InconclusiveWarning
 from pytest_simbench.repeatability.attack import Attack, Trial, divergence, effect
-from pytest_simbench.repeatability.episode import Episode, changed, scaled_jitter
+from pytest_simbench.repeatability.episode import Episode, changed
 from pytest_simbench.repeatability.motions import Difference
 from pytest_simbench.repeatability.perturbation import Perturbation, described
 from pytest_simbench.repeatability.replay_result import Again, Replay
@@ -128,7 +129,6 @@ def test_effects_of_what_is_none() -> None:
 
 def test_what_counts_as_changed() -> None:
     assert changed({"a": 1.0, "b": None, "c": 0.5}, {"a": 1.0, "b": 0.0}) == ["b", "c"]
-    assert scaled_jitter(2.0) == Jitter(2 * Jitter().distance, 2 * Jitter().angle)
 
 
 GROWING = [
@@ -433,7 +433,7 @@ def test_the_smallest_is_kept_as_an_example(
     kept: list[Any] = []
     experiment = Scripted(toppling)
     case = experiment.handle.case
-    experiment.handle.constructed = {"versions": {"sim": "1"}}
+    experiment.handle.constructed = Constructed(versions={"sim": "1"})
 
     def write(*arguments: Any) -> Path:
         kept.append(arguments)
