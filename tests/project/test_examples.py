@@ -49,7 +49,7 @@ def test_example_workflow(pytester: pytest.Pytester) -> None:
         command.replace('"', "").replace("--reps=20", "").split()
         for command in re.findall(r"pytest (--pyargs (?:.|\n +)*?)(?=\n#?\n|\n      -)", text)
     )
-    smallest = ("--protocol=smoke", "--reps=1", "-k", "throwing")
+    smallest = ("--protocol=smoke", "--reps=1", "-k", "not repeatability")
     assert pytester.runpytest_subprocess(*save, *smallest).ret == 0
     result = pytester.runpytest_subprocess(*gate, *smallest)
     assert result.ret == 0
