@@ -23,8 +23,8 @@ PICTURE = HERE / "pictures" / "first_test.svg"
 COLUMNS = 100
 """Width of the terminal."""
 
-SHOWN = (r"^=+ simulator comparison", r"^throwing, beyond the study")
-"""The picture shows the lines from the first pattern on, as far as the second one."""
+SHOWN = (r"^=+ simulator comparison", r"^report: ")
+"""The picture shows the lines from the first pattern to the second one."""
 
 LAST = r" passed| failed"
 """The picture ends with the line of this pattern."""
@@ -71,7 +71,7 @@ def lines(text: str) -> list[Text]:
     plain = [line.plain for line in found]
     first, last = (next(i for i, p in enumerate(plain) if re.search(s, p)) for s in SHOWN)
     end = max(i for i, line in enumerate(plain) if re.search(LAST, line))
-    return [*found[first:last], Text("..."), found[end]]
+    return [*found[first : last + 1], found[end]]
 
 
 def main() -> None:

@@ -5,8 +5,10 @@ Imported when tests are collected: standard library and pytest only.
 
 from __future__ import annotations
 
+import os
+import shlex
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -14,6 +16,9 @@ import pytest
 if TYPE_CHECKING:
     from pytest_simbench.measure.results import ResultSet
     from pytest_simbench.records.description import Description
+
+Group = tuple[Any, Sequence[Mapping[str, Any]]]
+"""Name and benchmarks, as the hook `pytest_benchmark_group_stats` gives them."""
 
 SAVED_COSTS = ("rtf", "cpu", "ram", "ram_peak", "cpu_cost", "start", "end", "total")
 
@@ -44,6 +49,19 @@ def time_by_workers(plugins: pytest.PytestPluginManager, items: Iterable[pytest.
     for item in items if has_benchmark(plugins) else ():
         group = item.name.partition("[")[0]
         item.add_marker(pytest.mark.benchmark(timer=worker_clock, group=group))
+
+
+def shown(config: pytest.Config, groups: Sequence[Group]) -> Sequence[Group]:
+    """The groups of pytest-benchmark's table without our benchmarks, which our own result tells
+    of; with them where one of its options is given."""
+    given = [*config.invocation_params.args, *config.getini("addopts")]
+    given += shlex.split(os.environ.get("PYTEST_ADDOPTS", ""))
+    if any(str(argument).startswith("--benchmark-") for argument in given):
+        return groups
+    from pytest_simbench.records.baseline import KEY
+
+    others = [(name, [b for b in found if KEY not in b["extra_info"]]) for name, found in groups]
+    return [(name, found) for name, found in others if found]
 
 
 @pytest.fixture

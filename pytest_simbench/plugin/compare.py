@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -22,6 +22,9 @@ from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.text import for_terminal
 from pytest_simbench.tasks.metrics import Metric, UnknownMetric
 
+if TYPE_CHECKING:
+    from pytest_simbench.measure.gate import GateReport
+
 
 class Comparison:
     """This run against a baseline: made when all tests have ended, shown in the summary.
@@ -34,7 +37,7 @@ class Comparison:
     def __init__(self, baseline: Reading, limits: Sequence[Limit] = ()) -> None:
         self.baseline = baseline
         self.limits = tuple(limits)
-        self._report: Any = None
+        self._report: GateReport | None = None
 
     def make(self, run: Reading) -> None:
         """Compare with this run, which says what the metrics mean."""
@@ -49,6 +52,11 @@ class Comparison:
     def failed(self) -> bool:
         """Whether limits were given and one was exceeded, or a test gives nothing any more."""
         return bool(self.limits and self._report and self._report.failures)
+
+    @property
+    def found(self) -> tuple[str, GateReport] | None:
+        """Name of the baseline and what differs from it; None when nothing was compared."""
+        return None if self._report is None else (self.baseline.name, self._report)
 
     def text(self, width: int) -> str:
         """For the terminal."""

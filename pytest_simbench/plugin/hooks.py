@@ -127,8 +127,16 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     session_of(session.config).finish(session)
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    session_of(terminalreporter.config).summarise(terminalreporter)
+@pytest.hookimpl(optionalhook=True, wrapper=True)
+def pytest_benchmark_group_stats(config: pytest.Config) -> Generator[None, Any, Any]:
+    """Leave our benchmarks out of pytest-benchmark's table unless one of its options is given."""
+    from pytest_simbench.plugin.benchmark import shown
+
+    return shown(config, (yield))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, exitstatus: int) -> None:
+    session_of(terminalreporter.config).summarise(terminalreporter, exitstatus)
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:

@@ -92,7 +92,8 @@ def merge_runs(config: pytest.Config) -> int:
         pytest.UsageError: a run that cannot be read, runs that are not parts of one, or a folder
             that already holds a run or cannot be written to.
     """
-    from pytest_simbench.report.files import write_report
+    from pytest_simbench.report.files import where, write_report
+    from pytest_simbench.report.page import PAGE_NAME
 
     runs = Runs.named(config, "sim_merge")
     records, whole = runs.merged("--sim-merge")
@@ -103,8 +104,9 @@ def merge_runs(config: pytest.Config) -> int:
         refused = _copy(records, runs.folders, folder)
         unsaved = folder.flush()
         written = write_report(folder)
-        shown = folder.path if written.complete and not unsaved else None
-        _print(written.summaries, [*runs.problems, *refused, *unsaved, *written.problems], shown)
+        _print(config, written.summaries, [*runs.problems, *refused, *unsaved, *written.problems])
+        if written.complete and not unsaved:
+            print(where(folder.path / PAGE_NAME, config.invocation_params.dir))
     finally:
         folder.close()
     return 0
@@ -119,7 +121,8 @@ def report_runs(config: pytest.Config) -> int:
     Raises:
         pytest.UsageError: a run that cannot be read, or runs that are not parts of one.
     """
-    from pytest_simbench.report.files import Written, in_order, summaries_of, write_files
+    from pytest_simbench.report.files import Written, in_order, summaries_of, where, write_files
+    from pytest_simbench.report.page import PAGE_NAME
     from pytest_simbench.report.repeatability import render_terminal, write_tables
 
     runs = Runs.named(config, "sim_report")
@@ -127,16 +130,18 @@ def report_runs(config: pytest.Config) -> int:
     (first, folder), *others = runs.folders.items()
     whole = runs.merged("--sim-report")[1] if others else runs.readings[first]
     summaries, written = summaries_of(whole), Written()
-    if whole.records and target is not None:
-        written = write_files(target, summaries, in_order(whole.records))
     tables, problems = ([], []) if others else write_tables(folder.path, target)
     if not (whole.records or tables or problems):
         raise pytest.UsageError(f"--sim-report {first}: it holds no repetition")
-    shown = target if written.complete else None
-    _print(summaries, [*runs.problems, *written.problems], shown)
+    if target is not None:
+        run = None if others else folder.path
+        written = write_files(target, summaries, in_order(whole.records), run=run)
+    _print(config, summaries, [*runs.problems, *written.problems])
     if tables or problems:
         width = shutil.get_terminal_size().columns
         print("\n".join(["", render_terminal(tables, width), *map(for_terminal, problems)]))
+    if target is not None and written.complete:
+        print(where(target / PAGE_NAME, config.invocation_params.dir))
     return 0 if written.complete else 1
 
 
@@ -157,10 +162,12 @@ def _target(config: pytest.Config, folders: list[RunFolder]) -> Path | None:
     return target
 
 
-def _print(summaries: Sequence[TaskSummary], problems: list[str], folder: Path | None) -> None:
+def _print(config: pytest.Config, summaries: Sequence[TaskSummary], problems: list[str]) -> None:
+    from pytest_simbench.report.brief import render_brief
     from pytest_simbench.report.tables import render_run
 
-    print(render_run(summaries, shutil.get_terminal_size().columns, folder))
+    show = render_run if config.get_verbosity() > 0 else render_brief
+    print(show(summaries, shutil.get_terminal_size().columns))
     for problem in problems:
         print(for_terminal(problem))
 

@@ -114,6 +114,8 @@ OPTIONS = (
     Option("--sim-output", File(), "folder of the run (default: .simbench/TIME-ID)", metavar="DIR"),
     Option("--sim-trace", Choice(("off", "on", "retain-on-failure")), "write joint and body motion "
            "at 50 Hz into the run folder: off, on, retain-on-failure", "off", metavar="WHEN"),
+    Option("--sim-badge", File(), "write the result as JSON for a badge of shields.io into this "
+           "file", metavar="FILE"),
     Option("--sim-threshold", Assignments("METRIC=NUMBER", numbers=True), "change a threshold of "
            "the suites: placed=0.9", {}, metavar="METRIC=VALUE"),
     Option("--sim-strict", Flag(), "claims that the repetitions do not decide fail, also those "

@@ -20,6 +20,7 @@ from pytest_simbench.records.text import for_terminal
 
 if TYPE_CHECKING:
     from pytest_simbench.experiment.experiment import Experiment
+    from pytest_simbench.plugin.compare import Comparison
     from pytest_simbench.plugin.resume import Resumed
     from pytest_simbench.report.progress import Progress
     from pytest_simbench.tasks.base import Task
@@ -37,6 +38,7 @@ class Run:
         reading: what the folder holds once the run is `complete`; empty before.
         mistake: in what was typed, found when the tests had ended; one sentence.
         resumed: the interrupted run that this one completes, if it does.
+        page: to look at, once the whole report is written.
     """
 
     def __init__(self, config: pytest.Config) -> None:
@@ -47,6 +49,7 @@ class Run:
         self.displays = Displays()
         self.reading = Reading()
         self.mistake = ""
+        self.page: Path | None = None
         self._attempts: Counter[tuple[str, str, str]] = Counter()
         self._lock = threading.Lock()
         self._progress: Progress | None = None
@@ -220,36 +223,54 @@ class Run:
         if (self.folder.used or self._shared()) and not self.problem:
             self.reading = self.folder.scan()
 
-    def summarise(self, reporter: pytest.TerminalReporter, comparison: str = "") -> None:
-        """Print the tables and write the report files.
+    def summarise(
+        self, reporter: pytest.TerminalReporter, comparison: Comparison | None, passed: bool
+    ) -> None:
+        """Print the result and write the report files.
 
         Args:
             reporter: prints.
-            comparison: with a baseline, as Markdown, for the summary page of a CI job.
+            comparison: with a baseline, where there is one.
+            passed: whether tests and limits passed, for the badge.
         """
         if self.mistake:
             reporter.write_line(f"ERROR: {for_terminal(self.mistake)}", red=True)
-        if not self.reading.records:
+        if not self.reading.records and not self._repeated():
             return
         from pytest_simbench.report import markdown
-        from pytest_simbench.report.files import write_report
+        from pytest_simbench.report.brief import render_brief
+        from pytest_simbench.report.files import write_badge, write_report
         from pytest_simbench.report.github import append_summary
+        from pytest_simbench.report.page import PAGE_NAME
         from pytest_simbench.report.tables import render_run
 
-        written = write_report(self.folder, self.reading)
+        written = write_report(self.folder, self.reading, comparison.found if comparison else None)
         unsaved = self.folder.flush()
         problems = [*self._problems, *self.reading.problems, *self.reading.refused]
         problems += written.problems
-        page = markdown.render_run(written.summaries)
-        problems.append(append_summary("\n".join([comparison, page])))
-        reporter.write_sep("=", "simulator comparison")
-        whole = written.complete and not unsaved
-        folder = self.folder.path if whole else None
-        reporter.write_line(render_run(written.summaries, reporter._tw.fullwidth, folder))
-        if not whole:
+        if written.summaries:
+            changes = comparison.markdown() if comparison else ""
+            page = markdown.render_run(written.summaries)
+            problems.append(append_summary("\n".join([changes, page])))
+            reporter.write_sep("=", "simulator comparison")
+            show = render_run if self.config.get_verbosity() > 0 else render_brief
+            reporter.write_line(show(written.summaries, reporter._tw.fullwidth))
+        badge = options.value(self.config, "sim_badge")
+        if badge:
+            path = Path(self.config.invocation_params.dir, badge)
+            problems.append(write_badge(path, self.reading.records, passed))
+        if written.complete and not unsaved:
+            self.page = self.folder.path / PAGE_NAME
+        else:
             problems.insert(0, f"\nwhat could be written is in {self.folder.path}")
         for line in [*map(for_terminal, filter(None, problems)), *unsaved]:
             reporter.write_line(line)
+
+    def _repeated(self) -> bool:
+        """Whether this run has results on repeatability."""
+        from pytest_simbench.records.repeatability import NAME
+
+        return (self.folder.path / NAME).is_file()
 
     def _shared(self) -> bool:
         return self.config.pluginmanager.has_plugin("dsession")

@@ -155,13 +155,12 @@ class SimSession:
                 session.exitstatus = pytest.ExitCode.TESTS_FAILED
         self.run.check_thresholds(session)
 
-    def summarise(self, reporter: pytest.TerminalReporter) -> None:
-        """Print the tables, and write them to the run folder."""
+    def summarise(self, reporter: pytest.TerminalReporter, exitstatus: int) -> None:
+        """Print the result, write the report, and say last where it is."""
         if self.in_worker:  # an xdist worker has a reporter too, which nobody reads
             return
         if self.begun:
-            markdown = self.comparison.markdown() if self.comparison else ""
-            self.run.summarise(reporter, markdown)
+            self.run.summarise(reporter, self.comparison, exitstatus == pytest.ExitCode.OK)
         if self.comparison:
             reporter.write_sep("=", "comparison with the baseline")
             reporter.write_line(self.comparison.text(reporter._tw.fullwidth))
@@ -172,6 +171,10 @@ class SimSession:
                 from pytest_simbench.plugin.repeatability import summarise
 
                 summarise(reporter, self.run.folder.path)
+        if self.begun and self.run.page is not None:
+            from pytest_simbench.report.files import where
+
+            reporter.write_line(where(self.run.page, self.config.invocation_params.dir))
 
     def close(self) -> None:
         """End what the run started."""

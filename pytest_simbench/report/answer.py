@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from pytest_simbench.measure.intervals import FEWEST
 from pytest_simbench.report import cells
@@ -31,6 +32,39 @@ def sentences(summary: TaskSummary) -> list[str]:
     elif attempts:
         found.append(f"failures: none in {attempts} repetitions.")
     return [sentence for sentence in [*found, *summary.modes] if sentence]
+
+
+@dataclass(frozen=True)
+class Standing:
+    """What the corrected tests say of the rows at one metric, by the rows' places.
+
+    Attributes:
+        ahead: who beats another and is beaten by nobody.
+        behind: who is beaten.
+        level: who was compared, and is neither.
+    """
+
+    ahead: tuple[int, ...] = ()
+    behind: tuple[int, ...] = ()
+    level: tuple[int, ...] = ()
+
+
+def standing(name: str, counts: Sequence[int], summary: TaskSummary) -> Standing:
+    """Who is ahead at a metric; nobody where fewer than two rows have enough repetitions.
+
+    Args:
+        name: of the metric.
+        counts: for each row the repetitions that have the metric.
+        summary: with its wins.
+    """
+    compared = [place for place, count in enumerate(counts) if count >= FEWEST]
+    if len(compared) < 2:
+        return Standing()
+    wins = [win for win in summary.wins if win.metric.name == name]
+    behind = {win.loser for win in wins}
+    ahead = {win.winner for win in wins} - behind
+    level = [place for place in compared if place not in ahead | behind]
+    return Standing(tuple(sorted(ahead)), tuple(sorted(behind)), tuple(level))
 
 
 def short_labels(rows: Sequence[Row]) -> list[str]:
@@ -63,11 +97,15 @@ def _compare(metric: Metric, summary: TaskSummary, names: Sequence[str]) -> str:
     if len(texts) < 2:
         return "".join(f"{metric.title}: {text}." for text in texts.values())
     everybody = list(texts.values())
-    if sum(value.count >= FEWEST for value in values.values()) < 2:
+    found = standing(
+        metric.name,
+        [0 if (v := values.get(place)) is None else v.count for place in range(len(names))],
+        summary,
+    )
+    if found == Standing():
         return f"{metric.title}: {_list(everybody)}; too few repetitions to compare."
     wins = [win for win in summary.wins if win.metric.name == metric.name]
-    losers = {win.loser for win in wins}
-    winners = {win.winner for win in wins} - losers
+    losers, winners = set(found.behind), set(found.ahead)
     ahead = [text for place, text in texts.items() if place in winners]
     behind = [text for place, text in texts.items() if place in losers]
     others = [text for place, text in texts.items() if place not in winners | losers]

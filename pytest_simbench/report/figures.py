@@ -8,7 +8,8 @@ from __future__ import annotations
 import io
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,16 @@ from pytest_simbench.records.names import file_name
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.text import for_figure
 from pytest_simbench.report.answer import short_labels
-from pytest_simbench.report.pooling import Spread
+from pytest_simbench.report.pooling import Spread, merged_order
 from pytest_simbench.report.summary import Row, TaskSummary
 from pytest_simbench.tasks.metrics import Metric
 
 DPI = 120
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito's palette: told apart by colour-blind readers too (jfly.uni-koeln.de/color)."""
+
+MARKERS = "osD^vP*X"
+"""With the colours, so that lines are told apart without them."""
 
 PLAIN_TEXT: Any = {
     "text.usetex": False,
@@ -43,46 +47,77 @@ def write_figures(folder: Path, summaries: Sequence[TaskSummary]) -> list[Path]:
         FiguresUnavailable: matplotlib is not installed.
         OSError: the folder cannot be written to.
     """
+    paths: list[Path] = []
+    with drawing():
+        for summary in summaries:
+            for name in ("metrics", "times", "resources"):
+                figure = draw(summary, name)
+                if figure is None:
+                    continue
+                path = folder / f"{file_name(summary.task)}_{name}.png"
+                picture = io.BytesIO()
+                figure.savefig(picture, format="png", dpi=DPI)
+                write_whole(path, picture.getvalue())
+                paths.append(path)
+    return paths
+
+
+@contextmanager
+def drawing(**settings: Any) -> Iterator[None]:
+    """While pictures are drawn and saved: no text means anything, no warning is shown.
+
+    Args:
+        settings: more of matplotlib's, `svg_fonttype` for `svg.fonttype`.
+
+    Raises:
+        FiguresUnavailable: matplotlib is not installed.
+    """
     try:
         from matplotlib import rc_context
     except ImportError as error:
         raise FiguresUnavailable(
             "no pictures: matplotlib is missing; pip install 'pytest-simbench[figures]'"
         ) from error
-    with rc_context(PLAIN_TEXT), warnings.catch_warnings():
+    more = {name.replace("_", "."): value for name, value in settings.items()}
+    with rc_context(PLAIN_TEXT | more), warnings.catch_warnings():
         # Characters that the font lacks are drawn as boxes, long labels leave less room.
         warnings.simplefilter("ignore", UserWarning)
-        return _draw(folder, summaries)
+        yield
 
 
-def _draw(folder: Path, summaries: Sequence[TaskSummary]) -> list[Path]:
+def draw(summary: TaskSummary, name: str, *, titled: bool = True) -> Any:
+    """One picture of a task as a `matplotlib.figure.Figure`, within `drawing`.
+
+    Args:
+        summary: of the task.
+        name: `metrics`, `times`, `resources` or `phases`.
+        titled: whether a title stands above it.
+
+    Returns:
+        None where there is nothing to draw.
+    """
     from matplotlib.figure import Figure
 
-    paths: list[Path] = []
-    for summary in summaries:
-        rows = [row for row in summary.rows if row.finished]
-        if not rows:
-            continue
-        for name, draw, panels in (
-            ("metrics", _metrics, max(1, len(summary.study))),
-            ("times", _times, 1),
-            ("resources", _resources, 2),
-        ):
-            # Figure without pyplot: no window, no display, no global state.
-            figure: Any = Figure(
-                figsize=(max(7, 2 + 3.5 * panels), 1.6 + 0.4 * len(rows)), layout="constrained"
-            )
-            axes = figure.subplots(1, panels, sharey=True, squeeze=False)[0]
-            draw(axes, summary, rows)
-            axes[0].set_yticks(range(len(rows)), map(for_figure, short_labels(rows)))
-            axes[0].set_ylim(len(rows) - 0.5, -0.5)
-            figure.suptitle(_title(summary, rows, name), fontsize="medium")
-            path = folder / f"{file_name(summary.task)}_{name}.png"
-            picture = io.BytesIO()
-            figure.savefig(picture, format="png", dpi=DPI)
-            write_whole(path, picture.getvalue())
-            paths.append(path)
-    return paths
+    rows = [row for row in summary.rows if row.finished]
+    if name == "phases":
+        rows = [row for row in rows if row.by_phase]
+    if not rows:
+        return None
+    # Figure without pyplot: no window, no display, no global state.
+    if name == "phases":
+        figure: Any = Figure(figsize=(9, 3.2 + 0.16 * len(rows)), layout="constrained")
+        _phases(figure, rows)
+        return figure
+    panels = {"metrics": max(1, len(summary.study)), "times": 1, "resources": 2}[name]
+    size = (max(7, 2 + 3.5 * panels), 1.6 + 0.4 * len(rows))
+    figure = Figure(figsize=size, layout="constrained")
+    axes = figure.subplots(1, panels, sharey=True, squeeze=False)[0]
+    {"metrics": _metrics, "times": _times, "resources": _resources}[name](axes, summary, rows)
+    axes[0].set_yticks(range(len(rows)), map(for_figure, short_labels(rows)))
+    axes[0].set_ylim(len(rows) - 0.5, -0.5)
+    if titled:
+        figure.suptitle(_title(summary, rows, name), fontsize="medium")
+    return figure
 
 
 def _title(summary: TaskSummary, rows: Sequence[Row], name: str) -> str:
@@ -164,6 +199,31 @@ def _resources(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -
         axis.set_xlim(left=0)
         axis.set_xlabel(label)
         axis.grid(axis="x", alpha=0.4)
+
+
+def _phases(figure: Any, rows: Sequence[Row]) -> None:
+    """CPU and RAM along the task's phases, a line for each row."""
+    order = merged_order(row.by_phase for row in rows)
+    panels = figure.subplots(1, 2, squeeze=False)[0]
+    for kind, (axis, label) in enumerate(zip(panels, ("CPU, % of a core", "RAM, MB"), strict=True)):
+        for place, (row, name) in enumerate(zip(rows, short_labels(rows), strict=True)):
+            known = [phase for phase in order if phase in row.by_phase]
+            axis.plot(
+                [order.index(phase) for phase in known],
+                [row.by_phase[phase][kind].mean for phase in known],
+                marker=MARKERS[place % len(MARKERS)],
+                ls=("-", "--")[place // len(COLOURS) % 2],
+                color=COLOURS[place % len(COLOURS)],
+                ms=5,
+                lw=1.2,
+                label=for_figure(name),
+            )
+        axis.set_xticks(range(len(order)), map(for_figure, order), rotation=40, ha="right")
+        axis.set_ylim(bottom=0)
+        axis.set_ylabel(label)
+        axis.grid(axis="y", alpha=0.4)
+    handles, names = panels[0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=4, frameon=False)
 
 
 def _heading(metric: Metric) -> str:

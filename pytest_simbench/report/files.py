@@ -1,4 +1,5 @@
-"""The report in the run folder: `report.md`, `report.csv` and, where matplotlib is, pictures."""
+"""The report in the run folder: `report.html`, `report.md`, `report.csv` and, where matplotlib is,
+pictures."""
 
 from __future__ import annotations
 
@@ -12,10 +13,12 @@ from typing import Any, TextIO
 from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.text import for_csv
+from pytest_simbench.records.text import for_csv, for_terminal
 from pytest_simbench.report import markdown
+from pytest_simbench.report.badge import badge
 from pytest_simbench.report.figures import FiguresUnavailable, write_figures
 from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.page import PAGE_NAME, Compared, page_of
 from pytest_simbench.report.summary import PHASES, TaskSummary, summarise
 from pytest_simbench.tasks.metrics import COSTS
 
@@ -43,12 +46,15 @@ class Written:
     summaries: tuple[TaskSummary, ...] = ()
 
 
-def write_report(folder: RunFolder, reading: Reading | None = None) -> Written:
+def write_report(
+    folder: RunFolder, reading: Reading | None = None, comparison: Compared | None = None
+) -> Written:
     """Write all files from what a run folder holds, into it.
 
     Args:
         folder: of the run.
         reading: of it, where it has been read already.
+        comparison: with a baseline, where there is one.
 
     Raises:
         RecordError: its records cannot be read.
@@ -56,7 +62,8 @@ def write_report(folder: RunFolder, reading: Reading | None = None) -> Written:
     reading = reading or folder.read()
     records = in_order(reading.records)
     summaries = summaries_of(reading)
-    return replace(write_files(folder.path, summaries, records), summaries=tuple(summaries))
+    written = write_files(folder.path, summaries, records, comparison=comparison)
+    return replace(written, summaries=tuple(summaries))
 
 
 def summaries_of(reading: Reading) -> list[TaskSummary]:
@@ -75,8 +82,19 @@ def write_files(
     summaries: Sequence[TaskSummary],
     records: Sequence[Record],
     figures: bool = True,
+    comparison: Compared | None = None,
+    run: Path | None = None,
 ) -> Written:
-    """Write all files; what cannot be written is told, and the rest is written all the same."""
+    """Write all files; what cannot be written is told, and the rest is written all the same.
+
+    Args:
+        folder: where.
+        summaries: of each task.
+        records: that they were made of.
+        figures: whether pictures are drawn too.
+        comparison: with a baseline, where there is one.
+        run: the run folder, where it is another: its results on repeatability are on the page.
+    """
     problems: list[str] = []
     failed: list[str] = []
     pictures: list[Path] = []
@@ -92,12 +110,31 @@ def write_files(
         except OSError as error:
             failed.append(f"pictures: {_unwritable(folder, error)}")
     text = markdown.render_run(summaries, [picture.name for picture in pictures])
-    for name, content in ((MARKDOWN_NAME, text), (CSV_NAME, csv_of(records))):
+    contents = {PAGE_NAME: page_of(run or folder, summaries, records, comparison)}
+    if records:  # else the run has results on repeatability alone
+        contents |= {MARKDOWN_NAME: text, CSV_NAME: csv_of(records)}
+    for name, content in contents.items():
         try:
             write_whole(folder / name, content.encode("utf-8", "replace"))
         except OSError as error:
             failed.append(_unwritable(folder / name, error))
     return Written((*problems, *failed), not failed)
+
+
+def where(page: Path, base: Path) -> str:
+    """The line that tells where the page is, short where it lies below the folder `base`."""
+    shown = page.relative_to(base) if page.is_relative_to(base) else page
+    return for_terminal(f"report: {shown}")
+
+
+def write_badge(path: Path, records: Sequence[Record], passed: bool) -> str:
+    """Write the badge of a run; a sentence when it could not be written."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, badge(records, passed).encode("ascii"))
+    except OSError as error:
+        return f"no badge: {_unwritable(path, error)}"
+    return ""
 
 
 def _unwritable(path: Path, error: OSError) -> str:

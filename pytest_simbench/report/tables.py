@@ -1,23 +1,21 @@
-"""The result in the terminal: for each task the answer, the study's table, and what explains it."""
+"""The whole result in the terminal, with `-v`: for each task answer, tables, what explains them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from pytest_simbench.records.text import for_terminal, in_one_line
 from pytest_simbench.report import columns
 from pytest_simbench.report.answer import sentences
 from pytest_simbench.report.grid import fill, render
+from pytest_simbench.report.headline import headline
 from pytest_simbench.report.summary import TaskSummary
 
 NARROWEST = 40
 """Tables are laid out for at least so many columns; in fewer, lines run over."""
 
 
-def render_run(
-    summaries: Sequence[TaskSummary], width: int = 80, folder: Path | str | None = None
-) -> str:
+def render_run(summaries: Sequence[TaskSummary], width: int = 80) -> str:
     """Everything the terminal shows of a run, as plain lines of at most `width` columns.
 
     No colours and nothing but ASCII of our own, so that any log holds it.
@@ -25,19 +23,17 @@ def render_run(
     Args:
         summaries: from `summary.summarise`; without one, the text is empty.
         width: of the terminal; 80 to 140 read well.
-        folder: the run folder, named where the reader should look on.
     """
     if not summaries:
         return ""
     width = max(width, NARROWEST)
-    parts = [render_task(summary, width) for summary in summaries]
+    parts = ["\n".join(fill(sentence, width, "  ") for sentence in headline(summaries))]
+    parts += [render_task(summary, width) for summary in summaries]
     parts.append(fill(columns.LEGEND, width))
     deviations = [f"{name}: {text}" for name, text in columns.deviations(summaries)]
     if deviations:
         lines = [f"  {fill(text, width, '    ')}" for text in deviations]
         parts.append("\n".join(["declared deviations from the scene", *lines]))
-    if folder is not None:
-        parts.append(f"records, logs and report: {folder}")
     return for_terminal("\n\n".join(parts))
 
 

@@ -32,7 +32,7 @@ TOLD = {
 def test_declared_deviations_are_recorded_and_shown(pytester: pytest.Pytester, name: str) -> None:
     pytester.makepyfile(test_it=TASK)
     result = pytester.runpytest_subprocess(
-        f"--sim={name}", "--reps=1", f"--sim-output={pytester.path / 'out'}"
+        f"--sim={name}", "--reps=1", "-v", f"--sim-output={pytester.path / 'out'}"
     )
     assert result.ret == 0
     line = (pytester.path / "out" / "records.jsonl").read_text().splitlines()[0]

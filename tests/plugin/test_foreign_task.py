@@ -99,7 +99,7 @@ def test_where_the_package_is_gone(
     run(pytester, "--reps=3", "--sim-seed=2028", "--sim-output=b", "-n2").assert_outcomes(passed=1)
     assert "spilt volume ml" in Path("b/report.md").read_text()  # xdist's controller read it there
     straight = report(Path("a"))
-    assert set(straight) == {"report.md", "report.csv"}
+    assert set(straight) == {"report.html", "report.md", "report.csv"}
     for path in (package, pytester.path / "test_it.py"):
         path.unlink()
     monkeypatch.setenv("PYTHONPATH", "")
@@ -108,17 +108,18 @@ def test_where_the_package_is_gone(
         shutil.move(name, elsewhere / name)
     monkeypatch.chdir(elsewhere)
 
-    shown = run(pytester, "--sim-report", "a").stdout.str()
+    shown = run(pytester, "-v", "--sim-report", "a").stdout.str()
     assert "spilt volume ml" in shown
     assert report(Path("a")) == straight
 
-    run(pytester, "--sim-merge", "b", "a", "--sim-output=whole").stdout.fnmatch_lines(
+    merged = run(pytester, "-v", "--sim-merge", "b", "a", "--sim-output=whole")
+    merged.stdout.fnmatch_lines(
         ["caught drops: mujoco 86 %*", "*spilt volume ml*", "reference*0.25*"]
     )
     whole = report(Path("whole"))
     told(whole["report.md"].decode())
     before = sorted(path for path in Path(".").rglob("*") if path.is_file())
-    both = run(pytester, "--sim-report", "a", "b")  # nowhere to write
+    both = run(pytester, "-v", "--sim-report", "a", "b")  # nowhere to write
     assert sorted(path for path in Path(".").rglob("*") if path.is_file()) == before
     both.stdout.fnmatch_lines(["pouring: 9 repetitions*", "*spilt volume ml*", "reference*0.25*"])
     run(pytester, "--sim-report", "a", "b", "--sim-output=both")

@@ -74,6 +74,7 @@ def test_report_folder(tmp_path: Path) -> None:
     assert write_files(tmp_path, summarise(records, METRICS, REFERENCES), records) == Written()
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "report.csv",
+        "report.html",
         "report.md",
         "stacking_metrics.png",
         "stacking_resources.png",
@@ -114,13 +115,16 @@ def test_without_matplotlib_one_line_says_so(
     (line,) = written.problems
     assert line.startswith("no pictures: matplotlib is missing")
     assert (tmp_path / "report.md").exists()
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "no pictures: matplotlib is missing; pip install" in page
+    assert '<figure class="picture">' not in page
     assert not list(tmp_path.glob("*.png"))
 
 
-def test_matplotlib_is_imported_only_when_drawing() -> None:
+def test_what_draws_and_writes_is_imported_only_then() -> None:
     code = (
         "import sys, pytest_simbench.report.files, pytest_simbench.report.tables;"
-        "print('matplotlib' in sys.modules)"
+        "print('matplotlib' in sys.modules, 'jinja2' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False"
+    assert done.stdout.strip() == "False False"

@@ -39,7 +39,7 @@ def test_a_folder_is_all_that_it_takes(tmp_path: Path) -> None:
     assert "does not say" not in report
     assert [summary.task for summary in written.summaries] == ["stacking", "throwing"]
     before = {path: path.read_bytes() for path in tmp_path.glob("report.*")}
-    assert len(before) == 2
+    assert len(before) == 3
     write_report(RunFolder(tmp_path))
     assert {path: path.read_bytes() for path in before} == before
 

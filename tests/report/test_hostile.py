@@ -11,6 +11,7 @@ from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.records.record import Failure, Record
 from pytest_simbench.records.repeatability import Line
 from pytest_simbench.report import changes, markdown, tables
+from pytest_simbench.report.brief import render_brief
 from pytest_simbench.report.capabilities import capability_markdown, capability_table
 from pytest_simbench.report.files import csv_of, write_files
 from pytest_simbench.report.github import VARIABLE, append_summary
@@ -71,9 +72,9 @@ def declared(text: str) -> dict[str, list[Metric]]:
 def test_the_terminal(text: str) -> None:
     found = with_wins(summarise(records(text), declared(text), {text: {text: 0.5}}), records(text))
     for width in (60, 200):
-        shown = tables.render_run(found, width, Path(text.replace("\0", "")))
-        assert_harmless_terminal(shown)
-        assert len(shown) < 100_000
+        for shown in (tables.render_run(found, width), render_brief(found, width)):
+            assert_harmless_terminal(shown)
+            assert len(shown) < 100_000
 
 
 @texts

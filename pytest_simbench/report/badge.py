@@ -1,0 +1,45 @@
+"""A badge for a README: the JSON that shields.io reads (shields.io/badges/endpoint-badge)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.text import in_one_line
+
+LABEL = "simulators"
+
+LONGEST = 60
+"""Characters of the message."""
+
+
+def badge(records: Sequence[Record], passed: bool) -> str:
+    """The badge of a run, as JSON.
+
+    Green: every test passed and no repetition failed. Yellow: the tests passed although some did.
+    Red: a test or a limit failed. Grey: nothing was measured.
+
+    Args:
+        records: of the run; interrupted repetitions say nothing.
+        passed: whether the tests, and the limits against the baseline, passed.
+    """
+    ended = [record for record in records if record.status != "interrupted"]
+    failed = sum(not record.ok for record in ended)
+    names = list(dict.fromkeys(record.simulator for record in ended))
+    who = names[0] if len(names) == 1 else f"{len(names)} simulators"
+    if not ended:
+        message, colour = "nothing measured", "lightgrey"
+    elif not passed:
+        message, colour = f"{who}: failing", "red"
+    elif failed:
+        message, colour = f"{who}: {failed} of {len(ended)} repetitions failed", "yellow"
+    else:
+        message, colour = f"{who}: {len(ended)} repetitions passed", "brightgreen"
+    data = {
+        "schemaVersion": 1,
+        "label": LABEL,
+        "message": in_one_line(message, LONGEST),
+        "color": colour,
+    }
+    return json.dumps(data) + "\n"

@@ -1,0 +1,233 @@
+"""What the page tells, ready for its template; a function of what a run folder holds."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.series import series
+from pytest_simbench.records.text import for_terminal
+from pytest_simbench.report import columns, repeatability
+from pytest_simbench.report.answer import sentences
+from pytest_simbench.report.changes import DIFFERENT
+from pytest_simbench.report.changes import columns as change_columns
+from pytest_simbench.report.headline import headline
+from pytest_simbench.report.page import setup
+from pytest_simbench.report.page.cells import Of, Table, from_columns, labelled, of, study
+from pytest_simbench.report.page.pictures import Picture, pictures
+from pytest_simbench.report.page.strips import Strip, strips
+from pytest_simbench.report.summary import TaskSummary
+
+if TYPE_CHECKING:
+    from pytest_simbench.measure.gate import GateReport
+
+TAIL = 30
+"""Lines of a log that are shown."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Failures of one row that share type and phase, with the end of the first one's log."""
+
+    title: str
+    of: Of
+    message: str
+    repetitions: str
+    log: str
+    tail: str
+
+
+@dataclass(frozen=True)
+class TaskPart:
+    """One task."""
+
+    title: str
+    answer: Sequence[str]
+    study: Table
+    strips: Sequence[Strip]
+    tables: Sequence[Table]
+    causes: Sequence[Cause]
+    pictures: Sequence[Picture]
+    notes: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Compared:
+    """The comparison with a baseline."""
+
+    name: str
+    failures: Sequence[str]
+    differences: Sequence[str]
+    notes: Sequence[str]
+    table: Table | None
+
+
+@dataclass(frozen=True)
+class Page:
+    """Everything. `filters` holds the choices by what they choose; of one there is none.
+
+    Attributes:
+        repetitions: of all tasks, as plain data, in the order of the dots' numbers.
+        problems: what could not be shown, as sentences.
+    """
+
+    title: str
+    answer: Sequence[str]
+    filters: Mapping[str, Sequence[str]]
+    tasks: Sequence[TaskPart]
+    repeatability: Sequence[Table]
+    comparison: Compared | None
+    setup: setup.Setup
+    repetitions: Sequence[Mapping[str, Any]]
+    problems: Sequence[str]
+
+
+def page(
+    folder: Path,
+    summaries: Sequence[TaskSummary],
+    records: Sequence[Record],
+    comparison: tuple[str, GateReport] | None = None,
+) -> Page:
+    """The page of a run, see `page_of`."""
+    numbers: dict[int, int] = {}
+    repetitions: list[dict[str, Any]] = []
+
+    def number(record: Record) -> int:
+        """Its place among the page's repetitions, where it is put when first asked for."""
+        if id(record) not in numbers:
+            numbers[id(record)] = len(repetitions)
+            repetitions.append(_repetition(record))
+        return numbers[id(record)]
+
+    problems: dict[str, None] = {}
+    tasks = []
+    for summary in summaries:
+        drawn, problem = pictures(summary)
+        rows = [row.records for row in series(r for r in records if r.task == summary.task)]
+        problems |= dict.fromkeys(filter(None, [problem]))
+        tasks.append(
+            TaskPart(
+                columns.title(summary),
+                sentences(summary),
+                study(summary),
+                strips(summary, rows, number),
+                _tables(summary),
+                _causes(summary, rows),
+                drawn,
+                columns.notes(summary),
+            )
+        )
+    again, unreadable = _repeatability(folder)
+    problems |= dict.fromkeys(unreadable)
+    rows_of = [of(row) for summary in summaries for row in summary.rows]
+    choices = {
+        name: list(dict.fromkeys(getattr(row, name) for row in rows_of)) for name in Of._fields
+    }
+    return Page(
+        " and ".join(summary.task for summary in summaries) or "repeatability",
+        headline(summaries),
+        {name: found for name, found in choices.items() if len(found) > 1},
+        tasks,
+        again,
+        None if comparison is None else _compared(*comparison),
+        setup.setup(summaries, records),
+        repetitions,
+        list(problems),
+    )
+
+
+def _tables(summary: TaskSummary) -> list[Table]:
+    rows = labelled(summary)
+    found = [item for item in columns.details(summary) if item[0] != "failures"]
+    found.append((columns.BY_PHASE, columns.by_phase(summary)))
+    return [
+        from_columns(name[0].upper() + name[1:], table, rows=rows) for name, table in found if table
+    ]
+
+
+def _causes(summary: TaskSummary, rows: Sequence[Sequence[Record]]) -> list[Cause]:
+    found = []
+    for row, records in zip(summary.rows, rows, strict=True):
+        for cause in row.causes:
+            first = next(r for r in records if r.repetition == cause.repetitions[0])
+            tail = first.error.log_tail.strip().splitlines() if first.error else []
+            many = len(cause.repetitions)
+            where = f" in {cause.phase}" if cause.phase else ""
+            found.append(
+                Cause(
+                    f"{row.label}: {many} x {cause.type}{where}",
+                    of(row),
+                    cause.message,
+                    columns.numbers(cause.repetitions, 10),
+                    cause.log,
+                    for_terminal("\n".join(tail[-TAIL:])),
+                )
+            )
+    return found
+
+
+def _repeatability(folder: Path) -> tuple[list[Table], list[str]]:
+    from pytest_simbench.records.repeatability import read
+    from pytest_simbench.repeatability.agreement import agreements
+
+    try:
+        lines = read(folder)
+        found = repeatability.tables(lines.items, agreements(folder))
+    except ValueError as error:
+        return [], [str(error)]
+    tables = [from_columns(title, table, note) for title, note, table in found]
+    return tables, [*lines.problems, *lines.refused]
+
+
+def _compared(name: str, report: GateReport) -> Compared:
+    found = change_columns(report)
+    return Compared(
+        name,
+        [f"FAILED {sentence}" for sentence in report.failures],
+        [f"{DIFFERENT}: {sentence}" for sentence in report.differences],
+        report.notes,
+        from_columns("Changes", found) if found else None,
+    )
+
+
+def _repetition(record: Record) -> dict[str, Any]:
+    """What a dot tells of its repetition."""
+    error = record.error
+    found = {
+        "of": record.label,
+        "task": record.task,
+        "repetition": record.repetition,
+        "seed": str(record.seed),  # JavaScript keeps 53 bits of a number
+        "status": record.status,
+        "cause": f"{error.cause}: {error.message}" if error else "",
+        "log": str(record.details.get("log") or ""),
+        "command": command(record),
+    }
+    return {k: for_terminal(v) if isinstance(v, str) else v for k, v in found.items()}
+
+
+def command(record: Record) -> str:
+    """What runs the same seed of the same test again; empty where its id is no plain one.
+
+    Settings that `--sim-set` changed are not in it.
+    """
+    file, _, name = record.test.partition("::")
+    fine = name and record.test.isprintable() and not file.startswith(("-", "/", "."))
+    if not fine or ".." in file or not file.endswith(".py"):
+        return ""
+    options = [
+        f"--sim-name={record.simulator}",
+        f"--sim-seed={record.seed}",
+        "--sim-reps=1",
+        f"--sim-profile={record.profile}",
+        f"--sim-protocol={record.protocol}",
+        f"--sim-jitter={record.jitter:g}",
+        *["--sim-gui"] * (record.mode == "gui"),
+    ]
+    if not all(map(str.isprintable, options)):
+        return ""
+    return shlex.join(["pytest", record.test, *options])

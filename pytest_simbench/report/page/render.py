@@ -1,0 +1,71 @@
+"""From what the page tells to HTML: every text is escaped, and nothing is loaded from anywhere."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from base64 import b64encode
+from importlib.resources import files
+from typing import Any
+
+from jinja2 import BaseLoader, Environment, StrictUndefined
+from markupsafe import Markup
+
+from pytest_simbench import __version__
+from pytest_simbench.records.text import for_terminal
+from pytest_simbench.report.page.context import Page
+
+_LOG = re.compile(r"logs/[A-Za-z0-9_=-][A-Za-z0-9_.=-]*\.log")
+"""A log in the run folder, as this package names them: it becomes a link, anything else a text."""
+
+SYMBOLS = {"ahead": ("\u25b2", "ahead"), "behind": ("\u25bc", "behind"),
+           "level": ("\u2248", "not told apart"), "": ("", "")}  # fmt: skip
+"""Of the verdicts: what is seen without colours, and what is read aloud."""
+
+
+def render(page: Page) -> str:
+    """The page as one HTML document, without a line that depends on when it was made."""
+    environment = Environment(
+        loader=_Parts(),
+        autoescape=True,
+        finalize=_text,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    style, script = _part("page.css"), _part("page.js")
+    return environment.get_template("page.html").render(
+        page=page,
+        style=Markup(style),
+        script=Markup(script),
+        # No other script runs, whatever a text smuggled in; nothing is loaded, styles stay inside.
+        policy=f"default-src 'none'; script-src 'sha256-{_digest(script)}'; "
+        "style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'",
+        symbols=SYMBOLS,
+        svg=lambda picture: Markup(picture.svg),
+        log_link=lambda log: log if _LOG.fullmatch(log) else "",
+        version=__version__,
+    )
+
+
+class _Parts(BaseLoader):
+    """Templates from the package, also from a zip file."""
+
+    def get_source(self, environment: Environment, template: str) -> tuple[str, None, Any]:
+        return _part(template), None, None
+
+
+def _part(name: str) -> str:
+    return (files(__package__) / "templates" / name).read_text(encoding="utf-8")
+
+
+def _text(value: Any) -> Any:
+    """Texts lose what is not to be seen; what was made safe on purpose stays as it is."""
+    return (
+        for_terminal(value) if isinstance(value, str) and not hasattr(value, "__html__") else value
+    )
+
+
+def _digest(script: str) -> str:
+    """Of the script as the page holds it, for its policy."""
+    return b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")

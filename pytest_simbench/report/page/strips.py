@@ -1,0 +1,223 @@
+"""Strip plots: for each metric a line for each row, on it one dot for each repetition.
+
+Drawn by the template as SVG whose lengths are shares of its width, so that it fits any screen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.text import for_figure
+from pytest_simbench.report import cells
+from pytest_simbench.report.answer import short_labels
+from pytest_simbench.report.page.cells import Of, of
+from pytest_simbench.report.summary import TaskSummary
+from pytest_simbench.tasks.metrics import COSTS, Metric
+
+HEIGHT = 36
+"""Of a line [px]."""
+
+COLUMN = 5
+"""Dots above each other; more of one value stand side by side."""
+
+STEP = 6.5
+"""Between two of them [px]."""
+
+LEFT, RIGHT = 2.0, 91.0
+"""Where the smallest and the largest value lie [% of the width]."""
+
+LOST = 96.5
+"""Where repetitions without a value lie [% of the width]."""
+
+NEAR = 1.2
+"""Dots that are closer than this [% of the width] are moved apart, up and down."""
+
+LOGARITHMIC = 20
+"""Costs that differ by more than this factor are drawn on a logarithmic scale."""
+
+SHOWN_COSTS = ("cpu_cost", "rtf", "ram", "start", "end")
+
+
+@dataclass(frozen=True)
+class Dot:
+    """One repetition.
+
+    Attributes:
+        number: its place among all repetitions of the page.
+        x: where it lies [% of the width].
+        aside, y: moved to the right of there, and down from the line's top [px].
+        value: in words.
+    """
+
+    number: int
+    x: float
+    aside: float
+    y: float
+    value: str
+
+
+@dataclass(frozen=True)
+class StripLine:
+    """One row: its repetitions with a value, those without, mean and interval [% of the width]."""
+
+    label: str
+    of: Of
+    dots: Sequence[Dot]
+    lost: Sequence[Dot]
+    mean: float | None
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True)
+class Strip:
+    """The plot of one metric.
+
+    Attributes:
+        ticks: place [% of the width] and text.
+        reference: where a perfect run would lie [% of the width].
+        study: whether it is shown at once, not only when it is opened.
+    """
+
+    title: str
+    doc: str
+    lines: Sequence[StripLine]
+    ticks: Sequence[tuple[float, str]]
+    reference: float | None = None
+    study: bool = False
+    logarithmic: bool = False
+
+    @property
+    def lost(self) -> bool:
+        return any(line.lost for line in self.lines)
+
+
+def strips(
+    summary: TaskSummary, rows: Sequence[Sequence[Record]], number: Callable[[Record], int]
+) -> list[Strip]:
+    """A plot for each metric and cost that any repetition has.
+
+    Args:
+        summary: of the task.
+        rows: the records of each of its rows.
+        number: of a record on the page.
+    """
+    own = {metric.name for metric in summary.metrics}
+    costs = [cost for name in SHOWN_COSTS for cost in COSTS if cost.name == name not in own]
+    plots = [
+        _strip(metric, summary, rows, number, lambda r, n=metric.name: r.metrics.get(n))  # type: ignore[misc]
+        for metric in summary.metrics
+    ]
+    plots += [
+        _strip(cost, summary, rows, number, lambda r, n=cost.name: r.cost(n), cost=True)  # type: ignore[misc]
+        for cost in costs
+    ]
+    return [plot for plot in plots if plot is not None]
+
+
+def _strip(
+    metric: Metric,
+    summary: TaskSummary,
+    rows: Sequence[Sequence[Record]],
+    number: Callable[[Record], int],
+    value: Callable[[Record], float | None],
+    cost: bool = False,
+) -> Strip | None:
+    every = [v for records in rows for r in records if (v := _finite(r, value)) is not None]
+    reference = None if cost else summary.references.get(metric.name)
+    if not every:
+        return None
+    low, high = min(every), max(every)
+    if metric.bounded and low >= 0 and high <= 1:
+        low, high = 0.0, 1.0
+    elif reference is not None and math.isfinite(reference):
+        low, high = min(low, reference), max(high, reference)
+    log = cost and low > 0 and high / low > LOGARITHMIC
+    scale = _Scale(low, high, log)
+    lines = []
+    for row, records, label in zip(summary.rows, rows, short_labels(summary.rows), strict=True):
+        found = [(r, _finite(r, value)) for r in records]
+        dots = [(number(r), scale(v), _text(v, metric)) for r, v in found if v is not None]
+        lost = [number(r) for r, v in found if v is None]
+        pooled = None if cost else row.metrics.get(metric.name)
+        there = [v for _, v in found if v is not None]
+        mean = sum(there) / len(there) if there else None
+        ends = (pooled.low, pooled.high) if pooled else (None, None)
+        lines.append(
+            StripLine(
+                for_figure(label),
+                of(row),
+                _swarm(dots),
+                _swarm([(k, LOST, "") for k in lost]),
+                *(None if v is None else scale(v) for v in (mean, *ends)),
+            )
+        )
+    return Strip(
+        for_figure(cells.heading(metric)),
+        metric.doc,
+        lines,
+        [(scale(v), cells.metric_value(v, metric)) for v in scale.ticks()],
+        None if reference is None or not math.isfinite(reference) else scale(reference),
+        metric.study and not cost,
+        log,
+    )
+
+
+class _Scale:
+    """From values to shares of the width."""
+
+    def __init__(self, low: float, high: float, log: bool) -> None:
+        self._log = log
+        self.low, self.high = low, high
+
+    def __call__(self, value: float) -> float:
+        low, high = self._of(self.low), self._of(self.high)
+        share = (self._of(max(value, self.low) if self._log else value) - low) / (high - low or 1)
+        share = share if high > low else 0.5
+        return round(LEFT + (RIGHT - LEFT) * min(1.0, max(0.0, share)), 2)
+
+    def _of(self, value: float) -> float:
+        return math.log10(value) if self._log else value
+
+    def ticks(self) -> list[float]:
+        """Both ends and what lies between them."""
+        if self.low == self.high:
+            return [self.low]
+        if self._log:
+            return [self.low, math.sqrt(self.low * self.high), self.high]
+        return [self.low + (self.high - self.low) * k / 4 for k in range(5)]
+
+
+def _swarm(found: Sequence[tuple[int, float, str]]) -> list[Dot]:
+    """Dots that lie on each other are moved apart: up and down, many of them also aside."""
+    piles: list[list[tuple[int, float, str]]] = []
+    for item in sorted(found, key=lambda dot: (dot[1], dot[0])):
+        if piles and item[1] - piles[-1][0][1] < NEAR:
+            piles[-1].append(item)
+        else:
+            piles.append([item])
+    dots = []
+    for pile in piles:
+        columns = -(-len(pile) // COLUMN)
+        tall = -(-len(pile) // columns)
+        for place, (number, x, value) in enumerate(pile):
+            column, k = divmod(place, tall)
+            high = min(tall, len(pile) - column * tall)
+            aside = STEP * (column - (columns - 1) / 2)
+            y = HEIGHT / 2 + STEP * (k - (high - 1) / 2)
+            dots.append(Dot(number, x, round(aside, 1), round(y, 1), value))
+    return dots
+
+
+def _text(value: float, metric: Metric) -> str:
+    unit = "%" if metric.bounded else metric.unit
+    return f"{cells.metric_value(value, metric)} {unit}".rstrip()
+
+
+def _finite(record: Record, value: Callable[[Record], float | None]) -> float | None:
+    """The value of a repetition that was finished; none of one that failed, as in the tables."""
+    found = value(record) if record.ok else None
+    return float(found) if found is not None and math.isfinite(found) else None

@@ -1,0 +1,122 @@
+"""The report of a run as users meet it: the page, the short result, the badge."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+
+TEST = """
+    from tests.tiny import Falling
+
+    def test_falling(repeat):
+        repeat(Falling())
+"""
+OTHER = """
+    def test_sum(benchmark):
+        assert benchmark(sum, [1, 2]) == 3
+"""
+
+
+def run(pytester: pytest.Pytester, *arguments: str) -> pytest.RunResult:
+    return pytester.runpytest_subprocess("--sim=mujoco", "--reps=5", "--sim-output=o", *arguments)
+
+
+@pytest.fixture(autouse=True)
+def test_file(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(test_it=TEST)
+
+
+def test_a_run_ends_with_its_page_and_the_answer(pytester: pytest.Pytester) -> None:
+    """The answer first, where the page is last, and no table of pytest-benchmark between."""
+    result = run(pytester, "--sim-badge=site/badge.json")
+    result.assert_outcomes(passed=1)
+    lines = result.stdout.lines
+    start = next(k for k, line in enumerate(lines) if "simulator comparison" in line)
+    end = next(k for k, line in enumerate(lines) if line.startswith("report: "))
+    assert lines[start + 1] == "mujoco did falling: 5 repetitions, none failed."
+    assert lines[end] == "report: o/report.html"
+    assert re.match(r"=+ .*1 passed", lines[end + 1])
+    assert end - start < 40
+    assert "benchmark: 1 tests" not in result.stdout.str()
+    assert "declared deviations" not in result.stdout.str()
+    page = (pytester.path / "o" / "report.html").read_text(encoding="utf-8")
+    assert page.startswith("<!DOCTYPE html>")
+    assert "mujoco did falling: 5 repetitions, none failed." in page
+    assert json.loads((pytester.path / "site" / "badge.json").read_text()) == {
+        "schemaVersion": 1,
+        "label": "simulators",
+        "message": "mujoco: 5 repetitions passed",
+        "color": "brightgreen",
+    }
+
+
+def test_everything_is_told_with_v(pytester: pytest.Pytester) -> None:
+    output = run(pytester, "-v").stdout.str()
+    assert "where the time went" in output
+    assert "declared deviations from the scene" in output
+    assert output.index("did falling: 5") < output.index("where the time went")
+    assert output.index("declared deviations") < output.index("\nreport: ")
+
+
+def test_a_failed_claim_makes_the_badge_red(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(test_it=TEST.rstrip() + ".assert_at_least('landed', 0.5)\n        assert 0")
+    result = run(pytester, "--sim-badge=badge.json")
+    result.assert_outcomes(failed=1)
+    assert json.loads((pytester.path / "badge.json").read_text())["color"] == "red"
+
+
+def test_a_badge_that_cannot_be_written_is_told(pytester: pytest.Pytester) -> None:
+    pytester.mkdir("badge.json")
+    result = run(pytester, "--sim-badge=badge.json")
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines(["no badge: *badge.json could not be written (*"])
+
+
+@pytest.mark.parametrize("where", ["command line", "ini", "environment"])
+def test_the_table_of_pytest_benchmark_comes_with_one_of_its_options(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    option = "--benchmark-columns=min,max"
+    if where == "ini":
+        pytester.makeini(f"[pytest]\naddopts = {option}")
+    if where == "environment":
+        monkeypatch.setenv("PYTEST_ADDOPTS", option)
+    result = run(pytester, *[option] * (where == "command line"))
+    result.stdout.fnmatch_lines(["*benchmark 'test_falling': 1 tests*", "test_falling*mujoco*"])
+
+
+def test_benchmarks_of_others_keep_their_table(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(test_it=TEST, test_other=OTHER)
+    result = run(pytester)
+    result.assert_outcomes(passed=2)
+    table = result.stdout.str().partition("- benchmark")[2].partition("Legend")[0]
+    assert "test_sum" in table
+    assert "test_falling" not in table
+
+
+def test_the_comparison_with_a_baseline_stands_on_the_page(pytester: pytest.Pytester) -> None:
+    pytester.runpytest_subprocess("--sim=mujoco", "--reps=5", "--sim-output=base")
+    run(pytester, "--sim-baseline=base")
+    page = (pytester.path / "o" / "report.html").read_text(encoding="utf-8")
+    assert '<section id="baseline">' in page
+    assert f"Compared with {pytester.path / 'base'}" in page
+
+
+def test_a_run_of_repeatability_alone_has_its_page(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        test_it="""
+        from pytest_simbench.records.repeatability import Line, append
+
+        def test_it(output_path):
+            found = {"sentence": "5 mm in x change it"}
+            append(output_path, Line("search", "t", "mujoco", "headless", "tuned", "falling", 1,
+                                     {}, {}, found))
+        """
+    )
+    result = pytester.runpytest_subprocess("--sim-output=o")
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines(["*= repeatability =*", "*5 mm in x change it*", "report: o/*"])
+    assert "5 mm in x change it" in (pytester.path / "o" / "report.html").read_text("utf-8")
+    assert not (pytester.path / "o" / "report.md").exists()
