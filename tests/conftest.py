@@ -57,6 +57,23 @@ def workers() -> set[psutil.Process]:
     return set(reaper.marked(reaper.new_mark().partition(".")[0]))
 
 
+@pytest.fixture(autouse=True)
+def inner_runs(
+    request: pytest.FixtureRequest,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    """A pytest that a test starts can import the tests' helpers, and is no worker of xdist.
+
+    pytest-benchmark, for one, switches itself off where xdist's variables are set.
+    """
+    monkeypatch.setenv("PYTHONPATH", str(request.config.rootpath))
+    for name in ("PYTEST_XDIST_WORKER", "PYTEST_XDIST_WORKER_COUNT", "PYTEST_XDIST_TESTRUNUID"):
+        monkeypatch.delenv(name, raising=False)
+    # matplotlib would look through all fonts in each test's new home: 5 to 10 s every time.
+    monkeypatch.setenv("MPLCONFIGDIR", str(tmp_path_factory.getbasetemp() / "matplotlib"))
+
+
 @pytest.fixture
 def case(tmp_path: Path) -> Case:
     """A headless MuJoCo case with short time-outs, its run folder in `tmp_path`."""

@@ -209,7 +209,10 @@ class File(Kind):
             raise BadValue(path, "give a path")
         if "\0" in path:
             raise BadValue(path, "a path holds no NUL character")
-        names = os.fsencode(path).split(b"/")
+        try:
+            names = os.fsencode(path).split(b"/")
+        except UnicodeEncodeError:
+            raise BadValue(path, "a path holds no lone surrogate") from None
         if max(map(len, names)) > LONGEST_FILE_NAME or len(os.fsencode(path)) > LONGEST_PATH:
             raise BadValue(path, "the path is longer than any file's")
         return path

@@ -38,7 +38,7 @@ def raising(case: Case, fault: str) -> Case:
         ("rude", "EngineFailed", "Rude: hm"),
         ("exit", "WorkerExited", "the adapter called sys.exit(3)"),
         ("exit_text", "WorkerExited", "the adapter called sys.exit('tired'), status 1"),
-        ("parity", "WorldParityError", "... (3000 characters)"),
+        ("parity", "WorldParityError", "... (16000 more characters)"),
     ],
 )
 def test_the_cause_arrives(case: Case, fault: str, kind: str, message: str) -> None:

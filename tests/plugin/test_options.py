@@ -25,11 +25,11 @@ BAD = {
     "unbalanced": "mujoco=", "no key": "=3", "twice": "mujoco.timestep=1,mujoco.timestep=1",
 }  # fmt: skip
 
-PATHS = BAD.keys() - {"empty", "blank", "long", "long list", "NUL"}
+PATHS = BAD.keys() - {"empty", "blank", "long", "long list", "NUL", "half a word"}
 FINE = {
     "sim_jitter": {"zero"}, "sim_seed": {"zero"},
     "sim_output": PATHS, "sim_baseline": PATHS, "sim_resume": PATHS, "sim_merge": PATHS,
-    "sim_report": PATHS,
+    "sim_report": PATHS, "sim_badge": PATHS,
     "sim_gui": {"zero"}, "sim_headless": {"zero"}, "sim_fresh": {"zero"},
     "sim_strict": {"zero"},
 }  # fmt: skip

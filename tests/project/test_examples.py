@@ -21,7 +21,7 @@ def block(page: str, language: str, number: int = 0) -> str:
     [
         (
             "write_a_task.md",
-            ("*2/2 cubes landed*", "*landed %", "mujoco headless tuned * 100 [[]*"),
+            ("*2/2 cubes landed*", "simulator * landed % *", "mujoco * 0 of 5 * 100 [[]*"),
         ),
         ("extending/arm.md", ("*1/1 cubes pushed*",)),
     ],

@@ -55,7 +55,7 @@ def test_pytest_without_hypothesis_does_not_import_it(pytester: pytest.Pytester)
         import sys
 
         def test_it():
-            assert "pytest_simbench.plugin.repeatability" in sys.modules
+            assert "pytest_simbench.plugin.hooks" in sys.modules
             assert "hypothesis.core" not in sys.modules
         """
     )
