@@ -47,7 +47,7 @@ class PackageFinder:
         )
 
 
-class Log(io.FileIO):
+class LogFile(io.FileIO):
     """A file that takes what a full disk does not: a log must not end a repetition."""
 
     def write(self, data: Any) -> int:
@@ -59,7 +59,7 @@ class Log(io.FileIO):
 
 def log_stream(descriptor: int) -> io.TextIOWrapper:
     """A text stream on stdout or stderr that raises nothing, whatever is written."""
-    raw = Log(descriptor, "w", closefd=False)
+    raw = LogFile(descriptor, "w", closefd=False)
     return io.TextIOWrapper(
         io.BufferedWriter(raw), "utf-8", errors="backslashreplace", line_buffering=True
     )

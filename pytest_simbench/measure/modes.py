@@ -54,7 +54,7 @@ def compare_modes(records: Sequence[Record], metrics: Iterable[Metric]) -> list[
     sides: dict[tuple[object, ...], dict[str, dict[int, Record]]] = {}
     named: dict[tuple[object, ...], tuple[str, str, str]] = {}
     for row in series(record for record in records if record.ok):
-        of = row.subject
+        of = row.key
         # The two modes of one test and configuration.
         key = (*of._replace(mode=""), text(told(row.records)))
         named[key] = (of.simulator, of.profile, of.function)

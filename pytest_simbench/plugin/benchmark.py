@@ -15,7 +15,7 @@ import pytest
 
 if TYPE_CHECKING:
     from pytest_simbench.measure.results import ResultSet
-    from pytest_simbench.records.description import Description
+    from pytest_simbench.records.description import TaskDescription
 
 Group = tuple[Any, Sequence[Mapping[str, Any]]]
 """Name and benchmarks, as the hook `pytest_benchmark_group_stats` gives them."""
@@ -86,7 +86,7 @@ def no_rounds() -> None:
 
 
 def give_rounds(
-    benchmark: Any, results: Sequence[ResultSet], described: Iterable[Description]
+    benchmark: Any, results: Sequence[ResultSet], described: Iterable[TaskDescription]
 ) -> None:
     """Hand the finished repetitions to pytest-benchmark as rounds of worker seconds.
 

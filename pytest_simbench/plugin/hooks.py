@@ -92,7 +92,7 @@ def pytest_report_collectionfinish(config: pytest.Config, items: list[pytest.Ite
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    session_of(session.config).claim(session.items)
+    session_of(session.config).lock(session.items)
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -97,7 +97,7 @@ def merge_runs(config: pytest.Config) -> int:
 
     runs = Runs.named(config, "sim_merge")
     records, whole = runs.merged("--sim-merge")
-    folder = _claimed(config)
+    folder = _locked(config)
     try:
         for task in whole.tasks.values():
             folder.describe(task)
@@ -172,7 +172,7 @@ def _print(config: pytest.Config, summaries: Sequence[TaskSummary], problems: li
         print(for_terminal(problem))
 
 
-def _claimed(config: pytest.Config) -> RunFolder:
+def _locked(config: pytest.Config) -> RunFolder:
     given = options.value(config, "sim_output")
     folder = RunFolder(
         Path(config.invocation_params.dir, given)
@@ -180,7 +180,7 @@ def _claimed(config: pytest.Config) -> RunFolder:
         else new_name(config.rootpath / ".simbench", "-merged")
     )
     try:
-        folder.claim()
+        folder.lock()
         for name in (RECORDS, TASKS):
             folder.inside(name)
     except FolderError as error:

@@ -18,7 +18,7 @@ from pytest_simbench.plugin import options
 from pytest_simbench.plugin.benchmark import give_rounds
 from pytest_simbench.plugin.resume import NotResumed
 from pytest_simbench.plugin.selection import number_mark
-from pytest_simbench.records.description import Description
+from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.text import in_one_line
 
@@ -41,7 +41,7 @@ class RepeatFixture:
         self.case = case
         self.run = run
         self.results: list[ResultSet] = []
-        self.described: dict[str, Description] = {}
+        self.described: dict[str, TaskDescription] = {}
         self._may_resume = False
 
     def __call__(self, task: Task) -> ResultSet:
@@ -52,7 +52,7 @@ class RepeatFixture:
         with _refusals_fail_the_test():
             found = self.run.take(experiment, wanted if isinstance(wanted, int) else None)
         self.run.describe(experiment.task)
-        self.described[experiment.task.name] = Description.of(experiment.task)
+        self.described[experiment.task.name] = TaskDescription.of(experiment.task)
 
         def up_to(number: int) -> list[Record]:
             return self._up_to(number, experiment, found)

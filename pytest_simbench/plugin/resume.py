@@ -15,7 +15,7 @@ from pytest_simbench.records.configuration import (
     other_meanings,
     task_parameters,
 )
-from pytest_simbench.records.description import Description
+from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RECORDS, RunFolder
 from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.records.series import configurations, short
@@ -132,7 +132,7 @@ class Resumed:
         found = [] if all(agree(r, now, "resume") for r in same) else self._differences(same, now)
         task = experiment.task
         if same and task.name in self.tasks:
-            ours = {task.name: Description.of(task)}
+            ours = {task.name: TaskDescription.of(task)}
             found += other_meanings(self.tasks, ours, "resume")
         found += _seeds(same, case.seed)
         if wanted is not None and any(record.repetition > wanted for record in same):

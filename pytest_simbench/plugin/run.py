@@ -33,7 +33,7 @@ class Run:
     """One pytest invocation, or one xdist worker's share of it.
 
     Attributes:
-        folder: of this run; claimed by `use`, before the first test that needs it.
+        folder: of this run; locked by `use`, before the first test that needs it.
         problem: why the folder cannot be used, as a sentence, for tests that need it.
         reading: what the folder holds once the run is `complete`; empty before.
         mistake: in what was typed, found when the tests had ended; one sentence.
@@ -74,17 +74,17 @@ class Run:
             return Path(self.config.invocation_params.dir, given)
         return new_name(self.config.rootpath / RUNS)
 
-    def claim(self) -> None:
+    def lock(self) -> None:
         """Make the folder this run's own; may be called again.
 
         Raises:
             pytest.UsageError: it holds another run, another run is under way in it, or it cannot
                 be written to.
         """
-        if self.folder.claimed:
+        if self.folder.locked:
             return
         try:
-            self.folder.claim(shared=self._shared_by is not None)
+            self.folder.lock(shared=self._shared_by is not None)
         except FolderError as error:
             raise pytest.UsageError(str(error)) from None
         if self._shared_by is not None:
@@ -101,7 +101,7 @@ class Run:
         For xdist's controller, which does not know whether any test needs the folder.
         """
         folder = self.folder
-        if folder.claimed or self.resumed is not None or not folder.holds_run:
+        if folder.locked or self.resumed is not None or not folder.holds_run:
             return ""
         return (
             f"{folder.path} already holds a run; complete that one with --sim-resume="
@@ -112,7 +112,7 @@ class Run:
         """The folder, for a test that writes to it; the test fails where it cannot be used."""
         if not self.problem:
             try:
-                self.claim()
+                self.lock()
             except pytest.UsageError as error:
                 self.problem = str(error)
         if self.problem:

@@ -88,7 +88,7 @@ class SimSession:
                 raise pytest.UsageError(wrong)
         named = any(options.given(config, name) for name in ("sim_output", "sim_resume"))
         if named and self._alone:
-            self.run.claim()
+            self.run.lock()
         asked = options.value(config, "sim_compare_fail") or options.value(config, "sim_baseline")
         if not self.in_worker and (asked or self.saved):
             from pytest_simbench.plugin.compare import prepare
@@ -120,10 +120,10 @@ class SimSession:
 
             time_by_workers(self.config.pluginmanager, timed)
 
-    def claim(self, items: Iterable[pytest.Item]) -> None:
+    def lock(self, items: Iterable[pytest.Item]) -> None:
         """Complain of a run folder that the ini file names, if a test needs one, before it runs."""
         if self._alone and any("sim_case" in fixtures_of(item) for item in items):
-            self.run.claim()
+            self.run.lock()
 
     def tell_worker(self, node: Any) -> None:
         """Tell an xdist worker which run folder all share, and why it cannot be used."""

@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pytest_simbench.records.description import Description, DescriptionError
+from pytest_simbench.records.description import TaskDescription, TaskDescriptionError
 from pytest_simbench.records.folder import RECORDS, Reading, RunFolder
 from pytest_simbench.records.record import SCHEMA, Record, RecordError
 from pytest_simbench.records.series import settled
@@ -70,7 +70,7 @@ def from_benchmarks(saved: Mapping[str, Any], name: str) -> Reading:
     if not isinstance(benchmarks, list):
         raise BaselineError(f"the baseline {name} is malformed: 'benchmarks' is not a list")
     records: list[Record] = []
-    tasks: dict[str, Description] = {}
+    tasks: dict[str, TaskDescription] = {}
     problems: list[str] = []
     for benchmark in benchmarks:
         extra = benchmark.get("extra_info") if isinstance(benchmark, Mapping) else None
@@ -90,21 +90,23 @@ def from_benchmarks(saved: Mapping[str, Any], name: str) -> Reading:
     return Reading(name, tuple(settled(records)), tasks, problems=tuple(problems))
 
 
-def _tasks(data: Mapping[str, Any], where: str, problems: list[str]) -> dict[str, Description]:
+def _tasks(data: Mapping[str, Any], where: str, problems: list[str]) -> dict[str, TaskDescription]:
     """What the numbers of a benchmark mean; older files do not tell."""
     found = {}
     listed = data.get("tasks") or []
     for item in listed if isinstance(listed, list) else [listed]:
         try:
-            task = Description.from_dict(item, f"{where}: {KEY!r}")
-        except DescriptionError as error:
+            task = TaskDescription.from_dict(item, f"{where}: {KEY!r}")
+        except TaskDescriptionError as error:
             problems.append(str(error))
         else:
             found[task.task] = task
     return found
 
 
-def to_extra_info(records: Iterable[Record], tasks: Iterable[Description] = ()) -> dict[str, Any]:
+def to_extra_info(
+    records: Iterable[Record], tasks: Iterable[TaskDescription] = ()
+) -> dict[str, Any]:
     """`{"schema", "tasks": [...], "shared": {...}, "repetitions": [{...}, ...]}`, plain data."""
     rows = [_slim(record) for record in records]
     shared = {

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
-from pytest_simbench.records.description import Description
+from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.record import Record, plain
 
 Use = Literal["twin", "pool", "rank", "resume", "merge", "compare"]
@@ -230,7 +230,7 @@ def differences(runs: Runs, use: Use = "compare", fields: Sequence[str] | None =
 
 
 def other_meanings(
-    before: Mapping[str, Description], now: Mapping[str, Description], use: Use = "compare"
+    before: Mapping[str, TaskDescription], now: Mapping[str, TaskDescription], use: Use = "compare"
 ) -> list[str]:
     """One sentence for each metric that both runs have and that means something else in one.
 

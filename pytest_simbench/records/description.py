@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 SCHEMA = 1
 
 
-class DescriptionError(ValueError):
+class TaskDescriptionError(ValueError):
     """What is no description; the message says where, and what is wrong with it."""
 
 
 @dataclass(frozen=True)
-class Description:
+class TaskDescription:
     """What a task's metrics and references mean.
 
     Attributes:
@@ -36,7 +36,7 @@ class Description:
     references: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, task: Task) -> Description:
+    def of(cls, task: Task) -> TaskDescription:
         """What a task says of itself; a reference that is no finite number is none."""
         known = {name: value for name, value in task.references.items() if isfinite(value)}
         return cls(task.name, tuple(task.metrics), known)
@@ -49,11 +49,11 @@ class Description:
         return found
 
     @classmethod
-    def from_dict(cls, data: Any, where: str = "description") -> Description:
+    def from_dict(cls, data: Any, where: str = "description") -> TaskDescription:
         """The description in `data`; `where` names it in messages.
 
         Raises:
-            DescriptionError: a part of it is missing or of the wrong type, or the schema is a
+            TaskDescriptionError: a part of it is missing or of the wrong type, or the schema is a
                 newer one.
         """
         try:
@@ -68,9 +68,9 @@ class Description:
             checked.numbers(references, "references")
             return cls(checked.name(whole.get("task"), "task"), metrics, references)
         except checked.CheckError as error:
-            raise DescriptionError(f"{where}: {error}") from None
+            raise TaskDescriptionError(f"{where}: {error}") from None
         except RecursionError:
-            raise DescriptionError(f"{where}: it is nested too deeply") from None
+            raise TaskDescriptionError(f"{where}: it is nested too deeply") from None
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class Threshold:
         """The threshold in `data`.
 
         Raises:
-            DescriptionError: it is none.
+            TaskDescriptionError: it is none.
         """
         try:
             whole = _whole(data)
@@ -105,7 +105,7 @@ class Threshold:
                 raise checked.CheckError("'value' must be a number")
             checked.number(whole["value"], "value")
         except checked.CheckError as error:
-            raise DescriptionError(f"{where}: {error}") from None
+            raise TaskDescriptionError(f"{where}: {error}") from None
         return cls(test, metric, float(whole["value"]))
 
 

@@ -21,9 +21,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pytest_simbench.records import lines
-from pytest_simbench.records.claim import Claim
-from pytest_simbench.records.description import Description, Threshold
+from pytest_simbench.records.description import TaskDescription, Threshold
 from pytest_simbench.records.lines import DAMAGED, LARGEST_LINE, Found, LinesFile, UnreadableError
+from pytest_simbench.records.lock import FolderLock
 from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.records.series import settled
@@ -60,7 +60,7 @@ class Reading:
 
     name: str = ""
     records: tuple[Record, ...] = ()
-    tasks: Mapping[str, Description] = field(default_factory=dict)
+    tasks: Mapping[str, TaskDescription] = field(default_factory=dict)
     thresholds: tuple[Threshold, ...] = ()
     problems: tuple[str, ...] = ()
     refused: tuple[str, ...] = ()
@@ -80,7 +80,7 @@ class Reading:
 class RunFolder:
     """One run's folder.
 
-    To write, `claim` it first. What a full disk or a lost folder does not take stays in this
+    To write, `lock` it first. What a full disk or a lost folder does not take stays in this
     object and is read back from it.
 
     Args:
@@ -96,10 +96,10 @@ class RunFolder:
         self.path = path
         self.own: list[Record] = []
         self._records = records
-        self._claim: Claim | None = None
+        self._folder_lock: FolderLock | None = None
         self._files: dict[str, LinesFile] = {}
         self._spare = lines.spare_folder()
-        self._described: dict[str, Description] = {}
+        self._described: dict[str, TaskDescription] = {}
         self._asked: dict[Threshold, None] = {}
         self._written: set[str] = set()
         self._lock = threading.RLock()
@@ -123,16 +123,16 @@ class RunFolder:
         return any(_size(self.path / name) for name in HOLD_RESULTS)
 
     @property
-    def claimed(self) -> bool:
+    def locked(self) -> bool:
         """Whether this process may write to it."""
-        return self._claim is not None
+        return self._folder_lock is not None
 
     @property
     def used(self) -> bool:
         """Whether this process has kept or taken over anything of it."""
         return bool(self.own or self._asked or self._described)
 
-    def claim(self, *, shared: bool = False) -> None:
+    def lock(self, *, shared: bool = False) -> None:
         """Make it this run's own until `close`.
 
         Args:
@@ -141,14 +141,14 @@ class RunFolder:
         Raises:
             FolderError: it cannot be written to, or another run is under way in it.
         """
-        if self._claim is None:
-            self._claim = Claim(self.path, shared=shared)
+        if self._folder_lock is None:
+            self._folder_lock = FolderLock(self.path, shared=shared)
 
     def release(self) -> None:
         """Give it up; a folder made for nothing goes away."""
-        if self._claim is not None:
-            self._claim.close()
-            self._claim = None
+        if self._folder_lock is not None:
+            self._folder_lock.close()
+            self._folder_lock = None
 
     def close(self) -> tuple[str, ...]:
         """Write what waits, and give the folder up; may be called again.
@@ -182,9 +182,9 @@ class RunFolder:
         with self._lock:
             self.own += records
 
-    def describe(self, task: Task | Description) -> None:
+    def describe(self, task: Task | TaskDescription) -> None:
         """Write what a task's numbers mean, unless the folder says so already."""
-        found = task if isinstance(task, Description) else Description.of(task)
+        found = task if isinstance(task, TaskDescription) else TaskDescription.of(task)
         with self._lock:
             line = json.dumps(found.to_dict())
             if line in self._written:
@@ -240,8 +240,8 @@ class RunFolder:
             name, tuple(records), tasks, tuple(asked), tuple(problems), found.refused, found.items
         )
 
-    def _tasks(self, problems: list[str] | None = None) -> dict[str, Description]:
-        found = self._parsed(TASKS, Description, [] if problems is None else problems)
+    def _tasks(self, problems: list[str] | None = None) -> dict[str, TaskDescription]:
+        found = self._parsed(TASKS, TaskDescription, [] if problems is None else problems)
         return {task.task: task for task in found}
 
     def _parsed(self, name: str, kind: Any, problems: list[str]) -> tuple[Any, ...]:

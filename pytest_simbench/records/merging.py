@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 from pytest_simbench.records.configuration import differences, other_meanings, task_parameters
-from pytest_simbench.records.description import Description
+from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import by_test, configurations
 
@@ -62,7 +62,7 @@ def merge(runs: Mapping[str, Sequence[Record]]) -> list[Merged]:
     return merged
 
 
-def merge_tasks(runs: Mapping[str, Mapping[str, Description]]) -> dict[str, Description]:
+def merge_tasks(runs: Mapping[str, Mapping[str, TaskDescription]]) -> dict[str, TaskDescription]:
     """What the numbers of all runs mean.
 
     Args:
@@ -71,7 +71,7 @@ def merge_tasks(runs: Mapping[str, Mapping[str, Description]]) -> dict[str, Desc
     Raises:
         MergeError: a metric means one thing in one run and another in another.
     """
-    found: dict[str, Description] = {}
+    found: dict[str, TaskDescription] = {}
     first: dict[str, str] = {}
     for name, tasks in runs.items():
         for task in tasks:

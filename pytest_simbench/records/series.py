@@ -66,7 +66,7 @@ def configurations(records: Iterable[Record]) -> list[list[Record]]:
     return [[records[k] for k in sorted(group)] for group in sorted(groups, key=min)]
 
 
-class Subject(NamedTuple):
+class RowKey(NamedTuple):
     """What a row of a table is of, besides its configuration; rows are sorted by it.
 
     Attributes:
@@ -81,7 +81,7 @@ class Subject(NamedTuple):
     parameters: str
 
     @classmethod
-    def of(cls, record: Record) -> Subject:
+    def of(cls, record: Record) -> RowKey:
         function, _, parameters = record.test.partition("[")
         inside = "-" + parameters.removesuffix("]") + "-"
         inside = inside.replace(f"-{record.simulator}-{record.mode}-", "-", 1).strip("-")
@@ -97,41 +97,41 @@ class Series(NamedTuple):
     """The repetitions of one row.
 
     Attributes:
-        subject: what they are of.
+        key: what they are of.
         records: one configuration, by repetition.
         label: what tells the row from others of its simulator, mode and profile; may be empty.
     """
 
-    subject: Subject
+    key: RowKey
     records: list[Record]
     label: str
 
 
 def series(records: Iterable[Record]) -> list[Series]:
     """The records of one task as rows, sorted: a row is one test and one configuration."""
-    by_subject: dict[Subject, list[Record]] = {}
-    for record in sorted(records, key=lambda r: (Subject.of(r).order, r.repetition)):
-        by_subject.setdefault(Subject.of(record), []).append(record)
+    by_subject: dict[RowKey, list[Record]] = {}
+    for record in sorted(records, key=lambda r: (RowKey.of(r).order, r.repetition)):
+        by_subject.setdefault(RowKey.of(record), []).append(record)
     rows = [(s, group) for s, found in by_subject.items() for group in configurations(found)]
     return [
-        Series(subject, group, _label(subject, group, [r for r in rows if r[0][:3] == subject[:3]]))
-        for subject, group in rows
+        Series(key, group, _label(key, group, [r for r in rows if r[0][:3] == key[:3]]))
+        for key, group in rows
     ]
 
 
 def _label(
-    subject: Subject, group: Sequence[Record], rows: Sequence[tuple[Subject, Sequence[Record]]]
+    key: RowKey, group: Sequence[Record], rows: Sequence[tuple[RowKey, Sequence[Record]]]
 ) -> str:
     """The test's function where the rows differ in it, then in what its rows differ."""
-    parts = [subject.function] if len({s.function for s, _ in rows}) > 1 else []
-    same = [(s, found) for s, found in rows if s.function == subject.function]
+    parts = [key.function] if len({s.function for s, _ in rows}) > 1 else []
+    same = [(s, found) for s, found in rows if s.function == key.function]
     if len(same) > 1:
         known = [told(found) for _, found in same]
-        every = dict.fromkeys(key for other in known for key in other)
+        every = dict.fromkeys(name for other in known for name in other)
         keys = [k for k in every if len({text(other.get(k)) for other in known}) > 1]
         apart = len({tuple(text(other.get(k)) for k in keys) for other in known}) == len(same)
-        if not apart and subject.parameters:
-            parts.append(f"[{subject.parameters}]")
+        if not apart and key.parameters:
+            parts.append(f"[{key.parameters}]")
         mine = told(group)
         differences = [f"{k.removeprefix('settings.')}={_shown(mine.get(k))}" for k in keys]
         parts += differences[:MOST] + ["..."] * (len(differences) > MOST)
@@ -148,7 +148,7 @@ def _shown(value: object) -> str:
 
 def comparable(a: Series, b: Series) -> bool:
     """Whether one row may be said to beat the other: the same was asked of both."""
-    if a.label != b.label and a.subject[3:] != b.subject[3:]:
+    if a.label != b.label and a.key[3:] != b.key[3:]:
         return False
     first, second = (
         {key: text(value) for key, value in told(row.records, "rank").items()} for row in (a, b)

@@ -23,8 +23,7 @@ def significant(value: float, digits: int = 3, *, keep_zeros: bool = False) -> s
     """A number with so many significant digits and never a power of ten: 1.35, 0.8, 161, 1552."""
     if value == 0 or not math.isfinite(value):
         return f"{value:g}"
-    rounded = float(f"{value:.{digits - 1}e}")
-    whole = math.floor(math.log10(abs(rounded))) + 1  # digits before the point
+    whole = int(f"{value:.{digits - 1}e}".partition("e")[2]) + 1  # digits before the point
     text = f"{value:.{max(0, digits - whole)}f}"
     return text if keep_zeros or "." not in text else text.rstrip("0").rstrip(".")
 

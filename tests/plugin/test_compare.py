@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import pytest
 
 import pytest_simbench.tasks  # noqa: F401 - pytester would import native modules a second time
-from pytest_simbench.records.description import Description
+from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.tasks.metrics import Metric
 
 TEST = """
@@ -145,7 +145,7 @@ def test_bad_input_is_one_sentence(
     good.joinpath("records.jsonl").write_text(first_line + "\n")
     metrics = [Metric("landed", "landed", better="lower"), Metric("landing_x", "x", better=None),
                Metric("placed", "placed", kind="share", of=15)]  # fmt: skip
-    said = Description("stacking", tuple(metrics)).to_dict()
+    said = TaskDescription("stacking", tuple(metrics)).to_dict()
     good.joinpath("tasks.jsonl").write_text(json.dumps(said) + "\n")
     pytester.path.joinpath("text").write_text("no record\n")
     pytester.path.joinpath("empty").write_text("")

@@ -94,13 +94,13 @@ def test_nothing_is_written_out_of_the_destination(pytester: pytest.Pytester, li
 
 
 def test_a_run_that_is_written_to_is_no_destination(pytester: pytest.Pytester) -> None:
-    from pytest_simbench.records.claim import Claim
+    from pytest_simbench.records.lock import FolderLock
 
     saved(pytester.path / "a", 1, "")
-    claim = Claim(pytester.path / "whole")
+    lock = FolderLock(pytester.path / "whole")
     with pytest.raises(pytest.UsageError, match="another run is under way"):
         merge(pytester, "a")
-    claim.close()
+    lock.close()
 
 
 def test_damaged_lines_are_told_and_the_rest_is_joined(

@@ -15,7 +15,7 @@ from pytest_simbench.records.baseline import (
     read_baseline,
     to_extra_info,
 )
-from pytest_simbench.records.description import Description
+from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.tasks.metrics import Metric
@@ -119,7 +119,9 @@ def test_an_empty_result_is_saved_as_such() -> None:
         from_extra_info({"shared": {}}, "x")
 
 
-SAID = Description("stacking", (Metric("placed", "placed", kind="share", of=15),), {"placed": 1.0})
+SAID = TaskDescription(
+    "stacking", (Metric("placed", "placed", kind="share", of=15),), {"placed": 1.0}
+)
 
 
 def test_a_saved_benchmark_says_what_its_numbers_mean() -> None:

@@ -16,7 +16,7 @@ from pytest_simbench.records.configuration import (
     equal_to,
     other_meanings,
 )
-from pytest_simbench.records.description import Description
+from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.record import Record
 from pytest_simbench.tasks.metrics import Metric
 
@@ -96,8 +96,8 @@ def test_every_field_of_a_metric_has_its_line_and_reason() -> None:
 )
 def test_other_meanings_are_named(change: dict[str, Any], named: str | None) -> None:
     metric = Metric("x", "x", "m")
-    before = {"t": Description("t", (metric, Metric("gone", "gone")))}
-    now = {"t": Description("t", (replace(metric, **change),)), "new": Description("new")}
+    before = {"t": TaskDescription("t", (metric, Metric("gone", "gone")))}
+    now = {"t": TaskDescription("t", (replace(metric, **change),)), "new": TaskDescription("new")}
     for use in ("resume", "merge", "compare"):
         assert other_meanings(before, now, use) == ([named] if named else [])  # type: ignore[arg-type]
 

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.records.description import Description, DescriptionError, Threshold
+from pytest_simbench.records.description import TaskDescription, TaskDescriptionError, Threshold
 from pytest_simbench.tasks import LeaningTowers, Stacking, Throwing
 from pytest_simbench.tasks.metrics import Metric
 
@@ -20,10 +20,10 @@ METRIC = {"name": "x", "title": "X"}
 
 @pytest.mark.parametrize("task", [Stacking(), Throwing(), LeaningTowers()], ids=lambda t: t.name)
 def test_what_a_task_says_survives_its_line(task: Any) -> None:
-    said = Description.of(task)
+    said = TaskDescription.of(task)
     assert said.metrics == tuple(task.metrics)
     assert said.references == dict(task.references)
-    assert Description.from_dict(json.loads(json.dumps(said.to_dict()))) == said
+    assert TaskDescription.from_dict(json.loads(json.dumps(said.to_dict()))) == said
 
 
 def test_numpy_values_are_plain_and_what_is_no_number_is_no_reference() -> None:
@@ -32,14 +32,14 @@ def test_numpy_values_are_plain_and_what_is_no_number_is_no_reference() -> None:
         metrics = (Metric("x", "x", of=np.int64(3), resolution=np.float32(0.5)),)  # type: ignore
         references: ClassVar = {"x": np.float32(0.25), "y": math.nan, "z": math.inf}
 
-    said = json.loads(json.dumps(Description.of(Baking()).to_dict()))  # type: ignore[arg-type]
+    said = json.loads(json.dumps(TaskDescription.of(Baking()).to_dict()))  # type: ignore[arg-type]
     metric = Metric("x", "x", of=3, resolution=0.5)
-    assert Description.from_dict(said) == Description("baking", (metric,), {"x": 0.25})
+    assert TaskDescription.from_dict(said) == TaskDescription("baking", (metric,), {"x": 0.25})
 
 
 def test_a_newer_plugin_may_say_more_of_a_metric() -> None:
     data = {"task": "t", "metrics": [{**METRIC, "colour": "red"}], "colour": "red"}
-    assert Description.from_dict(data) == Description("t", (Metric("x", "X"),))
+    assert TaskDescription.from_dict(data) == TaskDescription("t", (Metric("x", "X"),))
 
 
 @pytest.mark.parametrize(
@@ -82,8 +82,8 @@ def test_a_newer_plugin_may_say_more_of_a_metric() -> None:
     ids=lambda value: value[:60] if isinstance(value, str) else "",
 )
 def test_something_else_is_one_sentence(data: Any, message: str) -> None:
-    with pytest.raises(DescriptionError) as caught:
-        Description.from_dict(data, "here")
+    with pytest.raises(TaskDescriptionError) as caught:
+        TaskDescription.from_dict(data, "here")
     assert str(caught.value).startswith(f"here: {message}")
     assert len(str(caught.value)) < 300
 
@@ -101,10 +101,10 @@ fields = [*Metric.__dataclass_fields__, "schema", "task", "metrics", "references
         st.dictionaries(st.sampled_from(fields), anything), max_size=2))
 )  # fmt: skip
 def test_whatever_it_is_it_is_a_description_or_refused(data: dict[str, Any]) -> None:
-    for kind in (Description, Threshold):
+    for kind in (TaskDescription, Threshold):
         try:
             found = kind.from_dict(data)
-        except DescriptionError:
+        except TaskDescriptionError:
             continue
         again = json.loads(json.dumps(found.to_dict(), allow_nan=False))
         assert kind.from_dict(again) == found
@@ -115,5 +115,5 @@ def test_a_threshold_survives_its_line() -> None:
     assert Threshold.from_dict(json.loads(json.dumps(asked.to_dict()))) == asked
     for wrong in ({}, {"test": "t", "metric": "m"}, {"test": "t", "metric": 3, "value": 1},
                   {"test": "t", "metric": "m", "value": "1"}):  # fmt: skip
-        with pytest.raises(DescriptionError, match="here: "):
+        with pytest.raises(TaskDescriptionError, match="here: "):
             Threshold.from_dict(wrong, "here")

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from pytest_simbench.records.description import Description, Threshold
+from pytest_simbench.records.description import TaskDescription, Threshold
 from pytest_simbench.records.folder import RECORDS, TASKS, THRESHOLDS, RunFolder
 from pytest_simbench.records.lines import LARGEST_LINE
 from pytest_simbench.records.paths import FolderError
@@ -176,10 +176,10 @@ def test_a_text_that_no_file_takes_can_be_written_again(tmp_path: Path) -> None:
 
 CAUGHT = Metric("caught", "caught", kind="share", of=7)
 SPILL = Metric("spill", "spilt", "ml", better="lower")
-POURING = Description("pouring", (CAUGHT, SPILL), {"spill": 0.1})
+POURING = TaskDescription("pouring", (CAUGHT, SPILL), {"spill": 0.1})
 
 
-def folder_with(path: Path, *tasks: Description) -> RunFolder:
+def folder_with(path: Path, *tasks: TaskDescription) -> RunFolder:
     folder = RunFolder(path)
     folder.append(record(1, task="pouring", metrics={"caught": 0.5}))
     for task in tasks:
@@ -199,7 +199,7 @@ def test_what_numbers_mean_is_read_back_and_written_once(tmp_path: Path) -> None
 
 
 def test_the_last_line_of_a_task_holds(tmp_path: Path) -> None:
-    other = Description("pouring", (CAUGHT,))
+    other = TaskDescription("pouring", (CAUGHT,))
     assert folder_with(tmp_path, POURING, other).read().tasks == {"pouring": other}
     assert folder_with(tmp_path, POURING).read().tasks == {"pouring": POURING}
 
@@ -229,7 +229,7 @@ def test_a_bad_description_is_told_and_takes_nothing_with_it(
     folder_with(tmp_path, POURING)
     with (tmp_path / TASKS).open("ab") as file:
         file.write(line)
-    other = Description("baking")
+    other = TaskDescription("baking")
     folder_with(tmp_path, other)
     found = RunFolder(tmp_path).read()
     assert found.tasks == {"pouring": POURING, "baking": other}
@@ -300,13 +300,13 @@ def test_records_of_another_process_are_not_counted_twice(tmp_path: Path) -> Non
 
 def test_a_claimed_folder_is_given_up(tmp_path: Path) -> None:
     folder = RunFolder(tmp_path / "run")
-    folder.claim()
-    folder.claim()  # once is enough
-    assert folder.claimed
+    folder.lock()
+    folder.lock()  # once is enough
+    assert folder.locked
     with pytest.raises(FolderError, match="another run is under way"):
-        RunFolder(tmp_path / "run").claim()
+        RunFolder(tmp_path / "run").lock()
     assert folder.close() == ()
-    assert not folder.claimed
+    assert not folder.locked
     assert not (tmp_path / "run").exists()
 
 

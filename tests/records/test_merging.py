@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.records.description import Description
+from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.merging import MergeError, merge, merge_tasks
 from pytest_simbench.records.record import Record
 from pytest_simbench.tasks.metrics import Metric
@@ -133,9 +133,9 @@ def test_a_seed_twice_in_one_run_is_refused() -> None:
 
 def test_what_the_numbers_mean_is_merged_and_the_last_wording_holds() -> None:
     placed = Metric("placed", "placed", kind="share", of=15)
-    first = {"stacking": Description("stacking", (placed,))}
-    reworded = Description("stacking", (replace(placed, title="in place", of=6),))
-    second = {"stacking": reworded, "pouring": Description("pouring")}
+    first = {"stacking": TaskDescription("stacking", (placed,))}
+    reworded = TaskDescription("stacking", (replace(placed, title="in place", of=6),))
+    second = {"stacking": reworded, "pouring": TaskDescription("pouring")}
     assert merge_tasks({"a": first, "b": second, "c": {}}) == second
     assert merge_tasks({"b": second, "a": first}) == {**second, **first}
 
@@ -144,8 +144,8 @@ def test_what_the_numbers_mean_is_merged_and_the_last_wording_holds() -> None:
 def test_numbers_of_another_meaning_are_refused(change: dict[str, Any]) -> None:
     gap = Metric("gap", "gap", "m")
     runs = {
-        "a": {"stacking": Description("stacking", (gap,))},
-        "b": {"stacking": Description("stacking", (replace(gap, **change),))},
+        "a": {"stacking": TaskDescription("stacking", (gap,))},
+        "b": {"stacking": TaskDescription("stacking", (replace(gap, **change),))},
     }
     (name,) = change
     with pytest.raises(MergeError, match=rf"a and b are not.*: {name} of the metric gap of stack"):

@@ -148,6 +148,6 @@ def test_rows_of_other_modes_profiles_or_functions_are_not_ranked() -> None:
     assert not ranked(mode="gui")
     assert not ranked(profile="default")
     runs = [record(1, test=f"test_{n}[{s}]", simulator=s) for s in "ab" for n in "xy"]
-    rows = {(row.subject.simulator, row.label): row for row in series(runs)}
+    rows = {(row.key.simulator, row.label): row for row in series(runs)}
     assert comparable(rows["a", "test_x"], rows["b", "test_x"])
     assert not comparable(rows["a", "test_x"], rows["b", "test_y"])

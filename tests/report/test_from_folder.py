@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.measure.limits import Limit
-from pytest_simbench.records.description import Description
+from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.repeatability import Line, append
 from pytest_simbench.report import changes, markdown, tables
@@ -30,7 +30,7 @@ def test_a_folder_is_all_that_it_takes(tmp_path: Path) -> None:
     for item in stacking_run() + throwing_run():
         folder.append(item)
     for task, metrics in METRICS.items():
-        folder.describe(Description(task, metrics, REFERENCES.get(task, {})))
+        folder.describe(TaskDescription(task, metrics, REFERENCES.get(task, {})))
     written = write_report(RunFolder(tmp_path))
     assert written.complete
     report = (tmp_path / "report.md").read_text()
@@ -73,14 +73,17 @@ metrics = st.lists(
 )
 numbers = st.none() | st.integers(-5, 5) | st.floats(allow_nan=False, allow_infinity=False)
 descriptions = st.builds(
-    Description, st.just("task"), metrics.map(tuple), st.dictionaries(names, numbers.filter(bool))
+    TaskDescription,
+    st.just("task"),
+    metrics.map(tuple),
+    st.dictionaries(names, numbers.filter(bool)),
 )
 values = st.lists(st.dictionaries(names, numbers, max_size=4), min_size=1, max_size=12)
 
 
-def reading(said: Description, of: list[dict[str, Any]], **more: Any) -> Reading:
+def reading(said: TaskDescription, of: list[dict[str, Any]], **more: Any) -> Reading:
     """A run that says one thing and holds another; both as they come from the disk."""
-    said = Description.from_dict(json.loads(json.dumps(said.to_dict())))
+    said = TaskDescription.from_dict(json.loads(json.dumps(said.to_dict())))
     found = [
         record(("mujoco", "drake")[k % 2], k // 2, "task", metrics=item, seed=k // 2, **more)
         for k, item in enumerate(of)
@@ -90,7 +93,7 @@ def reading(said: Description, of: list[dict[str, Any]], **more: Any) -> Reading
 
 @given(descriptions, values)
 def test_whatever_is_said_of_whatever_numbers_is_shown(
-    said: Description, of: list[dict[str, Any]]
+    said: TaskDescription, of: list[dict[str, Any]]
 ) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -101,7 +104,7 @@ def test_whatever_is_said_of_whatever_numbers_is_shown(
 
 @given(descriptions, values, values, st.booleans())
 def test_whatever_is_said_is_compared_or_left_out(
-    said: Description, of: list[dict[str, Any]], now: list[dict[str, Any]], percent: bool
+    said: TaskDescription, of: list[dict[str, Any]], now: list[dict[str, Any]], percent: bool
 ) -> None:
     limits = [Limit(m.name, 0.05, percent) for m in said.metrics if m.better]
     before, after = reading(said, of), reading(said, now)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from pytest_simbench.tasks.metrics import COSTS, Metric, UnknownMetric
+from pytest_simbench.tasks.metrics import COSTS, Metric, UnknownMetric, significant
 
 
 def test_a_share_says_of_how_many() -> None:
@@ -35,3 +37,23 @@ def test_an_unknown_name_lists_the_valid_ones_and_the_nearest() -> None:
 def test_costs_have_distinct_names_and_all_say_what_they_are() -> None:
     assert len({metric.name for metric in COSTS}) == len(COSTS)
     assert all(metric.doc and metric.better for metric in COSTS)
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(99.7, "99.7"), (999.96, "1000"), (0.00012345, "0.000123"), (-1.996, "-2"), (0.0, "0")],
+)
+def test_significant_digits(value: float, shown: str) -> None:
+    assert significant(value) == shown
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_any_number_has_significant_digits(value: float) -> None:
+    """Also the largest: rounded up to a few digits it is no double any more."""
+    shown = significant(value)
+    assert "e" not in shown
+    assert float(shown) == pytest.approx(value, rel=0.006, abs=0.0)
+
+
+def test_the_largest_number_has_significant_digits() -> None:
+    assert len(significant(1.7975e308, 4)) == 309

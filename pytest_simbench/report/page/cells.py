@@ -43,7 +43,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Line:
+class TableRow:
     """One row; `of` is None where filters do not concern it, `fixed` where it is never sorted."""
 
     cells: Sequence[Cell]
@@ -66,7 +66,7 @@ class Table:
 
     title: str
     headings: Sequence[Heading]
-    lines: Sequence[Line]
+    lines: Sequence[TableRow]
     note: str = ""
 
 
@@ -110,7 +110,7 @@ def study(summary: TaskSummary) -> Table:
          [Cell(cells.cost(row.end), _mean(row.end)) for row in rows]),
     ]  # fmt: skip
     lines = [
-        Line([found[place] for _, found in columns], of(row)) for place, row in enumerate(rows)
+        TableRow([found[place] for _, found in columns], of(row)) for place, row in enumerate(rows)
     ]
     return Table("The study's table", [heading for heading, _ in columns], lines)
 
@@ -133,7 +133,7 @@ def from_columns(
     for found in zip(*(column.cells for column in (columns[0], *joined)), strict=True):
         line = [Cell(cell, _leading(cell)) for cell in found]
         label = tuple(found[0])
-        lines.append(Line(line, rows.get(label), label == ("reference",)))
+        lines.append(TableRow(line, rows.get(label), label == ("reference",)))
     return Table(title, headings, lines, note)
 
 

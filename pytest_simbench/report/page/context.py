@@ -30,7 +30,7 @@ TAIL = 30
 
 
 @dataclass(frozen=True)
-class Cause:
+class FailureBlock:
     """Failures of one row that share type and phase, with the end of the first one's log."""
 
     title: str
@@ -50,7 +50,7 @@ class TaskPart:
     study: Table
     strips: Sequence[Strip]
     tables: Sequence[Table]
-    causes: Sequence[Cause]
+    causes: Sequence[FailureBlock]
     pictures: Sequence[Picture]
     notes: Sequence[str]
 
@@ -149,7 +149,7 @@ def _tables(summary: TaskSummary) -> list[Table]:
     ]
 
 
-def _causes(summary: TaskSummary, rows: Sequence[Sequence[Record]]) -> list[Cause]:
+def _causes(summary: TaskSummary, rows: Sequence[Sequence[Record]]) -> list[FailureBlock]:
     found = []
     for row, records in zip(summary.rows, rows, strict=True):
         for cause in row.causes:
@@ -158,7 +158,7 @@ def _causes(summary: TaskSummary, rows: Sequence[Sequence[Record]]) -> list[Caus
             many = len(cause.repetitions)
             where = f" in {cause.phase}" if cause.phase else ""
             found.append(
-                Cause(
+                FailureBlock(
                     f"{row.label}: {many} x {cause.type}{where}",
                     of(row),
                     cause.message,

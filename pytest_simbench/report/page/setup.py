@@ -57,7 +57,7 @@ def setup(summaries: Sequence[TaskSummary], records: Sequence[Record]) -> Setup:
                 if not key.startswith(TASK)
             }
             versions = _part(known, "versions.")
-            subject = Of(*row.subject[:3])
+            subject = Of(*row.key[:3])
             same = (*subject, text(settings), text(versions))
             label = f"{subject.simulator} {subject.mode} {subject.profile}"
             found.setdefault(

@@ -1,4 +1,4 @@
-"""A claim on a run folder: never two runs in one."""
+"""The lock on a run folder: never two runs in one."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ PROBE = 64 * 1024
 """Bytes that a folder must be able to take before a run begins: some twenty records."""
 
 
-class Claim:
+class FolderLock:
     """A folder that this process writes a run to; until `close` no other run may use it.
 
-    The claim is a lock on the folder itself: it ends with the process, however that ends. A file
+    It is a lock on the folder itself and ends with the process, however that ends. A file
     system without locks (some network drives) gives none, and two runs could meet there.
 
     Args:

@@ -1,4 +1,4 @@
-"""A claim: one run in a folder, never two at once."""
+"""The lock: one run in a folder, never two at once."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.records.claim import Claim
+from pytest_simbench.records.lock import FolderLock
 from pytest_simbench.records.paths import FolderError
 
 
 def test_a_folder_is_one_run_at_a_time(tmp_path: Path) -> None:
     folder = tmp_path / "a" / "run"
-    claim = Claim(folder)
+    lock = FolderLock(folder)
     with pytest.raises(FolderError, match=f"another run is under way in {folder}; wait for it"):
-        Claim(folder)
-    claim.close()
-    Claim(folder).close()
+        FolderLock(folder)
+    lock.close()
+    FolderLock(folder).close()
 
 
 def test_another_process_is_refused_and_a_dead_one_holds_nothing(tmp_path: Path) -> None:
     code = """
 import sys, time
 from pathlib import Path
-from pytest_simbench.records.claim import Claim
-claim = Claim(Path(sys.argv[1]))
+from pytest_simbench.records.lock import FolderLock
+lock = FolderLock(Path(sys.argv[1]))
 print("mine", flush=True)
 time.sleep(600)
 """
@@ -36,28 +36,28 @@ time.sleep(600)
     assert process.stdout is not None
     assert process.stdout.readline() == "mine\n"
     with pytest.raises(FolderError, match="another run is under way"):
-        Claim(tmp_path)
+        FolderLock(tmp_path)
     process.kill()
     process.wait()
-    Claim(tmp_path).close()
+    FolderLock(tmp_path).close()
 
 
 def test_the_processes_of_one_run_share_it(tmp_path: Path) -> None:
-    workers = [Claim(tmp_path, shared=True) for _ in range(2)]
+    workers = [FolderLock(tmp_path, shared=True) for _ in range(2)]
     with pytest.raises(FolderError, match="another run is under way"):
-        Claim(tmp_path)  # somebody resumes it meanwhile
+        FolderLock(tmp_path)  # somebody resumes it meanwhile
     for worker in workers:
         worker.close()
-    controller = Claim(tmp_path)
-    Claim(tmp_path, shared=True).close()
+    controller = FolderLock(tmp_path)
+    FolderLock(tmp_path, shared=True).close()
     controller.close()
 
 
 def test_a_folder_made_for_nothing_goes_away(tmp_path: Path) -> None:
-    Claim(tmp_path / "new").close()
+    FolderLock(tmp_path / "new").close()
     assert not (tmp_path / "new").exists()
     (tmp_path / "old").mkdir()
-    Claim(tmp_path / "old").close()
+    FolderLock(tmp_path / "old").close()
     assert (tmp_path / "old").exists()
 
 
@@ -75,7 +75,7 @@ def test_what_can_be_no_folder_is_one_sentence(tmp_path: Path, kind: str) -> Non
         "long": (tmp_path / ("x" * 300), "File name too long"),
     }[kind]
     with pytest.raises(FolderError) as caught:
-        Claim(path)
+        FolderLock(path)
     expected = f"the run folder {path} cannot be made ({message}); give another --sim-output"
     assert str(caught.value) == expected
 
@@ -85,10 +85,10 @@ def test_no_space_is_noticed_before_anything_runs(tmp_path: Path) -> None:
     code = """
 import resource, signal, sys
 from pathlib import Path
-from pytest_simbench.records.claim import Claim
+from pytest_simbench.records.lock import FolderLock
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
-Claim(Path(sys.argv[1]))
+FolderLock(Path(sys.argv[1]))
 """
     done = subprocess.run(
         [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=False
