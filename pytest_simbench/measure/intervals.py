@@ -10,6 +10,9 @@ Which one is used where:
   interval of a mean without bounds can hold for every distribution; this one does for skewed costs
   up to a lognormal with sigma 1 (tests/measure/test_coverage.py), not for rare outliers: of 20
   values of which one in twenty is ten deviations off it holds the truth in 87 of 100 runs;
+- values with a least one (counts, distances, costs): the same, and the bets of a betting interval
+  give a lower end as well; the higher of the two counts. Such bets need no upper bound. Their end
+  holds for every distribution and never lies below the least value, where t's does for rare counts;
 - values that are all alike (within the metric's resolution): none. They are a deterministic
   simulator's, whose seeds do not matter, and so say nothing of a spread;
 - fewer than `FEWEST` values: none, since nothing holds there.
@@ -19,7 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -189,7 +192,8 @@ def interval(values: Sequence[float], metric: Metric, confidence: float = CONFID
     """Interval of the mean of a metric's values (n,), one for each repetition.
 
     Raises:
-        ValueError: a share outside 0..1, or a value that is not finite.
+        ValueError: a share outside 0..1, a value below the metric's least, or one that is not
+            finite.
     """
     sample = [float(value) for value in values]
     if not all(map(math.isfinite, sample)):
@@ -200,8 +204,19 @@ def interval(values: Sequence[float], metric: Metric, confidence: float = CONFID
         if metric.kind == "yes_no" and set(sample) <= {0.0, 1.0}:
             return proportion(sum(sample), len(sample), confidence)
         return betting(sample, confidence)
+    if metric.least is not None and min(sample) < metric.least:
+        raise ValueError(f"{metric.name} is at least {metric.least:g}, not {min(sample):g}")
     if len(sample) >= FEWEST and varies(sample, metric):
-        return skewed_t(sample, confidence)
+        found = skewed_t(sample, confidence)
+        return found if metric.least is None else _from(metric.least, found, sample)
     method = "none" if len(sample) < FEWEST else "constant"
     mean = math.fsum(sample) / len(sample)
     return Interval(mean, -math.inf, math.inf, len(sample), method, confidence)
+
+
+def _from(least: float, found: Interval, sample: Sequence[float]) -> Interval:
+    """An interval of values of which none can be below `least`."""
+    above = np.asarray(sample, dtype=float) - least
+    scale = float(above.mean())  # bets win shares, whatever the unit
+    low = least + scale * _least_mean(above / scale, 2 / (1 - found.confidence))
+    return replace(found, low=max(found.low, min(low, found.mean)))

@@ -99,7 +99,7 @@ MEANING: tuple[Part, ...] = (
     _part("of", "", "follows from the task's parameters, which must be equal"),
     *(
         _part(name, "", "for the reader only; the last one holds")
-        for name in ("title", "study", "doc", "resolution")
+        for name in ("title", "study", "doc", "resolution", "least")
     ),
 )
 """The same for what a folder says of a metric; within one folder there is one meaning."""

@@ -147,6 +147,7 @@ def _metric(data: Any, number: int) -> Metric:
             raise checked.CheckError(f"'{where}.{key}' is {checked.short(known[key])}")
     checked.number(known.get("of"), f"{where}.of", least=1)
     checked.number(known.get("resolution"), f"{where}.resolution", least=0)
+    checked.number(known.get("least"), f"{where}.least")
     try:
         return Metric(**known)
     except ValueError as error:

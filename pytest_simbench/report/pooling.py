@@ -14,7 +14,7 @@ from pytest_simbench.tasks.metrics import Metric
 Ends = Callable[[Sequence[float], Metric], tuple[float, float]]
 """Gives the lower and upper end of the interval of a metric's mean; infinite where not known."""
 
-AMOUNT = Metric("amount", "any cost")
+AMOUNT = Metric("amount", "any cost", least=0.0)
 """For the intervals of what is not a share."""
 
 
@@ -65,20 +65,26 @@ def spread(
 ) -> Spread | None:
     """Smallest, mean and largest of the values that are there, with the interval of the mean.
 
-    Without a metric no interval is computed, nor where a share lies outside 0..1: a report shows
-    a wrong record rather than fail on it.
+    Without a metric no interval is computed, nor where a share lies outside 0..1 or a value below
+    its least: a report shows a wrong record rather than fail on it.
     """
     found = [float(value) for value in values if value is not None and math.isfinite(value)]
     if not found:
         return None
     low: float | None = None
     high: float | None = None
-    if metric is not None and (not metric.bounded or (min(found) >= 0 and max(found) <= 1)):
+    if metric is not None and _possible(found, metric):
         low, high = ends(found, metric)
         if not (math.isfinite(low) and math.isfinite(high)):
             low = high = None
     std = statistics.stdev(found) if len(found) > 1 else 0.0
     return Spread(len(found), min(found), statistics.fmean(found), max(found), std, low, high)
+
+
+def _possible(values: Sequence[float], metric: Metric) -> bool:
+    if metric.bounded:
+        return min(values) >= 0 and max(values) <= 1
+    return metric.least is None or min(values) >= metric.least
 
 
 def pooled(

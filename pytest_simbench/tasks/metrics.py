@@ -57,6 +57,8 @@ class Metric:
         doc: one sentence that says what is counted.
         resolution: the smallest difference that means anything, in its unit; None: by unit, see
             `RESOLUTIONS`, else 0.
+        least: the smallest value that there can be, in its unit: 0 for a count or a distance; None
+            where there is none. Proportions lie in 0..1 whatever it says.
 
     Raises:
         ValueError: a share without `of`.
@@ -71,6 +73,7 @@ class Metric:
     study: bool = False
     doc: str = ""
     resolution: float | None = None
+    least: float | None = None
 
     def __post_init__(self) -> None:
         if self.kind == "share" and not self.of:
@@ -99,7 +102,7 @@ class Metric:
         return f"{significant(value, digits)} {self.unit}".rstrip()
 
 
-_cost = partial(Metric, resolution=0.0)
+_cost = partial(Metric, resolution=0.0, least=0.0)
 
 COSTS: tuple[Metric, ...] = (
     _cost("rtf", "real-time factor", doc="simulated over wall seconds of stepping"),

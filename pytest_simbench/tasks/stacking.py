@@ -111,9 +111,9 @@ class Stacking(Task):
                    doc=f"the same, {self.settle:g} s after the task ended"),
             Metric("towers", "towers complete", kind="share", of=self.towers,
                    doc="towers all of whose cubes are strictly in place at the end"),
-            Metric("untouched_moved", "untouched moved", unit="cubes", better="lower",
+            Metric("untouched_moved", "untouched moved", unit="cubes", better="lower", least=0,
                    doc="cubes nobody handled that are more than 1 cm away from their start"),
-            Metric("failed_picks", "failed picks", unit="picks", better="lower",
+            Metric("failed_picks", "failed picks", unit="picks", better="lower", least=0,
                    doc="cubes that could not be reached, planned for, or held"),
         )  # fmt: skip
 

@@ -22,6 +22,7 @@ Draw = Callable[[np.random.Generator, int], NDArray[np.float64]]
 SHARE = Metric("placed", "placed", kind="share", of=15)
 YES_NO = Metric("hit", "hit", kind="yes_no")
 VALUE = Metric("cost", "cost")
+COUNT = Metric("picks", "picks", least=0)
 EXPERIMENTS = 300
 
 SHARES: dict[str, tuple[Draw, float]] = {
@@ -45,6 +46,14 @@ VALUES: dict[str, tuple[Draw, float]] = {
     "lognormal 1": (lambda r, n: r.lognormal(0, 1, n), math.exp(0.5)),
     "mirrored": (lambda r, n: -r.exponential(1, n), -1.0),
     "counts": (lambda r, n: 1.0 * r.poisson(2, n), 2.0),
+}
+COUNTS: dict[str, tuple[Draw, float]] = {
+    "one in twenty": (lambda r, n: 1.0 * r.poisson(0.05, n), 0.05),
+    "one in five": (lambda r, n: 1.0 * r.poisson(0.2, n), 0.2),
+    "two": (lambda r, n: 1.0 * r.poisson(2, n), 2.0),
+    "geometric": (lambda r, n: r.geometric(0.2, n) - 1.0, 4.0),
+    "bursts in one of five": (lambda r, n: 5.0 * (r.random(n) < 0.2) * r.poisson(1, n), 1.0),
+    "nearly always six": (lambda r, n: 1.0 * r.binomial(6, 0.95, n), 5.7),
 }
 
 
@@ -74,6 +83,21 @@ def test_values(name: str, n: int) -> None:
     share, given = held(*VALUES[name], n, VALUE, 1500)
     assert given > 1400
     assert enough(share, given)
+
+
+@pytest.mark.parametrize("n", [5, 10, 20])
+@pytest.mark.parametrize("name", COUNTS)
+def test_counts(name: str, n: int) -> None:
+    """Each end errs in 2.5 % at most, and none lies where no count can be."""
+    rng = np.random.default_rng(7)
+    draw, truth = COUNTS[name]
+    found = [interval(draw(rng, n), COUNT) for _ in range(EXPERIMENTS)]
+    given = [one for one in found if math.isfinite(one.half_width)]
+    assert given
+    assert min(one.low for one in given) > 0  # a count above 0 was seen, so the mean is above 0
+    assert all(one.low <= one.mean <= one.high for one in given)
+    for wrong in (sum(one.low > truth for one in given), sum(one.high < truth for one in given)):
+        assert enough(1 - wrong / len(given), len(given), least=0.975)
 
 
 @pytest.mark.parametrize("n", range(1, FEWEST))

@@ -186,6 +186,36 @@ def test_what_varies_by_less_than_its_resolution_does_not_vary(
     assert varies(values, metric) is spread
 
 
+def test_the_interval_of_a_count_ends_where_counts_begin() -> None:
+    """One in twenty: Student and Willink say -0.08; at a mean of 4e-5 bets win 40 fold."""
+    values = [0.0] * 19 + [1.0]
+    count, free = Metric("picks", "picks", least=0), interval(values, COUNT)
+    found = interval(values, count)
+    assert free.low == pytest.approx(-0.078, abs=1e-3)
+    assert found.low == pytest.approx(4.24e-5, abs=1e-6)
+    assert capital([20 * x for x in values], 20 * found.low) == pytest.approx(40, rel=3e-3)
+    assert (found.mean, found.high, found.method) == (free.mean, free.high, "t")
+
+
+def test_the_higher_lower_end_counts() -> None:
+    steady = [10.0, 11.0, 9.0, 10.0, 10.5] * 4
+    count = Metric("picks", "picks", least=0)
+    assert interval(steady, count) == interval(steady, COUNT)
+
+
+@given(st.lists(st.integers(0, 20), min_size=5, max_size=20), st.sampled_from([1e-9, 1.0, 1e15]))
+def test_a_least_value_bounds_the_interval_in_any_unit(counts: list[int], unit: float) -> None:
+    values = [unit * (3 + count) for count in counts]
+    found = interval(values, Metric("x", "x", least=3 * unit))
+    if np.ptp(counts):
+        assert 3 * unit <= found.low <= found.mean * (1 + 1e-9)
+
+
+def test_a_value_below_the_least_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"^picks is at least 0, not -1$"):
+        interval([0.0, -1.0], Metric("picks", "picks", least=0))
+
+
 def test_values_that_do_not_vary_have_no_interval() -> None:
     for values in ([1.5] * 6, [1.5, 1.500001, 1.5, 1.5, 1.5, 1.500002]):
         found = interval(values, LENGTH)

@@ -29,11 +29,11 @@ def test_what_a_task_says_survives_its_line(task: Any) -> None:
 def test_numpy_values_are_plain_and_what_is_no_number_is_no_reference() -> None:
     class Baking:
         name = "baking"
-        metrics = (Metric("x", "x", of=np.int64(3), resolution=np.float32(0.5)),)  # type: ignore
+        metrics = (Metric("x", "x", of=np.int64(3), resolution=np.float32(0.5), least=-3),)  # type: ignore
         references: ClassVar = {"x": np.float32(0.25), "y": math.nan, "z": math.inf}
 
     said = json.loads(json.dumps(TaskDescription.of(Baking()).to_dict()))  # type: ignore[arg-type]
-    metric = Metric("x", "x", of=3, resolution=0.5)
+    metric = Metric("x", "x", of=3, resolution=0.5, least=-3)
     assert TaskDescription.from_dict(said) == TaskDescription("baking", (metric,), {"x": 0.25})
 
 
@@ -76,6 +76,7 @@ def test_a_newer_plugin_may_say_more_of_a_metric() -> None:
                 ({"resolution": -1}, "'metrics.1.resolution' must be at least 0, not -1"),
                 ({"resolution": "1"}, "'metrics.1.resolution' must be a number, not '1'"),
                 ({"resolution": 10**400}, "'metrics.resolution' is larger than any number"),
+                ({"least": "0"}, "'metrics.1.least' must be a number, not '0'"),
             )
         ),
     ],

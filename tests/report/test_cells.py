@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.report.cells import metric_value, number
+from pytest_simbench.report.cells import interval, metric_value, number
+from pytest_simbench.report.pooling import spread
 from pytest_simbench.tasks.metrics import Metric
 
 LATE = Metric("late", "late", unit="s")
@@ -47,3 +48,17 @@ def test_what_is_far_below_the_resolution_is_nothing(
     value: float, metric: Metric, shown: str
 ) -> None:
     assert metric_value(value, metric) == shown
+
+
+def test_an_end_far_nearer_to_0_than_to_the_other_is_0() -> None:
+    found = spread([0.0] * 19 + [1.0], Metric("picks", "picks", least=0))
+    assert found is not None
+    assert found.low is not None
+    assert 0 < found.low < 1e-4
+    assert interval(found, CUBES).startswith("[0, 0.")
+
+
+def test_a_value_below_the_least_is_shown_without_an_interval() -> None:
+    found = spread([0.0, 1.0, 2.0, 1.0, -1.0], Metric("picks", "picks", least=0))
+    assert found is not None
+    assert (found.min, found.low, found.high) == (-1.0, None, None)

@@ -67,6 +67,7 @@ metrics = st.lists(
         study=st.booleans(),
         doc=names,
         resolution=st.none() | st.floats(0, 1e308),
+        least=st.none() | st.integers(-5, 5) | st.floats(-1e308, 1e308),
     ),
     max_size=4,
     unique_by=lambda metric: metric.name,
