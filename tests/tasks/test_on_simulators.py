@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterable
 from contextlib import closing
 from dataclasses import dataclass, replace
+from typing import Any
 
 import pytest
 
@@ -13,15 +15,32 @@ from pytest_simbench.client.errors import Unavailable
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.records.record import Record
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
 from tests.conftest import ADAPTERS, able_to, case_of
 
+THROW = Throwing(settle=1.0)
 
-@pytest.fixture(params=ADAPTERS)
+_thrown: dict[str, tuple[Record, Exception | None]] = {}
+
+
+def on_one_worker(names: Iterable[str]) -> list[Any]:
+    """An engine's tests run on one of xdist's workers, since they share a throw."""
+    return [pytest.param(n, marks=pytest.mark.xdist_group(f"tasks on {n}")) for n in names]
+
+
+@pytest.fixture(params=on_one_worker(ADAPTERS))
 def any_case(request: pytest.FixtureRequest, case: Case) -> Case:
     return case_of(case, request.param)
+
+
+def thrown(case: Case) -> tuple[Record, Exception | None]:
+    """The first throw of this engine: made once for all tests, slow engines take minutes."""
+    if case.simulator not in _thrown:
+        _thrown[case.simulator] = Repetition(Experiment(case, THROW), 1).run()
+    return _thrown[case.simulator]
 
 
 def test_two_cubes_are_stacked(any_case: Case) -> None:
@@ -35,7 +54,7 @@ def test_two_cubes_are_stacked(any_case: Case) -> None:
 
 
 def test_the_throw_hits(any_case: Case) -> None:
-    record, error = Repetition(Experiment(any_case, Throwing().smoke()), 1).run()
+    record, error = thrown(any_case)
     assert error is None
     assert record.metrics["hit"] == 1.0
     assert record.metrics["lost_in_transit"] == 0.0
@@ -45,9 +64,7 @@ def test_the_throw_hits(any_case: Case) -> None:
 
 
 def test_the_same_seed_gives_the_same_outcome(any_case: Case) -> None:
-    first, second = (
-        Repetition(Experiment(any_case, Throwing().smoke()), 2).run()[0] for _ in range(2)
-    )
+    first, second = thrown(any_case)[0], Repetition(Experiment(any_case, THROW), 1).run()[0]
     assert first.metrics == second.metrics
     assert first.details["projectile_end"] == second.details["projectile_end"]
 
@@ -73,16 +90,16 @@ def test_unreachable_cubes_are_counted_and_the_task_goes_on(case: Case) -> None:
 
 
 @pytest.mark.skipif(shutil.which("Xvfb") is None, reason="no Xvfb: apt-get install xvfb")
-@pytest.mark.parametrize("name", able_to(Capability.WINDOW))
+@pytest.mark.parametrize("name", on_one_worker(able_to(Capability.WINDOW)))
 def test_with_a_window_the_outcome_is_the_same(case: Case, name: str) -> None:
-    headless, throw = case_of(case, name), Throwing(settle=1.0)
+    headless = case_of(case, name)
     displays = Displays()
     with closing(displays):
         gui = replace(headless, mode="gui", display=displays)
-        with_window, error = Repetition(Experiment(gui, throw), 1).run()
+        with_window, error = Repetition(Experiment(gui, THROW), 1).run()
     if isinstance(error, Unavailable):  # a driver that this machine lacks: a skip with its reason
         raise error
     assert error is None
-    without, _ = Repetition(Experiment(headless, throw), 1).run()
+    without, _ = thrown(headless)
     assert with_window.metrics == without.metrics
     assert with_window.details["projectile_end"] == without.details["projectile_end"]
