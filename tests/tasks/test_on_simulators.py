@@ -95,7 +95,8 @@ def test_with_a_window_the_outcome_is_the_same(case: Case, name: str) -> None:
     headless = case_of(case, name)
     displays = Displays()
     with closing(displays):
-        gui = replace(headless, mode="gui", display=displays)
+        # a busy machine draws in software for many seconds before the first step
+        gui = replace(headless, mode="gui", display=displays, stall_timeout=120.0)
         with_window, error = Repetition(Experiment(gui, THROW), 1).run()
     if isinstance(error, Unavailable):  # a driver that this machine lacks: a skip with its reason
         raise error
