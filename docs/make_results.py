@@ -25,6 +25,7 @@ from published_runs import (
     DATA,
     METRICS,
     PARTS,
+    PROFILES,
     REPETITIONS,
     RULES,
     SETTINGS,
@@ -263,7 +264,7 @@ def raw_links(runs: Runs) -> str:
                 for task in TASKS
                 if _of(runs, rules, profile, task)
             ]
-            for profile in ("tuned", "default")
+            for profile in PROFILES
         ]
         rows.append([words, *(", ".join(links) or "not run yet" for links in found)])
     return table(("all numbers, who beats whom", "tuned", "default"), rows, 3)

@@ -22,7 +22,8 @@ SIMULATORS = {
     "mujoco": "MuJoCo", "pybullet": "PyBullet", "sapien": "SAPIEN", "ovphysx": "Omniverse PhysX",
     "drake": "Drake", "dart": "DART", "newton": "Newton", "genesis": "Genesis",
 }  # fmt: skip
-SETTINGS = [("ours", "tuned"), ("ours", "default"), ("study", "tuned"), ("study", "default")]
+PROFILES = ("tuned", "default")
+SETTINGS = [(rules, profile) for rules in ("ours", "study") for profile in PROFILES]
 RULES = {
     "ours": "ours",
     "study": "**the study's**",
@@ -158,7 +159,7 @@ def load() -> Runs:
 
 def _order(key: tuple[str, str, str, str]) -> tuple[int, ...]:
     rules, profile, task, simulator = key
-    places = (list(RULES).index(rules), -len(profile), list(TASKS).index(task))
+    places = (list(RULES).index(rules), PROFILES.index(profile), list(TASKS).index(task))
     return (*places, list(SIMULATORS).index(simulator))
 
 

@@ -467,9 +467,9 @@ def test_it_says_what_it_measures(task: Stacking, settle: str, counted: str) -> 
         Metric("at_end_strict", "at the end, strict", **share, doc=end),
         Metric("towers", "towers complete", kind="share", of=3,
                doc="towers all of whose cubes are strictly in place at the end"),
-        Metric("untouched_moved", "untouched moved", unit="cubes", better="lower",
+        Metric("untouched_moved", "untouched moved", unit="cubes", better="lower", least=0,
                doc="cubes nobody handled that are more than 1 cm away from their start"),
-        Metric("failed_picks", "failed picks", unit="picks", better="lower",
+        Metric("failed_picks", "failed picks", unit="picks", better="lower", least=0,
                doc="cubes that could not be reached, planned for, or held"),
     )  # fmt: skip
 
