@@ -58,6 +58,7 @@ class World:
             [m/s] and angular velocity [rad/s], in the world frame.
         excused: differences from the scene that the adapter declares.
         trace: samples at `trace_period` of everything since loading, if asked for.
+        phases: when each phase began, in simulated time [s], and its name.
         stopwatch: wall seconds of this repetition by kind; `plan` is the task's to measure.
         timeline: wall seconds from launch of the moments that the task marked.
     """
@@ -76,7 +77,10 @@ class World:
         self.scene = scene
         self.stopwatch = stopwatch or Stopwatch()
         self.timeline: dict[str, float] = {}
+        self.time = 0.0
         self.trace: list[Motion] = []
+        self.phases: list[tuple[float, str]] = []
+        self._saved: dict[str, tuple[list[Motion], list[tuple[float, str]]]] = {}
         self._trace_period = trace_period
         self._on_phase = on_phase
         self._names = [body.name for body in scene.free_bodies]
@@ -119,6 +123,7 @@ class World:
 
     def _enter(self, name: str) -> None:
         self.process.where.phase = name
+        self.phases.append((self.time, name))
         self._on_phase(name)
 
     def mark(self, moment: str) -> None:
@@ -173,10 +178,14 @@ class World:
     def save(self, name: str = "saved") -> None:
         """Keep the whole state in the worker under `name`."""
         self.process.request("save", name=name)
+        self._saved[name] = [*self.trace], [*self.phases]
 
     def restore(self, name: str = "saved") -> None:
-        """Go back to a kept state."""
+        """Go back to a kept state, and to what had led to it."""
         self._take(self.process.request("restore", name=name))
+        if name in self._saved:
+            trace, phases = self._saved[name]
+            self.trace, self.phases = [*trace], [*phases]
 
     def contact_count(self) -> int:
         return int(self.process.request("contact_count"))

@@ -11,8 +11,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from pytest_simbench.client.errors import (
     DisplayError,
     DisplayLost,
@@ -29,7 +27,9 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import file_stem, record_of, settings
 from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.workers import IdleWorkers
+from pytest_simbench.recordings.trace import FOLDER, Trace
 from pytest_simbench.records.record import Failure, Record, Status
+from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.choices import seeds_seen
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.worker.text import LONGEST, named, readable, told
@@ -253,7 +253,7 @@ class Repetition:
         )
 
     def _write_trace(self, *, failed: bool) -> str:
-        """Joint and body states over time, as arrays of a .npz file in the run folder.
+        """Joint and body states over time, and what is needed to draw them, in the run folder.
 
         Returns:
             why it could not be written; the repetition counts all the same.
@@ -261,20 +261,11 @@ class Repetition:
         world, case = self._world, self.case
         if world is None or not world.trace or (case.trace == "retain-on-failure" and not failed):
             return ""
-        motion = Motion.joined(world.trace)
         name = file_stem(self.experiment, self.number)
-        folder = case.folder / "traces"
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            np.savez_compressed(
-                folder / f"{name}.npz",
-                time=motion.time,
-                joints=motion.joints,
-                bodies=motion.bodies,
-                joint_names=list(world.scene.robot.joint_names if world.scene.robot else ()),
-                body_names=[body.name for body in world.scene.free_bodies],
-            )
-        except OSError as error:
+            trace = Trace.of(world.scene, Motion.joined(world.trace), world.phases)
+            trace.write(case.folder / FOLDER / f"{name}.npz")
+        except (OSError, DescriptionError) as error:
             return f"the trace could not be written: {named(error)}"
         return ""
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from pytest_simbench.plugin import options
+from pytest_simbench.plugin import options, recording
 from pytest_simbench.records.folder import RECORDS, TASKS, Reading, RunFolder
 from pytest_simbench.records.merging import Merged, MergeError, merge, merge_tasks
 from pytest_simbench.records.paths import FolderError, new_name
@@ -104,7 +104,10 @@ def merge_runs(config: pytest.Config) -> int:
         refused = _copy(records, runs.folders, folder)
         unsaved = folder.flush()
         written = write_report(folder)
-        _print(config, written.summaries, [*runs.problems, *refused, *unsaved, *written.problems])
+        problems = [*runs.problems, *refused, *unsaved, *written.problems]
+        kept = [item.record for item in records]
+        problems += recording.record(config, folder.path, folder.path, kept)
+        _print(config, written.summaries, problems)
         if written.complete and not unsaved:
             print(where(folder.path / PAGE_NAME, config.invocation_params.dir))
     finally:
@@ -136,7 +139,12 @@ def report_runs(config: pytest.Config) -> int:
     if target is not None:
         run = None if others else folder.path
         written = write_files(target, summaries, in_order(whole.records), run=run)
-    _print(config, summaries, [*runs.problems, *written.problems])
+    recorded: list[str] = []
+    if target is not None and not others:
+        recorded = recording.record(config, folder.path, target, whole.records)
+    elif options.value(config, recording.RECORD):
+        recorded.append("no recordings: join the runs with --sim-merge first")
+    _print(config, summaries, [*runs.problems, *written.problems, *recorded])
     if tables or problems:
         width = shutil.get_terminal_size().columns
         print("\n".join(["", render_terminal(tables, width), *map(for_terminal, problems)]))

@@ -114,6 +114,8 @@ OPTIONS = (
     Option("--sim-output", File(), "folder of the run (default: .simbench/TIME-ID)", metavar="DIR"),
     Option("--sim-trace", Choice(("off", "on", "retain-on-failure")), "write joint and body motion "
            "at 50 Hz into the run folder: off, on, retain-on-failure", "off", metavar="WHEN"),
+    Option("--sim-record", Choice(("mcap",)), "write each repetition's motion as a rosbag2 folder "
+           "(MCAP), for Foxglove, PlotJuggler and ros2 bag", metavar="FORMAT"),
     Option("--sim-badge", File(), "write the result as JSON for a badge of shields.io into this "
            "file", metavar="FILE"),
     Option("--sim-threshold", Assignments("METRIC=NUMBER", numbers=True), "change a threshold of "

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from pytest_simbench.client.display import Displays
-from pytest_simbench.plugin import options
+from pytest_simbench.plugin import options, recording
 from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import Record
@@ -259,6 +259,8 @@ class Run:
         if badge:
             path = Path(self.config.invocation_params.dir, badge)
             problems.append(write_badge(path, self.reading.records, passed))
+        folder = self.folder.path
+        problems += recording.record(self.config, folder, folder, self.reading.records)
         if written.complete and not unsaved:
             self.page = self.folder.path / PAGE_NAME
         else:

@@ -123,8 +123,12 @@ def write_files(
 
 def where(page: Path, base: Path) -> str:
     """The line that tells where the page is, short where it lies below the folder `base`."""
-    shown = page.relative_to(base) if page.is_relative_to(base) else page
-    return for_terminal(f"report: {shown}")
+    return for_terminal(f"report: {shown(page, base)}")
+
+
+def shown(path: Path, base: Path) -> Path:
+    """A path as the terminal shows it: short where it lies below the folder `base`."""
+    return path.relative_to(base) if path.is_relative_to(base) else path
 
 
 def write_badge(path: Path, records: Sequence[Record], passed: bool) -> str:
