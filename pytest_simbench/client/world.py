@@ -159,12 +159,10 @@ class World:
     def _move(self, operation: str, log_period: float | None, **arguments: Any) -> Motion | None:
         period = log_period if log_period is not None else self._trace_period
         answer = self.process.request(operation, log_period=period, **arguments)
+        motion = Motion(**answer["log"]) if answer["log"] else None
+        if motion is not None and self._trace_period is not None and len(motion):
+            self.trace.append(self._thinned(motion))  # also where it ends in what cannot be
         self._take(answer)
-        if not answer["log"]:
-            return None
-        motion = Motion(**answer["log"])
-        if self._trace_period is not None and len(motion):
-            self.trace.append(self._thinned(motion))
         return motion if log_period is not None else None
 
     def _thinned(self, motion: Motion) -> Motion:

@@ -1,5 +1,5 @@
-"""The report in the run folder: `report.html`, `report.md`, `report.csv` and, where matplotlib is,
-pictures."""
+"""The report in the run folder: `report.html`, `replay.html` of its traces, `report.md`,
+`report.csv` and, where matplotlib is, pictures."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ from pytest_simbench.report.badge import badge
 from pytest_simbench.report.figures import FiguresUnavailable, write_figures
 from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.page import PAGE_NAME, Compared, page_of
+from pytest_simbench.report.replay import REPLAY_NAME
+from pytest_simbench.report.replay.groups import Group, groups
 from pytest_simbench.report.summary import PHASES, TaskSummary, summarise
 from pytest_simbench.tasks.metrics import COSTS
 
@@ -110,7 +112,11 @@ def write_files(
         except OSError as error:
             failed.append(f"pictures: {_unwritable(folder, error)}")
     text = markdown.render_run(summaries, [picture.name for picture in pictures])
-    contents = {PAGE_NAME: page_of(run or folder, summaries, records, comparison)}
+    shown, replay, told = _replay(run or folder, records)
+    problems += told
+    contents = {PAGE_NAME: page_of(run or folder, summaries, records, comparison, shown)}
+    if replay:
+        contents[REPLAY_NAME] = replay
     if records:  # else the run has results on repeatability alone
         contents |= {MARKDOWN_NAME: text, CSV_NAME: csv_of(records)}
     for name, content in contents.items():
@@ -119,6 +125,20 @@ def write_files(
         except OSError as error:
             failed.append(_unwritable(folder / name, error))
     return Written((*problems, *failed), not failed)
+
+
+def _replay(run: Path, records: Sequence[Record]) -> tuple[list[Group], str, list[str]]:
+    """What the replay shows, the page itself, and what could not be shown."""
+    from pytest_simbench.report.replay.render import ReplayUnavailable, replay_of
+
+    found = groups(run, records)
+    if not found:
+        return [], "", []
+    try:
+        page, count, problems = replay_of(found)
+    except ReplayUnavailable as error:
+        return [], "", [str(error)]
+    return found[:count], page, problems
 
 
 def where(page: Path, base: Path) -> str:

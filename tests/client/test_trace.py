@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
+import dataclasses
 
-from pytest_simbench.client.errors import Where
+import numpy as np
+import pytest
+
+from pytest_simbench.client.errors import Diverged, Where
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.experiment.case import Case
@@ -33,3 +36,14 @@ def test_what_was_undone_is_not_in_it(case: Case) -> None:
     begun = {name: round(time, 3) for time, name in world.phases}
     assert begun.items() >= {"fall": 0.0, "fall again": 0.1, "task": 0.16}.items()
     assert "lost" not in begun
+
+
+def test_what_went_wrong_is_in_it(case: Case) -> None:
+    """The motion that ends in a state that cannot be is the one to look at."""
+    process = WorkerProcess(case.launch("x"), Where(case.simulator, case.mode))
+    process.construct()
+    world = World(process, dataclasses.replace(SCENE, gravity=(500.0, 0.0, 0.0)), trace_period=0.02)
+    with pytest.raises(Diverged, match="left the room"):
+        world.wait(0.4)
+    process.close()
+    assert Motion.joined(world.trace).bodies[-1, 0, 0] > 5.0

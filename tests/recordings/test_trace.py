@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pytest_simbench.client.world import Motion
 from pytest_simbench.recordings.trace import Trace, TraceError
-from tests.recordings.samples import scene, trace
+from tests.recordings.samples import motion, scene, trace
 
 
 def test_it_is_read_back_without_the_robots_files(tmp_path: Path) -> None:
@@ -101,3 +102,23 @@ def test_what_is_no_file_of_arrays_is_refused(tmp_path: Path) -> None:
 def test_phases_in_which_no_time_passes_are_left_out() -> None:
     found = trace(phases=[(0.0, "launch"), (0.0, "pick"), (0.1, "task"), (0.1, "place")])
     assert list(found.phases) == [(0.0, "pick"), (0.1, "place")]
+
+
+def test_it_ends_where_numbers_do(tmp_path: Path) -> None:
+    moved = motion()
+    moved.bodies[5:, 1, 2] = np.nan
+    found = Trace.of(scene(), moved, [])
+    assert len(found.time) == len(found.bodies) == len(found.joints) == 5
+    found.write(tmp_path / "x.npz")
+    assert len(Trace.read(tmp_path / "x.npz").time) == 5
+
+
+def test_bodies_at_rest_cost_nothing(tmp_path: Path) -> None:
+    """Ten minutes of cubes that tremble by less than anybody can see."""
+    rng = np.random.default_rng(0)
+    rest = motion(0)
+    count = 30_000
+    bodies = np.tile(rest.bodies[:1], (count, 1, 1)) + rng.normal(0, 1e-9, (count, 2, 13))
+    still = Motion(np.arange(count) * 0.02, np.zeros((count, 2, 0)), bodies)
+    Trace.of(scene(robot=False), still, []).write(tmp_path / "x.npz")
+    assert (tmp_path / "x.npz").stat().st_size < bodies.astype(np.float32).nbytes / 10

@@ -20,6 +20,7 @@ from pytest_simbench.report.page import setup
 from pytest_simbench.report.page.cells import Of, Table, from_columns, labelled, of, study
 from pytest_simbench.report.page.pictures import Picture, pictures
 from pytest_simbench.report.page.strips import Strip, strips
+from pytest_simbench.report.replay.groups import Group, links
 from pytest_simbench.report.summary import TaskSummary
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ class FailureBlock:
 
 @dataclass(frozen=True)
 class TaskPart:
-    """One task."""
+    """One task; of its replays what each shows, and the address."""
 
     title: str
     answer: Sequence[str]
@@ -53,6 +54,7 @@ class TaskPart:
     causes: Sequence[FailureBlock]
     pictures: Sequence[Picture]
     notes: Sequence[str]
+    replays: Sequence[tuple[str, str]]
 
 
 @dataclass(frozen=True)
@@ -91,8 +93,10 @@ def page(
     summaries: Sequence[TaskSummary],
     records: Sequence[Record],
     comparison: tuple[str, GateReport] | None = None,
+    replays: Sequence[Group] = (),
 ) -> Page:
     """The page of a run, see `page_of`."""
+    replay = links(replays)
     numbers: dict[int, int] = {}
     repetitions: list[dict[str, Any]] = []
 
@@ -100,7 +104,7 @@ def page(
         """Its place among the page's repetitions, where it is put when first asked for."""
         if id(record) not in numbers:
             numbers[id(record)] = len(repetitions)
-            repetitions.append(_repetition(record))
+            repetitions.append(_repetition(record, replay.get(id(record), "")))
         return numbers[id(record)]
 
     problems: dict[str, None] = {}
@@ -119,6 +123,11 @@ def page(
                 _causes(summary, rows),
                 drawn,
                 columns.notes(summary),
+                [
+                    (f"seed {group.seed}, {_simulators(group)}", replay[id(group.shown[0][0])])
+                    for group in replays
+                    if group.task == summary.task
+                ],
             )
         )
     again, unreadable = _repeatability(folder)
@@ -194,7 +203,12 @@ def _compared(name: str, report: GateReport) -> Compared:
     )
 
 
-def _repetition(record: Record) -> dict[str, Any]:
+def _simulators(group: Group) -> str:
+    count = len(group.shown)
+    return group.shown[0][0].simulator if count == 1 else f"{count} side by side"
+
+
+def _repetition(record: Record, replay: str) -> dict[str, Any]:
     """What a dot tells of its repetition."""
     error = record.error
     found = {
@@ -206,6 +220,7 @@ def _repetition(record: Record) -> dict[str, Any]:
         "cause": f"{error.cause}: {error.message}" if error else "",
         "log": str(record.details.get("log") or ""),
         "command": command(record),
+        "replay": replay,
     }
     return {k: for_terminal(v) if isinstance(v, str) else v for k, v in found.items()}
 
