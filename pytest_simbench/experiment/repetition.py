@@ -252,6 +252,15 @@ class Repetition:
             else ""
         )
 
+    def _keeps(self, failed: bool) -> bool:
+        """Whether the motion of this repetition is kept."""
+        wanted = {
+            "on": True,
+            "retain-on-failure": failed,
+            "first-and-failed": failed or self.number == 1,
+        }
+        return wanted[self.case.trace]
+
     def _write_trace(self, *, failed: bool) -> str:
         """Joint and body states over time, and what is needed to draw them, in the run folder.
 
@@ -259,7 +268,7 @@ class Repetition:
             why it could not be written; the repetition counts all the same.
         """
         world, case = self._world, self.case
-        if world is None or not world.trace or (case.trace == "retain-on-failure" and not failed):
+        if world is None or not world.trace or not self._keeps(failed):
             return ""
         name = file_stem(self.experiment, self.number)
         try:

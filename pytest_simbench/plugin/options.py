@@ -112,8 +112,10 @@ OPTIONS = (
     Option("--sim-memory-limit", Number(1, 1e9), "memory a worker may use before it is killed",
            metavar="MB"),
     Option("--sim-output", File(), "folder of the run (default: .simbench/TIME-ID)", metavar="DIR"),
-    Option("--sim-trace", Choice(("off", "on", "retain-on-failure")), "write joint and body motion "
-           "at 50 Hz into the run folder: off, on, retain-on-failure", "off", metavar="WHEN"),
+    Option("--sim-trace", Choice(("first-and-failed", "retain-on-failure", "on", "off")), "keep "
+           "the motion of joints and bodies at 50 Hz, for replay and recordings: of the first "
+           "and failed repetitions of a test, of failed ones, of all, of none",
+           "first-and-failed", metavar="WHEN"),
     Option("--sim-record", Choice(("mcap",)), "write each repetition's motion as a rosbag2 folder "
            "(MCAP), for Foxglove, PlotJuggler and ros2 bag", metavar="FORMAT"),
     Option("--sim-badge", File(), "write the result as JSON for a badge of shields.io into this "

@@ -15,9 +15,11 @@ from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.text import for_csv, for_terminal
 from pytest_simbench.report import markdown
+from pytest_simbench.report import outcome as outcome_of
 from pytest_simbench.report.badge import badge
 from pytest_simbench.report.figures import FiguresUnavailable, write_figures
 from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.outcome import Outcome
 from pytest_simbench.report.page import PAGE_NAME, Compared, page_of
 from pytest_simbench.report.replay import REPLAY_NAME
 from pytest_simbench.report.replay.groups import Group, groups
@@ -151,7 +153,16 @@ def shown(path: Path, base: Path) -> Path:
     return path.relative_to(base) if path.is_relative_to(base) else path
 
 
-def write_badge(path: Path, records: Sequence[Record], passed: bool) -> str:
+def write_outcome(folder: Path, outcome: Outcome) -> str:
+    """Keep how a run ended in its folder; a sentence when it could not be written."""
+    try:
+        outcome.write(folder)
+    except OSError as error:
+        return _unwritable(folder / outcome_of.NAME, error)
+    return ""
+
+
+def write_badge(path: Path, records: Sequence[Record], passed: bool | None) -> str:
     """Write the badge of a run; a sentence when it could not be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
