@@ -71,6 +71,7 @@ class World:
         stopwatch: Stopwatch | None = None,
         on_phase: Callable[[str], None] = lambda name: None,
         trace_period: float | None = None,
+        after_phase: Callable[[World, str], None] = lambda world, name: None,
         parity: bool = True,
     ) -> None:
         self.process = process
@@ -82,6 +83,7 @@ class World:
         self.phases: list[tuple[float, str]] = []
         self._saved: dict[str, tuple[list[Motion], list[tuple[float, str]]]] = {}
         self._trace_period = trace_period
+        self._after_phase: Callable[[World, str], None] = lambda world, name: None
         self._on_phase = on_phase
         self._names = [body.name for body in scene.free_bodies]
         if process.launch.compile_timeout:
@@ -91,6 +93,7 @@ class World:
         self.excused: list[str] = answer["excused"]
         self._take(answer)
         self._enter("task")  # between the phases that the task names
+        self._after_phase = after_phase
 
     def _take(self, answer: Mapping[str, Any]) -> None:
         self.time = float(answer["time"])
@@ -119,6 +122,7 @@ class World:
         before = self.process.where.phase
         self._enter(name)
         yield  # on an error the phase stays, so that the error and the record name it
+        self._after_phase(self, name)
         self._enter(before)
 
     def _enter(self, name: str) -> None:

@@ -27,6 +27,7 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import file_stem, record_of, settings
 from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.workers import IdleWorkers
+from pytest_simbench.recordings.album import Album
 from pytest_simbench.recordings.trace import FOLDER, Trace
 from pytest_simbench.records.record import Failure, Record, Status
 from pytest_simbench.simulator import DescriptionError
@@ -50,6 +51,8 @@ class Repetition:
         interrupts: held from the moment that the task has ended or failed, so that the record
             is made; the caller ends the block when it has kept it.
         on_phase, on_count: progress, see `tasks.base`.
+        album: takes pictures by the engine's own renderer. They cost time and memory, so nothing
+            else of such a repetition should count.
     """
 
     def __init__(
@@ -61,7 +64,9 @@ class Repetition:
         interrupts: Interrupts | None = None,
         on_phase: Callable[[str], None] = lambda name: None,
         on_count: Callable[[int, int], None] = lambda done, total: None,
+        album: Album | None = None,
     ) -> None:
+        self._album = album
         self.experiment = experiment
         self.case = case = experiment.case
         self.number = number
@@ -131,11 +136,16 @@ class Repetition:
             self.experiment.scene(self.seed),
             stopwatch=self.stopwatch,
             on_phase=self._enter,
-            trace_period=None if self.case.trace == "off" else TRACE_PERIOD,
+            trace_period=TRACE_PERIOD if self._keeps(failed=True) else None,
+            after_phase=self._look,
         )
         outcome = self.experiment.task.perform(world, self.seed, self._on_count)
         self._stats = world.stats()
         return outcome
+
+    def _look(self, world: World, phase: str) -> None:
+        if self._album is not None:
+            self._album.look(group(phase), world.render)
 
     def _construct(self) -> WorkerProcess:
         """Launch the worker and give the simulator its settings."""
@@ -252,12 +262,15 @@ class Repetition:
             else ""
         )
 
-    def _keeps(self, failed: bool) -> bool:
+    def _keeps(self, *, failed: bool) -> bool:
         """Whether the motion of this repetition is kept."""
+        first = self.number == 1
         wanted = {
-            "on": True,
+            "first": first,
+            "first-and-failed": first or failed,
             "retain-on-failure": failed,
-            "first-and-failed": failed or self.number == 1,
+            "on": True,
+            "off": False,
         }
         return wanted[self.case.trace]
 
@@ -268,7 +281,7 @@ class Repetition:
             why it could not be written; the repetition counts all the same.
         """
         world, case = self._world, self.case
-        if world is None or not world.trace or not self._keeps(failed):
+        if world is None or not world.trace or not self._keeps(failed=failed):
             return ""
         name = file_stem(self.experiment, self.number)
         try:

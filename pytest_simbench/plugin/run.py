@@ -210,6 +210,11 @@ class Run:
             if self.mistake:
                 session.exitstatus = pytest.ExitCode.USAGE_ERROR
 
+    def tell(self, problem: str) -> None:
+        """A sentence for the end of the run."""
+        if problem not in self._problems:
+            self._problems.append(problem)
+
     def of_test(self, test: str) -> list[str]:
         """Records of one test as JSON lines, to travel with its report: the disk may be full."""
         return [r.to_json() for r in self.folder.own if r.test == test]

@@ -23,6 +23,8 @@ from pytest_simbench.report.outcome import Outcome
 from pytest_simbench.report.page import PAGE_NAME, Compared, page_of
 from pytest_simbench.report.replay import REPLAY_NAME
 from pytest_simbench.report.replay.groups import Group, groups
+from pytest_simbench.report.sheet import sheet_name
+from pytest_simbench.report.sheet import sheets as sheets_of
 from pytest_simbench.report.summary import PHASES, TaskSummary, summarise
 from pytest_simbench.tasks.metrics import COSTS
 
@@ -114,19 +116,31 @@ def write_files(
         except OSError as error:
             failed.append(f"pictures: {_unwritable(folder, error)}")
     text = markdown.render_run(summaries, [picture.name for picture in pictures])
+    sheets, told = _sheets(run or folder, records) if figures else ({}, [])
+    problems += told
     shown, replay, told = _replay(run or folder, records)
     problems += told
-    contents = {PAGE_NAME: page_of(run or folder, summaries, records, comparison, shown)}
+    contents = {PAGE_NAME: page_of(run or folder, summaries, records, comparison, shown, sheets)}
     if replay:
         contents[REPLAY_NAME] = replay
     if records:  # else the run has results on repeatability alone
         contents |= {MARKDOWN_NAME: text, CSV_NAME: csv_of(records)}
-    for name, content in contents.items():
+    encoded = {name: text.encode("utf-8", "replace") for name, text in contents.items()}
+    encoded |= {sheet_name(task): sheet for task, sheet in sheets.items()}
+    for name, content in encoded.items():
         try:
-            write_whole(folder / name, content.encode("utf-8", "replace"))
+            write_whole(folder / name, content)
         except OSError as error:
             failed.append(_unwritable(folder / name, error))
     return Written((*problems, *failed), not failed)
+
+
+def _sheets(run: Path, records: Sequence[Record]) -> tuple[dict[str, bytes], list[str]]:
+    """The contact sheet of each task, and what could not be shown."""
+    try:
+        return sheets_of(run, records)
+    except FiguresUnavailable as error:
+        return {}, [str(error)]
 
 
 def _replay(run: Path, records: Sequence[Record]) -> tuple[list[Group], str, list[str]]:

@@ -35,6 +35,7 @@ class Unlucky(Falling):
         ("on", ["1", "2", "unlucky 1", "unlucky 2"]),
         ("retain-on-failure", ["unlucky 1", "unlucky 2"]),
         ("first-and-failed", ["1", "unlucky 1", "unlucky 2"]),
+        ("first", ["1", "unlucky 1"]),
     ],
 )
 def test_whose_motion_is_kept(case: Case, when: str, kept: list[str]) -> None:
@@ -58,3 +59,19 @@ def test_the_motion_of_the_engine_is_in_it(case: Case) -> None:
     height = 0.1 - 9.80665 * trace.time[falling] ** 2 / 2
     np.testing.assert_allclose(trace.bodies[falling, 0, 2], height, atol=1e-3)
     assert {"fall": 0.0}.items() <= {name: time for time, name in trace.phases}.items()
+
+
+def test_what_is_not_kept_is_not_sampled(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sampling takes up to a third of the time of stepping (benchmarks/README.md)."""
+    sampled = []
+    real = Repetition._write_trace
+
+    def count(self: Repetition, *, failed: bool) -> str:
+        assert self._world is not None
+        sampled.append(sum(map(len, self._world.trace)))
+        return real(self, failed=failed)
+
+    monkeypatch.setattr(Repetition, "_write_trace", count)
+    for number in (1, 2):
+        Repetition(Experiment(replace(case, trace="first"), Falling()), number).run()
+    assert sampled == [30, 0]

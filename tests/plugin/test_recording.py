@@ -101,3 +101,17 @@ def test_missing_rosbags_is_one_sentence_before_anything_runs(pytester: pytest.P
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     result.stderr.fnmatch_lines(["ERROR: --sim-record=mcap: *pip install 'pytest-simbench[[]ros]'"])
     assert "Traceback" not in result.stdout.str() + result.stderr.str()
+
+
+def test_pictures_are_taken_beside_what_is_measured(pytester: pytest.Pytester) -> None:
+    pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
+    pytester.makepyfile(TEST)
+    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=o", "--sim-pictures")
+    result.assert_outcomes(passed=1)
+    folder = pytester.path / "o"
+    assert len((folder / "records.jsonl").read_text().splitlines()) == 2
+    assert (folder / "falling_pictures.png").read_bytes().startswith(b"\x89PNG")
+    assert 'src="data:image/png;base64,' in (folder / "report.html").read_text(encoding="utf-8")
+    (folder / "falling_pictures.png").unlink()
+    pytester.runpytest_subprocess("--sim-report=o")
+    assert (folder / "falling_pictures.png").exists()

@@ -7,7 +7,7 @@ is written.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from pytest_simbench.measure.gate import GateReport
@@ -27,6 +27,7 @@ def page_of(
     records: Sequence[Record],
     comparison: Compared | None = None,
     replays: Sequence[Group] = (),
+    sheets: Mapping[str, bytes] | None = None,
 ) -> str:
     """The page of a run, as HTML.
 
@@ -36,8 +37,9 @@ def page_of(
         records: that they were made of.
         comparison: with a baseline, where there is one.
         replays: what the replay beside the page shows.
+        sheets: contact sheets (PNG), by the name of their task.
     """
     from pytest_simbench.report.page.context import page
     from pytest_simbench.report.page.render import render
 
-    return render(page(folder, summaries, records, comparison, replays))
+    return render(page(folder, summaries, records, comparison, replays, sheets or {}))

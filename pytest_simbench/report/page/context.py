@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,7 +45,7 @@ class FailureBlock:
 
 @dataclass(frozen=True)
 class TaskPart:
-    """One task; of its replays what each shows, and the address."""
+    """One task; of its replays what each shows, and the address; its contact sheet as base64."""
 
     title: str
     answer: Sequence[str]
@@ -55,6 +56,7 @@ class TaskPart:
     pictures: Sequence[Picture]
     notes: Sequence[str]
     replays: Sequence[tuple[str, str]]
+    sheet: str
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,7 @@ def page(
     records: Sequence[Record],
     comparison: tuple[str, GateReport] | None = None,
     replays: Sequence[Group] = (),
+    sheets: Mapping[str, bytes] | None = None,
 ) -> Page:
     """The page of a run, see `page_of`."""
     replay = links(replays)
@@ -128,6 +131,7 @@ def page(
                     for group in replays
                     if group.task == summary.task
                 ],
+                b64encode((sheets or {}).get(summary.task, b"")).decode("ascii"),
             )
         )
     again, unreadable = _repeatability(folder)
