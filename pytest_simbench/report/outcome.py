@@ -16,7 +16,7 @@ from pytest_simbench.measure.comparison import MeanDifference
 from pytest_simbench.measure.gate import Change, GateReport
 from pytest_simbench.measure.limits import Limit
 from pytest_simbench.records import checked
-from pytest_simbench.records.description import Description, DescriptionError
+from pytest_simbench.records.description import TaskDescription, TaskDescriptionError
 from pytest_simbench.records.paths import FolderError, inside, write_whole
 from pytest_simbench.simulator.files import FileError, read_file, read_json
 
@@ -116,8 +116,8 @@ def _change(change: Change) -> dict[str, Any]:
 
 def _changed(data: Mapping[str, Any]) -> Change:
     try:
-        metric = Description.from_dict({"task": "-", "metrics": [data["metric"]]}).metrics[0]
-    except DescriptionError as error:
+        metric = TaskDescription.from_dict({"task": "-", "metrics": [data["metric"]]}).metrics[0]
+    except TaskDescriptionError as error:
         raise ValueError(str(error)) from None
     limit, mean = data["limit"], data["comparison"]
     first, second, p_value = (float(mean[key]) for key in ("first", "second", "p_value"))
