@@ -166,8 +166,8 @@ class Trace:
         figure = about["figure"]
         found = cls(
             _like(arrays["time"], (None,), "time"),
-            arrays["joints"].astype(float),
-            arrays["bodies"].astype(float),
+            np.ascontiguousarray(arrays["joints"], dtype=float),
+            np.ascontiguousarray(arrays["bodies"], dtype=float),
             [str(name) for name in arrays["joint_names"]],
             [str(name) for name in arrays["body_names"]],
             [Box.from_wire(box) for box in about["boxes"]],

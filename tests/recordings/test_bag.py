@@ -13,6 +13,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from pytest_simbench.recordings import bag
 from pytest_simbench.recordings.bag import BagsUnavailable, frame_of, write_bag
+from pytest_simbench.recordings.trace import Trace
 from tests.hostile import HOSTILE
 from tests.recordings.samples import motion, trace
 
@@ -50,7 +51,8 @@ def pose(transform: Any) -> list[float]:
 @pytest.mark.parametrize("read", [messages, messages_of_mcap])
 def test_it_reads_back_as_the_trace(read: Any, tmp_path: Path) -> None:
     kept = trace()
-    write_bag(kept, tmp_path / "x")
+    kept.write(tmp_path / "x.npz")
+    write_bag(Trace.read(tmp_path / "x.npz"), tmp_path / "x")
     found = read(tmp_path / "x")
     states = found["/joint_states"]
     assert len(states) == len(kept.time)

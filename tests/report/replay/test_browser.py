@@ -12,14 +12,16 @@ from pytest_simbench.client.world import Motion
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.recordings.trace import Trace
 from pytest_simbench.records.record import Record
+from pytest_simbench.report.files import write_files
 from pytest_simbench.report.replay.groups import groups
 from pytest_simbench.report.replay.render import replay_of
+from pytest_simbench.report.summary import summarise
 from pytest_simbench.scene import Pose
 from tests.hostile import HOSTILE
 from tests.recordings.samples import motion, scene
 from tests.report.browser import Opened, browser, opened
 from tests.report.page.test_hostile_page import MORE
-from tests.report.samples import record
+from tests.report.samples import METRICS, record
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -184,3 +186,21 @@ def test_hostile_names_stay_text(tmp_path: Path, opened: Opened) -> None:
     assert page.locator(".tile").count() == 1
     assert page.locator(".tile script, .tile img, .tile a").count() == 0
     assert page.evaluate("document.querySelectorAll('script').length") == 3
+
+
+def test_a_dot_of_the_report_leads_to_its_replay(tmp_path: Path, opened: Opened) -> None:
+    kept = [record("mujoco", k, metrics={"placed": k / 4}) for k in (1, 2)]
+    Trace.of(scene(), longer(0.5), [(0.0, "task")]).write(
+        tmp_path / "traces" / f"{file_stem_of(kept[1])}.npz"
+    )
+    assert write_files(tmp_path, summarise(kept, METRICS, {}), kept, figures=False).complete
+    page = opened(tmp_path / "report.html")
+    dots = page.locator(".strip").first.locator(".dot")
+    dots.nth(0).click()
+    assert page.locator("#detail a", has_text="replay").count() == 0
+    dots.nth(1).click()
+    page.locator("#detail a", has_text="replay").click()
+    page.wait_for_selector("body[data-ready]")
+    assert lines(page) == ["mujoco task"]
+    page.get_by_role("link", name="to the report").click()
+    assert page.locator(".answer").count()
