@@ -56,6 +56,11 @@ def motion() -> Trajectory:
 
 def bare(name: str) -> float:
     """CPU seconds of a loop with nothing in it but command and step, in a process of its own."""
+    return loop(name)[-1]
+
+
+def loop(name: str, **more: int) -> list[float]:
+    """What `bare_loop.py` prints for a simulator."""
     info, trajectory = adapter(name).info, motion()
     order = {
         "bootstrap": bootstrap.__file__,
@@ -69,6 +74,7 @@ def bare(name: str) -> float:
         "position": trajectory.position.tolist(),
         "velocity": trajectory.velocity.tolist(),
         "effort": trajectory.effort.tolist(),
+        **more,
     }
     output = subprocess.run(
         [interpreter(info) or sys.executable, str(Path(__file__).with_name("bare_loop.py"))],
@@ -78,7 +84,7 @@ def bare(name: str) -> float:
         text=True,
         check=True,
     ).stdout
-    return float(output.splitlines()[-1])
+    return [float(line) for line in output.splitlines()[-1 - len(more) :]]
 
 
 def worker(name: str) -> tuple[float, float]:

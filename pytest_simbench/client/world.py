@@ -58,6 +58,7 @@ class World:
             [m/s] and angular velocity [rad/s], in the world frame.
         excused: differences from the scene that the adapter declares.
         trace: samples at `trace_period` of everything since loading, if asked for.
+        phases: when each phase began, in simulated time [s], and its name.
         stopwatch: wall seconds of this repetition by kind; `plan` is the task's to measure.
         timeline: wall seconds from launch of the moments that the task marked.
     """
@@ -70,14 +71,19 @@ class World:
         stopwatch: Stopwatch | None = None,
         on_phase: Callable[[str], None] = lambda name: None,
         trace_period: float | None = None,
+        after_phase: Callable[[World, str], None] = lambda world, name: None,
         parity: bool = True,
     ) -> None:
         self.process = process
         self.scene = scene
         self.stopwatch = stopwatch or Stopwatch()
         self.timeline: dict[str, float] = {}
+        self.time = 0.0
         self.trace: list[Motion] = []
+        self.phases: list[tuple[float, str]] = []
+        self._saved: dict[str, tuple[list[Motion], list[tuple[float, str]]]] = {}
         self._trace_period = trace_period
+        self._after_phase: Callable[[World, str], None] = lambda world, name: None
         self._on_phase = on_phase
         self._names = [body.name for body in scene.free_bodies]
         if process.launch.compile_timeout:
@@ -87,6 +93,7 @@ class World:
         self.excused: list[str] = answer["excused"]
         self._take(answer)
         self._enter("task")  # between the phases that the task names
+        self._after_phase = after_phase
 
     def _take(self, answer: Mapping[str, Any]) -> None:
         self.time = float(answer["time"])
@@ -115,10 +122,12 @@ class World:
         before = self.process.where.phase
         self._enter(name)
         yield  # on an error the phase stays, so that the error and the record name it
+        self._after_phase(self, name)
         self._enter(before)
 
     def _enter(self, name: str) -> None:
         self.process.where.phase = name
+        self.phases.append((self.time, name))
         self._on_phase(name)
 
     def mark(self, moment: str) -> None:
@@ -154,12 +163,10 @@ class World:
     def _move(self, operation: str, log_period: float | None, **arguments: Any) -> Motion | None:
         period = log_period if log_period is not None else self._trace_period
         answer = self.process.request(operation, log_period=period, **arguments)
+        motion = Motion(**answer["log"]) if answer["log"] else None
+        if motion is not None and self._trace_period is not None and len(motion):
+            self.trace.append(self._thinned(motion))  # also where it ends in what cannot be
         self._take(answer)
-        if not answer["log"]:
-            return None
-        motion = Motion(**answer["log"])
-        if self._trace_period is not None and len(motion):
-            self.trace.append(self._thinned(motion))
         return motion if log_period is not None else None
 
     def _thinned(self, motion: Motion) -> Motion:
@@ -173,10 +180,14 @@ class World:
     def save(self, name: str = "saved") -> None:
         """Keep the whole state in the worker under `name`."""
         self.process.request("save", name=name)
+        self._saved[name] = [*self.trace], [*self.phases]
 
     def restore(self, name: str = "saved") -> None:
-        """Go back to a kept state."""
+        """Go back to a kept state, and to what had led to it."""
         self._take(self.process.request("restore", name=name))
+        if name in self._saved:
+            trace, phases = self._saved[name]
+            self.trace, self.phases = [*trace], [*phases]
 
     def contact_count(self) -> int:
         return int(self.process.request("contact_count"))

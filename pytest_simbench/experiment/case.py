@@ -49,7 +49,9 @@ class Case:
         memory_limit: of a worker and its children [MB]; None for no limit.
         seed: base seed; repetition k has seed + k - 1.
         jitter: scale of the start jitter; 1 is 1 mm and 1 degree.
-        trace: `off`, `on` or `retain-on-failure`: write the motion of every repetition.
+        trace: whose motion is kept: of the first repetition (`first`), also of failed ones
+            (`first-and-failed`), of these alone (`retain-on-failure`), of all (`on`), of none
+            (`off`). Failed ones are known only afterwards, so all are sampled for them.
         costly_start: the engine compiles when it starts; one worker serves several repetitions.
         compile_timeout: of the compiling [s].
         fresh: start a new worker for each repetition all the same.

@@ -11,8 +11,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from pytest_simbench.client.errors import (
     DisplayError,
     DisplayLost,
@@ -29,7 +27,10 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import file_stem, record_of, settings
 from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.workers import IdleWorkers
+from pytest_simbench.recordings.album import Album
+from pytest_simbench.recordings.trace import FOLDER, Trace
 from pytest_simbench.records.record import Failure, Record, Status
+from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.choices import seeds_seen
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.worker.text import LONGEST, named, readable, told
@@ -50,6 +51,8 @@ class Repetition:
         interrupts: held from the moment that the task has ended or failed, so that the record
             is made; the caller ends the block when it has kept it.
         on_phase, on_count: progress, see `tasks.base`.
+        album: takes pictures by the engine's own renderer. They cost time and memory, so nothing
+            else of such a repetition should count.
     """
 
     def __init__(
@@ -61,7 +64,9 @@ class Repetition:
         interrupts: Interrupts | None = None,
         on_phase: Callable[[str], None] = lambda name: None,
         on_count: Callable[[int, int], None] = lambda done, total: None,
+        album: Album | None = None,
     ) -> None:
+        self._album = album
         self.experiment = experiment
         self.case = case = experiment.case
         self.number = number
@@ -131,11 +136,16 @@ class Repetition:
             self.experiment.scene(self.seed),
             stopwatch=self.stopwatch,
             on_phase=self._enter,
-            trace_period=None if self.case.trace == "off" else TRACE_PERIOD,
+            trace_period=TRACE_PERIOD if self._keeps(failed=True) else None,
+            after_phase=self._look,
         )
         outcome = self.experiment.task.perform(world, self.seed, self._on_count)
         self._stats = world.stats()
         return outcome
+
+    def _look(self, world: World, phase: str) -> None:
+        if self._album is not None:
+            self._album.look(group(phase), world.render)
 
     def _construct(self) -> WorkerProcess:
         """Launch the worker and give the simulator its settings."""
@@ -252,29 +262,32 @@ class Repetition:
             else ""
         )
 
+    def _keeps(self, *, failed: bool) -> bool:
+        """Whether the motion of this repetition is kept."""
+        first = self.number == 1
+        wanted = {
+            "first": first,
+            "first-and-failed": first or failed,
+            "retain-on-failure": failed,
+            "on": True,
+            "off": False,
+        }
+        return wanted[self.case.trace]
+
     def _write_trace(self, *, failed: bool) -> str:
-        """Joint and body states over time, as arrays of a .npz file in the run folder.
+        """Joint and body states over time, and what is needed to draw them, in the run folder.
 
         Returns:
             why it could not be written; the repetition counts all the same.
         """
         world, case = self._world, self.case
-        if world is None or not world.trace or (case.trace == "retain-on-failure" and not failed):
+        if world is None or not world.trace or not self._keeps(failed=failed):
             return ""
-        motion = Motion.joined(world.trace)
         name = file_stem(self.experiment, self.number)
-        folder = case.folder / "traces"
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            np.savez_compressed(
-                folder / f"{name}.npz",
-                time=motion.time,
-                joints=motion.joints,
-                bodies=motion.bodies,
-                joint_names=list(world.scene.robot.joint_names if world.scene.robot else ()),
-                body_names=[body.name for body in world.scene.free_bodies],
-            )
-        except OSError as error:
+            trace = Trace.of(world.scene, Motion.joined(world.trace), world.phases)
+            trace.write(case.folder / FOLDER / f"{name}.npz")
+        except (OSError, DescriptionError) as error:
             return f"the trace could not be written: {named(error)}"
         return ""
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from pytest_simbench.plugin import options, spellings
+from pytest_simbench.plugin import options, recording, spellings
 from pytest_simbench.plugin.session import session_of
 from pytest_simbench.records.text import for_terminal
 
@@ -27,6 +27,7 @@ def run_command(config: pytest.Config) -> int:
     from pytest_simbench.plugin.merge import merge_runs, report_runs
 
     options.values(config)
+    recording.check(config)
     commands = dict(zip(options.COMMANDS, (_install, merge_runs, report_runs, _list), strict=True))
     return next(do(config) for name, do in commands.items() if options.given(config, name))
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench.plugin import arguments, benchmark, options
+from pytest_simbench.plugin import arguments, benchmark, options, recording
 from pytest_simbench.plugin.session import session_of
 from pytest_simbench.plugin.spellings import is_conftest
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 OWN = ("sim_", "simbench_")
 """How names begin that no other plugin has; pytest-playwright has an `output_path` too."""
 
-OF_CASES = ("fresh", "stall_timeout", "memory_limit", "seed", "jitter", "trace")
+OF_CASES = ("fresh", "stall_timeout", "memory_limit", "seed", "jitter")
 """Options of the same name as an attribute of `Case`, behind `sim_`."""
 
 
@@ -111,6 +111,7 @@ def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: A
         spec=chosen.specs.get(name),
         display=_display(this) if mode == "gui" else None,
         protocol=PROTOCOLS[options.value(config, "sim_protocol")],
+        trace=recording.trace_mode(config),
         **{name: options.value(config, f"sim_{name}") for name in OF_CASES},
         **more,
     )

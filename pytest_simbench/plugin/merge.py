@@ -17,14 +17,15 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from pytest_simbench.plugin import options
+from pytest_simbench.plugin import options, recording
 from pytest_simbench.records.folder import RECORDS, TASKS, Reading, RunFolder
 from pytest_simbench.records.merging import Merged, MergeError, merge, merge_tasks
 from pytest_simbench.records.paths import FolderError, new_name
-from pytest_simbench.records.record import RecordError
+from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.records.text import for_terminal
 
 if TYPE_CHECKING:
+    from pytest_simbench.report.outcome import Outcome
     from pytest_simbench.report.summary import TaskSummary
 
 
@@ -69,6 +70,13 @@ class Runs:
             files.add(file)
         return cls(folders, readings)
 
+    def outcomes(self) -> tuple[list[Outcome], list[str]]:
+        """How each ended, and what is wrong with what says so."""
+        from pytest_simbench.report.outcome import Outcome
+
+        found = [Outcome.read(folder.path) for folder in self.folders.values()]
+        return [outcome for outcome, _ in found], [problem for _, problem in found if problem]
+
     def merged(self, flag: str) -> tuple[list[Merged], Reading]:
         """Their records as those of one run: with where each comes from, and to be shown.
 
@@ -85,6 +93,23 @@ class Runs:
         return records, Reading(records=tuple(item.record for item in records), tasks=tasks)
 
 
+def together(passed: Sequence[bool | None]) -> bool | None:
+    """Whether the tests of several runs passed; None where one does not know."""
+    if False in passed:
+        return False
+    return None if None in passed else True
+
+
+def publish(config: pytest.Config, records: Sequence[Record], passed: bool | None) -> str:
+    """Write the badge, if one is asked for; a sentence when it could not be written."""
+    badge = options.value(config, "sim_badge")
+    if not badge:
+        return ""
+    from pytest_simbench.report.files import write_badge
+
+    return write_badge(Path(config.invocation_params.dir, badge), records, passed)
+
+
 def merge_runs(config: pytest.Config) -> int:
     """Merge the runs, print the result, and return the exit code.
 
@@ -92,7 +117,8 @@ def merge_runs(config: pytest.Config) -> int:
         pytest.UsageError: a run that cannot be read, runs that are not parts of one, or a folder
             that already holds a run or cannot be written to.
     """
-    from pytest_simbench.report.files import where, write_report
+    from pytest_simbench.report.files import where, write_outcome, write_report
+    from pytest_simbench.report.outcome import Outcome
     from pytest_simbench.report.page import PAGE_NAME
 
     runs = Runs.named(config, "sim_merge")
@@ -104,7 +130,14 @@ def merge_runs(config: pytest.Config) -> int:
         refused = _copy(records, runs.folders, folder)
         unsaved = folder.flush()
         written = write_report(folder)
-        _print(config, written.summaries, [*runs.problems, *refused, *unsaved, *written.problems])
+        problems = [*runs.problems, *refused, *unsaved, *written.problems]
+        kept = [item.record for item in records]
+        problems += recording.record(config, folder.path, folder.path, kept)
+        outcomes, wrong = runs.outcomes()
+        passed = together([outcome.passed for outcome in outcomes])
+        problems += [*wrong, write_outcome(folder.path, Outcome(passed))]
+        problems.append(publish(config, kept, passed))
+        _print(config, written.summaries, problems)
         if written.complete and not unsaved:
             print(where(folder.path / PAGE_NAME, config.invocation_params.dir))
     finally:
@@ -121,25 +154,41 @@ def report_runs(config: pytest.Config) -> int:
     Raises:
         pytest.UsageError: a run that cannot be read, or runs that are not parts of one.
     """
+    from pytest_simbench.report import repeatability
+    from pytest_simbench.report.changes import render_terminal
     from pytest_simbench.report.files import Written, in_order, summaries_of, where, write_files
     from pytest_simbench.report.page import PAGE_NAME
-    from pytest_simbench.report.repeatability import render_terminal, write_tables
 
     runs = Runs.named(config, "sim_report")
     target = _target(config, list(runs.folders.values()))
     (first, folder), *others = runs.folders.items()
     whole = runs.merged("--sim-report")[1] if others else runs.readings[first]
     summaries, written = summaries_of(whole), Written()
-    tables, problems = ([], []) if others else write_tables(folder.path, target)
+    outcomes, wrong = runs.outcomes()
+    tables, problems = ([], []) if others else repeatability.write_tables(folder.path, target)
     if not (whole.records or tables or problems):
         raise pytest.UsageError(f"--sim-report {first}: it holds no repetition")
     if target is not None:
         run = None if others else folder.path
-        written = write_files(target, summaries, in_order(whole.records), run=run)
-    _print(config, summaries, [*runs.problems, *written.problems])
+        compared = None if others else outcomes[0].compared
+        written = write_files(target, summaries, in_order(whole.records), True, compared, run)
+    recorded = [*wrong, publish(config, whole.records, together([o.passed for o in outcomes]))]
+    if target is not None and not others:
+        recorded = recording.record(config, folder.path, target, whole.records)
+    elif options.value(config, recording.RECORD):
+        recorded.append("no recordings: join the runs with --sim-merge first")
+    _print(config, summaries, [*runs.problems, *written.problems, *recorded])
+    if not others and outcomes[0].compared is not None:
+        name, report = outcomes[0].compared
+        text = render_terminal(report, shutil.get_terminal_size().columns, bool(report.changes))
+        print(for_terminal(f"\nbaseline: {name}\n{text}"))
     if tables or problems:
         width = shutil.get_terminal_size().columns
-        print("\n".join(["", render_terminal(tables, width), *map(for_terminal, problems)]))
+        print(
+            "\n".join(
+                ["", repeatability.render_terminal(tables, width), *map(for_terminal, problems)]
+            )
+        )
     if target is not None and written.complete:
         print(where(target / PAGE_NAME, config.invocation_params.dir))
     return 0 if written.complete else 1
@@ -168,7 +217,7 @@ def _print(config: pytest.Config, summaries: Sequence[TaskSummary], problems: li
 
     show = render_run if config.get_verbosity() > 0 else render_brief
     print(show(summaries, shutil.get_terminal_size().columns))
-    for problem in problems:
+    for problem in filter(None, problems):
         print(for_terminal(problem))
 
 

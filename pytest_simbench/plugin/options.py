@@ -112,8 +112,14 @@ OPTIONS = (
     Option("--sim-memory-limit", Number(1, 1e9), "memory a worker may use before it is killed",
            metavar="MB"),
     Option("--sim-output", File(), "folder of the run (default: .simbench/TIME-ID)", metavar="DIR"),
-    Option("--sim-trace", Choice(("off", "on", "retain-on-failure")), "write joint and body motion "
-           "at 50 Hz into the run folder: off, on, retain-on-failure", "off", metavar="WHEN"),
+    Option("--sim-trace", Choice(("first", "first-and-failed", "retain-on-failure", "on", "off")),
+           "keep the motion of joints and bodies at 50 Hz, for replay and recordings: of the first "
+           "repetition of each test (first), also of failed ones (first-and-failed), of these "
+           "alone (retain-on-failure), of all (on), of none (off)", "first", metavar="WHEN"),
+    Option("--sim-record", Choice(("mcap",)), "write each repetition's motion as a rosbag2 folder "
+           "(MCAP), for Foxglove, PlotJuggler and ros2 bag", metavar="FORMAT"),
+    Option("--sim-pictures", Flag(), "take pictures with each simulator's own renderer, in a "
+           "repetition that is not measured, for a contact sheet", False),
     Option("--sim-badge", File(), "write the result as JSON for a badge of shields.io into this "
            "file", metavar="FILE"),
     Option("--sim-threshold", Assignments("METRIC=NUMBER", numbers=True), "change a threshold of "

@@ -64,6 +64,11 @@ class RepeatFixture:
         else:
             number = wanted or number_mark(self.node, "reps") or self.case.protocol.repetitions
             result = ResultSet(up_to(int(number)), experiment.metrics)
+        if options.value(self.node.config, "sim_pictures"):
+            from pytest_simbench.experiment.photographer import photograph
+
+            if told := photograph(experiment):
+                self.run.tell(told)
         result.strict = options.value(self.node.config, "sim_strict")
         self.results.append(result)
         return result

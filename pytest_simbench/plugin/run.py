@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from pytest_simbench.client.display import Displays
-from pytest_simbench.plugin import options
+from pytest_simbench.plugin import options, recording
 from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import Record
@@ -210,6 +210,11 @@ class Run:
             if self.mistake:
                 session.exitstatus = pytest.ExitCode.USAGE_ERROR
 
+    def tell(self, problem: str) -> None:
+        """A sentence for the end of the run."""
+        if problem not in self._problems:
+            self._problems.append(problem)
+
     def of_test(self, test: str) -> list[str]:
         """Records of one test as JSON lines, to travel with its report: the disk may be full."""
         return [r.to_json() for r in self.folder.own if r.test == test]
@@ -237,10 +242,12 @@ class Run:
             reporter.write_line(f"ERROR: {for_terminal(self.mistake)}", red=True)
         if not self.reading.records and not self._repeated():
             return
+        from pytest_simbench.plugin.merge import publish
         from pytest_simbench.report import markdown
         from pytest_simbench.report.brief import render_brief
-        from pytest_simbench.report.files import write_badge, write_report
+        from pytest_simbench.report.files import write_outcome, write_report
         from pytest_simbench.report.github import append_summary
+        from pytest_simbench.report.outcome import Outcome
         from pytest_simbench.report.page import PAGE_NAME
         from pytest_simbench.report.tables import render_run
 
@@ -255,10 +262,11 @@ class Run:
             reporter.write_sep("=", "simulator comparison")
             show = render_run if self.config.get_verbosity() > 0 else render_brief
             reporter.write_line(show(written.summaries, reporter._tw.fullwidth))
-        badge = options.value(self.config, "sim_badge")
-        if badge:
-            path = Path(self.config.invocation_params.dir, badge)
-            problems.append(write_badge(path, self.reading.records, passed))
+        outcome = Outcome(passed, *(comparison.found or () if comparison else ()))
+        problems.append(write_outcome(self.folder.path, outcome))
+        problems.append(publish(self.config, self.reading.records, passed))
+        folder = self.folder.path
+        problems += recording.record(self.config, folder, folder, self.reading.records)
         if written.complete and not unsaved:
             self.page = self.folder.path / PAGE_NAME
         else:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench.plugin import options
+from pytest_simbench.plugin import options, recording
 
 if TYPE_CHECKING:
     from pytest_simbench.plugin.compare import Comparison
@@ -86,6 +86,8 @@ class SimSession:
 
             if wrong := bad_value(options.value(config, "sim_threshold")):
                 raise pytest.UsageError(wrong)
+        if not self.in_worker:
+            recording.check(config)
         named = any(options.given(config, name) for name in ("sim_output", "sim_resume"))
         if named and self._alone:
             self.run.lock()

@@ -14,15 +14,15 @@ LONGEST = 60
 """Characters of the message."""
 
 
-def badge(records: Sequence[Record], passed: bool) -> str:
+def badge(records: Sequence[Record], passed: bool | None) -> str:
     """The badge of a run, as JSON.
 
     Green: every test passed and no repetition failed. Yellow: the tests passed although some did.
-    Red: a test or a limit failed. Grey: nothing was measured.
+    Red: a test or a limit failed. Grey: nothing was measured, or it is not known what passed.
 
     Args:
         records: of the run; interrupted repetitions say nothing.
-        passed: whether the tests, and the limits against the baseline, passed.
+        passed: whether the tests, and the limits against the baseline, passed; None: not known.
     """
     ended = [record for record in records if record.status != "interrupted"]
     failed = sum(not record.ok for record in ended)
@@ -30,6 +30,8 @@ def badge(records: Sequence[Record], passed: bool) -> str:
     who = names[0] if len(names) == 1 else f"{len(names)} simulators"
     if not ended:
         message, colour = "nothing measured", "lightgrey"
+    elif passed is None:
+        message, colour = f"{who}: {len(ended)} repetitions, not judged", "lightgrey"
     elif not passed:
         message, colour = f"{who}: failing", "red"
     elif failed:

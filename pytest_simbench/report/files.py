@@ -1,5 +1,5 @@
-"""The report in the run folder: `report.html`, `report.md`, `report.csv` and, where matplotlib is,
-pictures."""
+"""The report in the run folder: `report.html`, `replay.html` of its traces, `report.md`,
+`report.csv` and, where matplotlib is, pictures."""
 
 from __future__ import annotations
 
@@ -15,10 +15,16 @@ from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.text import for_csv, for_terminal
 from pytest_simbench.report import markdown
+from pytest_simbench.report import outcome as outcome_of
 from pytest_simbench.report.badge import badge
 from pytest_simbench.report.figures import FiguresUnavailable, write_figures
 from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.outcome import Outcome
 from pytest_simbench.report.page import PAGE_NAME, Compared, page_of
+from pytest_simbench.report.replay import REPLAY_NAME
+from pytest_simbench.report.replay.groups import Group, groups
+from pytest_simbench.report.sheet import sheet_name
+from pytest_simbench.report.sheet import sheets as sheets_of
 from pytest_simbench.report.summary import PHASES, TaskSummary, summarise
 from pytest_simbench.tasks.metrics import COSTS
 
@@ -110,24 +116,67 @@ def write_files(
         except OSError as error:
             failed.append(f"pictures: {_unwritable(folder, error)}")
     text = markdown.render_run(summaries, [picture.name for picture in pictures])
-    contents = {PAGE_NAME: page_of(run or folder, summaries, records, comparison)}
+    sheets, told = _sheets(run or folder, records) if figures else ({}, [])
+    problems += told
+    shown, replay, told = _replay(run or folder, records)
+    problems += told
+    contents = {PAGE_NAME: page_of(run or folder, summaries, records, comparison, shown, sheets)}
+    if replay:
+        contents[REPLAY_NAME] = replay
     if records:  # else the run has results on repeatability alone
         contents |= {MARKDOWN_NAME: text, CSV_NAME: csv_of(records)}
-    for name, content in contents.items():
+    encoded = {name: text.encode("utf-8", "replace") for name, text in contents.items()}
+    encoded |= {sheet_name(task): sheet for task, sheet in sheets.items()}
+    for name, content in encoded.items():
         try:
-            write_whole(folder / name, content.encode("utf-8", "replace"))
+            write_whole(folder / name, content)
         except OSError as error:
             failed.append(_unwritable(folder / name, error))
     return Written((*problems, *failed), not failed)
 
 
+def _sheets(run: Path, records: Sequence[Record]) -> tuple[dict[str, bytes], list[str]]:
+    """The contact sheet of each task, and what could not be shown."""
+    try:
+        return sheets_of(run, records)
+    except FiguresUnavailable as error:
+        return {}, [str(error)]
+
+
+def _replay(run: Path, records: Sequence[Record]) -> tuple[list[Group], str, list[str]]:
+    """What the replay shows, the page itself, and what could not be shown."""
+    from pytest_simbench.report.replay.render import ReplayUnavailable, replay_of
+
+    found = groups(run, records)
+    if not found:
+        return [], "", []
+    try:
+        page, count, problems = replay_of(found)
+    except ReplayUnavailable as error:
+        return [], "", [str(error)]
+    return found[:count], page, problems
+
+
 def where(page: Path, base: Path) -> str:
     """The line that tells where the page is, short where it lies below the folder `base`."""
-    shown = page.relative_to(base) if page.is_relative_to(base) else page
-    return for_terminal(f"report: {shown}")
+    return for_terminal(f"report: {shown(page, base)}")
 
 
-def write_badge(path: Path, records: Sequence[Record], passed: bool) -> str:
+def shown(path: Path, base: Path) -> Path:
+    """A path as the terminal shows it: short where it lies below the folder `base`."""
+    return path.relative_to(base) if path.is_relative_to(base) else path
+
+
+def write_outcome(folder: Path, outcome: Outcome) -> str:
+    """Keep how a run ended in its folder; a sentence when it could not be written."""
+    try:
+        outcome.write(folder)
+    except OSError as error:
+        return _unwritable(folder / outcome_of.NAME, error)
+    return ""
+
+
+def write_badge(path: Path, records: Sequence[Record], passed: bool | None) -> str:
     """Write the badge of a run; a sentence when it could not be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

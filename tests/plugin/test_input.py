@@ -25,7 +25,7 @@ TEST = """
         (["--reps=auto:0"], "--reps=auto:0: give a whole number from 1"),
         (["--jitter=-1"], "--jitter=-1: give a number from 0 to 1000"),
         (["--protocol=quick"], "--protocol=quick: choose from fast, paper, smoke"),
-        (["--sim-trace=maybe"], "--sim-trace=maybe: choose from off, on, retain-on-failure"),
+        (["--sim-trace=maybe"], "--sim-trace=maybe: choose from first, first-and-failed, *, off"),
         (["--sim-set=mujoco.timestep"], "--sim-set=mujoco.timestep: write it as SIM.SETTING=VALUE"),
         (["--sim-set=timestep=1"], "--sim-set=timestep=1: write it as SIM.SETTING=VALUE"),
         (["--sim-set=mujoco.speed=1"], "mujoco has no setting 'speed'; choose from timestep=*"),

@@ -104,6 +104,37 @@ def test_the_comparison_with_a_baseline_stands_on_the_page(pytester: pytest.Pyte
     assert f"Compared with {pytester.path / 'base'}" in page
 
 
+def test_a_kept_run_shows_how_it_ended(pytester: pytest.Pytester) -> None:
+    """From the folder alone: the comparison with a baseline that is gone, and the badge."""
+    pytester.runpytest_subprocess("--sim=mujoco", "--reps=5", "--sim-output=base")
+    run(pytester, "--sim-baseline=base")
+    (pytester.path / "base").rename(pytester.path / "elsewhere")
+    kept = (pytester.path / "o" / "report.html").read_bytes()
+    (pytester.path / "o" / "report.html").unlink()
+    result = pytester.runpytest_subprocess("--sim-report=o", "--sim-badge=badge.json")
+    assert result.ret == 0
+    assert (pytester.path / "o" / "report.html").read_bytes() == kept
+    result.stdout.fnmatch_lines([f"baseline: {pytester.path / 'base'}", "*landed*", "report: o/*"])
+    assert json.loads((pytester.path / "badge.json").read_text())["color"] == "brightgreen"
+
+
+def test_the_badge_of_merged_runs_is_that_of_all(pytester: pytest.Pytester) -> None:
+    run(pytester)
+    pytester.makepyfile(test_it=TEST.rstrip() + ".assert_at_least('landed', 0.5)\n        assert 0")
+    pytester.runpytest_subprocess(
+        "--sim=mujoco", "--reps=5", "--sim-output=second", "--sim-seed=3000"
+    ).assert_outcomes(failed=1)
+    badge = pytester.path / "badge.json"
+    for command in (["--sim-merge", "o", "second", "--sim-output=whole"], ["--sim-report=whole"]):
+        result = pytester.runpytest_subprocess("--sim-badge=badge.json", *command)
+        assert result.ret == 0
+        assert json.loads(badge.read_text())["color"] == "red"
+        badge.unlink()
+    (pytester.path / "o" / "outcome.json").unlink()
+    pytester.runpytest_subprocess("--sim-report", "o", "--sim-badge=badge.json")
+    assert json.loads(badge.read_text())["message"] == "mujoco: 5 repetitions, not judged"
+
+
 def test_a_run_of_repeatability_alone_has_its_page(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(
         test_it="""

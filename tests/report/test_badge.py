@@ -26,11 +26,14 @@ ONE_FAILED = [*FINE, failed("WorkerDied", "load", "gone", repetition=11)]
         (ONE_FAILED, True, "3 simulators: 1 of 21 repetitions failed", "yellow"),
         (ONE_FAILED, False, "3 simulators: failing", "red"),
         (FINE, False, "2 simulators: failing", "red"),
+        (FINE, None, "2 simulators: 20 repetitions, not judged", "lightgrey"),
         ([record(status="interrupted")], True, "nothing measured", "lightgrey"),
         ([], False, "nothing measured", "lightgrey"),
     ],
 )
-def test_message_and_colour(records: list[Record], passed: bool, message: str, colour: str) -> None:
+def test_message_and_colour(
+    records: list[Record], passed: bool | None, message: str, colour: str
+) -> None:
     assert json.loads(badge(records, passed)) == {
         "schemaVersion": 1,
         "label": "simulators",

@@ -7,11 +7,12 @@ is written.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from pytest_simbench.measure.gate import GateReport
 from pytest_simbench.records.record import Record
+from pytest_simbench.report.replay.groups import Group
 from pytest_simbench.report.summary import TaskSummary
 
 PAGE_NAME = "report.html"
@@ -25,6 +26,8 @@ def page_of(
     summaries: Sequence[TaskSummary],
     records: Sequence[Record],
     comparison: Compared | None = None,
+    replays: Sequence[Group] = (),
+    sheets: Mapping[str, bytes] | None = None,
 ) -> str:
     """The page of a run, as HTML.
 
@@ -33,8 +36,10 @@ def page_of(
         summaries: from `summary.summarise`, with their wins.
         records: that they were made of.
         comparison: with a baseline, where there is one.
+        replays: what the replay beside the page shows.
+        sheets: contact sheets (PNG), by the name of their task.
     """
     from pytest_simbench.report.page.context import page
     from pytest_simbench.report.page.render import render
 
-    return render(page(folder, summaries, records, comparison))
+    return render(page(folder, summaries, records, comparison, replays, sheets or {}))

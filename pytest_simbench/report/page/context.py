@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,7 @@ from pytest_simbench.report.page import setup
 from pytest_simbench.report.page.cells import Of, Table, from_columns, labelled, of, study
 from pytest_simbench.report.page.pictures import Picture, pictures
 from pytest_simbench.report.page.strips import Strip, strips
+from pytest_simbench.report.replay.groups import Group, links
 from pytest_simbench.report.summary import TaskSummary
 
 if TYPE_CHECKING:
@@ -43,7 +45,7 @@ class FailureBlock:
 
 @dataclass(frozen=True)
 class TaskPart:
-    """One task."""
+    """One task; of its replays what each shows, and the address; its contact sheet as base64."""
 
     title: str
     answer: Sequence[str]
@@ -53,6 +55,8 @@ class TaskPart:
     causes: Sequence[FailureBlock]
     pictures: Sequence[Picture]
     notes: Sequence[str]
+    replays: Sequence[tuple[str, str]]
+    sheet: str
 
 
 @dataclass(frozen=True)
@@ -91,8 +95,11 @@ def page(
     summaries: Sequence[TaskSummary],
     records: Sequence[Record],
     comparison: tuple[str, GateReport] | None = None,
+    replays: Sequence[Group] = (),
+    sheets: Mapping[str, bytes] | None = None,
 ) -> Page:
     """The page of a run, see `page_of`."""
+    replay = links(replays)
     numbers: dict[int, int] = {}
     repetitions: list[dict[str, Any]] = []
 
@@ -100,7 +107,7 @@ def page(
         """Its place among the page's repetitions, where it is put when first asked for."""
         if id(record) not in numbers:
             numbers[id(record)] = len(repetitions)
-            repetitions.append(_repetition(record))
+            repetitions.append(_repetition(record, replay.get(id(record), "")))
         return numbers[id(record)]
 
     problems: dict[str, None] = {}
@@ -119,6 +126,12 @@ def page(
                 _causes(summary, rows),
                 drawn,
                 columns.notes(summary),
+                [
+                    (f"seed {group.seed}, {_simulators(group)}", replay[id(group.shown[0][0])])
+                    for group in replays
+                    if group.task == summary.task
+                ],
+                b64encode((sheets or {}).get(summary.task, b"")).decode("ascii"),
             )
         )
     again, unreadable = _repeatability(folder)
@@ -194,7 +207,12 @@ def _compared(name: str, report: GateReport) -> Compared:
     )
 
 
-def _repetition(record: Record) -> dict[str, Any]:
+def _simulators(group: Group) -> str:
+    count = len(group.shown)
+    return group.shown[0][0].simulator if count == 1 else f"{count} side by side"
+
+
+def _repetition(record: Record, replay: str) -> dict[str, Any]:
     """What a dot tells of its repetition."""
     error = record.error
     found = {
@@ -206,6 +224,7 @@ def _repetition(record: Record) -> dict[str, Any]:
         "cause": f"{error.cause}: {error.message}" if error else "",
         "log": str(record.details.get("log") or ""),
         "command": command(record),
+        "replay": replay,
     }
     return {k: for_terminal(v) if isinstance(v, str) else v for k, v in found.items()}
 

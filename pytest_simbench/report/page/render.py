@@ -40,7 +40,7 @@ def render(page: Page) -> str:
         script=Markup(script),
         # No other script runs, whatever a text smuggled in; nothing is loaded, styles stay inside.
         policy=f"default-src 'none'; script-src 'sha256-{_digest(script)}'; "
-        "style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'",
+        "style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'",
         symbols=SYMBOLS,
         svg=lambda picture: Markup(picture.svg),
         log_link=lambda log: log if _LOG.fullmatch(log) else "",

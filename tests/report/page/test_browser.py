@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import re
-import shutil
-from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -16,64 +14,19 @@ from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.page import PAGE_NAME, page_of
 from pytest_simbench.report.summary import summarise
 from tests.hostile import HOSTILE
+from tests.report.browser import Opened, browser, opened
 from tests.report.page.test_hostile_page import MORE
 from tests.report.samples import METRICS, REFERENCES, record, stacking_run, throwing_run
 from tests.report.test_hostile import declared, records
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Page
 
-BROWSER = shutil.which("chromium")
 STRANGE = "".join(text for text in (*HOSTILE, *MORE) if len(text) < 1000)
 SIZES = [(400, 800), (1400, 900)]
 
 pytestmark = pytest.mark.xdist_group("browser")
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs the extra 'test'")
-    if BROWSER is None:
-        pytest.skip("no chromium here: apt-get install chromium")
-    with playwright.sync_playwright() as started:
-        found = started.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
-        yield found
-        found.close()
-
-
-class Opened:
-    """Pages of one test; at the end nothing may have been complained of or loaded."""
-
-    def __init__(self, browser: Browser) -> None:
-        self._browser = browser
-        self._contexts: list[Any] = []
-        self.complaints: list[str] = []
-        self.loaded: list[str] = []
-
-    def __call__(self, path: Path, width: int = 1400, height: int = 900, **given: Any) -> Page:
-        context = self._browser.new_context(viewport={"width": width, "height": height}, **given)
-        context.set_default_timeout(10_000)
-        self._contexts.append(context)
-        page: Page = context.new_page()
-        page.on("console", lambda message: self.complaints.append(message.text))
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.on("dialog", lambda dialog: self.complaints.append(dialog.message))
-        page.on("request", lambda request: self.loaded.append(request.url))
-        page.goto(path.as_uri())
-        return page
-
-    def close(self) -> None:
-        for context in self._contexts:
-            context.close()
-
-
-@pytest.fixture
-def opened(browser: Browser) -> Iterator[Opened]:
-    found = Opened(browser)
-    yield found
-    found.close()
-    assert found.complaints == []
-    assert {url.partition("#")[0].rpartition("/")[2] for url in found.loaded} == {PAGE_NAME}
+__all__ = ["browser", "opened"]  # fixtures
 
 
 def write(folder: Path, found: list[Record], baseline: list[Record] | None = None) -> Path:

@@ -76,6 +76,11 @@
       line.append(plain ? element("a", found.log, { href: found.log }) : element("code", found.log));
       lines.push(line);
     }
+    if (found.replay) {
+      const line = element("span", "");
+      line.append(element("a", "replay", { href: found.replay }));
+      lines.push(line);
+    }
     if (found.command) {
       const line = element("span", "the same seed again: ");
       line.append(element("code", found.command));

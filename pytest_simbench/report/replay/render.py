@@ -1,0 +1,181 @@
+"""The replay as one HTML file: trimesh's viewer of the meshes, and our player beside it.
+
+trimesh's page holds three.js and a viewer whose `scene`, `camera`, `renderer` and `render` are
+global. The player takes `render` over: it draws every simulator into its own tile.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from base64 import b64encode
+from collections.abc import Sequence
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.recordings.bag import METAL
+from pytest_simbench.recordings.figure import Figure, Mesh
+from pytest_simbench.recordings.trace import Trace, TraceError
+from pytest_simbench.records.text import in_one_line
+from pytest_simbench.report.replay.groups import Group
+from pytest_simbench.report.replay.motion import SCALE, packed
+from pytest_simbench.scene import Box, Pose
+
+INSTALL = "no replay in 3-D: pip install 'pytest-simbench[replay]'"
+
+LARGEST = 12_000_000
+"""Of all motions in a page [bytes]; further seeds are left out."""
+
+
+class ReplayUnavailable(ImportError):
+    """trimesh is not installed; the message says how to install it."""
+
+
+def replay_of(shown: Sequence[Group]) -> tuple[str, int, list[str]]:
+    """The page.
+
+    Args:
+        shown: from `groups`.
+
+    Returns:
+        The page as HTML, how many of the groups it holds (the first ones), and what could not be
+        shown, one sentence each. Without a single trace that can be read there is no page: "".
+
+    Raises:
+        ReplayUnavailable: trimesh is not installed.
+    """
+    meshes = _Meshes()
+    told: list[dict[str, Any]] = []
+    problems: list[str] = []
+    size = 0
+    for group in shown:
+        tiles: list[dict[str, Any]] = []
+        several = len({record.simulator for record, _ in group.shown}) < len(group.shown)
+        for record, path in group.shown:
+            try:
+                trace = Trace.read(path)
+            except TraceError as error:
+                problems.append(f"no replay: {error}")
+                continue
+            tiles.append(
+                {
+                    "label": in_one_line(record.label if several else record.simulator),
+                    "status": record.status,
+                    "repetition": record.repetition,
+                    "motion": packed(trace),
+                    "samples": len(trace.time),
+                    "phases": [[time, in_one_line(name)] for time, name in trace.phases],
+                    "joints": list(trace.joint_names),
+                    "boxes": [_box(box) for box in trace.boxes],
+                    "free": len(trace.free),
+                    "figure": meshes.figure(trace.figure),
+                }
+            )
+        told.append({"task": in_one_line(group.task), "seed": str(group.seed), "tiles": tiles})
+        size += sum(len(tile["motion"]) for tile in tiles)
+        if size > LARGEST:
+            break
+    if len(told) < len(shown):
+        problems.append(f"the replay shows {len(told)} of {len(shown)} seeds: more would not fit")
+    if not size:
+        return "", 0, problems
+    data = {"groups": told, "scale": SCALE, "metal": METAL}
+    return _page(meshes.viewer(), data), len(told), list(dict.fromkeys(problems))
+
+
+class _Meshes:
+    """The meshes of all robots, each once."""
+
+    def __init__(self) -> None:
+        self._found: dict[bytes, int] = {}
+        self._meshes: list[Mesh] = []
+
+    def figure(self, figure: Figure | None) -> dict[str, Any] | None:
+        """What the player needs of a robot; parts name meshes of the viewer."""
+        if figure is None:
+            return None
+        numbers = [self._number(mesh) for mesh in figure.meshes]
+        return {
+            "root": figure.root,
+            "hinges": [
+                {**hinge.__dict__, "origin": list(hinge.origin.as_array())}
+                for hinge in figure.hinges
+            ],
+            "parts": [
+                {
+                    "link": part.link,
+                    "pose": list(part.pose.as_array()),
+                    "size": part.size,
+                    "mesh": None if part.mesh is None else numbers[part.mesh],
+                }
+                for part in figure.parts
+            ],
+        }
+
+    def _number(self, mesh: Mesh) -> int:
+        key = hashlib.sha256(mesh.triangles.tobytes()).digest()
+        if key not in self._found:
+            self._found[key] = len(self._meshes)
+            self._meshes.append(mesh)
+        return self._found[key]
+
+    def viewer(self) -> str:
+        """trimesh's page: a cube `box` of edge length 1, and the meshes `mesh_0`, `mesh_1`, ..."""
+        try:
+            import trimesh
+            from trimesh.viewer.notebook import scene_to_html
+        except ImportError:
+            raise ReplayUnavailable(INSTALL) from None
+        scene = trimesh.Scene()
+        scene.add_geometry(trimesh.creation.box(), node_name="box", geom_name="box")
+        for k, mesh in enumerate(self._meshes):
+            triangles = trimesh.Trimesh(
+                np.asarray(mesh.vertices, dtype=float), mesh.faces, process=False
+            )
+            scene.add_geometry(triangles, node_name=f"mesh_{k}", geom_name=f"mesh_{k}")
+        return str(scene_to_html(scene))
+
+
+def _box(box: Box) -> dict[str, Any]:
+    return {"size": box.size, "colour": box.colour, "pose": list(_array(box.pose))}
+
+
+def _array(pose: Pose) -> list[float]:
+    return [float(value) for value in pose.as_array()]
+
+
+def _page(viewer: str, data: dict[str, Any]) -> str:
+    """The viewer's page with our style and player in it."""
+    body, style, script = map(_part, ("body.html", "replay.css", "replay.js"))
+    # No text of the run can end the element: JSON without `<`.
+    content = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
+    player = (
+        f'<script type="application/json" id="data">{content}</script><script>{script}</script>'
+    )
+    page = viewer.replace("</body>", f"{body}{player}</body>", 1)
+    page = re.sub("<title>.*?</title>", "<title>Replay of simulators</title>", page, count=1)
+    page = re.sub('<meta name="viewport".*?>', "", page, count=1, flags=re.DOTALL)
+    scripts = list(re.findall(r"<script>(.*?)</script>", page, re.DOTALL))
+    digests = " ".join(f"'sha256-{_digest(found)}'" for found in scripts)
+    # The viewer loads its meshes from an address that is their content; nothing else is loaded.
+    policy = (
+        f"default-src 'none'; script-src {digests}; style-src 'unsafe-inline'; connect-src data:; "
+        "img-src data: blob:; base-uri 'none'; form-action 'none'"
+    )
+    head = (
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f'<meta name="color-scheme" content="light dark"><style>{style}</style></head>'
+    )
+    return page.replace("</head>", head, 1)
+
+
+def _part(name: str) -> str:
+    return (files(__package__) / "templates" / name).read_text(encoding="utf-8")
+
+
+def _digest(script: str) -> str:
+    return b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")

@@ -1,0 +1,49 @@
+"""What a world keeps of its motion: samples and phases, along the way to its present state."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from pytest_simbench.client.errors import Diverged, Where
+from pytest_simbench.client.process import WorkerProcess
+from pytest_simbench.client.world import Motion, World
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.scene import Pose, Scene
+from pytest_simbench.tasks.base import cube
+
+SCENE = Scene("s", (cube("a", Pose.at(0.0, 0.0, 2.0), (1.0,) * 4),))
+
+
+def test_what_was_undone_is_not_in_it(case: Case) -> None:
+    process = WorkerProcess(case.launch("x"), Where(case.simulator, case.mode))
+    process.construct()
+    world = World(process, SCENE, trace_period=0.02)
+    with world.phase("fall"):
+        world.wait(0.1)
+    world.save()
+    with world.phase("lost"):
+        world.wait(0.1)
+    world.restore()
+    with world.phase("fall again"):
+        world.wait(0.06)
+    process.close()
+    motion = Motion.joined(world.trace)
+    np.testing.assert_allclose(motion.time, np.arange(1, 9) * 0.02)
+    assert (np.diff(motion.bodies[:, 0, 2]) < 0).all()
+    begun = {name: round(time, 3) for time, name in world.phases}
+    assert begun.items() >= {"fall": 0.0, "fall again": 0.1, "task": 0.16}.items()
+    assert "lost" not in begun
+
+
+def test_what_went_wrong_is_in_it(case: Case) -> None:
+    """The motion that ends in a state that cannot be is the one to look at."""
+    process = WorkerProcess(case.launch("x"), Where(case.simulator, case.mode))
+    process.construct()
+    world = World(process, dataclasses.replace(SCENE, gravity=(500.0, 0.0, 0.0)), trace_period=0.02)
+    with pytest.raises(Diverged, match="left the room"):
+        world.wait(0.4)
+    process.close()
+    assert Motion.joined(world.trace).bodies[-1, 0, 0] > 5.0

@@ -1,0 +1,177 @@
+"""A recording says what the trace says, read back by `mcap` and by `rosbags`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+from pytest_simbench.recordings import bag
+from pytest_simbench.recordings.bag import BagsUnavailable, frame_of, write_bag
+from pytest_simbench.recordings.trace import Trace
+from tests.hostile import HOSTILE
+from tests.recordings.samples import motion, trace
+
+LATCHED = {"/tf_static", "/markers", "/robot_description"}
+STORE = get_typestore(Stores.ROS2_JAZZY)
+
+
+def messages(folder: Path) -> dict[str, list[tuple[int, Any]]]:
+    """By topic the stamps [ns] and messages, read by rosbags from the folder's metadata.yaml."""
+    found: dict[str, list[tuple[int, Any]]] = {}
+    with AnyReader([folder]) as reader:
+        for connection, stamp, data in reader.messages():
+            message = reader.deserialize(data, connection.msgtype)
+            found.setdefault(connection.topic, []).append((stamp, message))
+    return found
+
+
+def messages_of_mcap(folder: Path) -> dict[str, list[tuple[int, Any]]]:
+    """The same, read by Foxglove's own library from the one MCAP file."""
+    (path,) = folder.glob("*.mcap")
+    found: dict[str, list[tuple[int, Any]]] = {}
+    with path.open("rb") as file:
+        for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages():
+            assert schema is not None
+            read = STORE.deserialize_cdr(message.data, schema.name)
+            found.setdefault(channel.topic, []).append((message.log_time, read))
+    return found
+
+
+def pose(transform: Any) -> list[float]:
+    t, q = transform.translation, transform.rotation
+    return [t.x, t.y, t.z, q.w, q.x, q.y, q.z]
+
+
+@pytest.mark.parametrize("read", [messages, messages_of_mcap])
+def test_it_reads_back_as_the_trace(read: Any, tmp_path: Path) -> None:
+    kept = trace()
+    kept.write(tmp_path / "x.npz")
+    write_bag(Trace.read(tmp_path / "x.npz"), tmp_path / "x")
+    found = read(tmp_path / "x")
+    states = found["/joint_states"]
+    assert len(states) == len(kept.time)
+    for k, (stamp, state) in enumerate(states):
+        assert stamp == state.header.stamp.sec * 10**9 + state.header.stamp.nanosec
+        assert stamp == pytest.approx(kept.time[k] * 1e9, abs=1)
+        assert state.name == list(kept.joint_names)
+        np.testing.assert_allclose(state.position, kept.joints[k, 0], atol=1e-6)
+        np.testing.assert_allclose(state.velocity, kept.joints[k, 1], atol=1e-6)
+    for k, (_, message) in enumerate(found["/tf"]):
+        frames = {
+            t.child_frame_id: (t.header.frame_id, pose(t.transform)) for t in message.transforms
+        }
+        for body, box in enumerate(kept.free):
+            parent, found_pose = frames[frame_of(box)]
+            assert parent == "world"
+            np.testing.assert_allclose(found_pose, kept.bodies[k, body, :7], atol=1e-6)
+    assert [m.clock.sec * 10**9 + m.clock.nanosec for _, m in found["/clock"]] == [
+        stamp for stamp, _ in states
+    ]
+
+
+def test_links_stand_where_the_model_has_them(tmp_path: Path) -> None:
+    """Along /tf from the root, as a viewer goes, against the adapters' own forward kinematics."""
+    from pytest_simbench.robot.panda import panda
+    from pytest_simbench.scene import Pose
+    from pytest_simbench.simulator.kinematics import link_poses
+    from pytest_simbench.simulator.urdf import PreparedRobot
+
+    kept = trace()
+    write_bag(kept, tmp_path / "x")
+    found = messages(tmp_path / "x")
+    prepared = PreparedRobot(panda())
+    for k, (_, message) in enumerate(found["/tf"]):
+        positions = dict(zip(kept.joint_names, kept.joints[k, 0], strict=True))
+        expected = link_poses(prepared, positions)
+        poses = {"base": Pose()}
+        for transform in message.transforms:
+            if not transform.child_frame_id.startswith("bodies/"):
+                own = Pose.from_array(pose(transform.transform))
+                poses[transform.child_frame_id] = poses[transform.header.frame_id] * own
+        assert poses.keys() == expected.keys()
+        for name, there in poses.items():
+            np.testing.assert_allclose(there.matrix(), expected[name].matrix(), atol=1e-6)
+
+
+def test_what_does_not_change_is_latched_and_said_once(tmp_path: Path) -> None:
+    kept = trace()
+    write_bag(kept, tmp_path / "x")
+    found = messages(tmp_path / "x")
+    assert {topic for topic, sent in found.items() if len(sent) == 1} >= LATCHED
+    assert all(found[topic][0][0] == found["/clock"][0][0] for topic in LATCHED)
+    with AnyReader([tmp_path / "x"]) as reader:
+        durable = {
+            c.topic
+            for c in reader.connections
+            if "TRANSIENT_LOCAL" in str(c.ext.offered_qos_profiles)
+        }
+    assert durable == LATCHED
+    urdf = found["/robot_description"][0][1].data
+    assert urdf.startswith("<robot")
+    assert "mesh" not in urdf
+    assert "panda_joint7" in urdf
+
+
+def test_every_shape_has_a_marker_in_a_frame_that_there_is(tmp_path: Path) -> None:
+    kept = trace()
+    write_bag(kept, tmp_path / "x")
+    found = messages(tmp_path / "x")
+    markers = found["/markers"][0][1].markers
+    frames = {
+        t.child_frame_id for topic in ("/tf", "/tf_static") for t in found[topic][0][1].transforms
+    }
+    assert {marker.header.frame_id for marker in markers} <= frames
+    assert len({(marker.ns, marker.id) for marker in markers}) == len(markers)
+    triangles = [m for m in markers if m.type == m.TRIANGLE_LIST]
+    assert kept.figure is not None
+    assert sum(len(m.points) for m in triangles) == 3 * sum(
+        len(m.faces) for m in kept.figure.meshes
+    )
+    red = next(m for m in markers if m.header.frame_id == "bodies/red")
+    assert (red.scale.x, red.color.r, red.color.b) == pytest.approx((0.05, 0.9, 0.1))
+
+
+def test_phases_are_log_messages_at_their_own_time(tmp_path: Path) -> None:
+    write_bag(trace(phases=[(0.0, "pick"), (0.11, "place"), (9.0, "settle")]), tmp_path / "x")
+    found = messages(tmp_path / "x")["/rosout"]
+    assert [(stamp, m.msg) for stamp, m in found] == [
+        (0, "pick"), (110_000_000, "place"), (9_000_000_000, "settle")
+    ]  # fmt: skip
+
+
+def test_hostile_names_stay_text(tmp_path: Path) -> None:
+    phases = [(0.1 * k, text) for k, text in enumerate(HOSTILE)]
+    told = {"simulator": HOSTILE[0], "test": HOSTILE[4]}
+    write_bag(trace(phases=phases), tmp_path / "x", told)
+    found = [message.msg for _, message in messages(tmp_path / "x")["/rosout"]]
+    assert len(found) == len(HOSTILE)
+    assert all(text.isprintable() for text in found)
+    metadata = (tmp_path / "x" / "metadata.yaml").read_text()
+    assert all(line.isprintable() for line in metadata.splitlines())
+
+
+def test_a_scene_without_a_robot_is_a_bag_too(tmp_path: Path) -> None:
+    write_bag(trace(robot=False), tmp_path / "x")
+    found = messages(tmp_path / "x")
+    assert "/joint_states" not in found
+    assert "/robot_description" not in found
+    assert len(found["/tf"]) == len(motion(0).time)
+
+
+def test_a_bag_is_replaced_whole(tmp_path: Path) -> None:
+    write_bag(trace(), tmp_path / "x")
+    write_bag(trace(robot=False), tmp_path / "x")
+    assert "/joint_states" not in messages(tmp_path / "x")
+    assert [path.name for path in tmp_path.iterdir()] == ["x"]
+
+
+def test_what_is_missing_is_one_sentence(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(BagsUnavailable, match=r"pip install 'pytest-simbench\[ros\]'"):
+        bag.write_bag(trace(), tmp_path / "x")

@@ -1,0 +1,115 @@
+"""Which repetitions stand side by side, and what of them the page can hold."""
+
+from __future__ import annotations
+
+import builtins
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_simbench.experiment.identity import file_stem_of
+from pytest_simbench.records.record import Record
+from pytest_simbench.report.page import page_of
+from pytest_simbench.report.replay import render
+from pytest_simbench.report.replay.groups import groups, links
+from pytest_simbench.report.replay.render import ReplayUnavailable, replay_of
+from pytest_simbench.report.summary import summarise
+from tests.recordings.samples import trace
+from tests.report.samples import METRICS, record
+
+
+def keep(run: Path, *records: Record) -> list[Record]:
+    """Traces of these repetitions in a run folder."""
+    for made in records:
+        trace().write(run / "traces" / f"{file_stem_of(made)}.npz")
+    return list(records)
+
+
+def test_the_first_seed_of_each_task_comes_first(tmp_path: Path) -> None:
+    kept = keep(
+        tmp_path,
+        record("drake", 2, status="failed"),
+        record("drake", 1),
+        record("mujoco", 1),
+        record("mujoco", 1, task="throwing"),
+        record("mujoco", 1, test="t[2]", settings={"task.levels": 2}),
+    )
+    without = record("pybullet", 1)
+    found = groups(tmp_path, [*kept, without])
+    assert [(g.task, g.parameters, g.seed, len(g.shown)) for g in found] == [
+        ("stacking", '{"task.levels": 2}', 1001, 1),
+        ("stacking", "{}", 1001, 2),
+        ("throwing", "{}", 1001, 1),
+        ("stacking", "{}", 1002, 1),
+    ]
+    addresses = links(found)
+    assert addresses[id(kept[1])] == addresses[id(kept[2])] == "replay.html#1"
+    assert id(without) not in addresses
+
+
+def test_the_report_leads_to_the_replay(tmp_path: Path) -> None:
+    kept = keep(tmp_path, record("drake", 1), record("mujoco", 1))
+    summaries = summarise(kept, METRICS, {})
+    page = page_of(tmp_path, summaries, kept, None, groups(tmp_path, kept))
+    assert page.count('"replay": "replay.html#0"') == 2
+    assert '<a class="replay" href="replay.html#0">seed 1001, 2 side by side</a>' in page
+    assert 'href="replay.html' not in page_of(tmp_path, summaries, kept)
+
+
+def test_a_trace_that_is_none_is_told_and_the_rest_shown(tmp_path: Path) -> None:
+    kept = keep(tmp_path, record("drake", 1), record("mujoco", 1))
+    (tmp_path / "traces" / f"{file_stem_of(kept[0])}.npz").write_text("no zip")
+    page, count, problems = replay_of(groups(tmp_path, kept))
+    assert (count, len(problems)) == (1, 1)
+    assert "holds no arrays" in problems[0]
+    assert '"label":"mujoco"' in page
+    assert "drake" not in page
+
+
+def test_without_any_trace_there_is_no_page(tmp_path: Path) -> None:
+    kept = keep(tmp_path, record("drake", 1))
+    (tmp_path / "traces" / f"{file_stem_of(kept[0])}.npz").write_text("no zip")
+    assert replay_of(groups(tmp_path, kept))[:2] == ("", 0)
+
+
+def test_what_does_not_fit_is_left_out_and_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = keep(tmp_path, *(record("drake", k) for k in range(1, 6)))
+    shown = groups(tmp_path, kept)
+    assert replay_of(shown)[1:] == (5, [])
+    monkeypatch.setattr(render, "LARGEST", 1)
+    page, count, problems = replay_of(shown)
+    assert count == page.count('"seed":') == 1
+    assert problems == ["the replay shows 1 of 5 seeds: more would not fit"]
+
+
+def test_it_loads_nothing(tmp_path: Path) -> None:
+    page = replay_of(groups(tmp_path, keep(tmp_path, record("drake", 1))))[0]
+    assert "<link" not in page
+    assert not re.search(r"<(script|img|iframe|link|video)[^>]* (src|href)=", page)
+    assert "default-src 'none'" in page
+    assert "unsafe-eval" not in page
+
+
+def test_settings_tell_apart_what_names_do_not(tmp_path: Path) -> None:
+    kept = keep(tmp_path, record("drake", 1), record("drake", 1, mode="gui"))
+    page = replay_of(groups(tmp_path, kept))[0]
+    assert '"label":"drake headless (tuned)"' in page
+    assert '"label":"drake gui (tuned)"' in page
+
+
+def test_missing_trimesh_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = builtins.__import__
+
+    def no_trimesh(name: str, *args: Any) -> Any:
+        if name.startswith("trimesh"):
+            raise ImportError(name)
+        return real(name, *args)
+
+    monkeypatch.setattr(builtins, "__import__", no_trimesh)
+    shown = groups(tmp_path, keep(tmp_path, record("drake", 1)))
+    with pytest.raises(ReplayUnavailable, match=r"pip install 'pytest-simbench\[replay\]'"):
+        replay_of(shown)
