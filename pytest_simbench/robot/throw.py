@@ -59,10 +59,10 @@ class Throw:
         return landing_x(self.position, self.velocity, gravity)
 
 
-def study_swing(start: FloatArray, goal: FloatArray) -> tuple[Timed, float]:
+def study_swing(model: RobotModel, start: FloatArray, goal: FloatArray) -> tuple[Timed, float]:
     """The study's: full speed, every joint on a profile of its own, ending together; with its exact
     duration [s]. Infeasible: joint 2 would need 1.2 times what its motor gives."""
-    return synchronised_move(start, goal)
+    return synchronised_move(start, goal, model.limits)
 
 
 def feasible_swing(
@@ -79,7 +79,7 @@ def feasible_swing(
     """
 
     def swing(acceleration: float) -> tuple[Timed, float]:
-        return line_move(start, goal, (SPEED_SHARE, acceleration, JERK_SHARE))
+        return line_move(start, goal, model.limits, (SPEED_SHARE, acceleration, JERK_SHARE))
 
     def strain(timed: Timed) -> float:
         rows = (timed.position, timed.velocity, timed.acceleration)

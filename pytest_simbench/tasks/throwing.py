@@ -18,7 +18,7 @@ import numpy as np
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.robot.errors import PlanningError
 from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.panda import panda
+from pytest_simbench.robot.panda import THROW_END, WIND_UP, panda
 from pytest_simbench.robot.throw import Throw, feasible_swing, released, study_swing
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Pose, Scene
 from pytest_simbench.tasks.base import (
@@ -45,10 +45,6 @@ PYRAMID = (
     (-0.065, 0.025), (0.0, 0.025), (0.065, 0.025), (-0.0335, 0.075), (0.0335, 0.075), (0.0, 0.125),
 )  # fmt: skip
 """y and z of the six cubes of the pyramid [m] (study code)."""
-
-WIND_UP = (0.0, -1.65, 0.0, -0.1, 0.0, 3.6, 0.8)
-THROW_END = (0.0, 0.9, 0.0, -1.1, 0.0, 1.9, 0.8)
-"""Arm joints before and after the throw [rad] (study code)."""
 
 AFTER_THROW = 1.0
 """For so long after the swing the motion is sampled at every step [s]: flight and impact."""
@@ -211,7 +207,7 @@ def perfect_throw(release_fraction: float, feasible: bool) -> Throw:
     timed, duration = (
         feasible_swing(model, start, goal, np.array(STANDARD_GRAVITY), held)
         if feasible
-        else study_swing(start, goal)
+        else study_swing(model, start, goal)
     )
     return released(model, timed, duration, release_fraction)
 
