@@ -109,6 +109,7 @@ def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: A
         folder=this.use(),
         changes={**settings, **chosen.changes.get(name, {})},
         spec=chosen.specs.get(name),
+        robot=chosen.robot,
         display=_display(this) if mode == "gui" else None,
         protocol=PROTOCOLS[options.value(config, "sim_protocol")],
         **{name: options.value(config, f"sim_{name}") for name in OF_CASES},
@@ -196,6 +197,7 @@ def perturb(
 
     def perturb_task(task: Task) -> Perturber:
         experiment = Experiment(simbench_case, arguments.checked_task(task, "perturb"))
+        arguments.can_do(experiment)
         return Perturber(Episodes(experiment, handle), strict)
 
     with closing(own):

@@ -44,6 +44,10 @@ THROW_END = (0.0, 0.9, 0.0, -1.1, 0.0, 1.9, 0.8)
 """Arm joints before and after the throw [rad] (study code)."""
 
 
+HAND, TOOL_FRAME = "panda_hand", "panda_hand_tcp"
+"""Links: the root of the hand, which other arms can carry, and its tool centre point."""
+
+
 @cache
 def description_folder() -> Path:
     """The folder that the URDF calls `package://example-robot-data`.
@@ -64,6 +68,20 @@ def description_folder() -> Path:
     )
 
 
+def fingers(squeeze: float = SQUEEZE) -> tuple[Joint, ...]:
+    """The drives of the hand, each pressing with at most `squeeze` [N]."""
+    return tuple(
+        Joint(name, FINGER_STIFFNESS, FINGER_DAMPING, squeeze, ARMATURE, FINGER_OPENED)
+        for name in ("panda_finger_joint1", "panda_finger_joint2")
+    )
+
+
+def gripper(squeeze: float = SQUEEZE) -> Gripper:
+    """The hand."""
+    names = tuple(joint.name for joint in fingers(squeeze))
+    return Gripper(names, FINGER_OPENED, FINGER_CLOSED, squeeze)
+
+
 def panda(*, squeeze: float = SQUEEZE, friction: float = 1.0, base: Pose | None = None) -> Robot:
     """The Panda with its hand, nine driven joints: seven of the arm, two fingers.
 
@@ -78,19 +96,14 @@ def panda(*, squeeze: float = SQUEEZE, friction: float = 1.0, base: Pose | None 
         Joint(f"panda_joint{i + 1}", STIFFNESS[i], DAMPING[i], EFFORT_LIMITS[i], ARMATURE, READY[i])
         for i in range(7)
     ]
-    names = ("panda_finger_joint1", "panda_finger_joint2")
-    fingers = [
-        Joint(name, FINGER_STIFFNESS, FINGER_DAMPING, squeeze, ARMATURE, FINGER_OPENED)
-        for name in names
-    ]
     return Robot(
         name="panda",
         urdf=str(robot / "urdf/panda.urdf"),
         packages={DISTRIBUTION: str(folder)},
         srdf=str(robot / "srdf/panda.srdf"),
-        joints=(*arm, *fingers),
-        gripper=Gripper(names, FINGER_OPENED, FINGER_CLOSED, squeeze),
-        tool_frame="panda_hand_tcp",
+        joints=(*arm, *fingers(squeeze)),
+        gripper=gripper(squeeze),
+        tool_frame=TOOL_FRAME,
         base=base or Pose(),
         friction=friction,
         limits=LIMITS,

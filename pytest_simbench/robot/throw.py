@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pytest_simbench.robot.errors import PlanningError
+from pytest_simbench.robot.errors import PlanningError, RobotError
 from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.robot.panda import THROW_END, WIND_UP
 from pytest_simbench.robot.timing import TICK, Timed, line_move, synchronised_move
-from pytest_simbench.scene import Box, FloatArray
+from pytest_simbench.scene import Box, FloatArray, Robot
 
 EFFORT_SHARE = 0.9
 """Largest planned effort, as a share of each joint's limit: the drives need the rest to correct."""
@@ -57,6 +58,19 @@ class Throw:
     def landing(self, gravity: FloatArray) -> float | None:
         """Where a cube lands that is let go so, in x [m]."""
         return landing_x(self.position, self.velocity, gravity)
+
+
+def swing_of(robot: Robot) -> tuple[FloatArray, FloatArray]:
+    """Arm joints before and after the throw, each (arm,) [rad].
+
+    Raises:
+        RobotError: none is known for this robot.
+    """
+    if robot.name != "panda":
+        raise RobotError(
+            f"robot {robot.name!r} has no swing for the throw: throwing is for the panda"
+        )
+    return np.array(WIND_UP), np.array(THROW_END)
 
 
 def study_swing(model: RobotModel, start: FloatArray, goal: FloatArray) -> tuple[Timed, float]:
