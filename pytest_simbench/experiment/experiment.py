@@ -8,8 +8,8 @@ from typing import Any
 
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.robot.errors import RobotError
-from pytest_simbench.scene import Scene
-from pytest_simbench.tasks.base import Jitter, Task
+from pytest_simbench.scene import Robot, Scene
+from pytest_simbench.tasks.base import ROBOT, Jitter, Task
 from pytest_simbench.tasks.metrics import Metric
 
 
@@ -35,6 +35,11 @@ class Experiment:
         """
         version, robot = self.case.protocol.version_of(self.asked), self.case.robot
         return version if robot is None else version.on(robot)
+
+    @property
+    def robot(self) -> Robot | None:
+        """The robot that was chosen, if the task has one."""
+        return self.case.robot if ROBOT in vars(self.task) else None
 
     def problem(self) -> str | None:
         """What the case's robot cannot do of the task, in one sentence, or None."""

@@ -58,7 +58,7 @@ def record_of(
         settings={**settings, **experiment.parameters},
         versions={"pytest-simbench": __version__, **versions},
         scene=scene_digest(experiment.task),
-        robot=robot_told(case.robot),
+        robot=robot_told(experiment.robot),
         limits=experiment.limits,
         contended=case.contended,
         attempt=case.attempt,

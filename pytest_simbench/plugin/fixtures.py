@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from pytest_simbench.plugin.repeatability import Perturber
     from pytest_simbench.plugin.run import Run
     from pytest_simbench.repeatability.replay_result import Replay
-    from pytest_simbench.scene import Scene
+    from pytest_simbench.scene import Robot, Scene
     from pytest_simbench.tasks.base import Task
 
 
@@ -216,6 +216,14 @@ def threshold(request: pytest.FixtureRequest) -> Callable[[str, float], float]:
         return value
 
     return choose
+
+
+@pytest.fixture(scope="session")
+def robot(request: pytest.FixtureRequest) -> Robot:
+    """The robot of `--robot`, the Panda by default: `Scene("s", (), robot)`."""
+    from pytest_simbench.robot.panda import panda
+
+    return session_of(request.config).selection.robot or panda()
 
 
 @pytest.fixture(scope="session")
