@@ -39,9 +39,6 @@ LARGEST_FILE = 2**20
 SMALLEST = 1e-6
 """What must be above zero is at least this."""
 
-FINGERS = 2
-"""Joints of a hand that adapters couple."""
-
 JERK = 100.0
 """Jerk limit where a file has none, as a multiple of the acceleration limit [1/s]: the
 acceleration then builds up in 10 ms."""
@@ -184,15 +181,19 @@ class _Reader:
             hand.close()
             joints, gripper = panda.fingers(squeeze), panda.gripper(squeeze)
             return _Hand(joints, gripper, panda.TOOL_FRAME, panda.LIMITS.finger_speed, mount)
+        return self._own_hand(hand)
+
+    def _own_hand(self, hand: Table) -> _Hand:
+        """A hand in the robot's own URDF; one without joints only touches."""
+        if "joints" not in hand:
+            tool = hand.text("tool_frame")
+            hand.close()
+            return _Hand((), Gripper((), 0.0, 0.0, 0.0), tool, panda.LIMITS.finger_speed, None)
         names = hand.texts("joints")
-        if len(names) != FINGERS:
-            raise hand.error(
-                "joints", f"a hand has {FINGERS} finger joints, which are coupled, not {len(names)}"
-            )
         opened, closed = hand.number("opened"), hand.number("closed")
         if not closed < opened:
             raise hand.error("opened", f"it must be above closed, which is {closed:g}")
-        joints = self._drives(hand, names, [opened] * FINGERS)
+        joints = self._drives(hand, names, [opened] * len(names))
         squeeze = joints[0].effort_limit
         if {joint.effort_limit for joint in joints} != {squeeze}:
             raise hand.error("effort", "give all fingers the same: it is the hand's squeeze [N]")

@@ -63,6 +63,12 @@ class RobotModel:
             )
         return self.robot.limits
 
+    @property
+    def has_parallel_fingers(self) -> bool:
+        """Whether the hand is two fingers that slide."""
+        kinds = [joint.shortname() for joint in list(self.pin.joints)[self.arm + 1 :]]
+        return len(kinds) == 2 and all(kind.startswith("JointModelP") for kind in kinds)
+
     def full(self, arm: FloatArray) -> FloatArray:
         """Arm joints (arm,) with the fingers at their start appended, (n_joints,)."""
         return np.concatenate([arm[: self.arm], self._fingers])

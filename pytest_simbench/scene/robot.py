@@ -51,7 +51,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Gripper:
-    """A parallel gripper.
+    """A gripper; without joints, a hand that only touches.
 
     Its fingers are coupled mechanically: they always stand equally far from the middle. Without
     that, two fingers that both press with their largest force leave the object free between them.
@@ -75,6 +75,11 @@ class Gripper:
         for quantity in ("opened", "closed"):
             check_number(getattr(self, quantity), f"the gripper's position {quantity!r} [m]")
         check_number(self.squeeze, "the gripper's squeeze [N]", 0.0)
+
+    @property
+    def couplings(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of joints that stand at equal positions: the first one, and each other."""
+        return tuple((self.joints[0], other) for other in self.joints[1:])
 
     def to_wire(self) -> dict[str, Any]:
         return {**self.__dict__, "joints": list(self.joints)}

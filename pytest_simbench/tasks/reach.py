@@ -26,13 +26,15 @@ def cannot_handle(robot: Robot, fixed: Sequence[Box], places: Sequence[Pose]) ->
         fixed: what stands in the way.
         places: of the cubes' centres.
     """
+    model = RobotModel(robot)
+    if not model.has_parallel_fingers:
+        return f"robot {robot.name!r} has no hand with two parallel fingers to grasp a cube"
     needed = CUBE_SIZE / 2 + CLEARANCE
     if robot.gripper.opened < needed:
         return (
             f"robot {robot.name!r} opens its fingers to {robot.gripper.opened:g} m from the middle "
             f"and needs {needed:g} m for a cube of {CUBE_SIZE:g} m"
         )
-    model = RobotModel(robot)
     planning = PlanningScene(model, Scene("reach", tuple(fixed), robot))
     home, rng = robot.column("initial_position")[: model.arm], np.random.default_rng(0)
     for place in places:

@@ -131,7 +131,8 @@ class Server:
         if parity:
             expected = expected_quantities(world, simulator.settings)
             info = simulator.info
-            excused = check(expected, simulator.read_back(), info.deviations, info.name)
+            declared = [deviation.with_robot(world.robot) for deviation in info.deviations]
+            excused = check(expected, simulator.read_back(), declared, info.name)
         if simulator.gui:
             simulator.refresh_window()
         return {"excused": excused, **self.do_state()}

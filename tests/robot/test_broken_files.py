@@ -45,8 +45,8 @@ IN_TOML = {
         lambda text: text[: text.index("[arm]")] + text[text.index("[hand]") :],
         r"\[arm\]: joints is missing",
     ),
-    "no hand": (lambda text: text[: text.index("[hand]")], r"\[hand\]: joints is missing"),
-    "a number for a table": (swap("[hand]", "[hand_of_it]"), r"\[hand\]: joints is missing"),
+    "no hand": (lambda text: text[: text.index("[hand]")], r"\[hand\]: tool_frame is missing"),
+    "a number for a table": (swap("[hand]", "[hand_of_it]"), r"\[hand\]: tool_frame is missing"),
     "no URDF": (swap("small.urdf", "other.urdf"), r"cannot read the robot .*other\.urdf: No such"),
     "an unknown package": (
         swap("small.urdf", "package://mine/small.urdf"),
@@ -92,9 +92,13 @@ IN_TOML = {
         swap("closed = 0.0", "closed = 0.05"),
         r"opened: it must be above closed, which is 0\.05",
     ),
-    "a hand with one finger": (
+    "a hand without a finger of its own": (
         swap('["left_finger", "right_finger"]', '["left_finger"]'),
-        r"joints: a hand has 2 finger joints, which are coupled, not 1",
+        r"disagree about joints right_finger",
+    ),
+    "fingers of two strengths": (
+        swap("effort = 20.0", "effort = [20.0, 10.0]"),
+        r"effort: give all fingers the same: it is the hand's squeeze",
     ),
     "an unknown hand": (
         lambda text: text[: text.index("[hand]")] + '[hand]\nuse = "robotiq"\nmount = "lower"\n',

@@ -17,7 +17,7 @@ from pytest_simbench.robot.planning import CHECK_SPACING
 from pytest_simbench.robot.registry import BUILT_IN, find
 from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import PreparedRobot
-from tests.robot.small_arm import TOML, small_arm
+from tests.robot.small_arm import TOML, URDF, joint, link, small_arm
 
 MOUNTED = ("ur5", "ur10", "xarm7")
 
@@ -109,10 +109,10 @@ def test_between_two_checks_no_fingertip_moves_farther_than_twice_the_margin(nam
         pin.computeJointJacobians(model.pin, model.data, model.full(arm))
         tool = model.base.actInv(model.tool_transform(arm))
         tip = tool.act(np.array([0.009, 0.035 + 0.0152, 0.009]))
-        for joint in range(model.arm):
-            away = tip - model.data.oMi[joint + 1].translation
-            distance = np.linalg.norm(np.cross(model.data.J[3:, joint], away))
-            farthest[joint] = max(farthest[joint], float(distance))
+        for k in range(model.arm):
+            away = tip - model.data.oMi[k + 1].translation
+            distance = np.linalg.norm(np.cross(model.data.J[3:, k], away))
+            farthest[k] = max(farthest[k], float(distance))
     levers = model.limits.column("levers")
     assert (farthest * CHECK_SPACING <= 2 * MARGIN * levers).all(), farthest
 
@@ -136,3 +136,33 @@ def test_a_file_cannot_take_a_known_name(tmp_path: Path) -> None:
     path = small_arm(tmp_path, TOML.replace('"small"', '"ur5"', 1))
     with pytest.raises(RobotError, match="the name 'ur5' is that of a known robot"):
         find(str(path))
+
+
+def test_a_hand_that_only_touches(tmp_path: Path) -> None:
+    toml = TOML[: TOML.index("[hand]")] + '[hand]\ntool_frame = "grip"\n'
+    fixed = URDF.replace('type="prismatic"', 'type="fixed"')
+    robot = read_robot(small_arm(tmp_path, toml, fixed))
+    assert robot.joint_names == ("turn", "lift", "bend")
+    assert robot.gripper.couplings == ()
+    assert not RobotModel(robot).has_parallel_fingers
+
+
+def test_a_hand_of_three_fingers_and_one_of_one(tmp_path: Path) -> None:
+    third = link("third", "0.01 0.02 0.08", "0.005 0 0.06", 0.05, 0.1)
+    third += joint("third_finger", "lower", "third", "0 0 0.3", "1 0 0", "prismatic")
+    urdf = URDF.replace("</robot>", f"{third}</robot>")
+    toml = TOML.replace('"right_finger"]', '"right_finger", "third_finger"]')
+    robot = read_robot(small_arm(tmp_path, toml, urdf))
+    pairs = (("left_finger", "right_finger"), ("left_finger", "third_finger"))
+    assert robot.gripper.couplings == pairs
+    assert not RobotModel(robot).has_parallel_fingers
+    jaw = URDF.replace(
+        '<joint name="right_finger" type="prismatic">', '<joint name="right_finger" type="fixed">'
+    )
+    toml = TOML.replace(', "right_finger"]', "]")
+    assert read_robot(small_arm(tmp_path, toml, jaw)).gripper.couplings == ()
+
+
+def test_two_parallel_fingers() -> None:
+    assert RobotModel(panda()).has_parallel_fingers
+    assert RobotModel(find("ur5")).has_parallel_fingers
