@@ -49,7 +49,8 @@ class PlanningScene:
                 shape.geometry = shape.geometry.convex
         self._links = list(range(len(geometry.geometryObjects)))
         geometry.addAllCollisionPairs()
-        pin.removeCollisionPairs(model.pin, geometry, robot.srdf)
+        if robot.srdf:
+            pin.removeCollisionPairs(model.pin, geometry, robot.srdf)
         inverse = model.base.inverse()
         self._free = {body.name: body for body in scene.free_bodies}
         self._bodies: dict[str, int] = {}

@@ -132,7 +132,8 @@ class Robot:
         name: of the robot ("panda").
         urdf: path of its URDF file.
         packages: directory of each `package://NAME/` that the URDF refers to.
-        srdf: path of its SRDF file, which lists the link pairs not to be checked for collision.
+        srdf: path of its SRDF file, which lists the link pairs not to be checked for collision;
+            empty for none.
         joints: the driven joints in command order, arm first, then fingers.
         gripper: the fingers.
         tool_frame: link whose origin is the tool centre point.
