@@ -76,9 +76,8 @@ def test_a_run_with_another_robot(pytester: pytest.Pytester) -> None:
     run(pytester, "--reps=1", "--sim-output=ur5", "--robot=ur5").assert_outcomes(passed=1)
     small_run = ("--reps=1", f"--robot={path}")
     result = run(pytester, *small_run, "--sim-output=small", "--sim-baseline=ur5")
-    result.stdout.fnmatch_lines(
-        ["test_holding[[]mujoco-headless-small[]] is not in the baseline and is not compared"]
-    )
+    told = " ".join(result.stdout.str().split())
+    assert "with ur5, this run with small: different robots are not comparable" in told
     panda, ur5, small = (records(name)[0] for name in ("panda", "ur5", "small"))
     name = "test_a_run_with_another_robot.py::test_holding[mujoco-headless{}]"
     assert [r["test"] for r in (panda, ur5, small)] == [
@@ -123,13 +122,12 @@ def test_what_a_robot_or_a_task_cannot_do(pytester: pytest.Pytester) -> None:
     path = small_arm(pytester.path, TOML.replace("opened = 0.04", "opened = 0.02"))
     result = run(pytester, "--reps=1", f"--robot={path}", "--sim-output=out", ret=1)
     result.assert_outcomes(passed=2, failed=5)
-    result.stdout.fnmatch_lines(
-        [
-            "--robot: robot 'small' opens too little",
-            "--robot: robot 'small' has no swing for the throw*",
-            "--robot: the task 'own' takes no other robot than its own: give it a field*",
-        ]
-    )
+    for sentence in (
+        "--robot: robot 'small' opens too little",
+        "--robot: robot 'small' has no swing for the throw",
+        "--robot: the task 'own' takes no other robot than its own: give it a field",
+    ):
+        assert f"\n{sentence}" in result.stdout.str()
     assert "robot" not in records("out")[0]  # the towers know no robot
 
 
