@@ -43,7 +43,9 @@ def motion() -> Trajectory:
     assert SCENE.robot is not None
     model = RobotModel(SCENE.robot)
     start = SCENE.robot.column("initial_position")[:7]
-    timed = straight_move(start, start + np.array([0.8, -0.2, 0, 0, 0, 0, 0.5]), speed=0.1)
+    timed = straight_move(
+        start, start + np.array([0.8, -0.2, 0, 0, 0, 0, 0.5]), model.limits, speed=0.1
+    )
     rows = len(timed.position)
     position = np.hstack([timed.position, np.full((rows, 2), 0.035)])
     velocity, acceleration = (

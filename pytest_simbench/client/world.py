@@ -11,11 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.client.errors import Diverged
+from pytest_simbench.client.errors import Diverged, EngineFailed
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.stopwatch import Stopwatch
 from pytest_simbench.scene import FloatArray, Pose, Scene, Trajectory
 from pytest_simbench.scene.plausibility import implausible
+from pytest_simbench.simulator import DescriptionError
+from pytest_simbench.simulator.files import FileError
+from pytest_simbench.simulator.robot_files import with_content
 
 
 @dataclass(frozen=True)
@@ -89,7 +92,7 @@ class World:
         if process.launch.compile_timeout:
             self._compile()
         with self.phase("load"), self.stopwatch.measuring("load"):
-            answer = process.request("load", scene=scene.to_wire(), parity=parity)
+            answer = process.request("load", scene=self._wire(), parity=parity)
         self.excused: list[str] = answer["excused"]
         self._take(answer)
         self._enter("task")  # between the phases that the task names
@@ -106,13 +109,20 @@ class World:
                 self.process.where,
             )
 
+    def _wire(self) -> dict[str, Any]:
+        """The scene, its robot described by content: a path means nothing in the worker."""
+        try:
+            return with_content(self.scene.to_wire(), self.scene.robot)
+        except (DescriptionError, FileError) as error:
+            raise EngineFailed(str(error), self.process.where, self.process.log_tail()) from None
+
     def _compile(self) -> None:
         """Have the engine compile; the repetition's time-out stands still meanwhile."""
         process, deadline, began = self.process, self.process.deadline, time.monotonic()
         process.deadline = None
         with self.phase("compiling"), self.stopwatch.measuring("compile"):
             limits = process.launch.compile_timeout, process.launch.stall_timeout
-            process.request("compile", timeout=max(limits), scene=self.scene.to_wire())
+            process.request("compile", timeout=max(limits), scene=self._wire())
         if deadline is not None:
             process.deadline = deadline + time.monotonic() - began
 

@@ -14,6 +14,7 @@ from pytest_simbench.client.launch import Launch
 from pytest_simbench.experiment.protocol import PROTOCOLS, Protocol
 from pytest_simbench.records.names import file_name
 from pytest_simbench.records.series import short
+from pytest_simbench.scene import Robot
 from pytest_simbench.simulator.registry import adapter, registered
 
 
@@ -58,6 +59,7 @@ class Case:
         contended: repetitions run side by side, so their times are not comparable.
         folder: the run folder.
         attempt: of the same repetitions in this process, see `records.record`.
+        robot: that does the tasks; None for the tasks' own.
     """
 
     test: str
@@ -83,6 +85,7 @@ class Case:
     fresh: bool = False
     contended: bool = False
     attempt: int = 1
+    robot: Robot | None = None
 
     @classmethod
     def of(cls, simulator: str, *, python: str | None = None, **more: Any) -> Case:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,8 +22,8 @@ from pytest_simbench.client.tape import ARRAYS, Operation
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.records.names import file_name
 from pytest_simbench.records.text import in_one_line
-from pytest_simbench.robot.panda import panda
-from pytest_simbench.scene import Robot, Scene
+from pytest_simbench.robot.registry import BUILT_IN as ROBOTS
+from pytest_simbench.scene import Scene
 from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.files import FileError, read_file, read_json
 from pytest_simbench.simulator.registry import adapter
@@ -40,10 +40,8 @@ MOST_BODIES = 300
 LONGEST_MOTION, LONGEST_WAIT = 600.0, 86_400.0
 """Of one operation [s]."""
 
-ROBOTS: Mapping[str, Callable[[], Robot]] = {"panda": panda}
-"""Robots whose description files are taken from here, by name."""
-
 ROBOT_FILES = ("urdf", "srdf", "packages")
+"""What a file does not hold of a robot that comes with the package."""
 
 
 class ExampleError(ValueError):

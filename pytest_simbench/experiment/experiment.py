@@ -7,8 +7,9 @@ from functools import cached_property
 from typing import Any
 
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.scene import Scene
-from pytest_simbench.tasks.base import Jitter, Task
+from pytest_simbench.robot.errors import RobotError
+from pytest_simbench.scene import Robot, Scene
+from pytest_simbench.tasks.base import ROBOT, Jitter, Task
 from pytest_simbench.tasks.metrics import Metric
 
 
@@ -26,9 +27,28 @@ class Experiment:
 
     @cached_property
     def task(self) -> Task:
-        """The version of the task that the protocol wants. Nobody else asks the protocol: a version
-        of a version would be another one."""
-        return self.case.protocol.version_of(self.asked)
+        """The version of the task that the protocol wants, done by the case's robot. Nobody else
+        asks the protocol: a version of a version would be another one.
+
+        Raises:
+            RobotError: the task takes no other robot than its own.
+        """
+        version, robot = self.case.protocol.version_of(self.asked), self.case.robot
+        return version if robot is None else version.on(robot)
+
+    @property
+    def robot(self) -> Robot | None:
+        """The robot that was chosen, if the task has one."""
+        return self.case.robot if ROBOT in vars(self.task) else None
+
+    def problem(self) -> str | None:
+        """What the case's robot cannot do of the task, in one sentence, or None."""
+        if self.case.robot is None:
+            return None
+        try:
+            return self.task.problem()
+        except RobotError as error:
+            return str(error)
 
     def in_case(self, **changes: Any) -> Experiment:
         """The same task in a changed case."""

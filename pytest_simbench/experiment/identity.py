@@ -7,6 +7,7 @@ import json
 import platform
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import asdict
 from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -18,6 +19,8 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.records.names import file_name
 from pytest_simbench.records.record import Record, Status
 from pytest_simbench.records.series import short
+from pytest_simbench.scene import Robot
+from pytest_simbench.simulator.robot_files import CONTENT, with_content
 from pytest_simbench.tasks.base import Jitter, Task
 
 
@@ -55,6 +58,7 @@ def record_of(
         settings={**settings, **experiment.parameters},
         versions={"pytest-simbench": __version__, **versions},
         scene=scene_digest(experiment.task),
+        robot=robot_told(experiment.robot),
         limits=experiment.limits,
         contended=case.contended,
         attempt=case.attempt,
@@ -103,6 +107,16 @@ def versions(case: Case) -> dict[str, str]:
         found = environment.version()
         return {info.distribution: found} if found else {}
     return {}  # somebody's own interpreter
+
+
+def robot_told(robot: Robot | None) -> dict[str, str]:
+    """Name of a robot and twelve digits of everything that it is; empty for a task's own robot."""
+    if robot is None:
+        return {}
+    wire = with_content({"robot": robot.to_wire()}, robot)["robot"]
+    meshes = sorted(wire[CONTENT].pop("meshes"))  # named by their content
+    data = json.dumps([wire, meshes, asdict(robot.limits) if robot.limits else None])
+    return {"name": robot.name, "digest": hashlib.sha256(data.encode()).hexdigest()[:12]}
 
 
 def scene_digest(task: Task) -> str:

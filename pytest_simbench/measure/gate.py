@@ -126,10 +126,17 @@ def run_gate(
         limits: from `parse_limits`.
         metrics: the metrics of each task, by its name.
     """
+    baseline, current = list(baseline), list(current)
     before, after = _by_test(baseline, current, metrics)
+    robots = [_robots(baseline), _robots(current)]
     common = [test for test in after if test in before]
     notes = [f"{test} is not in the baseline and is not compared" for test in after.keys() - before]
     notes += [f"{test} is in the baseline but did not run" for test in before.keys() - after]
+    if notes and robots[0] != robots[1]:
+        notes.append(
+            f"the baseline was made with {' and '.join(robots[0])}, this run with "
+            f"{' and '.join(robots[1])}: different robots are not comparable"
+        )
     broken = [_broken(test, before[test], after[test]) for test in common]
     broken += dict.fromkeys(_vain(after[test], limit) for test in common for limit in limits)
     changes = _corrected(
@@ -157,6 +164,11 @@ def run_gate(
     return GateReport(
         tuple(named), changes, others, tuple(filter(None, broken)), tuple(sorted(notes))
     )
+
+
+def _robots(records: Sequence[Record]) -> list[str]:
+    """Names of the robots that were chosen, sorted; of the tasks' own, one that says so."""
+    return sorted({record.robot.get("name", "the tasks' own robot") for record in records})
 
 
 def _corrected(found: Iterable[Change | None]) -> tuple[Change, ...]:

@@ -11,6 +11,7 @@ import pytest
 from pytest_simbench.plugin.values import ANY_NUMBER, BadValue, shown
 
 if TYPE_CHECKING:
+    from pytest_simbench.experiment.experiment import Experiment
     from pytest_simbench.tasks.base import Task
 
 
@@ -28,6 +29,13 @@ def checked_task(value: Any, fixture: str) -> Task:
         name = value.__name__
         _refuse(f"{fixture}({name}) got a class instead of a task: write {fixture}({name}())")
     _refuse(f"{fixture}({shown(repr(value))}) takes a task, for instance {fixture}(Throwing())")
+
+
+def can_do(experiment: Experiment) -> Experiment:
+    """An experiment whose robot can do the task; else the test fails before anything runs."""
+    if problem := experiment.problem():
+        _refuse(f"--robot: {problem}")
+    return experiment
 
 
 def once(task: Task, done: list[Task]) -> None:

@@ -1,4 +1,5 @@
-"""Options that do their work and exit: `--sims`, `--sim-install`, `--sim-merge`, `--sim-report`."""
+"""Options that do their work and exit: `--sims`, `--robots`, `--sim-install`, `--sim-merge`,
+`--sim-report`."""
 
 from __future__ import annotations
 
@@ -15,6 +16,7 @@ from pytest_simbench.records.text import for_terminal
 
 if TYPE_CHECKING:
     from pytest_simbench.plugin.selection import Selection
+    from pytest_simbench.scene import Robot
     from pytest_simbench.simulator.info import SimulatorInfo
 
 
@@ -28,7 +30,8 @@ def run_command(config: pytest.Config) -> int:
 
     options.values(config)
     recording.check(config)
-    commands = dict(zip(options.COMMANDS, (_install, merge_runs, report_runs, _list), strict=True))
+    actions = (_install, merge_runs, report_runs, _list, _robots)
+    commands = dict(zip(options.COMMANDS, actions, strict=True))
     return next(do(config) for name, do in commands.items() if options.given(config, name))
 
 
@@ -54,6 +57,38 @@ def _list(config: pytest.Config) -> int:
     for line in [*_simulators(session_of(config).selection), *spellings.foreign(config)]:
         print(line)
     return 0
+
+
+def _robots(config: pytest.Config) -> int:
+    """`--robots`: the known robots, and the one that `--robot` names; 1 when one is broken."""
+    from pytest_simbench.robot.errors import RobotError
+    from pytest_simbench.robot.registry import known, known_robot
+
+    chosen = session_of(config).selection.robot
+    broken = False
+    for name in known():
+        try:
+            print(for_terminal(_robot_line(known_robot(name))))
+        except RobotError as error:
+            broken = True
+            print(for_terminal(f"{name}: BROKEN: {error}"))
+    if chosen is not None and chosen.name not in known():
+        print(for_terminal(_robot_line(chosen)))
+    return int(broken)
+
+
+def _robot_line(robot: Robot) -> str:
+    """Name, size and hand of a robot, and what it cannot do."""
+    from pytest_simbench.tasks import Stacking, Throwing
+
+    arm, fingers = len(robot.arm_joints), len(robot.gripper.joints)
+    x, y, z = robot.base.position
+    line = (
+        f"{robot.name}: {arm} arm joints, {fingers} fingers that open to "
+        f"{robot.gripper.opened:g} m, base at ({x:g}, {y:g}, {z:g})"
+    )
+    tasks = (Stacking(robot=robot), Throwing(robot=robot))
+    return "".join([line, *(f"\n    no {t.name}: {p}" for t in tasks if (p := t.problem()))])
 
 
 def _width() -> int:

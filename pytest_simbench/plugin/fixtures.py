@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from pytest_simbench.plugin.repeatability import Perturber
     from pytest_simbench.plugin.run import Run
     from pytest_simbench.repeatability.replay_result import Replay
-    from pytest_simbench.scene import Scene
+    from pytest_simbench.scene import Robot, Scene
     from pytest_simbench.tasks.base import Task
 
 
@@ -109,6 +109,7 @@ def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: A
         folder=this.use(),
         changes={**settings, **chosen.changes.get(name, {})},
         spec=chosen.specs.get(name),
+        robot=chosen.robot,
         display=_display(this) if mode == "gui" else None,
         protocol=PROTOCOLS[options.value(config, "sim_protocol")],
         trace=recording.trace_mode(config),
@@ -197,6 +198,7 @@ def perturb(
 
     def perturb_task(task: Task) -> Perturber:
         experiment = Experiment(simbench_case, arguments.checked_task(task, "perturb"))
+        arguments.can_do(experiment)
         return Perturber(Episodes(experiment, handle), strict)
 
     with closing(own):
@@ -215,6 +217,14 @@ def threshold(request: pytest.FixtureRequest) -> Callable[[str, float], float]:
         return value
 
     return choose
+
+
+@pytest.fixture(scope="session")
+def robot(request: pytest.FixtureRequest) -> Robot:
+    """The robot of `--robot`, the Panda by default: `Scene("s", (), robot)`."""
+    from pytest_simbench.robot.panda import panda
+
+    return session_of(request.config).selection.robot or panda()
 
 
 @pytest.fixture(scope="session")

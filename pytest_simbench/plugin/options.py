@@ -82,6 +82,8 @@ def name_of(flag: str) -> str:
 OPTIONS = (
     Option("--sim-name", Words(), "simulators to run: names, or all (default: every installed one)",
            [], "--sim", "NAME"),
+    Option("--sim-robot", File(), "robot that does the tasks: a name (pytest --robots) or a robot "
+           "file that ends in .toml (default: panda)", None, "--robot", "NAME|FILE"),
     Option("--sim-gui", Flag(), "run in the simulators' own windows", False, "--gui"),
     Option("--sim-headless", Flag(), "run without windows (default; with --sim-gui: both)", False,
            "--headless"),
@@ -142,12 +144,14 @@ OPTIONS = (
            "their folders alone, and exit; several are merged, and written where --sim-output says",
            metavar="RUN", ini=False, arguments={"nargs": "+", "action": "store"}),
     Option("--sim-list", Flag(), "list the known simulators and exit", False, "--sims", ini=False),
+    Option("--sim-robots", Flag(), "list the known robots, check the one of --robot, and exit",
+           False, "--robots", ini=False),
     Option("--sim-install", Words(), "make the environment of a simulator that needs one of its "
            "own, and exit", metavar="NAME", ini=False),
 )  # fmt: skip
 """All options. Only their tests know them besides this table; docs/options.md is made of it."""
 
-COMMANDS = ("sim_install", "sim_merge", "sim_report", "sim_list")
+COMMANDS = ("sim_install", "sim_merge", "sim_report", "sim_list", "sim_robots")
 """Options that do their work and exit, see `plugin.commands`."""
 
 _BY_NAME = {item.name: item for item in OPTIONS}

@@ -15,6 +15,7 @@ from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.sequential import Plan, SequentialResultSet
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.plugin import options
+from pytest_simbench.plugin.arguments import can_do
 from pytest_simbench.plugin.benchmark import give_rounds
 from pytest_simbench.plugin.resume import NotResumed
 from pytest_simbench.plugin.selection import number_mark
@@ -47,7 +48,7 @@ class RepeatFixture:
     def __call__(self, task: Task) -> ResultSet:
         """Run a task's repetitions, as many as options and marks say."""
         wanted = options.repetitions(self.node.config)
-        experiment = Experiment(self.case, task)
+        experiment = can_do(Experiment(self.case, task))
         experiment = experiment.in_case(attempt=self.run.begin(experiment))
         with _refusals_fail_the_test():
             found = self.run.take(experiment, wanted if isinstance(wanted, int) else None)

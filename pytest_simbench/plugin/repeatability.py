@@ -15,6 +15,7 @@ from pytest_simbench.client.errors import DisplayError
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.handle import SimulatorHandle
+from pytest_simbench.plugin.arguments import can_do
 from pytest_simbench.records.repeatability import NAME, Line, append, read
 from pytest_simbench.records.text import for_terminal
 from pytest_simbench.repeatability import search, stability
@@ -58,7 +59,7 @@ class ReplayFixture:
             def handle(case: Case) -> SimulatorHandle:
                 return stack.enter_context(closing(SimulatorHandle(case)))
 
-            episodes = Episodes(Experiment(case, task), handle(case))
+            episodes = Episodes(can_do(Experiment(case, task)), handle(case))
             result = replay(
                 episodes,
                 claims=Capability.DETERMINISTIC in info.capabilities,

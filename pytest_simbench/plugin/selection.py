@@ -12,6 +12,7 @@ from pytest_simbench.plugin.interpreters import checked_specification, interpret
 from pytest_simbench.plugin.values import BadValue, shown
 
 if TYPE_CHECKING:
+    from pytest_simbench.scene import Robot
     from pytest_simbench.simulator.info import SimulatorInfo
 
 MODES = ("headless", "gui")
@@ -28,6 +29,7 @@ class Selection:
         profile: settings profile.
         changes: simulator name to changed settings, as texts.
         pythons, specs: simulator name to interpreter or execnet specification.
+        robot: that does the tasks; None for the tasks' own, the Panda.
     """
 
     simulators: tuple[str, ...]
@@ -37,6 +39,11 @@ class Selection:
     changes: dict[str, dict[str, str]] = field(default_factory=dict)
     pythons: dict[str, str] = field(default_factory=dict)
     specs: dict[str, str] = field(default_factory=dict)
+    robot: Robot | None = None
+
+    def id_of(self, name: str, mode: str) -> str:
+        """Of the parameter of a test; the default robot adds nothing."""
+        return "-".join([name, mode, *([self.robot.name] if self.robot else [])])
 
     def missing(self, name: str) -> str | None:
         """Why a simulator cannot run here, with what mends it; None when it can."""
@@ -119,6 +126,7 @@ def _select(config: pytest.Config) -> Selection:
         changes,
         pythons,
         specs,
+        _robot(options.value(config, "sim_robot")),
     )
     for name in changes:
         problem = selection._settings_problem(name)
@@ -133,6 +141,21 @@ def _select(config: pytest.Config) -> Selection:
     return replace(
         selection, simulators=tuple(n for n in selection.simulators if not selection.missing(n))
     )
+
+
+def _robot(text: str | None) -> Robot | None:
+    """The robot of that name or file; None for the one that the tasks have anyway."""
+    if text is None:
+        return None
+    from pytest_simbench.robot.errors import RobotError
+    from pytest_simbench.robot.registry import DEFAULT, find
+
+    if text == DEFAULT:
+        return None
+    try:
+        return find(text)
+    except RobotError as error:
+        raise pytest.UsageError(f"--robot={shown(text)}: {error}") from None
 
 
 def _check_profile(name: str) -> None:
@@ -172,7 +195,7 @@ def parameters(metafunc: pytest.Metafunc, selection: Selection) -> list[Any]:
     for name in names:
         for mode in selection.modes:
             marks = _marks(node, name, mode, selection)
-            result.append(pytest.param((name, mode), id=f"{name}-{mode}", marks=marks))
+            result.append(pytest.param((name, mode), id=selection.id_of(name, mode), marks=marks))
     return result or [NOTHING]
 
 

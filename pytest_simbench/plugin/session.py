@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from pytest_simbench.plugin.run import Run
     from pytest_simbench.plugin.selection import Selection
 
-NAMING = ("sim_name", "sim_profile", "sim_set", "sim_python", "sim_spec")
-"""Options whose values name simulators: they are held against the adapters, which takes imports."""
+NAMING = ("sim_name", "sim_robot", "sim_profile", "sim_set", "sim_python", "sim_spec")
+"""Options whose values name simulators or robots: they are held against what is registered, which
+takes imports."""
 
 
 class SimSession:

@@ -64,6 +64,7 @@ PARTS: tuple[Part, ...] = (
         f"{EVERYWHERE} rank",
         "a task whose code changed builds another world by the same name",
     ),
+    _part("robot", f"{EVERYWHERE} rank", "another arm or hand is another experiment"),
     _part("limits", EVERYWHERE, "a time-out decides which repetitions fail"),
     _part("versions", EVERYWHERE, "another engine, adapter or Python is another simulator"),
     # What the engine told of it.

@@ -51,6 +51,7 @@ class Record:
 
     Attributes:
         scene: digest of the task's scene for one seed and no jitter; empty where not known.
+        robot: its `name` and the `digest` of its description; empty for the task's own robot.
         limits: `timeout`, `stall_timeout` [s] and `memory_limit` [MB]; empty where not known.
         attempt: how often this process had begun the same repetitions, with this time: a plugin
             that reruns failed tests, or a test that repeats a task twice. The last one counts.
@@ -76,6 +77,7 @@ class Record:
     settings: Mapping[str, Any] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
     scene: str = ""
+    robot: Mapping[str, str] = field(default_factory=dict)
     limits: Mapping[str, float | None] = field(default_factory=dict)
     attempt: int = 1
     host: Mapping[str, Any] = field(default_factory=dict)
@@ -113,7 +115,7 @@ class Record:
         """Plain data in a fixed order of keys; numbers that JSON does not have become None."""
         data: dict[str, Any] = {"schema": SCHEMA}
         for item in fields(self):
-            if item.name != "extra":
+            if item.name != "extra" and not (item.name == "robot" and not self.robot):
                 data[item.name] = getattr(self, item.name)
         if self.error is not None:
             data["error"] = {f.name: getattr(self.error, f.name) for f in fields(self.error)}
@@ -192,7 +194,8 @@ def _known(data: dict[str, Any]) -> dict[str, Any]:
             )
     for name in ("seconds", "stepping", "timeline", "limits"):
         checked.numbers(known[name], name)
-    checked.texts(known["versions"], "versions")
+    for name in ("versions", "robot"):
+        checked.texts(known[name], name)
     checked.texts({k: v for k, v in known["details"].items() if k in _TEXT_DETAILS}, "details")
     checked.use_of_resources(known["resources"], "resources")
     deviations = known.get("deviations") or ()
@@ -233,6 +236,7 @@ _OBJECTS = (
     "resources",
     "settings",
     "versions",
+    "robot",
     "limits",
     "host",
 )

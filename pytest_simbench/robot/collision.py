@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
 
 import coal
@@ -10,6 +11,7 @@ import pinocchio as pin
 
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene
+from pytest_simbench.simulator.robot_files import description_xml
 
 MARGIN = 0.012
 """Distance kept from obstacles in free motions [m]; straight approaches may touch."""
@@ -37,11 +39,9 @@ class PlanningScene:
         self.opening = model.robot.gripper.opened
         self.held: str | None = None
         robot = model.robot
-        geometry = pin.buildGeomFromUrdf(
-            model.pin,
-            robot.urdf,
-            pin.GeometryType.COLLISION,
-            package_dirs=sorted({_parent(folder) for folder in robot.packages.values()}),
+        urdf = ET.tostring(description_xml(robot), encoding="unicode")
+        geometry = pin.buildGeomFromUrdfString(
+            model.pin, urdf, pin.GeometryType.COLLISION, package_dirs=[]
         )
         for shape in geometry.geometryObjects:
             if isinstance(shape.geometry, coal.BVHModelBase):
@@ -49,7 +49,8 @@ class PlanningScene:
                 shape.geometry = shape.geometry.convex
         self._links = list(range(len(geometry.geometryObjects)))
         geometry.addAllCollisionPairs()
-        pin.removeCollisionPairs(model.pin, geometry, robot.srdf)
+        if robot.srdf:
+            pin.removeCollisionPairs(model.pin, geometry, robot.srdf)
         inverse = model.base.inverse()
         self._free = {body.name: body for body in scene.free_bodies}
         self._bodies: dict[str, int] = {}
@@ -170,7 +171,3 @@ class PlanningScene:
                         return objects[first].name, objects[second].name
                 return "robot", "obstacle"
         return None
-
-
-def _parent(folder: str) -> str:
-    return folder.rstrip("/").rsplit("/", 1)[0]

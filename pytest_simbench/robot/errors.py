@@ -1,6 +1,10 @@
-"""Why a motion could not be planned."""
+"""Why a motion could not be planned, or a robot not be used."""
 
 from __future__ import annotations
+
+
+class RobotError(ValueError):
+    """A robot that is not known, cannot be used, or cannot do what a task asks; one sentence."""
 
 
 class PlanningError(Exception):

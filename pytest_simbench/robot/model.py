@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Vector3
+from pytest_simbench.scene import Box, FloatArray, MotionLimits, Pose, Robot, Vector3
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.robot_check import check_robot
 
@@ -48,6 +48,26 @@ class RobotModel:
         self._loaded: dict[tuple[float, Vector3], pin.Model] = {}
         self.effort_limits = robot.column("effort_limit")[: self.arm]
         self._fingers = np.array([joint.initial_position for joint in robot.joints[self.arm :]])
+
+    @property
+    def limits(self) -> MotionLimits:
+        """Of the arm's motion.
+
+        Raises:
+            DescriptionError: the robot has none.
+        """
+        if self.robot.limits is None:
+            raise DescriptionError(
+                f"robot {self.robot.name!r} has no limits of motion, which planning needs: give it "
+                "Robot(limits=MotionLimits(...))"
+            )
+        return self.robot.limits
+
+    @property
+    def has_parallel_fingers(self) -> bool:
+        """Whether the hand is two fingers that slide."""
+        kinds = [joint.shortname() for joint in list(self.pin.joints)[self.arm + 1 :]]
+        return len(kinds) == 2 and all(kind.startswith("JointModelP") for kind in kinds)
 
     def full(self, arm: FloatArray) -> FloatArray:
         """Arm joints (arm,) with the fingers at their start appended, (n_joints,)."""

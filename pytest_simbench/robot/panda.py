@@ -1,4 +1,4 @@
-"""The Franka Panda: where its description lies, its drives and its limits of motion."""
+"""The Franka Panda and its hand: where they are described, their drives and limits of motion."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
-import numpy as np
-
-from pytest_simbench.scene import Gripper, Joint, Pose, Robot
+from pytest_simbench.scene import Gripper, Joint, MotionLimits, Pose, Robot
 from pytest_simbench.simulator import DescriptionError
 
 DISTRIBUTION = "example-robot-data"
@@ -32,13 +30,22 @@ FINGER_OPENED, FINGER_CLOSED, SQUEEZE = 0.035, 0.0, 25.0
 """[m] and [N]. On a 0.05 m cube a finger stands at 0.025: 1000 N/m x 0.025 m = 25 N, the limit, so
 that PD drives and force-limited velocity motors squeeze alike."""
 
-VELOCITY_LIMITS = np.array([2.175] * 4 + [2.61] * 3)
-ACCELERATION_LIMITS = np.array([15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0])
-JERK_LIMITS = np.array([7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0])
-"""Of the arm [rad/s, rad/s^2, rad/s^3] (Franka's data sheet)."""
+LIMITS = MotionLimits(
+    velocity=(2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61),
+    acceleration=(15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0),
+    jerk=(7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0),
+    levers=(0.85, 0.85, 0.65, 0.65, 0.30, 0.30, 0.15),
+    finger_speed=0.2,
+)
+"""Of the arm from Franka's data sheet, of the fingers from the URDF."""
 
-FINGER_SPEED = 0.2
-"""[m/s], the URDF's velocity limit of the fingers."""
+WIND_UP = (0.0, -1.65, 0.0, -0.1, 0.0, 3.6, 0.8)
+THROW_END = (0.0, 0.9, 0.0, -1.1, 0.0, 1.9, 0.8)
+"""Arm joints before and after the throw [rad] (study code)."""
+
+
+HAND, TOOL_FRAME = "panda_hand", "panda_hand_tcp"
+"""Links: the root of the hand, which other arms can carry, and its tool centre point."""
 
 
 @cache
@@ -61,6 +68,20 @@ def description_folder() -> Path:
     )
 
 
+def fingers(squeeze: float = SQUEEZE) -> tuple[Joint, ...]:
+    """The drives of the hand, each pressing with at most `squeeze` [N]."""
+    return tuple(
+        Joint(name, FINGER_STIFFNESS, FINGER_DAMPING, squeeze, ARMATURE, FINGER_OPENED)
+        for name in ("panda_finger_joint1", "panda_finger_joint2")
+    )
+
+
+def gripper(squeeze: float = SQUEEZE) -> Gripper:
+    """The hand."""
+    names = tuple(joint.name for joint in fingers(squeeze))
+    return Gripper(names, FINGER_OPENED, FINGER_CLOSED, squeeze)
+
+
 def panda(*, squeeze: float = SQUEEZE, friction: float = 1.0, base: Pose | None = None) -> Robot:
     """The Panda with its hand, nine driven joints: seven of the arm, two fingers.
 
@@ -75,19 +96,15 @@ def panda(*, squeeze: float = SQUEEZE, friction: float = 1.0, base: Pose | None 
         Joint(f"panda_joint{i + 1}", STIFFNESS[i], DAMPING[i], EFFORT_LIMITS[i], ARMATURE, READY[i])
         for i in range(7)
     ]
-    names = ("panda_finger_joint1", "panda_finger_joint2")
-    fingers = [
-        Joint(name, FINGER_STIFFNESS, FINGER_DAMPING, squeeze, ARMATURE, FINGER_OPENED)
-        for name in names
-    ]
     return Robot(
         name="panda",
         urdf=str(robot / "urdf/panda.urdf"),
         packages={DISTRIBUTION: str(folder)},
         srdf=str(robot / "srdf/panda.srdf"),
-        joints=(*arm, *fingers),
-        gripper=Gripper(names, FINGER_OPENED, FINGER_CLOSED, squeeze),
-        tool_frame="panda_hand_tcp",
+        joints=(*arm, *fingers(squeeze)),
+        gripper=gripper(squeeze),
+        tool_frame=TOOL_FRAME,
         base=base or Pose(),
         friction=friction,
+        limits=LIMITS,
     )

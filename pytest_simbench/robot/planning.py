@@ -20,7 +20,6 @@ from pytest_simbench.robot.collision import PlanningScene
 from pytest_simbench.robot.errors import InCollision, NoPath, PlanningError
 from pytest_simbench.robot.kinematics import straight_line
 from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.panda import FINGER_SPEED
 from pytest_simbench.robot.throw import (
     Throw,
     feasible_swing,
@@ -31,10 +30,6 @@ from pytest_simbench.robot.timing import TICK, Timed, along_path, straight_move
 from pytest_simbench.scene import FloatArray, Pose, Trajectory
 
 __all__ = ["MotionPlanner", "PlanningError"]
-
-LEVERS = np.array([0.85, 0.85, 0.65, 0.65, 0.30, 0.30, 0.15])
-"""Largest distance of the fingertips from each arm joint's axis [m], rounded up: a turn of joint i
-by dq moves nothing of the hand farther than LEVERS[i] |dq|."""
 
 CHECK_SPACING = 0.02
 """Farthest that the hand moves between two collision checks [m]. The planning scene's margin is
@@ -63,6 +58,8 @@ class MotionPlanner:
         gravity: Iterable[float],
     ) -> None:
         self.model = model
+        self.limits = model.limits
+        self.levers = self.limits.column("levers")
         self.scene = scene
         self.rng = rng
         self.gravity = np.array(list(gravity))
@@ -76,15 +73,15 @@ class MotionPlanner:
             InCollision: start or goal touch something.
             NoPath: none found.
         """
-        direct = straight_move(start, goal, speed=speed)
-        if self.scene.first_collision(_thinned(direct.position)) is None:
+        direct = straight_move(start, goal, self.limits, speed=speed)
+        if self.scene.first_collision(self._thinned(direct.position)) is None:
             return self._trajectory(direct, fingers)
         for what, arm in (("start", start), ("goal", goal)):
             touching = self.scene.collision(arm)
             if touching is not None:
                 raise InCollision(f"{what} in collision: {' and '.join(touching)}")
         path = self._shortened(self._search(start, goal))
-        parts = [straight_move(a, b, speed=speed) for a, b in pairwise(path)]
+        parts = [straight_move(a, b, self.limits, speed=speed) for a, b in pairwise(path)]
         return self._trajectory(
             Timed(
                 np.concatenate([part.position for part in parts]),
@@ -109,9 +106,9 @@ class MotionPlanner:
             Unreachable: the line leaves the workspace.
             InCollision: something else is in the way.
         """
-        timed = along_path(straight_line(self.model, start, target), speed=speed)
+        timed = along_path(straight_line(self.model, start, target), self.limits, speed=speed)
         touching = self.scene.first_collision(
-            _thinned(timed.position), ignored=ignored, margin=False
+            self._thinned(timed.position), ignored=ignored, margin=False
         )
         if touching is not None:
             raise InCollision(f"straight line blocked: {' and '.join(touching)}")
@@ -121,7 +118,7 @@ class MotionPlanner:
         self, arm: FloatArray, opening: float, target: float, hold: float
     ) -> Trajectory:
         """Fingers from `opening` to `target` [m] at their speed, then `hold` [s] more."""
-        steps = int(np.ceil(abs(target - opening) / FINGER_SPEED / TICK))
+        steps = int(np.ceil(abs(target - opening) / self.limits.finger_speed / TICK))
         rows = steps + int(np.ceil(hold / TICK)) + 1
         ramp = np.interp(np.arange(rows), [0, max(1, steps)], [opening, target])
         still = np.zeros((rows, self.model.arm))
@@ -146,7 +143,7 @@ class MotionPlanner:
         timed, duration = (
             feasible_swing(self.model, start, goal, self.gravity, self.scene.held_body)
             if feasible
-            else study_swing(start, goal)
+            else study_swing(self.model, start, goal)
         )
         throw = released(self.model, timed, duration, fraction)
         fingers = np.where(np.arange(len(timed.position)) >= throw.row, opened, closed)
@@ -190,7 +187,7 @@ class MotionPlanner:
 
         information.setStateValidityChecker(valid)
         information.setStateValidityCheckingResolution(
-            CHECK_SPACING / float(np.linalg.norm(LEVERS)) / space.getMaximumExtent()
+            CHECK_SPACING / float(np.linalg.norm(self.levers)) / space.getMaximumExtent()
         )
         information.setup()
         problem = base.ProblemDefinition(information)
@@ -216,23 +213,22 @@ class MotionPlanner:
         at = 0
         while at < len(points) - 2:
             for skip in range(len(points) - 1, at + 1, -1):
-                segment = _segment(points[at], points[skip])
+                segment = self._segment(points[at], points[skip])
                 if self.scene.first_collision(segment) is None:
                     del points[at + 1 : skip]
                     break
             at += 1
         return np.array(points)
 
+    def _segment(self, a: FloatArray, b: FloatArray) -> FloatArray:
+        """Positions between a and b to check, both ends among them."""
+        steps = max(1, int(np.ceil(self.levers @ np.abs(b - a) / CHECK_SPACING)))
+        return np.asarray(a + np.linspace(0.0, 1.0, steps + 1)[:, None] * (b - a))
 
-def _segment(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Positions between a and b to check, both ends among them."""
-    steps = max(1, int(np.ceil(LEVERS @ np.abs(b - a) / CHECK_SPACING)))
-    return np.asarray(a + np.linspace(0.0, 1.0, steps + 1)[:, None] * (b - a))
-
-
-def _thinned(rows: FloatArray) -> FloatArray:
-    """Rows between which the hand moves at most `CHECK_SPACING`, first and last among them."""
-    travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(rows, axis=0)) @ LEVERS)])
-    wanted = np.arange(0.0, travelled[-1], CHECK_SPACING)
-    picked = np.unique(np.searchsorted(travelled, wanted))
-    return np.vstack([rows[picked], rows[-1:]])
+    def _thinned(self, rows: FloatArray) -> FloatArray:
+        """Rows between which the hand moves at most `CHECK_SPACING`, first and last among them."""
+        ways = np.abs(np.diff(rows, axis=0)) @ self.levers
+        travelled = np.concatenate([[0.0], np.cumsum(ways)])
+        wanted = np.arange(0.0, travelled[-1], CHECK_SPACING)
+        picked = np.unique(np.searchsorted(travelled, wanted))
+        return np.vstack([rows[picked], rows[-1:]])

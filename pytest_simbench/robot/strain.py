@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.panda import ACCELERATION_LIMITS, VELOCITY_LIMITS
 from pytest_simbench.scene import Box, FloatArray
 
 SPAN = 0.01
@@ -72,7 +71,7 @@ def strain(
             shares = np.abs(model.effort_shares(gravity, *motion, body))
             torque = max(torque, float(shares.max()))
     return Strain(
-        velocity=float((np.abs(velocity) / VELOCITY_LIMITS).max()),
-        acceleration=float((np.abs(acceleration) / ACCELERATION_LIMITS).max()),
+        velocity=float((np.abs(velocity) / model.limits.column("velocity")).max()),
+        acceleration=float((np.abs(acceleration) / model.limits.column("acceleration")).max()),
         torque=torque,
     )

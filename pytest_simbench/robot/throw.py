@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pytest_simbench.robot.errors import PlanningError
+from pytest_simbench.robot.errors import PlanningError, RobotError
 from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.robot.panda import THROW_END, WIND_UP
 from pytest_simbench.robot.timing import TICK, Timed, line_move, synchronised_move
-from pytest_simbench.scene import Box, FloatArray
+from pytest_simbench.scene import Box, FloatArray, Robot
 
 EFFORT_SHARE = 0.9
 """Largest planned effort, as a share of each joint's limit: the drives need the rest to correct."""
@@ -59,10 +60,23 @@ class Throw:
         return landing_x(self.position, self.velocity, gravity)
 
 
-def study_swing(start: FloatArray, goal: FloatArray) -> tuple[Timed, float]:
+def swing_of(robot: Robot) -> tuple[FloatArray, FloatArray]:
+    """Arm joints before and after the throw, each (arm,) [rad].
+
+    Raises:
+        RobotError: none is known for this robot.
+    """
+    if robot.name != "panda":
+        raise RobotError(
+            f"robot {robot.name!r} has no swing for the throw: throwing is for the panda"
+        )
+    return np.array(WIND_UP), np.array(THROW_END)
+
+
+def study_swing(model: RobotModel, start: FloatArray, goal: FloatArray) -> tuple[Timed, float]:
     """The study's: full speed, every joint on a profile of its own, ending together; with its exact
     duration [s]. Infeasible: joint 2 would need 1.2 times what its motor gives."""
-    return synchronised_move(start, goal)
+    return synchronised_move(start, goal, model.limits)
 
 
 def feasible_swing(
@@ -79,7 +93,7 @@ def feasible_swing(
     """
 
     def swing(acceleration: float) -> tuple[Timed, float]:
-        return line_move(start, goal, (SPEED_SHARE, acceleration, JERK_SHARE))
+        return line_move(start, goal, model.limits, (SPEED_SHARE, acceleration, JERK_SHARE))
 
     def strain(timed: Timed) -> float:
         rows = (timed.position, timed.velocity, timed.acceleration)

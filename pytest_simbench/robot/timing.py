@@ -8,8 +8,7 @@ import numpy as np
 import ruckig
 from scipy.interpolate import CubicSpline
 
-from pytest_simbench.robot.panda import ACCELERATION_LIMITS, JERK_LIMITS, VELOCITY_LIMITS
-from pytest_simbench.scene import FloatArray
+from pytest_simbench.scene import FloatArray, MotionLimits
 
 TICK = 0.004
 """Time between two set points [s]."""
@@ -29,19 +28,25 @@ class Timed:
         return TICK * (len(self.position) - 1)
 
 
-def straight_move(start: FloatArray, goal: FloatArray, *, speed: float = 1.0) -> Timed:
+def straight_move(
+    start: FloatArray, goal: FloatArray, limits: MotionLimits, *, speed: float = 1.0
+) -> Timed:
     """From rest to rest on the straight line in joint space; its last row is the goal.
 
     Args:
         start, goal: arm joints, (arm,) [rad].
+        limits: of the arm.
         speed: share of the velocity limits; acceleration scales with its square, jerk with its
             cube, which stretches time by 1 / speed.
     """
-    return line_move(start, goal, (speed, speed**2, speed**3))[0]
+    return line_move(start, goal, limits, (speed, speed**2, speed**3))[0]
 
 
 def line_move(
-    start: FloatArray, goal: FloatArray, shares: tuple[float, float, float]
+    start: FloatArray,
+    goal: FloatArray,
+    limits: MotionLimits,
+    shares: tuple[float, float, float],
 ) -> tuple[Timed, float]:
     """The same with shares of the velocity, acceleration and jerk limits; also the exact duration
     [s], which the rows round up to a whole number of ticks.
@@ -52,25 +57,25 @@ def line_move(
     """
     way = np.asarray(goal) - np.asarray(start)
     reach = np.maximum(np.abs(way), 1e-9)
-    limits = [
+    bounds = [
         np.array([(bound / reach).min() * share])
-        for bound, share in zip(
-            (VELOCITY_LIMITS, ACCELERATION_LIMITS, JERK_LIMITS), shares, strict=True
-        )
+        for bound, share in zip(_bounds(limits), shares, strict=True)
     ]
-    profile = _plan(np.zeros(1), np.ones(1), *limits)
+    profile = _plan(np.zeros(1), np.ones(1), *bounds)
     s, ds, dds = _sampled(profile)
     return Timed(np.asarray(start) + s * way, ds * way, dds * way), float(profile.duration)
 
 
-def synchronised_move(start: FloatArray, goal: FloatArray) -> tuple[Timed, float]:
+def synchronised_move(
+    start: FloatArray, goal: FloatArray, limits: MotionLimits
+) -> tuple[Timed, float]:
     """From rest to rest at full speed, joints only starting and ending together; also the exact
     duration [s], which the rows round up to a whole number of ticks."""
-    trajectory = _plan(start, goal, VELOCITY_LIMITS, ACCELERATION_LIMITS, JERK_LIMITS)
+    trajectory = _plan(start, goal, *_bounds(limits))
     return Timed(*_sampled(trajectory)), float(trajectory.duration)
 
 
-def along_path(path: FloatArray, *, speed: float = 1.0) -> Timed:
+def along_path(path: FloatArray, limits: MotionLimits, *, speed: float = 1.0) -> Timed:
     """From rest to rest along a smooth path, within all joint limits.
 
     A cubic spline goes through the way points; one Ruckig profile runs along its arc length with
@@ -78,6 +83,7 @@ def along_path(path: FloatArray, *, speed: float = 1.0) -> Timed:
 
     Args:
         path: way points, (n, arm) [rad], n >= 2.
+        limits: of the arm.
         speed: share of the velocity limits, as in `straight_move`.
     """
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
@@ -88,25 +94,31 @@ def along_path(path: FloatArray, *, speed: float = 1.0) -> Timed:
     spline = CubicSpline(length, path)
     dense = np.linspace(0.0, length[-1], 10 * len(path))
     first, second = (np.abs(spline(dense, order)).max(axis=0) + 1e-9 for order in (1, 2))
-    velocity = min((VELOCITY_LIMITS / first).min(), np.sqrt(ACCELERATION_LIMITS / 2 / second).min())
-    acceleration = (ACCELERATION_LIMITS / 2 / first).min()
-    jerk = (JERK_LIMITS / 4 / first).min()
-    limits = np.array([[velocity * speed], [acceleration * speed**2], [jerk * speed**3]])
+    velocities, accelerations, jerks = _bounds(limits)
+    velocity = min((velocities / first).min(), np.sqrt(accelerations / 2 / second).min())
+    acceleration = (accelerations / 2 / first).min()
+    jerk = (jerks / 4 / first).min()
+    bounds = np.array([[velocity * speed], [acceleration * speed**2], [jerk * speed**3]])
     for _ in range(5):
-        timed = _along(spline, float(length[-1]), limits)
+        timed = _along(spline, float(length[-1]), bounds)
         excess = max(
-            (np.abs(timed.velocity) / VELOCITY_LIMITS).max(),
-            np.sqrt((np.abs(timed.acceleration) / ACCELERATION_LIMITS).max()),
+            (np.abs(timed.velocity) / velocities).max(),
+            np.sqrt((np.abs(timed.acceleration) / accelerations).max()),
         )
         if excess <= 1.0:
             return timed
         slower = 1.0 / (1.01 * excess)
-        limits = limits * np.array([[slower], [slower**2], [slower**3]])
+        bounds = bounds * np.array([[slower], [slower**2], [slower**3]])
     return timed
 
 
-def _along(spline: CubicSpline, length: float, limits: FloatArray) -> Timed:
-    s, ds, dds = _sampled(_plan(np.zeros(1), np.array([length]), *limits))
+def _bounds(limits: MotionLimits) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Velocity, acceleration and jerk limits of the joints, each (arm,)."""
+    return limits.column("velocity"), limits.column("acceleration"), limits.column("jerk")
+
+
+def _along(spline: CubicSpline, length: float, bounds: FloatArray) -> Timed:
+    s, ds, dds = _sampled(_plan(np.zeros(1), np.array([length]), *bounds))
     d1, d2 = spline(s[:, 0], 1), spline(s[:, 0], 2)
     return Timed(spline(s[:, 0]), d1 * ds, d2 * ds**2 + d1 * dds)
 

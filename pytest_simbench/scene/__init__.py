@@ -3,7 +3,7 @@
 from pytest_simbench.scene.bodies import Box, penetration
 from pytest_simbench.scene.checks import SceneError
 from pytest_simbench.scene.pose import FloatArray, Pose, Quaternion, Vector3, rotation_matrix
-from pytest_simbench.scene.robot import Gripper, Joint, Robot
+from pytest_simbench.scene.robot import Gripper, Joint, MotionLimits, Robot
 from pytest_simbench.scene.scene import STANDARD_GRAVITY, Scene
 from pytest_simbench.scene.trajectory import Trajectory
 
@@ -13,6 +13,7 @@ __all__ = [
     "FloatArray",
     "Gripper",
     "Joint",
+    "MotionLimits",
     "Pose",
     "Quaternion",
     "Robot",

@@ -51,7 +51,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Gripper:
-    """A parallel gripper.
+    """A gripper; without joints, a hand that only touches.
 
     Its fingers are coupled mechanically: they always stand equally far from the middle. Without
     that, two fingers that both press with their largest force leave the object free between them.
@@ -76,12 +76,52 @@ class Gripper:
             check_number(getattr(self, quantity), f"the gripper's position {quantity!r} [m]")
         check_number(self.squeeze, "the gripper's squeeze [N]", 0.0)
 
+    @property
+    def couplings(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of joints that stand at equal positions: the first one, and each other."""
+        return tuple((self.joints[0], other) for other in self.joints[1:])
+
     def to_wire(self) -> dict[str, Any]:
         return {**self.__dict__, "joints": list(self.joints)}
 
     @classmethod
     def from_wire(cls, data: dict[str, Any]) -> Gripper:
         return cls(**{**data, "joints": tuple(data["joints"])})
+
+
+@dataclass(frozen=True)
+class MotionLimits:
+    """How the arm may be moved: what motions are planned within. No simulator is told.
+
+    Attributes:
+        velocity: of each arm joint [rad/s].
+        acceleration: [rad/s^2].
+        jerk: [rad/s^3].
+        levers: a turn of arm joint i by dq moves the fingertips about levers[i] |dq| at most [m]:
+            their distance from the joint's axis. Collisions are checked by it.
+        finger_speed: of each finger [m/s].
+    """
+
+    velocity: tuple[float, ...]
+    acceleration: tuple[float, ...]
+    jerk: tuple[float, ...]
+    levers: tuple[float, ...]
+    finger_speed: float
+
+    def __post_init__(self) -> None:
+        arms = ("velocity", "acceleration", "jerk", "levers")
+        for what in arms:
+            for number in getattr(self, what):
+                check_number(number, f"a limit of motion ({what})", 0.0, above=True)
+        check_number(self.finger_speed, "the speed of the fingers [m/s]", 0.0, above=True)
+        counts = {what: len(getattr(self, what)) for what in arms}
+        if len(set(counts.values())) > 1:
+            told = ", ".join(f"{what} of {count}" for what, count in counts.items())
+            raise SceneError(f"limits of motion of several numbers of joints: {told}")
+
+    def column(self, what: str) -> FloatArray:
+        """One limit of all arm joints, (n_arm,): `limits.column("velocity")`."""
+        return np.array(getattr(self, what), dtype=float)
 
 
 @dataclass(frozen=True)
@@ -92,23 +132,27 @@ class Robot:
         name: of the robot ("panda").
         urdf: path of its URDF file.
         packages: directory of each `package://NAME/` that the URDF refers to.
-        srdf: path of its SRDF file, which lists the link pairs not to be checked for collision.
+        srdf: path of its SRDF file, which lists the link pairs not to be checked for collision;
+            empty for none.
         joints: the driven joints in command order, arm first, then fingers.
         gripper: the fingers.
         tool_frame: link whose origin is the tool centre point.
         base: pose of the root link in the world.
         friction: of every link's surface.
+        limits: of the arm's motion; None for a robot that no task moves. They stay on this side:
+            simulators are not told, and a robot that came over the wire has none.
     """
 
     name: str
     urdf: str
-    packages: Mapping[str, str]
+    packages: Mapping[str, str] = field(hash=False)
     srdf: str
     joints: tuple[Joint, ...]
     gripper: Gripper
     tool_frame: str
     base: Pose = field(default_factory=Pose)
     friction: float = 1.0
+    limits: MotionLimits | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         check_name(self.name, "a robot")
@@ -127,6 +171,11 @@ class Robot:
             raise SceneError(
                 f"the gripper of {self.name!r} has the joints {', '.join(unknown)}, which have no "
                 f"drives; choose from {', '.join(names)}"
+            )
+        if self.limits is not None and len(self.limits.velocity) != len(self.arm_joints):
+            raise SceneError(
+                f"robot {self.name!r} has {len(self.arm_joints)} arm joints and limits of motion "
+                f"of {len(self.limits.velocity)}"
             )
 
     @property
@@ -147,8 +196,9 @@ class Robot:
         return np.array([getattr(joint, attribute) for joint in self.joints], dtype=float)
 
     def to_wire(self) -> dict[str, Any]:
+        told = {key: value for key, value in self.__dict__.items() if key != "limits"}
         return {
-            **self.__dict__,
+            **told,
             "packages": dict(self.packages),
             "joints": [joint.to_wire() for joint in self.joints],
             "gripper": self.gripper.to_wire(),

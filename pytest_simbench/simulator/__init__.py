@@ -13,13 +13,14 @@ from pytest_simbench.simulator.errors import (
     StateError,
     UnavailableError,
 )
-from pytest_simbench.simulator.info import Capability, Deviation, SimulatorInfo
+from pytest_simbench.simulator.info import FOLLOWER, Capability, Deviation, SimulatorInfo
 from pytest_simbench.simulator.lazy import lazy_import
 from pytest_simbench.simulator.parity import one_value
 from pytest_simbench.simulator.settings import Settings
 from pytest_simbench.simulator.urdf import PreparedRobot
 
 __all__ = [
+    "FOLLOWER",
     "Capability",
     "DescriptionError",
     "Deviation",

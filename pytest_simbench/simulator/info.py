@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from fnmatch import fnmatchcase
+
+from pytest_simbench.scene import Robot
 
 
 class Capability(StrEnum):
@@ -21,6 +23,13 @@ class Capability(StrEnum):
     GPU = "gpu"
 
 
+MEASURED_ON = "panda"
+"""The robot on which the sizes of declared deviations were measured."""
+
+FOLLOWER = "FOLLOWER"
+"""Stands for the name of a joint in the pattern of a deviation, see `Deviation.with_robot`."""
+
+
 @dataclass(frozen=True)
 class Deviation:
     """Something of the scene that an engine cannot express or cannot report.
@@ -31,11 +40,24 @@ class Deviation:
         reason: why, in one sentence for the user.
         within: the largest difference that it excuses, in the quantity's unit; None excuses any,
             and that the engine does not tell the quantity.
+        elsewhere: the same with another robot than `MEASURED_ON`, whose links may be larger; None
+            where it makes no difference.
     """
 
     quantity: str
     reason: str
     within: float | None = None
+    elsewhere: float | None = None
+
+    def with_robot(self, robot: Robot | None) -> Deviation:
+        """The same in a world with this robot. `FOLLOWER` in its patterns is then each finger that
+        follows the first one."""
+        if robot is None or robot.name == MEASURED_ON:
+            return self
+        followers = robot.gripper.joints[1:] if FOLLOWER in self.quantity else ()
+        patterns = [self.quantity.replace(FOLLOWER, name) for name in followers]
+        within = self.within if self.elsewhere is None else self.elsewhere
+        return replace(self, quantity=" ".join(patterns) or self.quantity, within=within)
 
     def excuses(self, quantity: str) -> bool:
         return any(fnmatchcase(quantity, pattern) for pattern in self.quantity.split())

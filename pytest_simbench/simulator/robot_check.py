@@ -15,6 +15,8 @@ def check_robot(robot: Robot) -> None:
         DescriptionError: what is wrong, where, and what to do.
     """
     PreparedRobot(robot)
+    if not robot.srdf:
+        return
     srdf = read_xml(robot.srdf, "the list of link pairs")
     if srdf.tag != "robot":
         raise DescriptionError(f"{robot.srdf} is no SRDF: it holds <{srdf.tag}>, not <robot>")

@@ -10,7 +10,7 @@ as visual shapes too.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -138,7 +138,7 @@ class PreparedRobot:
         for joint in joints:
             if _parent(joint) != name:
                 continue
-            child, origin = _child(joint), pose * _origin(joint)
+            child, origin = _child(joint), pose * origin_of(joint)
             if joint.attrib["type"] == "fixed":
                 self.links[into].absorb(raw[child], origin)
                 self._descend(child, into, origin, joints, raw)
@@ -168,7 +168,7 @@ class PreparedRobot:
         if inertial is not None:
             mass, i = inertial.find("mass"), inertial.find("inertia")
             if mass is not None and i is not None:
-                pose = _origin(inertial)
+                pose = origin_of(inertial)
                 values = {key: float(value) for key, value in i.attrib.items()}
                 tensor = np.array(
                     [
@@ -183,10 +183,10 @@ class PreparedRobot:
         for collision in element.findall("collision"):
             box, mesh = collision.find("geometry/box"), collision.find("geometry/mesh")
             if box is not None:
-                link.shapes.append(Shape(_origin(collision), size=_vector(box.attrib["size"])))
+                link.shapes.append(Shape(origin_of(collision), size=_vector(box.attrib["size"])))
             elif mesh is not None:
                 path = self._description.mesh(mesh.attrib["filename"])
-                link.shapes.append(Shape(_origin(collision), mesh=path))
+                link.shapes.append(Shape(origin_of(collision), mesh=path))
         return link
 
     def to_urdf(self) -> str:
@@ -201,7 +201,7 @@ class PreparedRobot:
                     _write_shape(ET.SubElement(element, tag), shape)
         for joint in self.joints:
             element = ET.SubElement(root, "joint", name=joint.name, type=joint.kind)
-            _write_origin(element, joint.origin)
+            write_origin(element, joint.origin)
             ET.SubElement(element, "parent", link=joint.parent)
             ET.SubElement(element, "child", link=joint.child)
             ET.SubElement(element, "axis", xyz=_spaced(joint.axis))
@@ -251,26 +251,35 @@ def _vector(text: str) -> Vector3:
     return (x, y, z)
 
 
-def _origin(element: ET.Element) -> Pose:
+def origin_of(element: ET.Element) -> Pose:
     """Pose of an element's <origin>; URDF angles are roll, pitch, yaw about fixed axes."""
     origin = element.find("origin")
     if origin is None:
         return Pose()
-    roll, pitch, yaw = np.array(_vector(origin.attrib.get("rpy", "0 0 0"))) / 2
+    return pose_of_rpy(
+        _vector(origin.attrib.get("xyz", "0 0 0")), _vector(origin.attrib.get("rpy", "0 0 0"))
+    )
+
+
+def pose_of_rpy(xyz: Sequence[float], rpy: Sequence[float]) -> Pose:
+    """A pose as a URDF writes it: position [m]; roll, pitch and yaw about fixed axes [rad]."""
+    x, y, z = xyz
+    roll, pitch, yaw = np.array(rpy) / 2
     turns = [
         Pose(quaternion=(np.cos(yaw), 0.0, 0.0, np.sin(yaw))),
         Pose(quaternion=(np.cos(pitch), 0.0, np.sin(pitch), 0.0)),
         Pose(quaternion=(np.cos(roll), np.sin(roll), 0.0, 0.0)),
     ]
     quaternion = (turns[0] * turns[1] * turns[2]).quaternion
-    return Pose(_vector(origin.attrib.get("xyz", "0 0 0")), quaternion)
+    return Pose((x, y, z), quaternion)
 
 
 def _spaced(values: Any) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def _write_origin(element: ET.Element, pose: Pose) -> None:
+def write_origin(element: ET.Element, pose: Pose) -> None:
+    """Give an element an <origin>."""
     r = pose.rotation()
     pitch = np.arcsin(np.clip(-r[2, 0], -1.0, 1.0))
     roll, yaw = np.arctan2(r[2, 1], r[2, 2]), np.arctan2(r[1, 0], r[0, 0])
@@ -294,7 +303,7 @@ def _write_inertial(element: ET.Element, link: Link) -> None:
 
 
 def _write_shape(element: ET.Element, shape: Shape) -> None:
-    _write_origin(element, shape.pose)
+    write_origin(element, shape.pose)
     geometry = ET.SubElement(element, "geometry")
     if shape.size is not None:
         ET.SubElement(geometry, "box", size=_spaced(shape.size))

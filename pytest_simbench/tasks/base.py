@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
 from pytest_simbench.client.world import World
-from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.robot.errors import RobotError
+from pytest_simbench.scene import Box, Pose, Robot, Scene
 from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.moments import Moment
 
@@ -22,6 +23,10 @@ CUBE_MASS = 0.1
 
 STUDY_TOLERANCE = 0.05
 """The study counts a cube as in its place within this distance in x and in y [m]."""
+
+
+ROBOT = "robot"
+"""Name of the field of a task that takes the robot."""
 
 
 @dataclass(frozen=True)
@@ -95,9 +100,32 @@ class Task(ABC):
         the record says which one held."""
         return self
 
+    def on(self, robot: Robot) -> Task:
+        """The task as another robot does it: its field `robot` replaced.
+
+        Raises:
+            RobotError: it takes none; one sentence.
+        """
+        if ROBOT in {item.name for item in fields(self)}:  # type: ignore[arg-type]
+            return replace(self, **{ROBOT: robot})  # type: ignore[type-var]
+        if self.scene(0, Jitter(0.0, 0.0)).robot is None:
+            return self
+        raise RobotError(
+            f"the task {self.name!r} takes no other robot than its own: give it a field "
+            f"`{ROBOT}: Robot | None = None`, and use that robot in its scene"
+        )
+
+    def problem(self) -> str | None:
+        """What the robot cannot do of the task, in one sentence, or None. Asked before anything
+        runs, of a robot that was chosen."""
+        return None
+
     def parameters(self) -> dict[str, Any]:
-        """Every parameter under its name in records: `task.levels`, `task.speeds.carry`."""
-        return dict(_flat("task", asdict(self)))  # type: ignore[call-overload]
+        """Every parameter under its name in records: `task.levels`, `task.speeds.carry`. The robot
+        is a part of the record by itself."""
+        told = asdict(self)  # type: ignore[call-overload]
+        told.pop(ROBOT, None)
+        return dict(_flat("task", told))
 
     @abstractmethod
     def scene(self, seed: int, jitter: Jitter) -> Scene:

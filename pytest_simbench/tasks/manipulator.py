@@ -214,7 +214,8 @@ class Manipulator:
         """
         motion = self.world.follow(trajectory, log_period=log_period)
         self.arm = trajectory.position[-1, : self.model.arm].copy()
-        self.fingers = float(trajectory.position[-1, -1])
+        if self.gripper.joints:
+            self.fingers = float(trajectory.position[-1, -1])
         return motion
 
     def close_hand(self, around: str | None = None, seen: Pose | None = None) -> None:

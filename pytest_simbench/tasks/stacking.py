@@ -10,9 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import World
-from pytest_simbench.robot.panda import FINGER_CLOSED, panda
+from pytest_simbench.robot.panda import panda
 from pytest_simbench.robot.planning import PlanningError
-from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.scene import Box, Pose, Robot, Scene
 from pytest_simbench.tasks.base import (
     CUBE_SIZE,
     STUDY_TOLERANCE,
@@ -26,6 +26,7 @@ from pytest_simbench.tasks.base import (
 )
 from pytest_simbench.tasks.manipulator import FULL_SPEED, LostCube, Manipulator, Speeds
 from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.tasks.reach import cannot_handle
 
 TABLE_TOP = 0.30
 """Height of the table top [m] (study code, Webots)."""
@@ -71,9 +72,10 @@ class Stacking(Task):
         check_delay: to the count of *placed*, from the release or the retreat [s].
         count_after_retreat: whether the hand retreats before `check_delay` begins; if not, it
             waits and retreats after the count.
-        finger_closed: position commanded to each finger to grasp [m].
+        finger_closed: position commanded to each finger to grasp [m]; None: the hand's own.
         speeds: of the arm.
         settle: from the end of the task to the count at the end [s].
+        robot: that stacks; None: the Panda.
     """
 
     name: ClassVar[str] = "stacking"
@@ -86,9 +88,21 @@ class Stacking(Task):
     release_height: float = 0.005
     check_delay: float = 0.5
     count_after_retreat: bool = False
-    finger_closed: float = FINGER_CLOSED
+    finger_closed: float | None = None
     speeds: Speeds = field(default_factory=Speeds)
     settle: float = 60.0
+    robot: Robot | None = None
+
+    @property
+    def arm(self) -> Robot:
+        """The robot that stacks, its hand closing as the task has it."""
+        robot = self.robot or panda()
+        if self.finger_closed is None:
+            return robot
+        return replace(robot, gripper=replace(robot.gripper, closed=self.finger_closed))
+
+    def parameters(self) -> dict[str, Any]:
+        return super().parameters() | {"task.finger_closed": self.arm.gripper.closed}
 
     @property
     def cubes(self) -> int:
@@ -145,9 +159,13 @@ class Stacking(Task):
             )
             for number, (x, y) in enumerate(GRID, start=1)
         ]
-        robot = panda()
-        gripper = replace(robot.gripper, closed=self.finger_closed)
-        return Scene("stacking", (TABLE, *cubes), replace(robot, gripper=gripper))
+        return Scene("stacking", (TABLE, *cubes), self.arm)
+
+    def problem(self) -> str | None:
+        """The hand is too narrow for the cubes, or a cube or a place out of reach."""
+        starts = [Pose.at(x, y, TABLE_TOP + CUBE_SIZE / 2) for x, y in GRID]
+        ends = [place.pose.translated(z=self.release_height) for place in self.places()]
+        return cannot_handle(self.arm, (TABLE,), [*starts, *ends])
 
     def places(self) -> list[Place]:
         """Targets in the order in which they are filled."""

@@ -31,7 +31,7 @@ OUT_OF_HAND = 0.06
 """Farther than this from the tool centre point, a cube is certainly not held [m]."""
 
 UNCLENCHED = 0.0005
-"""The fingers do not press any more when both have opened by this [m]."""
+"""The fingers do not press any more when all have opened by this [m]."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,8 @@ def unclenched(fingers: FloatArray) -> BoolArray:
     """At which samples the fingers do not press any more, (n,).
 
     Args:
-        fingers: positions of the finger joints [m], (n, 2); in the first sample they hold the cube.
+        fingers: positions of the finger joints [m], (n, n_fingers); in the first sample
+            they hold the cube.
     """
     return np.asarray((fingers - fingers[0] > UNCLENCHED).all(axis=1))
 

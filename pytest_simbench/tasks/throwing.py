@@ -16,11 +16,17 @@ from typing import ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import Motion, World
-from pytest_simbench.robot.errors import PlanningError
+from pytest_simbench.robot.errors import PlanningError, RobotError
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import panda
-from pytest_simbench.robot.throw import Throw, feasible_swing, released, study_swing
-from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Pose, Scene
+from pytest_simbench.robot.throw import (
+    Throw,
+    feasible_swing,
+    released,
+    study_swing,
+    swing_of,
+)
+from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Pose, Robot, Scene
 from pytest_simbench.tasks.base import (
     CUBE_SIZE,
     STUDY_TOLERANCE,
@@ -35,6 +41,7 @@ from pytest_simbench.tasks.impact import impact
 from pytest_simbench.tasks.manipulator import LostCube, Manipulator, Speeds
 from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.moments import Moment
+from pytest_simbench.tasks.reach import cannot_handle
 from pytest_simbench.tasks.throw_analysis import Thrown
 
 PROJECTILE = Pose.at(0.5, 0.0, CUBE_SIZE / 2)
@@ -45,10 +52,6 @@ PYRAMID = (
     (-0.065, 0.025), (0.0, 0.025), (0.065, 0.025), (-0.0335, 0.075), (0.0335, 0.075), (0.0, 0.125),
 )  # fmt: skip
 """y and z of the six cubes of the pyramid [m] (study code)."""
-
-WIND_UP = (0.0, -1.65, 0.0, -0.1, 0.0, 3.6, 0.8)
-THROW_END = (0.0, 0.9, 0.0, -1.1, 0.0, 1.9, 0.8)
-"""Arm joints before and after the throw [rad] (study code)."""
 
 AFTER_THROW = 1.0
 """For so long after the swing the motion is sampled at every step [s]: flight and impact."""
@@ -79,6 +82,7 @@ class Throwing(Task):
         by_throw: only what the thrown cube moved counts as moved; else, as in the study, every cube
             that is elsewhere in the end.
         settle: from the throw to the count [s] (study: 60).
+        robot: that throws; None: the Panda.
     """
 
     name: ClassVar[str] = "throwing"
@@ -95,6 +99,12 @@ class Throwing(Task):
     feasible: bool = True
     by_throw: bool = True
     settle: float = 60.0
+    robot: Robot | None = None
+
+    @property
+    def arm(self) -> Robot:
+        """The robot that throws."""
+        return self.robot or panda()
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
@@ -130,7 +140,7 @@ class Throwing(Task):
     @property
     def references(self) -> Mapping[str, float]:  # type: ignore[override]
         """Of a perfect follower, from the trajectory."""
-        throw = perfect_throw(self.release_fraction, self.feasible)
+        throw = perfect_throw(self.arm, self.release_fraction, self.feasible)
         landing = throw.landing(np.array(STANDARD_GRAVITY))
         assert landing is not None
         return {"landing_x": landing, "release_speed": float(np.linalg.norm(throw.velocity))}
@@ -148,7 +158,15 @@ class Throwing(Task):
         for number, (y, z) in enumerate(PYRAMID, start=1):
             pose = jitter.disturbed(Pose.at(PYRAMID_X, y, z), rng)
             cubes.append(cube(f"pyramid_{number}", pose, GREEN))
-        return Scene("throwing", tuple(cubes), panda())
+        return Scene("throwing", tuple(cubes), self.arm)
+
+    def problem(self) -> str | None:
+        """It has no swing, or cannot pick the cube up."""
+        try:
+            swing_of(self.arm)
+        except RobotError as error:
+            return str(error)
+        return cannot_handle(self.arm, (), [PROJECTILE])
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         with world.phase("settle start"):
@@ -163,7 +181,7 @@ class Throwing(Task):
             with world.phase("pick"):
                 manipulator.pick("projectile")
             with world.phase("wind up"):
-                manipulator.go_to(np.array(WIND_UP), speed=self.wind_up_speed)
+                manipulator.go_to(swing_of(self.arm)[0], speed=self.wind_up_speed)
             with world.phase("throw"):
                 thrown = self._throw(manipulator)
             metrics |= thrown.metrics()
@@ -192,7 +210,7 @@ class Throwing(Task):
         world = manipulator.world
         started = world.time
         swing, perfect = manipulator.throw(
-            np.array(THROW_END), self.release_fraction, feasible=self.feasible
+            swing_of(self.arm)[1], self.release_fraction, feasible=self.feasible
         )
         parts = (swing, world.wait(AFTER_THROW, log_period=0.0))
         motion = Motion.joined([part for part in parts if part is not None])
@@ -203,15 +221,15 @@ class Throwing(Task):
 
 
 @cache
-def perfect_throw(release_fraction: float, feasible: bool) -> Throw:
+def perfect_throw(robot: Robot, release_fraction: float, feasible: bool) -> Throw:
     """The swing and the release of a perfect follower."""
-    model = RobotModel(panda())
-    start, goal = np.array(WIND_UP), np.array(THROW_END)
+    model = RobotModel(robot)
+    start, goal = swing_of(robot)
     held = cube("projectile", PROJECTILE, RED)
     timed, duration = (
         feasible_swing(model, start, goal, np.array(STANDARD_GRAVITY), held)
         if feasible
-        else study_swing(start, goal)
+        else study_swing(model, start, goal)
     )
     return released(model, timed, duration, release_fraction)
 

@@ -24,6 +24,7 @@ from pytest_simbench.simulator.memory import remembering
 from pytest_simbench.simulator.parity import check
 from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.simulator.robot_check import check_names
+from pytest_simbench.simulator.robot_files import received
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.worker.state import check_following, check_log, check_start, checked_state
 from pytest_simbench.worker.stepping import Stepper
@@ -115,11 +116,11 @@ class Server:
         }
 
     def do_compile(self, scene: dict[str, Any]) -> None:
-        self._constructed().compile(Scene.from_wire(scene))
+        self._constructed().compile(Scene.from_wire(received(scene)))
 
     def do_load(self, scene: dict[str, Any], parity: bool) -> dict[str, Any]:
         simulator = self._constructed()
-        world = Scene.from_wire(scene)
+        world = Scene.from_wire(received(scene))
         check_names(world)
         simulator.load(world)
         self.scene = world
@@ -130,7 +131,8 @@ class Server:
         if parity:
             expected = expected_quantities(world, simulator.settings)
             info = simulator.info
-            excused = check(expected, simulator.read_back(), info.deviations, info.name)
+            declared = [deviation.with_robot(world.robot) for deviation in info.deviations]
+            excused = check(expected, simulator.read_back(), declared, info.name)
         if simulator.gui:
             simulator.refresh_window()
         return {"excused": excused, **self.do_state()}

@@ -23,6 +23,7 @@ import numpy as np
 
 from pytest_simbench.scene import Box, FloatArray, Scene
 from pytest_simbench.simulator import (
+    FOLLOWER,
     Capability,
     Deviation,
     PreparedRobot,
@@ -100,6 +101,10 @@ class DART(Simulator):
             Deviation(
                 "joint/*finger_joint2/effort_limit",
                 "the second finger has no drive: it follows the first, by up to both their limits",
+            ),
+            Deviation(
+                f"joint/{FOLLOWER}/effort_limit",
+                "a finger that follows has no drive: the first one moves it, by up to both limits",
             ),
             Deviation(
                 "", "the coupling is one-way: the first finger does not feel the second's load"
@@ -201,12 +206,12 @@ class DART(Simulator):
             for shape in body.getShapeNodes():
                 if shape.hasCollisionAspect():
                     _set_surface(shape, robot.friction)
-        follower = robot.gripper.joints[1]
+        followers = robot.gripper.joints[1:]
         for drive in robot.joints:
             joint = skeleton.getJoint(drive.name)
             joint.setLimitEnforcement(True)
             limit = drive.effort_limit
-            if drive.name == follower:
+            if drive.name in followers:
                 limit *= 2
             else:
                 joint.setActuatorType(dynamics.ActuatorType.SERVO)
@@ -217,7 +222,7 @@ class DART(Simulator):
             joint.setVelocityLowerLimit(0, -np.inf)
         names = [skeleton.getDof(i).getName() for i in range(skeleton.getNumDofs())]
         self._index = np.array([names.index(name) for name in robot.joint_names])
-        driven = np.array([name != follower for name in robot.joint_names])
+        driven = np.array([name not in followers for name in robot.joint_names])
         self._gain = driven * (self.settings.position_gain / self.settings.timestep)
         self._share = driven * (1 - self.settings.position_gain)
         initial = robot.column("initial_position")
@@ -309,10 +314,10 @@ def _set_surface(shape: Any, friction: float) -> None:
 
 
 def _with_mimic(prepared: PreparedRobot) -> str:
-    """The reduced URDF, its second finger following the first: dartpy cannot set that itself."""
-    first, second = prepared.robot.gripper.joints
+    """The reduced URDF, its other fingers following the first: dartpy cannot set that itself."""
+    fingers = prepared.robot.gripper.joints
     root = ET.fromstring(prepared.to_urdf())
     for joint in root.findall("joint"):
-        if joint.attrib["name"] == second:
-            ET.SubElement(joint, "mimic", joint=first, multiplier="1", offset="0")
+        if joint.attrib["name"] in fingers[1:]:
+            ET.SubElement(joint, "mimic", joint=fingers[0], multiplier="1", offset="0")
     return ET.tostring(root, encoding="unicode")

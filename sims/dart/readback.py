@@ -71,9 +71,9 @@ class ReadBack:
                 reported |= _inertial(f"link/{link.name}", body)
             for name in self.prepared.robot.joint_names:
                 reported |= _joint(f"joint/{name}", self.robot.getJoint(name))
-            second = self.robot.getJoint(self.prepared.robot.gripper.joints[1])
+            others = map(self.robot.getJoint, self.prepared.robot.gripper.joints[1:])
             mimic = dartpy.dynamics.ActuatorType.MIMIC
-            reported["gripper/coupled"] = float(second.getActuatorType() == mimic)
+            reported["gripper/coupled"] = float(all(j.getActuatorType() == mimic for j in others))
         return reported | touches(self.scene, self.prepared, self._can_touch)
 
     def _box(self, prefix: str, body: Any) -> dict[str, Any]:

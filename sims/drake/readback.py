@@ -140,8 +140,8 @@ class ReadBack:
 
     def _robot(self, prepared: PreparedRobot) -> dict[str, Any]:
         world, context = self.world, self.context
-        coupled = world.plant.GetConstraintActiveStatus(context, world.coupling)
-        reported: dict[str, Any] = {"gripper/coupled": float(coupled)}
+        coupled = [world.plant.GetConstraintActiveStatus(context, c) for c in world.couplings]
+        reported: dict[str, Any] = {"gripper/coupled": float(all(coupled))}
         for name in prepared.robot.joint_names:
             joint, drive = world.joints[name], world.drives[name]
             gains = drive.get_controller_gains()

@@ -76,7 +76,7 @@ class World:
             the world body.
         shapes: geometry ids by name of the box or link that they belong to, or "ground".
         model: the robot's model instance.
-        coupling: id of the constraint between the fingers.
+        couplings: ids of the constraints between the fingers.
     """
 
     def __init__(self, scene: Scene, settings: DrakeSettings, builder: Any) -> None:
@@ -197,8 +197,10 @@ class World:
             made.set_default_rotor_inertia(drive.armature)
             made.set_controller_gains(trees.PdControllerGains(p=drive.stiffness, d=drive.damping))
             self.drives[drive.name] = made
-        first, second = (self.joints[name] for name in robot.gripper.joints)
-        self.coupling = plant.AddCouplerConstraint(first, second, 1.0)
+        self.couplings = [
+            plant.AddCouplerConstraint(self.joints[first], self.joints[second], 1.0)
+            for first, second in robot.gripper.couplings
+        ]
 
     def _filter_collisions(self) -> None:
         manager = self.scene_graph.collision_filter_manager()

@@ -70,7 +70,8 @@ class ReadBack:
         return reported | touches(self.scene, self.prepared, self._can_touch)
 
     def _robot(self, prepared: PreparedRobot) -> dict[str, Any]:
-        found: dict[str, Any] = {"gripper/coupled": self._coupled(prepared.robot.gripper.joints)}
+        coupled = float(all(map(self._coupled, prepared.robot.gripper.couplings)))
+        found: dict[str, Any] = {"gripper/coupled": coupled}
         links = [self.robot.get_link(name) for name in prepared.links]
         for name, link, pose in zip(prepared.links, links, self._poses(links), strict=True):
             found |= self._part(f"link/{name}", link, pose)
@@ -167,13 +168,11 @@ class ReadBack:
         first, second, kinds = (self._array("equalities", name)[:, 0] for name in names)
         return first, second, kinds
 
-    def _coupled(self, fingers: Sequence[str]) -> float:
+    def _coupled(self, fingers: Sequence[str]) -> bool:
         joints = {self.robot.get_joint(name).idx for name in fingers}
-        return float(
-            any(
-                {a, b} == joints and kind == genesis.EQUALITY_TYPE.JOINT
-                for a, b, kind in zip(*self._equalities(), strict=True)
-            )
+        return any(
+            {a, b} == joints and kind == genesis.EQUALITY_TYPE.JOINT
+            for a, b, kind in zip(*self._equalities(), strict=True)
         )
 
     def _can_touch(self, a: str, b: str) -> bool:

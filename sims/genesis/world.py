@@ -106,10 +106,10 @@ def add_box(world: Any, box: Box) -> Any:
 def add_robot(world: Any, prepared: PreparedRobot) -> Any:
     """The entity of the reduced robot, its fingers held together by an equality constraint."""
     xml = ET.fromstring(prepared.to_urdf())
-    first, second = prepared.robot.gripper.joints
+    fingers = prepared.robot.gripper.joints
     for joint in xml.findall("joint"):
-        if joint.attrib["name"] == second:  # becomes an equality constraint
-            ET.SubElement(joint, "mimic", joint=first, multiplier="1", offset="0")
+        if joint.attrib["name"] in fingers[1:]:  # becomes an equality constraint
+            ET.SubElement(joint, "mimic", joint=fingers[0], multiplier="1", offset="0")
     morph = genesis.morphs.URDF(
         file=ET.tostring(xml, encoding="unicode"),
         fixed=True,

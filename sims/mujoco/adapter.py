@@ -119,7 +119,8 @@ class MuJoCo(Simulator):
                 self._set_surface(geom, scene.robot.friction, ROBOT, 0)
             for joint in scene.robot.joints:
                 _add_drive(spec, joint)
-            _couple_fingers(spec, scene.robot.gripper.joints)
+            for pair in scene.robot.gripper.couplings:
+                _couple_fingers(spec, *pair)
         ground = spec.worldbody.add_geom(
             name="ground",
             type=mujoco.mjtGeom.mjGEOM_PLANE,
@@ -296,9 +297,8 @@ def _add_drive(spec: Any, joint: Any) -> None:
     spec.joint(joint.name).armature = joint.armature
 
 
-def _couple_fingers(spec: Any, fingers: tuple[str, ...]) -> None:
-    """Hold the fingers at equal positions, by a constraint as stiff as the step allows."""
-    first, second = fingers
+def _couple_fingers(spec: Any, first: str, second: str) -> None:
+    """Hold two fingers at equal positions, by a constraint as stiff as the step allows."""
     spec.add_equality(
         type=mujoco.mjtEq.mjEQ_JOINT,
         objtype=mujoco.mjtObj.mjOBJ_JOINT,

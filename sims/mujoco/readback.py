@@ -68,7 +68,8 @@ class ReadBack:
         for name, joint in at.joints.items():
             reported |= self._joint(f"joint/{name}", joint)
         if self.prepared is not None:
-            reported["gripper/coupled"] = self._coupled(self.prepared.robot.gripper.joints)
+            couplings = self.prepared.robot.gripper.couplings
+            reported["gripper/coupled"] = float(all(map(self._coupled, couplings)))
         return reported | touches(self.scene, self.prepared, self._can_touch)
 
     def _box(self, prefix: str, geom: int) -> dict[str, Any]:
@@ -212,23 +213,21 @@ class ReadBack:
             f"{prefix}/initial_position": self.data.qpos[model.jnt_qposadr[joint]],
         }
 
-    def _coupled(self, fingers: tuple[str, ...]) -> float:
-        """Whether an active constraint holds the fingers at equal positions."""
+    def _coupled(self, fingers: tuple[str, str]) -> bool:
+        """Whether an active constraint holds two fingers at equal positions."""
         model, joints = self.model, {self.at.joints[name] for name in fingers}
-        return float(
-            any(
-                {a, b} == joints
-                and kind == mujoco.mjtEq.mjEQ_JOINT
-                and active
-                and list(data[:5]) == [0, 1, 0, 0, 0]
-                for a, b, kind, active, data in zip(
-                    model.eq_obj1id,
-                    model.eq_obj2id,
-                    model.eq_type,
-                    self.active,
-                    model.eq_data,
-                    strict=True,
-                )
+        return any(
+            {a, b} == joints
+            and kind == mujoco.mjtEq.mjEQ_JOINT
+            and active
+            and list(data[:5]) == [0, 1, 0, 0, 0]
+            for a, b, kind, active, data in zip(
+                model.eq_obj1id,
+                model.eq_obj2id,
+                model.eq_type,
+                self.active,
+                model.eq_data,
+                strict=True,
             )
         )
 

@@ -99,8 +99,8 @@ def _add_robot(builder: Any, prepared: PreparedRobot, surface: Any) -> None:
     joints = names(builder.joint_label)
     for joint in robot.joints:
         _set_drive(builder, joints.index(joint.name), joint)
-    first, second = (joints.index(name) for name in robot.gripper.joints)
-    builder.set_joint_mimic(second, first)
+    for first, second in robot.gripper.couplings:
+        builder.set_joint_mimic(joints.index(second), joints.index(first))
 
 
 def _add_box(builder: Any, box: Box, surface: Any) -> None:

@@ -141,11 +141,11 @@ class Stage:
         ]
         schemas = ("PhysicsArticulationRootAPI", "PhysxArticulationAPI")
         prims.append(usd.prim("PhysicsFixedJoint", ROOT.rpartition("/")[2], schemas, root))
-        first, second = robot.finger_indices
+        first, *others = [*robot.finger_indices, None]
         for joint in prepared.joints:
             index = robot.joint_names.index(joint.name)
             limits = prepared.limits[joint.name]
-            coupled_to = first if index == second else None
+            coupled_to = first if index in others else None
             prims.append(_joint(index, joint, robot.joints[index], limits, names, coupled_to))
         return prims
 

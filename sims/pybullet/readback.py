@@ -28,7 +28,7 @@ class ReadBack:
         robot: body of the robot.
         links: number of each link; -1 is the base.
         joints: numbers of the driven joints.
-        coupling: constraint between the fingers.
+        couplings: constraints between the fingers.
         prepared: names of links and joints; no value is taken from it.
     """
 
@@ -40,12 +40,12 @@ class ReadBack:
         robot: int,
         links: Mapping[str, int],
         joints: Sequence[int],
-        coupling: int,
+        couplings: Sequence[int],
         prepared: PreparedRobot | None,
     ) -> None:
         self.c, self.ground, self.bodies = client, ground, bodies
         self.robot, self.links, self.joints = robot, links, joints
-        self.coupling, self.prepared = coupling, prepared
+        self.couplings, self.prepared = couplings, prepared
 
     def all(self) -> dict[str, Any]:
         """Every quantity that Bullet tells, by its name."""
@@ -143,11 +143,15 @@ class ReadBack:
         )
 
     def _coupled(self, robot: Robot) -> float:
-        """Whether the constraint is a gear between the fingers."""
-        info = pybullet.getConstraintInfo(self.coupling, physicsClientId=self.c)
-        fingers = {self.joints[robot.joint_names.index(name)] for name in robot.gripper.joints}
-        ends = info[0] == info[2] == self.robot and {info[1], info[3]} == fingers
-        return float(ends and info[4] == pybullet.JOINT_GEAR)
+        """Whether the constraints are gears between the fingers."""
+        found = set()
+        for constraint in self.couplings:
+            info = pybullet.getConstraintInfo(constraint, physicsClientId=self.c)
+            if info[0] == info[2] == self.robot and info[4] == pybullet.JOINT_GEAR:
+                found.add(frozenset((info[1], info[3])))
+        joints = dict(zip(robot.joint_names, self.joints, strict=True))
+        wanted = {frozenset(joints[name] for name in pair) for pair in robot.gripper.couplings}
+        return float(found == wanted)
 
     def _held(self) -> set[int]:
         """Bodies that a constraint holds."""

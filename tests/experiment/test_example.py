@@ -24,6 +24,7 @@ from pytest_simbench.experiment.example import (
 )
 from pytest_simbench.repeatability.__main__ import main
 from pytest_simbench.robot.panda import panda
+from pytest_simbench.robot.registry import find
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.tasks.base import cube
 from tests.hostile import assert_harmless_terminal
@@ -105,13 +106,22 @@ def test_the_robot_is_this_machine_s(case: Case, tmp_path: Path) -> None:
     assert read_example(path, tmp_path).scene.robot == panda(squeeze=10.0)
 
 
+def test_another_robot_that_is_built_in(case: Case, tmp_path: Path) -> None:
+    scene = replace(SCENE, robot=find("ur5"))
+    path = write_example(case, "robot", scene, TAPE)
+    assert "/" not in json.dumps(json.loads(path.read_text())["scene"])
+    assert read_example(path, tmp_path).scene == scene
+
+
 def test_a_robot_of_unknown_files_needs_a_word(
     case: Case, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     scene = replace(SCENE, robot=replace(panda(), name="mine"))
     path = write_example(case, "robot", scene, TAPE)
     assert main([str(path)]) == 2
-    assert "robot 'mine' is not known here (known: panda)" in capsys.readouterr().err
+    assert (
+        "robot 'mine' is not known here (known: panda, ur10, ur5, xarm7)" in capsys.readouterr().err
+    )
     assert read_example(path, tmp_path, trust_robot=True).scene == scene
     assert replay_command(path, case, scene).endswith(f"{path.name} --trust-robot")
     assert main([str(path), "--trust-robot"]) == 0

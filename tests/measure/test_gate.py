@@ -284,3 +284,15 @@ def test_a_test_that_is_broken_is_told_beside_its_limits() -> None:
     report = run(made([1.0] * 2), [failed(0), failed(1, "WorkerDied"), failed(2)], "placed:5%")
     assert report.broken == report.failures
     assert "none of 3 repetitions succeeded (most often WorkerHung in settle)" in report.broken[0]
+
+
+def test_runs_of_different_robots_are_not_comparable() -> None:
+    """Their tests have different names, and the report says why."""
+    own = made([1.0] * 5, test="t[sim-headless]")
+    ur5 = made([1.0] * 5, test="t[sim-headless-ur5]", robot={"name": "ur5"})
+    sentence = (
+        "the baseline was made with the tasks' own robot, this run with ur5: different robots are "
+        "not comparable"
+    )
+    assert sentence in run(own, ur5, "placed:5%").notes
+    assert not any("robot" in note for note in run(ur5, ur5, "placed:5%").notes)

@@ -116,7 +116,8 @@ def test_ini_flags(pytester: pytest.Pytester, name: str, word: str, value: bool)
 @pytest.mark.parametrize("short", [o.short for o in OPTIONS if o.short])
 def test_short_names_are_the_same_option(pytester: pytest.Pytester, short: str) -> None:
     option = next(o for o in OPTIONS if o.short == short)
-    word = {"--sim": "mujoco", "--reps": "3", "--protocol": "smoke", "--jitter": "2"}.get(short)
+    words = {"--sim": "mujoco", "--robot": "ur5", "--reps": "3", "--protocol": "smoke"}
+    word = {**words, "--jitter": "2"}.get(short)
     value = [] if word is None else [word]
     by_short = options.value(pytester.parseconfig(short, *value), option.name)
     by_long = options.value(pytester.parseconfig(option.flag, *value), option.name)

@@ -34,6 +34,7 @@ ANOTHER: dict[str, Any] = {
     "protocol": "paper",
     "jitter": 50.0,
     "scene": "another",
+    "robot": {"name": "ur5", "digest": "12ab"},
     "limits": {"timeout": 5.0},
     "versions": {"engine": "2.0"},
     "deviations": ("no armature",),
@@ -63,7 +64,8 @@ def test_records_agree_as_the_table_says(use: Use, name: str) -> None:
 
 
 def test_a_configuration_is_equal_for_pooling_resuming_and_merging() -> None:
-    configuration = {"profile", "settings", "protocol", "jitter", "scene", "limits", "versions"}
+    configuration = {"profile", "settings", "protocol", "jitter", "scene", "robot", "limits"}
+    configuration |= {"versions"}
     assert set(equal_to("pool")) == set(equal_to("resume")) == configuration
     assert set(equal_to("merge")) == {*configuration, "deviations"}
     circumstances = {"deviations", "host", "contended", "reused_worker"}
@@ -71,7 +73,7 @@ def test_a_configuration_is_equal_for_pooling_resuming_and_merging() -> None:
 
 
 def test_simulators_are_ranked_where_the_same_was_asked_of_them() -> None:
-    ranked = {"mode", "profile", "settings", "protocol", "jitter", "scene"}
+    ranked = {"mode", "profile", "settings", "protocol", "jitter", "scene", "robot"}
     assert set(equal_to("rank")) == ranked
     other = whole(simulator="b", versions={"b": "1"}, settings={"substeps": 4, "task.towers": 3})
     ours = whole(settings={"timestep": 0.004, "task.towers": 3})
@@ -126,6 +128,20 @@ def test_a_setting_that_one_lacks_is_a_difference_between_records_that_ended() -
 
 def test_an_older_record_without_scene_and_limits_agrees() -> None:
     assert agree(whole(), record())
+
+
+def test_another_robot_is_named() -> None:
+    """The task's own robot leaves no trace; one of another description is told by its digest."""
+    assert "robot" not in whole().to_dict()
+    ur5 = {"name": "ur5", "digest": "12ab"}
+    assert Record.from_dict(whole(robot=ur5).to_dict()).robot == ur5
+    runs = {"t": ([whole()], [whole(robot=ur5)])}
+    assert differences(runs) == [
+        'robot.name was absent, is "ur5" (t)',
+        'robot.digest was absent, is "12ab" (t)',
+    ]
+    runs = {"t": ([whole(robot={**ur5, "digest": "34cd"})], [whole(robot=ur5)])}
+    assert differences(runs) == ['robot.digest was "34cd", is "12ab" (t)']
 
 
 def test_a_failure_that_knows_its_settings_agrees_with_no_others() -> None:

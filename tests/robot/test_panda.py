@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 
-import numpy as np
 import pytest
 
-from pytest_simbench.robot.panda import ACCELERATION_LIMITS, JERK_LIMITS, VELOCITY_LIMITS, panda
+from pytest_simbench.robot.panda import panda
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
 from pytest_simbench.tasks.base import CUBE_SIZE
 
@@ -38,8 +37,12 @@ def test_limits_are_the_descriptions_and_the_data_sheets() -> None:
         for joint in ET.parse(robot.urdf).getroot().iter("joint")
         if joint.find("limit") is not None
     }
+    found = robot.limits
+    assert found is not None
     for index, joint in enumerate(robot.joints[:7]):
         assert joint.effort_limit == float(limits[joint.name]["effort"])
-        assert VELOCITY_LIMITS[index] == float(limits[joint.name]["velocity"])
-    assert np.array_equal(ACCELERATION_LIMITS, [15, 7.5, 10, 12.5, 15, 20, 20])
-    assert np.array_equal(JERK_LIMITS, [7500, 3750, 5000, 6250, 7500, 10000, 10000])
+        assert found.velocity[index] == float(limits[joint.name]["velocity"])
+    for joint in robot.joints[7:]:
+        assert found.finger_speed == float(limits[joint.name]["velocity"])
+    assert found.acceleration == (15, 7.5, 10, 12.5, 15, 20, 20)
+    assert found.jerk == (7500, 3750, 5000, 6250, 7500, 10000, 10000)

@@ -9,10 +9,9 @@ from pytest_simbench.robot.collision import PlanningScene
 from pytest_simbench.robot.errors import InCollision
 from pytest_simbench.robot.kinematics import inverse_kinematics, tool_over
 from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.panda import panda
-from pytest_simbench.robot.planning import MotionPlanner, _thinned
+from pytest_simbench.robot.panda import THROW_END, WIND_UP, panda
+from pytest_simbench.robot.planning import MotionPlanner
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene
-from pytest_simbench.tasks.throwing import THROW_END, WIND_UP
 
 WALL = Box("wall", (0.1, 0.02, 0.5), Pose.at(0.5, 0.0, 0.55))
 
@@ -90,7 +89,7 @@ def test_checks_are_close_together(planner: MotionPlanner, ready: FloatArray) ->
     goal = ready + np.array([1.0, -0.3, 0.2, 0.3, -0.5, 0.2, 1.0])
     rows = planner.move_to(ready, goal, 0.035).position[:, :7]
     model = planner.model
-    tips = np.array([model.tool_pose(q).position for q in _thinned(rows)])
+    tips = np.array([model.tool_pose(q).position for q in planner._thinned(rows)])
     assert np.linalg.norm(np.diff(tips, axis=0), axis=1).max() < 0.035
 
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from pytest_simbench.simulator import Deviation, ParityError, one_value
+from pytest_simbench.robot.panda import panda
+from pytest_simbench.scene import Gripper
+from pytest_simbench.simulator import FOLLOWER, Deviation, ParityError, one_value
 from pytest_simbench.simulator.parity import check, compare
 
 SOFT = Deviation("", "contacts are soft")
@@ -189,3 +193,19 @@ def test_a_difference_of_just_the_declared_size_is_excused() -> None:
 def test_no_shapes_where_none_are_asked_for() -> None:
     none = np.zeros((0, 26))
     assert not compare({"body/a/meshes": none}, {"body/a/meshes": none}, (), "sim").wrong
+
+
+def test_sizes_hold_for_the_robot_they_were_measured_on() -> None:
+    """Another robot may have larger meshes, and fingers of other names."""
+    hull = Deviation("link/*/meshes", "hulls", within=5e-4, elsewhere=1e-3)
+    finger = Deviation(f"joint/{FOLLOWER}/effort_limit", "follows")
+    ur5 = replace(
+        panda(), name="ur5", gripper=Gripper(("panda_joint1", "panda_joint2"), 1.0, 0.0, 1.0)
+    )
+    for robot in (None, panda()):
+        assert hull.with_robot(robot) == hull
+        assert not finger.with_robot(robot).excuses("joint/panda_finger_joint2/effort_limit")
+    assert hull.with_robot(ur5).within == 1e-3
+    assert replace(hull, elsewhere=None).with_robot(ur5).within == 5e-4
+    assert finger.with_robot(ur5).excuses("joint/panda_joint2/effort_limit")
+    assert not finger.with_robot(ur5).excuses("joint/panda_joint1/effort_limit")

@@ -22,6 +22,7 @@ from pytest_simbench.client.launch import Constructed
 from pytest_simbench.client.world import World
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.scene import FloatArray, Pose, Scene
+from pytest_simbench.simulator.robot_files import received
 from pytest_simbench.tasks import Jitter, Task
 from pytest_simbench.tasks.base import CUBE_SIZE, Outcome
 
@@ -108,7 +109,7 @@ class ScriptedProcess:
         return Constructed({"timestep": self.timestep})
 
     def do_load(self, scene: dict[str, Any], parity: bool) -> dict[str, Any]:
-        self.scene = Scene.from_wire(scene)
+        self.scene = Scene.from_wire(received(scene))
         robot = self.scene.robot
         self.model = None if robot is None else RobotModel(robot)
         self.position = np.zeros(0) if robot is None else robot.column("initial_position")

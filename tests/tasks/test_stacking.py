@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from pytest_simbench.client.errors import Diverged, RepetitionTimeout
+from pytest_simbench.robot.files import read_robot
 from pytest_simbench.robot.panda import READY
+from pytest_simbench.robot.registry import find
 from pytest_simbench.scene import Box, Pose
 from pytest_simbench.tasks import Jitter, Stacking, stacking
 from pytest_simbench.tasks.base import generators
 from pytest_simbench.tasks.manipulator import Manipulator, Speeds
 from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.stacking import GRID, TABLE, TOWERS, Place, _placed, _strict
+from tests.robot.small_arm import TOML, URDF, small_arm
 from tests.tasks.scripted import (
     Asked,
     Mishap,
@@ -363,8 +367,10 @@ def test_the_studys_rules() -> None:
     own = Stacking(1, 2, True, 0.01, 2.0, False, 0.01, Speeds(0.5, 0.5, 0.5), settle=1.0)
     assert own.study() == replace(Stacking().study(), towers=1, levels=2)  # its size stays
     assert Stacking() == Stacking(
-        3, 5, True, 0.005, 0.5, False, 0.0, Speeds(1.0, 0.6, 0.3), 60.0
+        3, 5, True, 0.005, 0.5, False, None, Speeds(1.0, 0.6, 0.3), 60.0
     )  # fmt: skip
+    assert Stacking().parameters()["task.finger_closed"] == 0.0  # the Panda's own
+    assert Stacking().study().parameters()["task.finger_closed"] == 0.02
     assert Stacking().smoke() == Stacking(towers=1, levels=2, settle=2.0)
 
 
@@ -476,3 +482,47 @@ def test_it_says_what_it_measures(task: Stacking, settle: str, counted: str) -> 
 
 STUDY_Y = (-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3)
 FIRST_OF_2022 = ["cube_02", "cube_06", "cube_09"]
+
+
+# Other robots
+
+
+def test_another_robot_stacks_in_the_same_world() -> None:
+    ur5 = find("ur5")
+    task = Stacking().on(ur5)
+    assert task == Stacking(robot=ur5)
+    assert task.parameters() == Stacking().parameters()  # the robot is no parameter
+    scene, pandas = task.scene(3, Jitter()), Stacking().scene(3, Jitter())
+    assert scene.robot == ur5
+    assert scene.bodies == pandas.bodies
+    assert task.smoke() == Stacking(towers=1, levels=2, settle=2.0, robot=ur5)
+    study = task.study().scene(3, Jitter()).robot
+    assert study is not None
+    assert study.gripper == replace(ur5.gripper, closed=0.02)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur5", "ur10", "xarm7"])
+def test_a_built_in_robot_can_do_it(name: str) -> None:
+    assert Stacking(robot=find(name)).problem() is None
+
+
+def test_what_a_robot_cannot_do_is_a_sentence(tmp_path: Path) -> None:
+    ur5 = find("ur5")
+    far = replace(ur5, base=Pose.at(-0.5, 0.0, 0.3))
+    assert Stacking(robot=far).problem() == (
+        "robot 'ur5' cannot handle a cube at (0.40, -0.30, 0.33): it is out of its reach; place "
+        "its base elsewhere"
+    )
+    low = replace(ur5, base=Pose.at(0.0, 0.0, 0.15))
+    assert "makes" in str(Stacking(robot=low).problem())
+    assert "touch table" in str(Stacking(robot=low).problem())
+    narrow = replace(ur5, gripper=replace(ur5.gripper, opened=0.028))
+    assert Stacking(robot=narrow).problem() == (
+        "robot 'ur5' opens its fingers to 0.028 m from the middle and needs 0.03 m for a cube of "
+        "0.05 m"
+    )
+    toml = TOML[: TOML.index("[hand]")] + '[hand]\ntool_frame = "grip"\n'
+    bare = read_robot(small_arm(tmp_path, toml, URDF.replace('"prismatic"', '"fixed"')))
+    assert Stacking(robot=bare).problem() == (
+        "robot 'small' has no hand with two parallel fingers to grasp a cube"
+    )

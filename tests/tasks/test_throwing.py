@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pytest_simbench.robot.panda import panda
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks import Jitter, Outcome, Throwing
 from pytest_simbench.tasks.throwing import PYRAMID, perfect_throw
@@ -16,7 +17,7 @@ from tests.tasks.scripted import Mishap, drop, move, perform, put
 
 EXACT = Jitter(0.0, 0.0)
 TASK = Throwing(settle=3.0)
-PERFECT = perfect_throw(0.5, True)
+PERFECT = perfect_throw(panda(), 0.5, True)
 NOTHING_MOVED = {"moved": 0.0, "hit": 0.0, "moved_otherwise": 0.0}
 
 
@@ -137,7 +138,6 @@ def test_a_late_release(late: float) -> None:
     timed = PERFECT.timed
     row = PERFECT.row + round(late / 0.004)
     from pytest_simbench.robot.model import RobotModel
-    from pytest_simbench.robot.panda import panda
 
     model = RobotModel(panda())
     position = np.array(model.tool_pose(timed.position[row]).position)
@@ -315,12 +315,12 @@ def test_references_are_the_trajectorys() -> None:
     """Not constants: another release lands elsewhere."""
     for fraction in (0.4, 0.5, 0.55):
         task = Throwing(release_fraction=fraction)
-        throw = perfect_throw(fraction, True)
+        throw = perfect_throw(panda(), fraction, True)
         landing = parabola(throw.position, throw.velocity)
         assert task.references["landing_x"] == pytest.approx(landing, abs=1e-4)
         assert task.references["release_speed"] == pytest.approx(np.linalg.norm(throw.velocity))
     study = Throwing().study()
-    throw = perfect_throw(0.5, False)
+    throw = perfect_throw(panda(), 0.5, False)
     assert study.references["landing_x"] == pytest.approx(
         parabola(throw.position, throw.velocity), abs=1e-4
     )
@@ -332,7 +332,7 @@ def test_what_is_planned_is_the_reference() -> None:
     for task in (TASK, replace(TASK, feasible=False)):
         outcome, process = thrown(task=task, jitter=Jitter())
         swing = next(a for a in process.asked if a.phase == "throw" and a.kind == "follow")
-        timed = perfect_throw(0.5, task.feasible).timed
+        timed = perfect_throw(panda(), 0.5, task.feasible).timed
         assert np.allclose(swing.arguments["position"][:, :7], timed.position, atol=1e-9)
         assert np.allclose(swing.arguments["velocity"][:, :7], timed.velocity, atol=1e-9)
         release = outcome.details["release"]

@@ -1,0 +1,252 @@
+"""Robots from TOML files, each next to a URDF: drives, limits of motion, hand, tool frame, base.
+
+The built-in arms are such files too, in the folder `arms`. docs/extending/robots.md has the keys.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from pytest_simbench.robot import panda
+from pytest_simbench.robot.collision import PlanningScene
+from pytest_simbench.robot.errors import RobotError
+from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.robot.mounting import mounted, pairs_not_checked
+from pytest_simbench.robot.table import Table
+from pytest_simbench.scene import Gripper, Joint, MotionLimits, Pose, Robot, Scene, SceneError
+from pytest_simbench.simulator import DescriptionError
+from pytest_simbench.simulator.files import FileError, read_file
+from pytest_simbench.simulator.mesh_check import PACKAGE
+from pytest_simbench.simulator.robot_files import content_of, description_xml, keep
+from pytest_simbench.simulator.urdf import pose_of_rpy
+from pytest_simbench.simulator.urdf_check import MOVING, Description
+from pytest_simbench.simulator.xml_file import read_xml
+
+ARMS = Path(__file__).with_name("arms")
+"""Files of the built-in arms."""
+
+LARGEST_FILE = 2**20
+"""[bytes]"""
+
+SMALLEST = 1e-6
+"""What must be above zero is at least this."""
+
+JERK = 100.0
+"""Jerk limit where a file has none, as a multiple of the acceleration limit [1/s]: the
+acceleration then builds up in 10 ms."""
+
+
+def read_robot(path: str | Path) -> Robot:
+    """The robot that a TOML file describes, checked.
+
+    Raises:
+        RobotError: the file, or one that it names, cannot be used; one sentence.
+    """
+    path = Path(path)
+    try:
+        data = tomllib.loads(read_file(path, LARGEST_FILE, "the robot file").decode())
+    except FileError as error:
+        raise RobotError(str(error)) from None
+    except (ValueError, RecursionError) as error:
+        raise RobotError(f"{path} is no TOML file: {error}") from None
+    try:
+        return _Reader(Table(data, str(path)), path.parent).read()
+    except (DescriptionError, SceneError, FileError) as error:
+        raise RobotError(f"{path}: {error}") from None
+
+
+class _Hand(NamedTuple):
+    """What a file says of the hand; `mount` where it is another description's."""
+
+    joints: tuple[Joint, ...]
+    gripper: Gripper
+    tool_frame: str
+    speed: float
+    mount: tuple[str, Pose] | None
+
+
+class _Reader:
+    """Reads one file.
+
+    Args:
+        table: its content.
+        folder: where its paths begin.
+    """
+
+    def __init__(self, table: Table, folder: Path) -> None:
+        self.table, self.folder = table, folder
+        self.name = table.text("name")
+        if not re.fullmatch(r"[A-Za-z0-9_-]{1,40}", self.name) or self.name in ("all", "none"):
+            raise table.error("name", "use up to 40 letters, digits, _ and - (not all, not none)")
+        self.packages = {panda.DISTRIBUTION: str(panda.description_folder())}
+        for name, place in table.names("packages").items():
+            self.packages[name] = str(folder / place)
+        self.urdf = self._path(table.text("urdf"))
+        description = Description(self.urdf, self.packages)
+        self.moving = {
+            joint.attrib["name"]: joint.find("limit")
+            for joint in description.joints
+            if joint.get("type") in MOVING
+        }
+
+    def read(self) -> Robot:
+        """Arm and hand as one robot."""
+        table, arm = self.table, self.table.table("arm")
+        names = arm.texts("joints")
+        joints = self._drives(arm, names, arm.each("ready", len(names)))
+        measured, limits = "levers" in arm, self._limits(arm, names)
+        arm.close()
+        hand = self._hand()
+        position, yaw = table.each("base", 3, 0.0), table.number("yaw", 0.0)
+        srdf = self._path(table.text("srdf")) if "srdf" in table else None
+        robot = Robot(
+            name=self.name,
+            urdf=self.urdf,
+            packages=self.packages,
+            srdf="",
+            joints=(*joints, *hand.joints),
+            gripper=hand.gripper,
+            tool_frame=hand.tool_frame,
+            base=Pose.at(*position, yaw=yaw),
+            friction=table.number("friction", 1.0, least=0.0),
+        )
+        table.close()
+        robot = _with_files(robot, hand, srdf)
+        limits = replace(limits, finger_speed=hand.speed)
+        if not measured:
+            limits = replace(limits, levers=levers_of(RobotModel(robot)))
+        return _standing(replace(robot, limits=limits))
+
+    def _path(self, text: str) -> str:
+        """A path from the file's folder, or of a package."""
+        package, _, rest = text.removeprefix(PACKAGE).partition("/")
+        if not text.startswith(PACKAGE):
+            return str(self.folder / text)
+        if package not in self.packages:
+            known = ", ".join(self.packages)
+            raise RobotError(
+                f"{self.table.where}: {text!r:.200} is in no package of the file; it has {known}"
+            )
+        return str(Path(self.packages[package]) / rest)
+
+    def _drives(
+        self, table: Table, names: Sequence[str], start: Sequence[float]
+    ) -> tuple[Joint, ...]:
+        for name in names:
+            if name not in self.moving:
+                known = ", ".join(self.moving) or "none"
+                raise table.error(
+                    "joints", f"{name!r} is no moving joint of the URDF; it has {known}"
+                )
+        n = len(names)
+        columns = [table.each(key, n, least=SMALLEST) for key in ("stiffness", "damping")]
+        effort = table.each("effort", n, self._of_urdf("effort", names), least=SMALLEST)
+        armature = table.each("armature", n, panda.ARMATURE, least=0.0)
+        return tuple(
+            Joint(*values) for values in zip(names, *columns, effort, armature, start, strict=True)
+        )
+
+    def _of_urdf(self, key: str, names: Sequence[str]) -> list[float]:
+        """The URDF's limits of effort or velocity."""
+        limits = [self.moving.get(name) for name in names]
+        return [0.0 if limit is None else float(limit.get(key, "0")) for limit in limits]
+
+    def _limits(self, arm: Table, names: Sequence[str]) -> MotionLimits:
+        n = len(names)
+        acceleration = arm.each("acceleration", n, least=SMALLEST)
+        return MotionLimits(
+            velocity=arm.each("velocity", n, self._of_urdf("velocity", names), least=SMALLEST),
+            acceleration=acceleration,
+            jerk=arm.each("jerk", n, [JERK * value for value in acceleration], least=SMALLEST),
+            levers=arm.each("levers", n, 1.0, least=SMALLEST),
+            finger_speed=1.0,
+        )
+
+    def _hand(self) -> _Hand:
+        hand = self.table.table("hand")
+        if "use" in hand:
+            if hand.text("use") != "panda":
+                raise hand.error("use", 'the one hand that is known is "panda"')
+            xyz, rpy = hand.each("xyz", 3, 0.0), hand.each("rpy", 3, 0.0)
+            mount = hand.text("mount"), pose_of_rpy(xyz, rpy)
+            squeeze = hand.number("squeeze", panda.SQUEEZE, least=SMALLEST)
+            hand.close()
+            joints, gripper = panda.fingers(squeeze), panda.gripper(squeeze)
+            return _Hand(joints, gripper, panda.TOOL_FRAME, panda.LIMITS.finger_speed, mount)
+        return self._own_hand(hand)
+
+    def _own_hand(self, hand: Table) -> _Hand:
+        """A hand in the robot's own URDF; one without joints only touches."""
+        if "joints" not in hand:
+            tool = hand.text("tool_frame")
+            hand.close()
+            return _Hand((), Gripper((), 0.0, 0.0, 0.0), tool, panda.LIMITS.finger_speed, None)
+        names = hand.texts("joints")
+        opened, closed = hand.number("opened"), hand.number("closed")
+        if not closed < opened:
+            raise hand.error("opened", f"it must be above closed, which is {closed:g}")
+        joints = self._drives(hand, names, [opened] * len(names))
+        squeeze = joints[0].effort_limit
+        if {joint.effort_limit for joint in joints} != {squeeze}:
+            raise hand.error("effort", "give all fingers the same: it is the hand's squeeze [N]")
+        speed = hand.number("speed", min(self._of_urdf("velocity", names)), least=SMALLEST)
+        tool = hand.text("tool_frame")
+        hand.close()
+        return _Hand(joints, Gripper(names, opened, closed, squeeze), tool, speed, None)
+
+
+def _with_files(robot: Robot, hand: _Hand, srdf: str | None) -> Robot:
+    """The robot with its hand mounted, and a list of the link pairs that are not checked."""
+    lists = [read_xml(srdf, "the list of link pairs")] if srdf else []
+    if hand.mount is None:
+        urdf = description_xml(robot)
+    else:
+        whole = panda.panda()
+        arm, other = content_of(robot), content_of(whole)
+        urdf = mounted(
+            ET.fromstring(arm["urdf"]), ET.fromstring(other["urdf"]), panda.HAND, *hand.mount
+        )
+        lists.append(read_xml(whole.srdf, "the list of link pairs"))
+        path = keep(ET.tostring(urdf, encoding="unicode"), {**arm["meshes"], **other["meshes"]})
+        robot = replace(robot, urdf=str(path), packages={})
+    pairs = ET.tostring(pairs_not_checked(urdf, lists), encoding="unicode")
+    return replace(robot, srdf=str(keep(pairs, {}, ".srdf")))
+
+
+def _standing(robot: Robot) -> Robot:
+    """The robot, if the arm carries the hand, and nothing touches where it begins."""
+    model = RobotModel(robot)
+    carrier = model.pin.frames[model.tool].parentJoint
+    if carrier != model.arm:
+        raise DescriptionError(
+            f"the tool frame {robot.tool_frame!r} hangs on {model.pin.names[carrier]!r}, not on "
+            f"{model.pin.names[model.arm]!r}, the last joint of the arm"
+        )
+    ready = robot.column("initial_position")[: model.arm]
+    touching = PlanningScene(model, Scene("ready", (), robot)).collision(ready)
+    if touching is not None:
+        raise DescriptionError(
+            f"in its ready position {' touches '.join(touching)}; change ready, or list two links "
+            "that may touch in an SRDF file"
+        )
+    return robot
+
+
+def levers_of(model: RobotModel) -> tuple[float, ...]:
+    """How far the fingertips can be from each arm joint's axis at most [m]: the lengths from joint
+    to joint up to the tool frame, and the opening of the hand."""
+    offsets = [
+        float(np.linalg.norm(model.pin.jointPlacements[joint].translation))
+        for joint in range(1, model.arm + 1)
+    ]
+    tool = float(np.linalg.norm(model.pin.frames[model.tool].placement.translation))
+    rest = tool + model.robot.gripper.opened
+    return tuple(sum(offsets[joint + 1 :]) + rest for joint in range(model.arm))

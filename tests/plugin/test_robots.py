@@ -1,0 +1,168 @@
+"""`--robot` and `--robots`: ids, records, baselines, and what a robot or a task cannot do."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.robot.small_arm import TOML, small_arm
+
+HOLDING = '''
+    """A robot stands still, whichever it is."""
+
+    from dataclasses import dataclass
+    from typing import ClassVar
+
+    from pytest_simbench.robot.panda import panda
+    from pytest_simbench.scene import Robot, Scene
+    from pytest_simbench.tasks.base import Outcome, Task
+    from pytest_simbench.tasks.metrics import Metric
+
+    @dataclass(frozen=True)
+    class Holding(Task):
+        name: ClassVar[str] = "holding"
+        study_timeout: ClassVar[float] = 60.0
+        robot: Robot | None = None
+
+        @property
+        def metrics(self):
+            return (Metric("joints", "joints", better=None),)
+
+        def problem(self):
+            narrow = self.robot is not None and self.robot.gripper.opened < 0.03
+            return f"robot {self.robot.name!r} opens too little" if narrow else None
+
+        def scene(self, seed, jitter):
+            return Scene("holding", (), self.robot or panda())
+
+        def perform(self, world, seed, count):
+            world.mark("start")
+            world.wait(0.02)
+            world.mark("end")
+            return Outcome({"joints": float(world.joints.shape[1])})
+
+    @dataclass(frozen=True)
+    class Own(Task):
+        name: ClassVar[str] = "own"
+        study_timeout: ClassVar[float] = 60.0
+        metrics = ()
+
+        def scene(self, seed, jitter):
+            return Scene("own", (), panda())
+
+        def perform(self, world, seed, count):
+            return Outcome()
+
+    def test_holding(repeat):
+        repeat(Holding())
+'''
+
+
+def run(pytester: pytest.Pytester, *arguments: str, ret: int = 0) -> pytest.RunResult:
+    result = pytester.runpytest_subprocess("--sim=mujoco", "-p", "no:cacheprovider", *arguments)
+    text = result.stdout.str() + result.stderr.str()
+    assert "Traceback" not in text
+    assert result.ret == ret, text
+    return result
+
+
+def records(folder: str) -> list[dict[str, object]]:
+    lines = Path(folder, "records.jsonl").read_text().splitlines()
+    return [json.loads(line) for line in lines]
+
+
+def test_a_run_with_another_robot(pytester: pytest.Pytester) -> None:
+    """Its name is in the id and in the record; the default robot leaves no trace. A baseline of
+    another robot is said to be one."""
+    pytester.makepyfile(HOLDING)
+    path = small_arm(pytester.path)
+    run(pytester, "--reps=1", "--sim-output=panda", "--robot=panda").assert_outcomes(passed=1)
+    run(pytester, "--reps=1", "--sim-output=ur5", "--robot=ur5").assert_outcomes(passed=1)
+    small_run = ("--reps=1", f"--robot={path}")
+    result = run(pytester, *small_run, "--sim-output=small", "--sim-baseline=ur5")
+    told = " ".join(result.stdout.str().split())
+    assert "with ur5, this run with small: different robots are not comparable" in told
+    panda, ur5, small = (records(name)[0] for name in ("panda", "ur5", "small"))
+    name = "test_a_run_with_another_robot.py::test_holding[mujoco-headless{}]"
+    assert [r["test"] for r in (panda, ur5, small)] == [
+        name.format(""), name.format("-ur5"), name.format("-small"),
+    ]  # fmt: skip
+    assert "robot" not in panda
+    assert [r["robot"]["name"] for r in (ur5, small)] == ["ur5", "small"]  # type: ignore[index]
+    assert [r["metrics"] for r in (panda, ur5, small)] == [
+        {"joints": 9.0}, {"joints": 8.0}, {"joints": 5.0},
+    ]  # fmt: skip
+    path.write_text(TOML.replace("8.0", "9.0"))  # another limit of acceleration, the same name
+    result = run(pytester, *small_run, "--sim-baseline=small")
+    result.stdout.fnmatch_lines(["*robot.digest was *, is *"])
+
+
+def test_what_a_robot_or_a_task_cannot_do(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        HOLDING,
+        test_more="""
+            from pytest_simbench.tasks import LeaningTowers, Throwing
+            from test_what_a_robot_or_a_task_cannot_do import Own
+
+            def test_throwing(repeat):
+                repeat(Throwing())
+
+            def test_own(repeat):
+                repeat(Own())
+
+            def test_replay(replay):
+                replay(Throwing())
+
+            def test_perturb(perturb):
+                perturb(Throwing())
+
+            def test_without_a_robot(repeat):
+                repeat(LeaningTowers(margins=(0.01,), levels=1, settle=0.01))
+
+            def test_fixture(robot):
+                assert robot.name == "small"
+        """,
+    )
+    path = small_arm(pytester.path, TOML.replace("opened = 0.04", "opened = 0.02"))
+    result = run(pytester, "--reps=1", f"--robot={path}", "--sim-output=out", ret=1)
+    result.assert_outcomes(passed=2, failed=5)
+    for sentence in (
+        "--robot: robot 'small' opens too little",
+        "--robot: robot 'small' has no swing for the throw",
+        "--robot: the task 'own' takes no other robot than its own: give it a field",
+    ):
+        assert f"\n{sentence}" in result.stdout.str()
+    assert "robot" not in records("out")[0]  # the towers know no robot
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ("ur7", "*--robot=ur7: unknown robot 'ur7'; choose from panda, ur10, ur5, xarm7*"),
+        ("none.toml", "*--robot=none.toml: cannot read the robot file none.toml: No such file*"),
+        ("bad.toml", "*--robot=bad.toml: bad.toml, [[]arm[]]: stiffness: -1 is no number of at*"),
+    ],
+)
+def test_a_robot_that_is_none(pytester: pytest.Pytester, value: str, message: str) -> None:
+    path = small_arm(pytester.path, TOML.replace("2000.0", "-1"))
+    path.rename(pytester.path / "bad.toml")
+    pytester.makepyfile("def test_it(repeat):\n    pass\n")
+    run(pytester, f"--robot={value}", ret=4).stderr.fnmatch_lines([message])
+    pytester.makeini(f"[pytest]\nrobot = {value}\n")
+    run(pytester, ret=4).stderr.fnmatch_lines([message])
+
+
+def test_the_list_of_robots(pytester: pytest.Pytester) -> None:
+    path = small_arm(pytester.path)
+    result = run(pytester, "--robots", f"--robot={path}")
+    result.stdout.fnmatch_lines(
+        [
+            "panda: 7 arm joints, 2 fingers that open to 0.035 m, base at (0, 0, 0)",
+            "ur5: 6 arm joints, 2 fingers*",
+            "    no throwing: robot 'ur5' has no swing*",
+            "small: 3 arm joints, 2 fingers that open to 0.04 m, base at (0.1, 0, 0.2)",
+            "    no stacking: robot 'small' cannot handle a cube at (0.20, -0.30, 0.33): it is *",
+        ]
+    )

@@ -1,0 +1,168 @@
+"""Robots from files: what a file says is what the robot is, and the built-in arms are files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from pytest_simbench.robot.collision import MARGIN
+from pytest_simbench.robot.errors import RobotError
+from pytest_simbench.robot.files import ARMS, read_robot
+from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.robot.panda import panda
+from pytest_simbench.robot.planning import CHECK_SPACING
+from pytest_simbench.robot.registry import BUILT_IN, find
+from pytest_simbench.scene import Pose
+from pytest_simbench.simulator import PreparedRobot
+from tests.robot.small_arm import TOML, URDF, joint, link, small_arm
+
+MOUNTED = ("ur5", "ur10", "xarm7")
+
+
+def test_a_file_says_everything(tmp_path: Path) -> None:
+    robot = read_robot(small_arm(tmp_path))
+    assert robot.name == "small"
+    assert robot.joint_names == ("turn", "lift", "bend", "left_finger", "right_finger")
+    assert robot.column("stiffness").tolist() == [2000, 2000, 2000, 1000, 1000]
+    assert robot.column("damping").tolist() == [200, 200, 150, 40, 40]
+    assert robot.column("effort_limit").tolist() == [80, 80, 80, 20, 20]
+    assert robot.column("armature").tolist() == [0.1] * 5
+    assert robot.column("initial_position").tolist() == [0, 0.4, 1.2, 0.04, 0.04]
+    assert (robot.gripper.opened, robot.gripper.closed, robot.gripper.squeeze) == (0.04, 0, 20)
+    assert robot.tool_frame == "grip"
+    assert robot.base == Pose.at(0.1, 0.0, 0.2)
+    assert robot.friction == 1.0
+    limits = robot.limits
+    assert limits is not None
+    assert limits.velocity == (2, 2, 2)  # the URDF's
+    assert limits.acceleration == (8, 8, 8)
+    assert limits.jerk == (800, 800, 800)
+    assert limits.finger_speed == 2
+    assert limits.levers == pytest.approx((0.2 + 0.3 + 0.42, 0.3 + 0.42, 0.42))
+
+
+def test_what_a_file_says_besides(tmp_path: Path) -> None:
+    more = TOML.replace(
+        "[arm]", "yaw = 1.5\nfriction = 0.6\n[arm]\njerk = 50\nlevers = [1, 0.9, 0.5]"
+    )
+    more = more.replace("[arm]\n", "[arm]\nvelocity = [1, 1.5, 2]\neffort = 40\narmature = 0.02\n")
+    robot = read_robot(small_arm(tmp_path, more.replace("[hand]", "[hand]\nspeed = 0.1")))
+    assert robot.base == Pose.at(0.1, 0.0, 0.2, yaw=1.5)
+    assert robot.friction == 0.6
+    assert robot.column("effort_limit")[:3].tolist() == [40, 40, 40]
+    assert robot.column("armature")[:3].tolist() == [0.02] * 3
+    limits = robot.limits
+    assert limits is not None
+    assert limits.velocity == (1, 1.5, 2)
+    assert limits.jerk == (50, 50, 50)
+    assert limits.levers == (1, 0.9, 0.5)
+    assert limits.finger_speed == 0.1
+
+
+@pytest.mark.parametrize("name", MOUNTED)
+def test_a_built_in_arm_carries_the_pandas_hand(name: str) -> None:
+    robot = find(name)
+    assert robot.name == name
+    assert robot.gripper == panda().gripper
+    assert robot.joints[-2:] == panda().joints[-2:]
+    prepared, whole = PreparedRobot(robot), PreparedRobot(panda())
+    for finger in ("panda_leftfinger", "panda_rightfinger"):
+        ours, theirs = prepared.links[finger], whole.links[finger]
+        assert ours.mass == theirs.mass
+        assert [shape.size for shape in ours.shapes] == [shape.size for shape in theirs.shapes]
+    arm = pin.buildModelFromUrdf(str(read_arm(name)))
+    mass = sum(inertia.mass for inertia in RobotModel(robot).pin.inertias)
+    assert mass == pytest.approx(sum(inertia.mass for inertia in arm.inertias) + 0.73 + 0.03)
+
+
+def read_arm(name: str) -> Path:
+    """The arm's own URDF, as its file names it."""
+    line = next(x for x in (ARMS / f"{name}.toml").read_text().splitlines() if x.startswith("urdf"))
+    folder = panda().packages["example-robot-data"]
+    return Path(folder, line.partition("example-robot-data/")[2].rstrip('"'))
+
+
+@pytest.mark.parametrize("name", MOUNTED)
+def test_the_tool_lies_before_the_flange(name: str) -> None:
+    """The hand's tool centre point is 0.1034 m along the flange's z axis, at any position."""
+    robot = find(name)
+    model = RobotModel(robot)
+    arm = pin.buildModelFromUrdf(str(read_arm(name)))
+    flange = arm.getFrameId("tool0" if name.startswith("ur") else "link_eef")
+    for q in np.random.default_rng(1).uniform(-1, 1, (5, model.arm)):
+        data = arm.createData()
+        pin.framesForwardKinematics(arm, data, q)
+        expected = model.base * data.oMf[flange] * pin.SE3(np.eye(3), np.array([0, 0, 0.1034]))
+        assert np.allclose(model.tool_transform(q).homogeneous, expected.homogeneous, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", sorted(BUILT_IN))
+def test_between_two_checks_no_fingertip_moves_farther_than_twice_the_margin(name: str) -> None:
+    """Distances from the tip of an open finger to each joint's axis, at random positions. The
+    Panda's levers are 14 % short of a stretched arm's."""
+    model = RobotModel(find(name))
+    farthest = np.zeros(model.arm)
+    for arm in np.random.default_rng(5).uniform(model.lower, model.upper, (1000, model.arm)):
+        pin.computeJointJacobians(model.pin, model.data, model.full(arm))
+        tool = model.base.actInv(model.tool_transform(arm))
+        tip = tool.act(np.array([0.009, 0.035 + 0.0152, 0.009]))
+        for k in range(model.arm):
+            away = tip - model.data.oMi[k + 1].translation
+            distance = np.linalg.norm(np.cross(model.data.J[3:, k], away))
+            farthest[k] = max(farthest[k], float(distance))
+    levers = model.limits.column("levers")
+    assert (farthest * CHECK_SPACING <= 2 * MARGIN * levers).all(), farthest
+
+
+def test_the_same_robot_lies_in_the_same_place() -> None:
+    """Engines keep compiled meshes by path; files are named by their content."""
+    first, again = (read_robot(ARMS / "ur5.toml") for _ in range(2))
+    assert first == again
+    assert first.limits == again.limits
+    assert Path(first.urdf).stem == Path(again.urdf).stem != Path(find("ur10").urdf).stem
+
+
+def test_unknown_robots() -> None:
+    with pytest.raises(RobotError, match=r"unknown robot 'ur7'; choose from panda, .*ur5.*\.toml"):
+        find("ur7")
+    with pytest.raises(RobotError, match=r"cannot read the robot file none\.toml: No such file"):
+        find("none.toml")
+
+
+def test_a_file_cannot_take_a_known_name(tmp_path: Path) -> None:
+    path = small_arm(tmp_path, TOML.replace('"small"', '"ur5"', 1))
+    with pytest.raises(RobotError, match="the name 'ur5' is that of a known robot"):
+        find(str(path))
+
+
+def test_a_hand_that_only_touches(tmp_path: Path) -> None:
+    toml = TOML[: TOML.index("[hand]")] + '[hand]\ntool_frame = "grip"\n'
+    fixed = URDF.replace('type="prismatic"', 'type="fixed"')
+    robot = read_robot(small_arm(tmp_path, toml, fixed))
+    assert robot.joint_names == ("turn", "lift", "bend")
+    assert robot.gripper.couplings == ()
+    assert not RobotModel(robot).has_parallel_fingers
+
+
+def test_a_hand_of_three_fingers_and_one_of_one(tmp_path: Path) -> None:
+    third = link("third", "0.01 0.02 0.08", "0.005 0 0.06", 0.05, 0.1)
+    third += joint("third_finger", "lower", "third", "0 0 0.3", "1 0 0", "prismatic")
+    urdf = URDF.replace("</robot>", f"{third}</robot>")
+    toml = TOML.replace('"right_finger"]', '"right_finger", "third_finger"]')
+    robot = read_robot(small_arm(tmp_path, toml, urdf))
+    pairs = (("left_finger", "right_finger"), ("left_finger", "third_finger"))
+    assert robot.gripper.couplings == pairs
+    assert not RobotModel(robot).has_parallel_fingers
+    jaw = URDF.replace(
+        '<joint name="right_finger" type="prismatic">', '<joint name="right_finger" type="fixed">'
+    )
+    toml = TOML.replace(', "right_finger"]', "]")
+    assert read_robot(small_arm(tmp_path, toml, jaw)).gripper.couplings == ()
+
+
+def test_two_parallel_fingers() -> None:
+    assert RobotModel(panda()).has_parallel_fingers
+    assert RobotModel(find("ur5")).has_parallel_fingers
