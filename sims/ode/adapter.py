@@ -29,7 +29,7 @@ from pytest_simbench.simulator import (
 from . import world as build
 from .contacts import Contacts, Part
 from .drives import Axis, Drive, Drives
-from .library import library, library_path
+from .library import body_id, library, library_path, turn, turned
 from .readback import ReadBack
 
 ode = lazy_import("ode")
@@ -68,6 +68,14 @@ class ODESettings(Settings):
     position_gain: float = 10.0
     sleeping: bool = True
 
+    def quantities(self) -> Mapping[str, Any]:
+        if self.drive == "spring":
+            return {}
+        # v + CFM effort = P (q* - q), read as the law of a drive whose d acts on v alone
+        stiffness = self.position_gain / self.cfm
+        damping = 1 / self.cfm - self.timestep * stiffness
+        return {"joint/*/stiffness": stiffness, "joint/*/damping": damping}
+
 
 @dataclass(frozen=True)
 class State:
@@ -75,7 +83,8 @@ class State:
 
     Attributes:
         steps: since loading.
-        bodies: position, quaternion, linear and angular velocity of each body.
+        bodies: position, linear and angular velocity of each body.
+        turns: rotation of each body.
         awake: whether each body is.
         commanded: the drives' set points.
         seed: of ODE's random numbers.
@@ -83,8 +92,9 @@ class State:
 
     steps: int
     bodies: list[tuple[Any, ...]]
+    turns: list[tuple[bytes, bytes]]
     awake: list[bool]
-    commanded: FloatArray | None
+    commanded: tuple[FloatArray, FloatArray, FloatArray] | None
     seed: int
 
 
@@ -111,18 +121,20 @@ class ODE(Simulator):
             }
         ),
         deviations=(
-            Deviation(
-                "joint/*/stiffness joint/*/damping",
-                "with drive=velocity, as in Webots, motors are neither springs nor dampers",
-            ),
             Deviation("joint/*/friction", "ODE's joints have no friction"),
             Deviation("body/*/margin link/*/margin", "ODE's shapes have no margin"),
             Deviation(
-                "joint/*finger_joint2/effort_limit",
+                "joint/*finger_joint2/effort_limit joint/*finger_joint2/stiffness "
+                "joint/*finger_joint2/damping",
                 "the second finger has no drive: it follows the first, by up to both their limits",
             ),
             Deviation(
                 "", "the coupling is one-way: the first finger does not feel the second's load"
+            ),
+            Deviation(
+                "",
+                "with drive=velocity (profile default) the drives are Webots' controllers of "
+                "velocity: far stiffer than the scene's, and blind to set points of velocity",
             ),
         ),
         install_size_mb=40,
@@ -166,6 +178,7 @@ class ODE(Simulator):
             self._load_robot(self.prepared)
         links = [part.body for part in self._links.values() if part.body is not None]
         self._moving = [*self._free, *links]
+        self._names = [body_id(body) for body in self._moving]
 
     def _load_robot(self, prepared: PreparedRobot) -> None:
         robot, s = prepared.robot, self.settings
@@ -214,20 +227,19 @@ class ODE(Simulator):
         return np.empty((2, 0)) if self._drives is None else self._drives.state()
 
     def save(self) -> State:
-        bodies = [
-            (b.getPosition(), b.getQuaternion(), b.getLinearVel(), b.getAngularVel())
-            for b in self._moving
-        ]
+        bodies = [(b.getPosition(), b.getLinearVel(), b.getAngularVel()) for b in self._moving]
+        turns = [turned(name) for name in self._names]
         commanded = None if self._drives is None else self._drives.commanded
         awake = [bool(body.isEnabled()) for body in self._moving]
-        return State(self._steps, bodies, awake, commanded, library().dRandGetSeed())
+        return State(self._steps, bodies, turns, awake, commanded, library().dRandGetSeed())
 
     def restore(self, state: State) -> None:
         self._steps = state.steps
+        for name, rotation in zip(self._names, state.turns, strict=True):
+            turn(name, *rotation)
         for body, values, awake in zip(self._moving, state.bodies, state.awake, strict=True):
-            position, quaternion, linear, angular = values
+            position, linear, angular = values
             body.setPosition(position)
-            body.setQuaternion(quaternion)
             body.setLinearVel(linear)
             body.setAngularVel(angular)
             body.enable() if awake else body.disable()

@@ -15,7 +15,7 @@ bounded by FMax. All that is asked of a drive follows from what Vel and CFM are:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -102,10 +102,9 @@ class Drives:
         position_gain: P of the kind `velocity` [1/s].
 
     Attributes:
-        springs: whether drives are of the kind `spring`.
-        stiffness: k of each drive [N m/rad or N/m], (n_joints,).
+        first, second: joints of the fingers; the second follows the first.
         rotors: by joint name.
-        commanded: the last set points, (3, n_joints).
+        commanded: the last set points: position, velocity, effort.
     """
 
     def __init__(
@@ -118,29 +117,26 @@ class Drives:
         position_gain: float,
     ) -> None:
         self.axes = [axes[name] for name in robot.joint_names]
-        first, second = (axes[name] for name in robot.gripper.joints)
-        self.first, self.second = first, second
-        self._follow = FOLLOWED / timestep
-        self.stiffness = robot.column("stiffness")
-        self.limit = robot.column("effort_limit")
-        resistance = timestep * self.stiffness + robot.column("damping")
-        self.springs = drive == "spring"
-        self._soft = (resistance > 0) | (not self.springs)
-        given = np.where(resistance > 0, resistance, 1.0)
-        if not self.springs:
-            shares = np.array([[position_gain], [0.0], [0.0]]) * np.ones(len(self.axes))
-        else:
-            shares = (
-                np.stack([self.stiffness, robot.column("damping"), np.ones(len(given))]) / given
-            )
+        self.first, self.second = (axes[name] for name in robot.gripper.joints)
+        self._follow, self._limits = FOLLOWED / timestep, robot.column("effort_limit")
+        shares, softness = _law(robot, timestep, drive, position_gain)
         self._shares = shares
+        self._zeros = shares[0] * [axis.zero for axis in self.axes]
+        self._driven: list[tuple[int, Any, Callable[[], float], float]] = []
+        self._limp: list[tuple[int, Callable[[float], None]]] = []
         for k, axis in enumerate(self.axes):
-            if axis is second:
-                axis.joint.setParam(MOST_FORCE, 2 * self.limit[k])
-                continue
-            if self.springs and self._soft[k]:
-                axis.joint.setParam(SOFTNESS, 1 / resistance[k])
-            axis.joint.setParam(MOST_FORCE, self.limit[k] if self._soft[k] else 0.0)
+            limit = float(self._limits[k])
+            if axis is self.second:
+                limit *= 2
+            else:
+                if softness[k] is not None:
+                    axis.joint.setParam(SOFTNESS, softness[k])
+                if softness[k] == np.inf:
+                    limit = 0.0
+                    self._limp.append((k, axis.push))
+                else:
+                    self._driven.append((k, axis.joint, axis.angle, float(shares[0, k])))
+            axis.joint.setParam(MOST_FORCE, limit)
         self.rotors = {
             name: Rotor(world, axes[name], inertia, timestep)
             for name, inertia in zip(robot.joint_names, robot.column("armature"), strict=True)
@@ -151,26 +147,21 @@ class Drives:
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         """Set points of all joints."""
-        self.commanded = np.stack([position, velocity, effort])
-        asked = (self._shares * self.commanded).sum(axis=0)
-        pushed = np.clip(effort, -self.limit, self.limit)
-        self._drives: Sequence[tuple[Axis, float, float]] = [
-            (axis, float(asked[k]), float(self._shares[0, k]))
-            for k, axis in enumerate(self.axes)
-            if self._soft[k] and axis is not self.second
-        ]
-        self._pushed = [
-            (axis, float(pushed[k]))
-            for k, axis in enumerate(self.axes)
-            if not self._soft[k] and pushed[k] and axis is not self.second
-        ]
+        self.commanded = position, velocity, effort
+        p, v, e = self._shares
+        self._asked = (p * position + v * velocity + e * effort - self._zeros).tolist()
+
+    def gain(self, axis: Axis) -> float:
+        """Velocity that a drive asks for at a unit position error [1/s]."""
+        return float(self._shares[0, self.axes.index(axis)])
 
     def act(self) -> None:
         """Before a step: tell the motors what they are asked for."""
-        for axis, asked, gain in self._drives:
-            axis.joint.setParam(VELOCITY, asked - gain * axis.position())
-        for axis, effort in self._pushed:
-            axis.push(effort)
+        asked = self._asked
+        for k, joint, angle, gain in self._driven:
+            joint.setParam(VELOCITY, asked[k] - gain * angle())
+        for k, push in self._limp:
+            push(float(np.clip(self.commanded[2][k], -self._limits[k], self._limits[k])))
         first, second = self.first, self.second
         gap = first.position() - second.position()
         second.joint.setParam(VELOCITY, first.rate() + self._follow * gap)
@@ -182,3 +173,22 @@ class Drives:
         return np.array(
             [[axis.position() for axis in self.axes], [axis.rate() for axis in self.axes]]
         )
+
+
+def _law(
+    robot: Robot, timestep: float, drive: Drive, position_gain: float
+) -> tuple[FloatArray, list[float | None]]:
+    """What the motors are told, see the module.
+
+    Returns:
+        Shares of position, velocity and effort in Vel, (3, n_joints). CFM of each motor: None for
+        the world's, infinite for a joint without stiffness and damping, whose motor is off.
+    """
+    n = len(robot.joints)
+    if drive == "velocity":
+        return np.outer([position_gain, 0.0, 0.0], np.ones(n)), [None] * n
+    stiffness, damping = robot.column("stiffness"), robot.column("damping")
+    resistance = timestep * stiffness + damping
+    given = np.where(resistance > 0, resistance, 1.0)
+    softness = [1 / float(value) if value > 0 else np.inf for value in resistance]
+    return np.stack([stiffness, damping, np.ones(n)]) / given, list(softness)

@@ -20,7 +20,8 @@ from pytest_simbench.simulator import lazy_import
 ode = lazy_import("ode")
 
 Vector = ctypes.c_double * 4
-"""dVector3 and dQuaternion, of a library with double precision."""
+Matrix = ctypes.c_double * 12
+"""dVector3 and dQuaternion, and dMatrix3, of a library with double precision."""
 
 LO_STOP, HI_STOP, VELOCITY, MOST_FORCE, SOFTNESS = 0, 1, 2, 5, 8
 """Numbers of a joint's parameters (ode/common.h, D_ALL_PARAM_NAMES). pyode's ParamFMax (3) and all
@@ -53,6 +54,8 @@ _FUNCTIONS: dict[str, tuple[Any, Sequence[Any]]] = {
     ),
     "dGeomTriMeshDataDestroy": (None, [_ID]),
     "dCreateTriMesh": (_ID, [_ID, _ID, _ID, _ID, _ID]),
+    "dBodyGetQuaternion": (_ID, [_ID]),
+    "dBodyGetRotation": (_ID, [_ID]),
     "dBodyGetLinearDamping": (_REAL, [_ID]),
     "dBodyGetAngularDamping": (_REAL, [_ID]),
 }
@@ -125,9 +128,28 @@ class Mesh:
         return int(self._geom)
 
     def setBody(self, body: Any) -> None:
-        carrier = ode.GeomBox(None, (1.0, 1.0, 1.0))  # pyode tells the ids of geoms alone
-        carrier.setBody(body)
-        self._library.dGeomSetBody(self._geom, self._library.dGeomGetBody(carrier._id()))
+        self._library.dGeomSetBody(self._geom, body_id(body))
+
+
+def body_id(body: Any) -> int:
+    """ODE's own name of a body. pyode tells those of geoms alone."""
+    carrier = ode.GeomBox(None, (1.0, 1.0, 1.0))
+    carrier.setBody(body)
+    return int(library().dGeomGetBody(carrier._id()))
+
+
+def turned(body: int) -> tuple[bytes, bytes]:
+    """A body's quaternion and rotation matrix, bit for bit."""
+    return (
+        ctypes.string_at(library().dBodyGetQuaternion(body), ctypes.sizeof(Vector)),
+        ctypes.string_at(library().dBodyGetRotation(body), ctypes.sizeof(Matrix)),
+    )
+
+
+def turn(body: int, quaternion: bytes, matrix: bytes) -> None:
+    """Put back what `turned` gave; `dBodySetQuaternion` would normalise it, and so round it."""
+    ctypes.memmove(library().dBodyGetQuaternion(body), quaternion, len(quaternion))
+    ctypes.memmove(library().dBodyGetRotation(body), matrix, len(matrix))
 
 
 def place(geom: Any, pose: Pose, body: Any = None) -> None:
@@ -146,7 +168,7 @@ def pose_of(geom: Any) -> Pose:
     return Pose.from_array([*library().dGeomGetPosition(geom._id())[:3], *turn])
 
 
-def damping(geom: Any) -> FloatArray:
-    """Shares of its linear and angular velocity that the geom's body loses in a step, (2,)."""
-    body = library().dGeomGetBody(geom._id())
-    return np.array([library().dBodyGetLinearDamping(body), library().dBodyGetAngularDamping(body)])
+def damping(body: Any) -> FloatArray:
+    """Shares of its linear and angular velocity that a body loses in a step, (2,)."""
+    tell, name = library(), body_id(body)
+    return np.array([tell.dBodyGetLinearDamping(name), tell.dBodyGetAngularDamping(name)])

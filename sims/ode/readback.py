@@ -70,7 +70,7 @@ class ReadBack:
         if self.prepared is not None and self.drives is not None:
             for name, axis in self.axes.items():
                 reported |= self._joint(f"joint/{name}", name, axis, self.drives)
-            reported["gripper/coupled"] = float(self.drives.first is not self.drives.second)
+            reported["gripper/coupled"] = float(_follows(self.drives))
         return reported | touches(self.scene, self.prepared, self._can_touch)
 
     def _part(self, prefix: str, part: Part) -> dict[str, Any]:
@@ -101,15 +101,13 @@ class ReadBack:
 
     def _inertial(self, prefix: str, part: Part) -> dict[str, Any]:
         mass, frame = part.body.getMass(), part.frame.inverse()
-        found = {
+        return {
             f"{prefix}/mass": mass.mass,
             f"{prefix}/com": placed(np.array([mass.c]), frame)[0],
             f"{prefix}/inertia": frame.rotation() @ np.array(mass.I) @ frame.rotation().T,
             f"{prefix}/gravity": float(part.body.getGravityMode()),
+            f"{prefix}/damping": damping(part.body) / self.timestep,
         }
-        if part.geoms:
-            found[f"{prefix}/damping"] = damping(part.geoms[0]) / self.timestep
-        return found
 
     def _measured(self, mesh: Mesh, frame: Pose) -> FloatArray:
         """The reach of a mesh in a frame: how far a plane stands off when it just touches."""
@@ -139,10 +137,10 @@ class ReadBack:
         if name in drives.rotors:
             softness = drives.rotors[name].motor.getParam(SOFTNESS)
             found[f"{prefix}/armature"] = self.timestep / softness
-        if drives.springs and axis is not drives.second:
-            stiffness = drives.stiffness[drives.axes.index(axis)]
-            found[f"{prefix}/stiffness"] = stiffness
+        if axis is not drives.second:
             resistance = 1 / joint.getParam(SOFTNESS)
+            stiffness = resistance * drives.gain(axis)
+            found[f"{prefix}/stiffness"] = stiffness
             found[f"{prefix}/damping"] = resistance - self.timestep * stiffness
         return found
 
@@ -170,6 +168,12 @@ def _collide(x: int, y: int) -> bool:
 
 def _pose(body: Any) -> Pose:
     return Pose.from_array([*body.getPosition(), *body.getQuaternion()])
+
+
+def _follows(drives: Drives) -> bool:
+    """Whether the second finger's motor can hold whatever the first one presses."""
+    forces = [axis.joint.getParam(MOST_FORCE) for axis in (drives.first, drives.second)]
+    return bool(forces[1] >= forces[0])
 
 
 def _motion(axis: Axis, frame: Pose) -> FloatArray:
