@@ -27,8 +27,9 @@ from pytest_simbench.simulator import (
 )
 
 from . import world as build
+from .axes import Axis
 from .contacts import Contacts, Part
-from .drives import Axis, Drive, Drives
+from .drives import Drive, Drives
 from .library import body_id, library, library_path, turn, turned
 from .readback import ReadBack
 
@@ -84,16 +85,18 @@ class State:
     Attributes:
         steps: since loading.
         bodies: position, linear and angular velocity of each body.
-        turns: rotation of each body.
+        rotations: of each body.
         awake: whether each body is.
+        turns: of each joint, see `Axis`.
         commanded: the drives' set points.
         seed: of ODE's random numbers.
     """
 
     steps: int
     bodies: list[tuple[Any, ...]]
-    turns: list[tuple[bytes, bytes]]
+    rotations: list[tuple[bytes, bytes]]
     awake: list[bool]
+    turns: list[tuple[int, float]]
     commanded: tuple[FloatArray, FloatArray, FloatArray] | None
     seed: int
 
@@ -123,14 +126,7 @@ class ODE(Simulator):
         deviations=(
             Deviation("joint/*/friction", "ODE's joints have no friction"),
             Deviation("body/*/margin link/*/margin", "ODE's shapes have no margin"),
-            Deviation(
-                "joint/*finger_joint2/effort_limit joint/*finger_joint2/stiffness "
-                "joint/*finger_joint2/damping",
-                "the second finger has no drive: it follows the first, by up to both their limits",
-            ),
-            Deviation(
-                "", "the coupling is one-way: the first finger does not feel the second's load"
-            ),
+            Deviation("", "a joint that turns by more than 360 degrees has no stops"),
             Deviation(
                 "",
                 "with drive=velocity (profile default) the drives are Webots' controllers of "
@@ -143,8 +139,7 @@ class ODE(Simulator):
         "default": ODESettings(),
         "tuned": ODESettings(
             timestep=0.001,
-            cfm=1e-9,
-            contact_cfm=1e-6,
+            contact_cfm=1e-5,
             drive="spring",
             sleeping=False,
         ),
@@ -177,7 +172,8 @@ class ODE(Simulator):
             self.prepared = PreparedRobot(scene.robot)
             self._load_robot(self.prepared)
         links = [part.body for part in self._links.values() if part.body is not None]
-        self._moving = [*self._free, *links]
+        pinion = [] if self._drives is None else [self._drives.pinion.body]
+        self._moving = [*self._free, *links, *pinion]
         self._names = [body_id(body) for body in self._moving]
 
     def _load_robot(self, prepared: PreparedRobot) -> None:
@@ -228,14 +224,16 @@ class ODE(Simulator):
 
     def save(self) -> State:
         bodies = [(b.getPosition(), b.getLinearVel(), b.getAngularVel()) for b in self._moving]
-        turns = [turned(name) for name in self._names]
+        rotations = [turned(name) for name in self._names]
         commanded = None if self._drives is None else self._drives.commanded
         awake = [bool(body.isEnabled()) for body in self._moving]
-        return State(self._steps, bodies, turns, awake, commanded, library().dRandGetSeed())
+        turns = [axis.turn for axis in self._axes.values()]
+        seed = library().dRandGetSeed()
+        return State(self._steps, bodies, rotations, awake, turns, commanded, seed)
 
     def restore(self, state: State) -> None:
         self._steps = state.steps
-        for name, rotation in zip(self._names, state.turns, strict=True):
+        for name, rotation in zip(self._names, state.rotations, strict=True):
             turn(name, *rotation)
         for body, values, awake in zip(self._moving, state.bodies, state.awake, strict=True):
             position, linear, angular = values
@@ -243,6 +241,8 @@ class ODE(Simulator):
             body.setLinearVel(linear)
             body.setAngularVel(angular)
             body.enable() if awake else body.disable()
+        for axis, turns in zip(self._axes.values(), state.turns, strict=True):
+            axis.turn = turns
         if self._drives is not None and state.commanded is not None:
             self._drives.command(*state.commanded)
         library().dRandSetSeed(state.seed)

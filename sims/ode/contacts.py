@@ -71,7 +71,9 @@ class Contacts:
         self.world, self.erp, self.cfm, self.most = world, erp, cfm, most
         self.space, self.count = ode.SimpleSpace(), 0
         self._group = ode.JointGroup()
-        self._mode = ode.ContactApprox1 | ode.ContactSoftERP | ode.ContactSoftCFM
+        self._soft = (erp, cfm) != (world.getERP(), world.getCFM())
+        soft = ode.ContactSoftERP | ode.ContactSoftCFM if self._soft else 0
+        self._mode, self._bouncy = ode.ContactApprox1 | soft, ode.ContactBounce
         self._collide, self._joint = ode.collide, ode.ContactJoint
 
     def make(self) -> None:
@@ -92,14 +94,18 @@ class Contacts:
         if len(contacts) > self.most:
             contacts.sort(key=_depth, reverse=True)
             del contacts[self.most :]
-        friction, bounce, mode = min(a.friction, b.friction), min(a.bounce, b.bounce), self._mode
+        friction, bounce = min(a.friction, b.friction), min(a.bounce, b.bounce)
+        world, group, joint = self.world, self._group, self._joint
+        mode = self._mode | self._bouncy if bounce else self._mode
         for contact in contacts:
-            contact.setMode(mode | ode.ContactBounce if bounce else mode)
-            contact.setBounce(bounce)
+            contact.setMode(mode)
             contact.setMu(friction)
-            contact.setSoftERP(self.erp)
-            contact.setSoftCFM(self.cfm)
-            self._joint(self.world, self._group, contact).attach(one, other)
+            if bounce:
+                contact.setBounce(bounce)
+            if self._soft:
+                contact.setSoftERP(self.erp)
+                contact.setSoftCFM(self.cfm)
+            joint(world, group, contact).attach(one, other)
         self.count += len(contacts)
 
 

@@ -1,7 +1,7 @@
-"""Drives, rotors and the fingers' coupling, all of them motors of ODE's joints.
+"""Drives and rotors, all of them motors of ODE's joints.
 
 A motor of ODE is a row of the constraint solver: joint velocity + CFM x effort = Vel, the effort
-bounded by FMax. All that is asked of a drive follows from what Vel and CFM are:
+bounded by FMax. What it does follows from Vel and CFM:
 
 - `spring`: with Vel = (k (q* - q) + d v* + tau_ff) / (h k + d) and CFM = 1 / (h k + d) the effort
   is k (q* - q - h v) + d (v* - v) + tau_ff at the velocity v after the step h: the scene's drive
@@ -9,13 +9,11 @@ bounded by FMax. All that is asked of a drive follows from what Vel and CFM are:
 - `velocity`: Vel = P (q* - q), what Webots does with its motors; CFM is the world's.
 - a rotor of inertia J: with Vel the present velocity and CFM = h / J the effort is that which
   accelerates it, -J dv / h, and FMax has no limit. It is a motor of its own beside the drive's.
-- the second finger follows the first: Vel is the first one's velocity and a share of their
-  difference.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -23,40 +21,16 @@ import numpy as np
 from pytest_simbench.scene import FloatArray, Robot
 from pytest_simbench.simulator import lazy_import
 
+from .axes import Axis
+from .coupling import Pinion
 from .library import MOST_FORCE, SOFTNESS, VELOCITY
 
 ode = lazy_import("ode")
 
 Drive = Literal["spring", "velocity"]
 
-FOLLOWED = 0.5
-"""Share of the difference between the fingers that is corrected in a step."""
-
-
-class Axis:
-    """One joint of ODE, hinge or slider.
-
-    Args:
-        joint: of ODE, attached to the child first, then to the parent or None.
-        zero: the joint's position in the scene where ODE's is 0 [rad or m].
-
-    Attributes:
-        child, parent: bodies of ODE; None for the world.
-    """
-
-    def __init__(self, joint: Any, zero: float) -> None:
-        self.joint, self.zero = joint, zero
-        self.child, self.parent = joint.getBody(0), joint.getBody(1)
-        self.hinged = isinstance(joint, ode.HingeJoint)
-        self.angle: Callable[[], float] = joint.getAngle if self.hinged else joint.getPosition
-        self.rate: Callable[[], float] = (
-            joint.getAngleRate if self.hinged else joint.getPositionRate
-        )
-        self.push: Callable[[float], None] = joint.addTorque if self.hinged else joint.addForce
-
-    def position(self) -> float:
-        """[rad or m]."""
-        return self.zero + self.angle()
+WEAKEST = 1e-9
+"""Least resistance h k + d of a drive [N m s/rad or N s/m]: a joint without k and d has no CFM."""
 
 
 class Rotor:
@@ -102,9 +76,12 @@ class Drives:
         position_gain: P of the kind `velocity` [1/s].
 
     Attributes:
-        first, second: joints of the fingers; the second follows the first.
-        rotors: by joint name.
+        rotors: of the arm's joints, by name.
+        pinion: couples the fingers, and has their rotors.
         commanded: the last set points: position, velocity, effort.
+
+    Raises:
+        NotSupportedError: fingers that cannot be coupled.
     """
 
     def __init__(
@@ -117,33 +94,30 @@ class Drives:
         position_gain: float,
     ) -> None:
         self.axes = [axes[name] for name in robot.joint_names]
-        self.first, self.second = (axes[name] for name in robot.gripper.joints)
-        self._follow, self._limits = FOLLOWED / timestep, robot.column("effort_limit")
-        shares, softness = _law(robot, timestep, drive, position_gain)
-        self._shares = shares
-        self._zeros = shares[0] * [axis.zero for axis in self.axes]
-        self._driven: list[tuple[int, Any, Callable[[], float], float]] = []
-        self._limp: list[tuple[int, Callable[[float], None]]] = []
-        for k, axis in enumerate(self.axes):
-            limit = float(self._limits[k])
-            if axis is self.second:
-                limit *= 2
-            else:
-                if softness[k] is not None:
-                    axis.joint.setParam(SOFTNESS, softness[k])
-                if softness[k] == np.inf:
-                    limit = 0.0
-                    self._limp.append((k, axis.push))
-                else:
-                    self._driven.append((k, axis.joint, axis.angle, float(shares[0, k])))
+        self._shares, softness = _law(robot, timestep, drive, position_gain)
+        self._zeros = self._shares[0] * [axis.zero for axis in self.axes]
+        for axis, soft, limit in zip(
+            self.axes, softness, robot.column("effort_limit"), strict=True
+        ):
             axis.joint.setParam(MOST_FORCE, limit)
+            if soft is not None:
+                axis.joint.setParam(SOFTNESS, soft)
+        inertias = dict(zip(robot.joint_names, robot.column("armature"), strict=True))
+        fingers = [inertias.pop(name) for name in robot.gripper.joints]
+        first, second = (axes[name] for name in robot.gripper.joints)
+        self.pinion = Pinion(world, first, second, sum(fingers), timestep)
         self.rotors = {
             name: Rotor(world, axes[name], inertia, timestep)
-            for name, inertia in zip(robot.joint_names, robot.column("armature"), strict=True)
+            for name, inertia in inertias.items()
             if inertia > 0
         }
+        self._motors = [
+            (axis.joint.setParam, axis.angle, float(gain))
+            for axis, gain in zip(self.axes, self._shares[0], strict=True)
+        ]
         start = robot.column("initial_position")
         self.command(start, 0 * start, 0 * start)
+        self.pinion.mesh()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         """Set points of all joints."""
@@ -157,16 +131,11 @@ class Drives:
 
     def act(self) -> None:
         """Before a step: tell the motors what they are asked for."""
-        asked = self._asked
-        for k, joint, angle, gain in self._driven:
-            joint.setParam(VELOCITY, asked[k] - gain * angle())
-        for k, push in self._limp:
-            push(float(np.clip(self.commanded[2][k], -self._limits[k], self._limits[k])))
-        first, second = self.first, self.second
-        gap = first.position() - second.position()
-        second.joint.setParam(VELOCITY, first.rate() + self._follow * gap)
+        for (tell, angle, gain), asked in zip(self._motors, self._asked, strict=True):
+            tell(VELOCITY, asked - gain * angle())
         for rotor in self.rotors.values():
             rotor.turn()
+        self.pinion.mesh()
 
     def state(self) -> FloatArray:
         """Positions and velocities, (2, n_joints)."""
@@ -181,14 +150,12 @@ def _law(
     """What the motors are told, see the module.
 
     Returns:
-        Shares of position, velocity and effort in Vel, (3, n_joints). CFM of each motor: None for
-        the world's, infinite for a joint without stiffness and damping, whose motor is off.
+        Shares of position, velocity and effort in Vel, (3, n_joints), and CFM of each motor, None
+        for the world's.
     """
     n = len(robot.joints)
     if drive == "velocity":
         return np.outer([position_gain, 0.0, 0.0], np.ones(n)), [None] * n
     stiffness, damping = robot.column("stiffness"), robot.column("damping")
-    resistance = timestep * stiffness + damping
-    given = np.where(resistance > 0, resistance, 1.0)
-    softness = [1 / float(value) if value > 0 else np.inf for value in resistance]
-    return np.stack([stiffness, damping, np.ones(n)]) / given, list(softness)
+    resistance = np.maximum(timestep * stiffness + damping, WEAKEST)
+    return np.stack([stiffness, damping, np.ones(n)]) / resistance, (1 / resistance).tolist()

@@ -15,8 +15,9 @@ from pytest_simbench.simulator import PreparedRobot, lazy_import
 from pytest_simbench.simulator.quantities import touches
 from pytest_simbench.simulator.shapes import DIRECTIONS, box_corners, outlines, placed, reach
 
+from .axes import Axis
 from .contacts import Part
-from .drives import Axis, Drives
+from .drives import Drives
 from .library import HI_STOP, LO_STOP, MOST_FORCE, SOFTNESS, Mesh, damping, library, pose_of
 
 ode = lazy_import("ode")
@@ -70,7 +71,7 @@ class ReadBack:
         if self.prepared is not None and self.drives is not None:
             for name, axis in self.axes.items():
                 reported |= self._joint(f"joint/{name}", name, axis, self.drives)
-            reported["gripper/coupled"] = float(_follows(self.drives))
+            reported["gripper/coupled"] = float(self.drives.pinion.holds)
         return reported | touches(self.scene, self.prepared, self._can_touch)
 
     def _part(self, prefix: str, part: Part) -> dict[str, Any]:
@@ -127,21 +128,22 @@ class ReadBack:
     def _joint(self, prefix: str, name: str, axis: Axis, drives: Drives) -> dict[str, Any]:
         joint = axis.joint
         limits = np.array([joint.getParam(LO_STOP), joint.getParam(HI_STOP)])
+        resistance = 1 / joint.getParam(SOFTNESS)
+        stiffness = resistance * drives.gain(axis)
         found: dict[str, Any] = {
             f"{prefix}/axis": _motion(axis, self._frame(self._child(axis))),
             f"{prefix}/limits": limits + axis.zero,
             f"{prefix}/initial_position": axis.position(),
             f"{prefix}/effort_limit": joint.getParam(MOST_FORCE),
+            f"{prefix}/stiffness": stiffness,
+            f"{prefix}/damping": resistance - self.timestep * stiffness,
             f"{prefix}/armature": 0.0,
         }
         if name in drives.rotors:
             softness = drives.rotors[name].motor.getParam(SOFTNESS)
             found[f"{prefix}/armature"] = self.timestep / softness
-        if axis is not drives.second:
-            resistance = 1 / joint.getParam(SOFTNESS)
-            stiffness = resistance * drives.gain(axis)
-            found[f"{prefix}/stiffness"] = stiffness
-            found[f"{prefix}/damping"] = resistance - self.timestep * stiffness
+        elif axis in drives.pinion.fingers:
+            found[f"{prefix}/armature"] = drives.pinion.inertia / 2
         return found
 
     def _child(self, axis: Axis) -> Part:
@@ -168,12 +170,6 @@ def _collide(x: int, y: int) -> bool:
 
 def _pose(body: Any) -> Pose:
     return Pose.from_array([*body.getPosition(), *body.getQuaternion()])
-
-
-def _follows(drives: Drives) -> bool:
-    """Whether the second finger's motor can hold whatever the first one presses."""
-    forces = [axis.joint.getParam(MOST_FORCE) for axis in (drives.first, drives.second)]
-    return bool(forces[1] >= forces[0])
 
 
 def _motion(axis: Axis, frame: Pose) -> FloatArray:

@@ -2,11 +2,12 @@
 
 The origin of a body of ODE is its centre of mass; its axes are those of the link. A hinge tells
 angles from -180 to 180 degrees: its zero is put into the middle of the joint's range, since one
-joint of a Panda turns to 215.
+joint of a Panda turns to 215. ODE has no stops beyond 180 degrees from there.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -19,8 +20,8 @@ from pytest_simbench.simulator.kinematics import link_poses, motion_subspace
 from pytest_simbench.simulator.mesh_check import TRIANGLE
 from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
 
+from .axes import Axis
 from .contacts import BASE, FIXED, FREE, GROUND, LINK, Part
-from .drives import Axis
 from .library import HI_STOP, LO_STOP, Mesh, place
 
 ode = lazy_import("ode")
@@ -74,17 +75,19 @@ def add_joints(world: Any, prepared: PreparedRobot, links: Mapping[str, Part]) -
     places, zeros = link_poses(prepared, middle(prepared)), middle(prepared)
     axes = {}
     for joint in prepared.joints:
-        axis = _axis(world, joint, links, places[joint.child], zeros[joint.name])
-        lower, upper = prepared.limits[joint.name] - axis.zero
+        lower, upper = prepared.limits[joint.name] - zeros[joint.name]
+        axis = Axis(
+            _joint(world, joint, links, places[joint.child]),
+            zeros[joint.name],
+            wide=joint.kind == "revolute" and upper - lower > math.tau,
+        )
         axis.joint.setParam(LO_STOP, lower)
         axis.joint.setParam(HI_STOP, upper)
         axes[joint.name] = axis
     return axes
 
 
-def _axis(
-    world: Any, joint: MovingJoint, links: Mapping[str, Part], pose: Pose, zero: float
-) -> Axis:
+def _joint(world: Any, joint: MovingJoint, links: Mapping[str, Part], pose: Pose) -> Any:
     hinged = joint.kind == "revolute"
     made = ode.HingeJoint(world) if hinged else ode.SliderJoint(world)
     made.attach(links[joint.child].body, links[joint.parent].body)
@@ -92,7 +95,7 @@ def _axis(
     if hinged:
         made.setAnchor(pose.position)
     made.setAxis(tuple(direction))
-    return Axis(made, zero)
+    return made
 
 
 def put_links(

@@ -111,7 +111,7 @@ def lighter_rotor(s: Any) -> None:
 
 
 def uncoupled(s: Any) -> None:
-    s._drives.second.joint.setParam(MOST_FORCE, 0.0)
+    s._drives.pinion.release()
 
 
 FAULTS: dict[str, Callable[[Any], None]] = {
