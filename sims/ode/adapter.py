@@ -172,8 +172,9 @@ class ODE(Simulator):
             self.prepared = PreparedRobot(scene.robot)
             self._load_robot(self.prepared)
         links = [part.body for part in self._links.values() if part.body is not None]
-        pinion = [] if self._drives is None else [self._drives.pinion.body]
-        self._moving = [*self._free, *links, *pinion]
+        self._moving = [*self._free, *links]
+        if self._drives is not None:
+            self._moving.append(self._drives.pinion.body)
         self._names = [body_id(body) for body in self._moving]
 
     def _load_robot(self, prepared: PreparedRobot) -> None:
