@@ -235,6 +235,7 @@ class ODE(Simulator):
 
     def restore(self, state: State) -> None:
         self._steps = state.steps
+        self.contacts.settle()  # else the order of contacts is that of what went before
         for name, rotation in zip(self._names, state.rotations, strict=True):
             turn(name, *rotation)
         for body, values, awake in zip(self._moving, state.bodies, state.awake, strict=True):

@@ -81,6 +81,11 @@ class Contacts:
         self.count = 0
         self.space.collide(None, self._near)
 
+    def settle(self) -> None:
+        """Have the space note what has moved. What moves next then comes first in its order, which
+        is the order of the contacts, and so of the rows that the solver sums."""
+        self.space.collide(None, _nothing)
+
     def clear(self) -> None:
         """Take the joints away, after the step."""
         self._group.empty()
@@ -107,6 +112,10 @@ class Contacts:
                 contact.setSoftCFM(self.cfm)
             joint(world, group, contact).attach(one, other)
         self.count += len(contacts)
+
+
+def _nothing(_: Any, first: Any, second: Any) -> None:
+    """Leave a pair alone."""
 
 
 def _depth(contact: Any) -> float:
