@@ -9,7 +9,7 @@ import pytest
 from hypothesis import settings
 
 from pytest_simbench.client import reaper
-from pytest_simbench.client.environments import missing
+from pytest_simbench.client.environments import interpreter, missing
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter, registered
@@ -23,7 +23,7 @@ ADAPTERS = {name: entry.value for name, entry in registered().items()}
 HERE = [
     name
     for name in ADAPTERS
-    if not adapter(name).info.requirements and not missing(adapter(name).info)
+    if not missing(adapter(name).info) and interpreter(adapter(name).info) is None
 ]
 """The engines that can be imported in this process."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -43,6 +44,19 @@ def test_the_core_imports_no_simulator() -> None:
         for source in TOP.rglob("*.py")
         for name in imported(source)
         if name.removeprefix("pytest_simbench.").partition(".")[0] in roots
+    }
+    assert not found
+
+
+@pytest.mark.parametrize("room", ["scene", "simulator", "worker"])
+def test_workers_need_numpy_and_the_standard_library_alone(room: str) -> None:
+    """A worker runs in interpreters that hold nothing else, the system's Python for instance."""
+    allowed = {*sys.stdlib_module_names, "numpy", "pytest_simbench"}
+    found = {
+        (str(source.relative_to(TOP)), name)
+        for source in (TOP / room).rglob("*.py")
+        for name in imported(source)
+        if name.partition(".")[0] not in allowed
     }
     assert not found
 

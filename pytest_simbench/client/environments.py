@@ -19,6 +19,7 @@ from importlib.metadata import distributions
 from importlib.util import find_spec
 from pathlib import Path
 
+from pytest_simbench.client.system import SystemPython
 from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.info import SimulatorInfo
 
@@ -55,6 +56,11 @@ class Environment:
     def python(self) -> Path:
         """Its interpreter."""
         return self.folder / "bin" / "python"
+
+    @property
+    def place(self) -> str:
+        """Where that is, for `--sims`."""
+        return f"in its own environment, {self.folder}"
 
     @property
     def problem(self) -> str | None:
@@ -126,20 +132,37 @@ def cache_variables(caches: Mapping[str, str], folder: Path) -> dict[str, str]:
 
 
 def missing(info: SimulatorInfo) -> str | None:
-    """Why an engine can be imported neither here nor in its own environment, and what mends it."""
-    absent = [module for module in info.modules if not _importable(module)]
+    """Why an engine can be imported neither here nor where it lives, and what mends it."""
+    absent = _absent(info)
     if not absent:
         return None
-    if info.requirements:
-        return Environment.of(info).problem
+    other = outside(info)
+    if other is not None:
+        return other.problem
     return f"{info.name} is not installed (no module {absent[0]}); install it: {info.install}"
 
 
+def outside(info: SimulatorInfo) -> Environment | SystemPython | None:
+    """Where an engine lives that is not for this interpreter; None for one that is.
+
+    An engine of the system's packages may be importable here, where this is the system's Python.
+    """
+    if info.requirements:
+        return Environment.of(info)
+    if info.system_packages and _absent(info):
+        return SystemPython(info)
+    return None
+
+
 def interpreter(info: SimulatorInfo) -> str | None:
-    """The interpreter of an engine's own environment where there is one; None for this one."""
-    if not info.requirements or Environment.of(info).problem:
-        return None
-    return str(Environment.of(info).python)
+    """The interpreter that an engine lives in, where it is ready; None for this one."""
+    other = outside(info)
+    return None if other is None or other.problem else str(other.python)
+
+
+def _absent(info: SimulatorInfo) -> list[str]:
+    """The engine's modules that cannot be imported here."""
+    return [module for module in info.modules if not _importable(module)]
 
 
 def _importable(module: str) -> bool:

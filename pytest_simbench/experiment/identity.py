@@ -70,7 +70,7 @@ def expected(experiment: Experiment, number: int = 1) -> Record:
     """The record of a repetition that has not begun: everything about it that is known here.
 
     Settings are those of the adapter's profile with the case's changes; versions those installed
-    here or in the engine's own environment. What only a worker can tell is absent.
+    here or in the interpreter that the engine lives in. What only a worker can tell is absent.
     """
     case = experiment.case
     return record_of(experiment, number, settings=settings(case), versions=versions(case))
@@ -89,22 +89,22 @@ def settings(case: Case) -> dict[str, Any]:
 
 
 def versions(case: Case) -> dict[str, str]:
-    """The engine's version, where it is installed here or in its own environment."""
-    from pytest_simbench.client.environments import Environment
+    """The engine's version, where it is installed here or in the interpreter that it lives in."""
+    from pytest_simbench.client.environments import outside
     from pytest_simbench.simulator.registry import adapter, registered
 
     entry = registered().get(case.simulator)
     if entry is None or entry.value != case.adapter or case.spec:
         return {}
     info = adapter(case.simulator).info
-    environment = Environment.of(info)
     if case.python is None:
         here = {"python": platform.python_version()}
         with suppress(PackageNotFoundError):
             here[info.distribution] = version(info.distribution)
         return here
-    if info.requirements and Path(case.python) == environment.python:
-        found = environment.version()
+    other = outside(info)
+    if other is not None and Path(case.python) == other.python:
+        found = other.version()
         return {info.distribution: found} if found else {}
     return {}  # somebody's own interpreter
 

@@ -97,18 +97,18 @@ def _width() -> int:
 
 def _here(selection: Selection, name: str) -> str:
     """Where a simulator is and which version."""
-    from pytest_simbench.client.environments import Environment, interpreter
+    from pytest_simbench.client.environments import interpreter, outside
     from pytest_simbench.simulator.registry import adapter
 
     info = adapter(name).info
     if name in selection.pythons or name in selection.specs:
         return f"in {selection.pythons.get(name) or selection.specs[name]}"
-    own = Environment.of(info) if interpreter(info) else None
+    other = outside(info) if interpreter(info) else None
     try:
-        found = own.version() if own else version(info.distribution)
+        found = other.version() if other else version(info.distribution)
     except Exception:  # not there, or metadata that nobody can read
         found = None
-    place = f"in its own environment, {own.folder}" if own else "installed"
+    place = other.place if other else "installed"
     untested = "" if found == info.tested_version else ", UNTESTED"
     return f"version {found or 'unknown'}{untested}, {place}"
 

@@ -30,11 +30,15 @@ def rows(infos: Sequence[SimulatorInfo]) -> dict[str, list[str]]:
     }
     for heading, capability in MARKS:
         table[heading] = ["yes" if capability in info.capabilities else "-" for info in infos]
-    table["own environment"] = ["yes" if info.requirements else "-" for info in infos]
+    table["own environment"] = [_environment(info) for info in infos]
     table["compiles first"] = ["yes" if info.costly_start else "-" for info in infos]
     table["on disk MB"] = [str(info.install_size_mb or "?") for info in infos]
     table["tested version"] = [info.tested_version for info in infos]
     return table
+
+
+def _environment(info: SimulatorInfo) -> str:
+    return "yes" if info.requirements else "system's Python" if info.system_packages else "-"
 
 
 def capability_table(infos: Sequence[SimulatorInfo], width: int) -> str:

@@ -83,6 +83,8 @@ class SimulatorInfo:
         compile_timeout: the longest that `Simulator.compile` may take with cold caches [s].
         requirements: pinned requirements of an interpreter of its own, for an engine whose
             packages clash with pytest's or with another engine's; empty when it installs here.
+        system_packages: of Debian and Ubuntu, for an engine that comes with the operating system:
+            its worker then runs in the system's Python. Name numpy's package too.
         caches: environment variables to be set to folders (named by the values) that are kept
             between runs, for compiled kernels.
         environment: variables to be set before a headless engine is imported, unless the user did.
@@ -103,6 +105,7 @@ class SimulatorInfo:
     costly_start: bool = False
     compile_timeout: float = 900.0
     requirements: tuple[str, ...] = ()
+    system_packages: tuple[str, ...] = ()
     caches: Mapping[str, str] = field(default_factory=dict)
     install_size_mb: int | None = None
     environment: Mapping[str, str] = field(default_factory=dict)

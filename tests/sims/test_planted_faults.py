@@ -1,4 +1,4 @@
-"""Parity of engines in environments of their own: honest worlds pass, planted faults do not.
+"""Parity of engines in interpreters of their own: honest worlds pass, planted faults do not.
 
 Their faults are planted in the worker, by an adapter whose settings name the quantity.
 """
@@ -17,7 +17,7 @@ from pytest_simbench.simulator.parity import compare
 from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
 
-from . import genesis_faults, newton_faults
+from . import genesis_faults, newton_faults, ode_faults
 from .coverage import uncovered
 from .worlds import Worlds
 
@@ -25,8 +25,15 @@ SCENE = Stacking().scene(1, Jitter())
 ENGINES: dict[str, tuple[type[Simulator], Any]] = {
     "newton": (newton_faults.FaultyNewton, newton_faults.FAULTS),
     "genesis": (genesis_faults.FaultyGenesis, genesis_faults.FAULTS),
+    "ode": (ode_faults.FaultyODE, ode_faults.FAULTS),
 }
-HONEST = [("newton", "default"), ("newton", "tuned"), ("genesis", "tuned")]
+HONEST = [
+    ("newton", "default"),
+    ("newton", "tuned"),
+    ("genesis", "tuned"),
+    ("ode", "default"),
+    ("ode", "tuned"),
+]
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,1 @@
+"""ODE, the engine inside Webots and Gazebo classic."""

@@ -1,0 +1,258 @@
+"""ODE (the engine inside Gazebo classic and, as a fork, Webots), through pyode.
+
+Drives are motors of ODE's joints, see `drives`. ODE finds pairs that may touch; contacts become
+joints here, in Python (`contacts`). pyode has no window and draws no pictures.
+
+What was learnt stands in docs/engines/ode.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.simulator import (
+    Capability,
+    Deviation,
+    PreparedRobot,
+    SeedsSeen,
+    Settings,
+    Simulator,
+    SimulatorInfo,
+    lazy_import,
+)
+
+from . import world as build
+from .axes import Axis
+from .contacts import Contacts, Part
+from .drives import Drive, Drives
+from .library import body_id, library, library_path, turn, turned
+from .readback import ReadBack
+
+ode = lazy_import("ode")
+
+PACKAGES = ("python3-numpy", "python3-pyode")
+
+SEED = 0
+"""Of ODE's own random numbers, by which quickStep shuffles its rows; 0 is where they begin."""
+
+
+@dataclass(frozen=True)
+class ODESettings(Settings):
+    """ODE's options; defaults are Webots' own (WorldInfo, ContactProperties, Motor, R2023b).
+
+    Attributes:
+        timestep: [s]; Webots' default of 32 ms is longer than tasks allow, this is half of it.
+        solver: `step` (all rows at once, Dantzig), which Webots takes, or `quickstep` (iterative).
+        iterations: of `quickstep`; 20 is ODE's default.
+        erp, cfm: of all joints: share of their error that is corrected in a step, and softness.
+        contact_erp, contact_cfm: the same of contacts.
+        contacts: the most of a pair of shapes that count, the deepest.
+        drive: `velocity` motors with Webots' P controller, or `spring`: the scene's drive law.
+        position_gain: P of `velocity` [1/s].
+        sleeping: whether boxes at rest for 1 s (0.01 m/s, 0.01 rad/s) are left out.
+    """
+
+    timestep: float = 0.016
+    solver: Literal["step", "quickstep"] = "step"
+    iterations: int = 20
+    erp: float = 0.2
+    cfm: float = 1e-5
+    contact_erp: float = 0.2
+    contact_cfm: float = 1e-3
+    contacts: int = 10
+    drive: Drive = "velocity"
+    position_gain: float = 10.0
+    sleeping: bool = True
+
+    def quantities(self) -> Mapping[str, Any]:
+        if self.drive == "spring":
+            return {}
+        # v + CFM effort = P (q* - q), read as the law of a drive whose d acts on v alone
+        stiffness = self.position_gain / self.cfm
+        damping = 1 / self.cfm - self.timestep * stiffness
+        return {"joint/*/stiffness": stiffness, "joint/*/damping": damping}
+
+
+@dataclass(frozen=True)
+class State:
+    """What a run goes on from.
+
+    Attributes:
+        steps: since loading.
+        bodies: position, linear and angular velocity of each body.
+        rotations: of each body.
+        awake: whether each body is.
+        turns: of each joint, see `Axis`.
+        commanded: the drives' set points.
+        seed: of ODE's random numbers.
+    """
+
+    steps: int
+    bodies: list[tuple[Any, ...]]
+    rotations: list[tuple[bytes, bytes]]
+    awake: list[bool]
+    turns: list[tuple[int, float]]
+    commanded: tuple[FloatArray, FloatArray, FloatArray] | None
+    seed: int
+
+
+class ODE(Simulator):
+    """Adapter of ODE."""
+
+    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+        name="ode",
+        title="Open Dynamics Engine",
+        distribution="Py3ODE",
+        modules=("ode",),
+        install=f"apt-get install {' '.join(PACKAGES)}",
+        system_packages=PACKAGES,
+        licence="BSD-3-Clause or LGPL-2.1",
+        engine="ODE",
+        language="C++",
+        tested_version="1.2.0.dev15",
+        capabilities=frozenset(
+            {
+                Capability.SAVE_RESTORE,
+                Capability.CONTACT_COUNT,
+                Capability.DETERMINISTIC,
+            }
+        ),
+        deviations=(
+            Deviation("joint/*/friction", "ODE's joints have no friction"),
+            Deviation("body/*/margin link/*/margin", "ODE's shapes have no margin"),
+            Deviation("", "a joint that turns by more than 360 degrees has no stops"),
+            Deviation(
+                "",
+                "with drive=velocity (profile default) the drives are Webots' controllers of "
+                "velocity: far stiffer than the scene's, and blind to set points of velocity",
+            ),
+        ),
+        install_size_mb=40,
+    )
+    profiles: ClassVar[Mapping[str, Settings]] = {
+        "default": ODESettings(),
+        "tuned": ODESettings(
+            timestep=0.002,
+            contact_cfm=1e-5,
+            drive="spring",
+        ),
+    }
+    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+        "tuned": (SeedsSeen("throwing", 100, 101), SeedsSeen("stacking", 100, 100)),
+    }
+    settings: ODESettings
+
+    def load(self, scene: Scene) -> None:
+        self.scene, s = scene, self.settings
+        self._steps = 0
+        library().dRandSetSeed(SEED)
+        self.world = world = ode.World()
+        world.setGravity(scene.gravity)
+        world.setERP(s.erp)
+        world.setCFM(s.cfm)
+        world.setQuickStepNumIterations(s.iterations)
+        world.setAutoDisableFlag(s.sleeping)
+        world.setAutoDisableTime(1.0)
+        self.contacts = Contacts(world, s.contact_erp, s.contact_cfm, s.contacts)
+        space = self.contacts.space
+        self._advance = world.step if s.solver == "step" else world.quickStep
+        self._ground = build.add_ground(space, scene.ground_friction)
+        self._bodies = {box.name: build.add_box(world, space, box) for box in scene.bodies}
+        self._free = [self._bodies[box.name].body for box in scene.free_bodies]
+        self._links: dict[str, Part] = {}
+        self._axes: dict[str, Axis] = {}
+        self._drives: Drives | None = None
+        self.prepared = None
+        if scene.robot is not None:
+            self.prepared = PreparedRobot(scene.robot)
+            self._load_robot(self.prepared)
+        links = [part.body for part in self._links.values() if part.body is not None]
+        self._moving = [*self._free, *links]
+        if self._drives is not None:
+            self._moving.append(self._drives.pinion.body)
+        self._names = [body_id(body) for body in self._moving]
+
+    def _load_robot(self, prepared: PreparedRobot) -> None:
+        robot, s = prepared.robot, self.settings
+        self.world.setAutoDisableFlag(False)  # of bodies made from here on: a motor wakes nobody
+        self._links = build.add_links(self.world, self.contacts.space, prepared)
+        self._axes = build.add_joints(self.world, prepared, self._links)
+        build.put_links(prepared, self._links, {j.name: j.initial_position for j in robot.joints})
+        self._drives = Drives(self.world, robot, self._axes, s.timestep, s.drive, s.position_gain)
+
+    def read_back(self) -> dict[str, Any]:
+        return ReadBack(
+            self.world,
+            self.settings.timestep,
+            self._ground,
+            self._bodies,
+            self._links,
+            self._axes,
+            self._drives,
+            self.scene,
+            self.prepared,
+        ).all()
+
+    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        if self._drives is not None:
+            self._drives.command(position, velocity, effort)
+
+    def step(self) -> None:
+        if self._drives is not None:
+            self._drives.act()
+        self.contacts.make()
+        self._advance(self.settings.timestep)
+        self.contacts.clear()
+        self._steps += 1
+
+    @property
+    def time(self) -> float:
+        return self._steps * self.settings.timestep
+
+    def body_state(self) -> FloatArray:
+        state = np.empty((len(self._free), 13))
+        for row, body in zip(state, self._free, strict=True):
+            row[:3], row[3:7] = body.getPosition(), body.getQuaternion()
+            row[7:10], row[10:] = body.getLinearVel(), body.getAngularVel()
+        return state
+
+    def joint_state(self) -> FloatArray:
+        return np.empty((2, 0)) if self._drives is None else self._drives.state()
+
+    def save(self) -> State:
+        bodies = [(b.getPosition(), b.getLinearVel(), b.getAngularVel()) for b in self._moving]
+        rotations = [turned(name) for name in self._names]
+        commanded = None if self._drives is None else self._drives.commanded
+        awake = [bool(body.isEnabled()) for body in self._moving]
+        turns = [axis.turn for axis in self._axes.values()]
+        seed = library().dRandGetSeed()
+        return State(self._steps, bodies, rotations, awake, turns, commanded, seed)
+
+    def restore(self, state: State) -> None:
+        self._steps = state.steps
+        self.contacts.settle()  # else the order of contacts is that of what went before
+        for name, rotation in zip(self._names, state.rotations, strict=True):
+            turn(name, *rotation)
+        for body, values, awake in zip(self._moving, state.bodies, state.awake, strict=True):
+            position, linear, angular = values
+            body.setPosition(position)
+            body.setLinearVel(linear)
+            body.setAngularVel(angular)
+            body.enable() if awake else body.disable()
+        for axis, turns in zip(self._axes.values(), state.turns, strict=True):
+            axis.turn = turns
+        if self._drives is not None and state.commanded is not None:
+            self._drives.command(*state.commanded)
+        library().dRandSetSeed(state.seed)
+
+    def contact_count(self) -> int:
+        return self.contacts.count
+
+    def versions(self) -> dict[str, str]:
+        number = library_path().partition(".so.")[2]
+        return {**super().versions(), **({"libode": number} if number else {})}

@@ -1,0 +1,123 @@
+"""Contacts: ODE names pairs that may touch, and the caller makes a joint of each contact point.
+
+It calls back for each pair, here into Python. What this costs stands in docs/engines/ode.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from pytest_simbench.scene import Pose
+from pytest_simbench.simulator import lazy_import
+
+from .library import library
+
+ode = lazy_import("ode")
+
+GROUND, FIXED, FREE, BASE, LINK = 1, 2, 4, 8, 16
+"""Categories of geoms."""
+
+TOUCHES = {
+    GROUND: FREE | LINK,
+    FIXED: FREE | LINK,
+    FREE: GROUND | FIXED | FREE | BASE | LINK,
+    BASE: FREE,
+    LINK: GROUND | FIXED | FREE,
+}
+"""What a category collides with: all but links with links, and what never moves with its like."""
+
+
+@dataclass
+class Part:
+    """A body or link of the scene, as the contacts know it.
+
+    Attributes:
+        body: of ODE, its origin the centre of mass; None for what is fixed.
+        friction: Coulomb's coefficient; a pair has the smaller one.
+        bounce: coefficient of restitution; a pair has the smaller one.
+        frame: of the scene's body or link, in the frame of ODE's body, or in the world.
+        geoms: its shapes.
+    """
+
+    body: Any
+    friction: float
+    frame: Pose = field(default_factory=Pose)
+    bounce: float = 0.0
+    geoms: list[Any] = field(default_factory=list)
+
+    def add(self, geom: Any, category: int) -> None:
+        """Make a geom one of its shapes."""
+        geom.attribs["part"] = self
+        library().dGeomSetCategoryBits(geom._id(), category)
+        library().dGeomSetCollideBits(geom._id(), TOUCHES[category])
+        self.geoms.append(geom)
+
+
+class Contacts:
+    """The contact joints of one step.
+
+    Args:
+        world: of ODE.
+        erp, cfm: share of a penetration that is corrected in a step, and softness [m/(N s)].
+        most: joints of a pair of shapes; the deepest contacts become joints.
+
+    Attributes:
+        space: that all geoms are in.
+        count: of the joints in the last step.
+    """
+
+    def __init__(self, world: Any, erp: float, cfm: float, most: int) -> None:
+        self.world, self.erp, self.cfm, self.most = world, erp, cfm, most
+        self.space, self.count = ode.SimpleSpace(), 0
+        self._group = ode.JointGroup()
+        self._soft = (erp, cfm) != (world.getERP(), world.getCFM())
+        soft = ode.ContactSoftERP | ode.ContactSoftCFM if self._soft else 0
+        self._mode, self._bouncy = ode.ContactApprox1 | soft, ode.ContactBounce
+        self._collide, self._joint = ode.collide, ode.ContactJoint
+
+    def make(self) -> None:
+        """Find what touches and make joints of it."""
+        self.count = 0
+        self.space.collide(None, self._near)
+
+    def settle(self) -> None:
+        """Have the space note what has moved. What moves next then comes first in its order, which
+        is the order of the contacts, and so of the rows that the solver sums."""
+        self.space.collide(None, _nothing)
+
+    def clear(self) -> None:
+        """Take the joints away, after the step."""
+        self._group.empty()
+
+    def _near(self, _: Any, first: Any, second: Any) -> None:
+        a, b = first.attribs["part"], second.attribs["part"]
+        one, other = a.body, b.body
+        if not ((one is not None and one.isEnabled()) or (other is not None and other.isEnabled())):
+            return  # both asleep, or one asleep upon what never moves
+        contacts = self._collide(first, second)
+        if len(contacts) > self.most:
+            contacts.sort(key=_depth, reverse=True)
+            del contacts[self.most :]
+        friction, bounce = min(a.friction, b.friction), min(a.bounce, b.bounce)
+        world, group, joint = self.world, self._group, self._joint
+        mode = self._mode | self._bouncy if bounce else self._mode
+        for contact in contacts:
+            contact.setMode(mode)
+            contact.setMu(friction)
+            if bounce:
+                contact.setBounce(bounce)
+            if self._soft:
+                contact.setSoftERP(self.erp)
+                contact.setSoftCFM(self.cfm)
+            joint(world, group, contact).attach(one, other)
+        self.count += len(contacts)
+
+
+def _nothing(_: Any, first: Any, second: Any) -> None:
+    """Leave a pair alone."""
+
+
+def _depth(contact: Any) -> float:
+    depth: float = contact.getContactGeomParams()[2]
+    return depth

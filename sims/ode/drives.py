@@ -1,0 +1,161 @@
+"""Drives and rotors, all of them motors of ODE's joints.
+
+A motor of ODE is a row of the constraint solver: joint velocity + CFM x effort = Vel, the effort
+bounded by FMax. What it does follows from Vel and CFM:
+
+- `spring`: with Vel = (k (q* - q) + d v* + tau_ff) / (h k + d) and CFM = 1 / (h k + d) the effort
+  is k (q* - q - h v) + d (v* - v) + tau_ff at the velocity v after the step h: the scene's drive
+  law, implicit, and clipped to the limit within the solver.
+- `velocity`: Vel = P (q* - q), what Webots does with its motors; CFM is the world's.
+- a rotor of inertia J: with Vel the present velocity and CFM = h / J the effort is that which
+  accelerates it, -J dv / h, and FMax has no limit. It is a motor of its own beside the drive's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Robot
+from pytest_simbench.simulator import lazy_import
+
+from .axes import Axis
+from .coupling import Pinion
+from .library import MOST_FORCE, SOFTNESS, VELOCITY
+
+ode = lazy_import("ode")
+
+Drive = Literal["spring", "velocity"]
+
+WEAKEST = 1e-9
+"""Least resistance h k + d of a drive [N m s/rad or N s/m]: a joint without k and d has no CFM."""
+
+
+class Rotor:
+    """A rotor on a joint, as a motor between the joint's bodies.
+
+    Args:
+        world: of ODE.
+        axis: the joint.
+        inertia: J as seen at the joint [kg m^2 or kg].
+        timestep: [s].
+    """
+
+    def __init__(self, world: Any, axis: Axis, inertia: float, timestep: float) -> None:
+        self.axis = axis
+        self.motor = ode.AMotor(world) if axis.hinged else ode.LMotor(world)
+        self.motor.attach(axis.child, axis.parent)
+        self.motor.setNumAxes(1)
+        self.motor.setAxis(0, 1, axis.joint.getAxis())  # 1: turns with the child
+        self.motor.setParam(MOST_FORCE, ode.Infinity)
+        self.motor.setParam(SOFTNESS, timestep / inertia)
+
+    def turn(self) -> None:
+        """Before a step: keep the present velocity."""
+        self.motor.setParam(VELOCITY, self.axis.rate() if self.axis.hinged else self._speed())
+
+    def _speed(self) -> float:
+        """Of the bodies' centres along the axis [m/s], which is what a linear motor moves."""
+        x, y, z = self.axis.joint.getAxis()
+        u, v, w = self.axis.child.getLinearVel()
+        a, b, c = self.axis.parent.getLinearVel() if self.axis.parent else (0.0, 0.0, 0.0)
+        return float(x * (u - a) + y * (v - b) + z * (w - c))
+
+
+class Drives:
+    """The drives of a robot.
+
+    Args:
+        world: of ODE.
+        robot: whose drives they are.
+        axes: its joints by name.
+        timestep: [s].
+        drive: kind of drive.
+        position_gain: P of the kind `velocity` [1/s].
+
+    Attributes:
+        rotors: of the arm's joints, by name.
+        pinion: couples the fingers, and has their rotors.
+        commanded: the last set points: position, velocity, effort.
+
+    Raises:
+        NotSupportedError: fingers that cannot be coupled.
+    """
+
+    def __init__(
+        self,
+        world: Any,
+        robot: Robot,
+        axes: Mapping[str, Axis],
+        timestep: float,
+        drive: Drive,
+        position_gain: float,
+    ) -> None:
+        self.axes = [axes[name] for name in robot.joint_names]
+        self._shares, softness = _law(robot, timestep, drive, position_gain)
+        self._zeros = self._shares[0] * [axis.zero for axis in self.axes]
+        for axis, soft, limit in zip(
+            self.axes, softness, robot.column("effort_limit"), strict=True
+        ):
+            axis.joint.setParam(MOST_FORCE, limit)
+            if soft is not None:
+                axis.joint.setParam(SOFTNESS, soft)
+        inertias = dict(zip(robot.joint_names, robot.column("armature"), strict=True))
+        fingers = [inertias.pop(name) for name in robot.gripper.joints]
+        first, second = (axes[name] for name in robot.gripper.joints)
+        self.pinion = Pinion(world, first, second, sum(fingers), timestep)
+        self.rotors = {
+            name: Rotor(world, axes[name], inertia, timestep)
+            for name, inertia in inertias.items()
+            if inertia > 0
+        }
+        self._motors = [
+            (axis.joint.setParam, axis.angle, float(gain))
+            for axis, gain in zip(self.axes, self._shares[0], strict=True)
+        ]
+        start = robot.column("initial_position")
+        self.command(start, 0 * start, 0 * start)
+        self.pinion.mesh()
+
+    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        """Set points of all joints."""
+        self.commanded = position, velocity, effort
+        p, v, e = self._shares
+        self._asked = (p * position + v * velocity + e * effort - self._zeros).tolist()
+
+    def gain(self, axis: Axis) -> float:
+        """Velocity that a drive asks for at a unit position error [1/s]."""
+        return float(self._shares[0, self.axes.index(axis)])
+
+    def act(self) -> None:
+        """Before a step: tell the motors what they are asked for."""
+        for (tell, angle, gain), asked in zip(self._motors, self._asked, strict=True):
+            tell(VELOCITY, asked - gain * angle())
+        for rotor in self.rotors.values():
+            rotor.turn()
+        self.pinion.mesh()
+
+    def state(self) -> FloatArray:
+        """Positions and velocities, (2, n_joints)."""
+        return np.array(
+            [[axis.position() for axis in self.axes], [axis.rate() for axis in self.axes]]
+        )
+
+
+def _law(
+    robot: Robot, timestep: float, drive: Drive, position_gain: float
+) -> tuple[FloatArray, list[float | None]]:
+    """What the motors are told, see the module.
+
+    Returns:
+        Shares of position, velocity and effort in Vel, (3, n_joints), and CFM of each motor, None
+        for the world's.
+    """
+    n = len(robot.joints)
+    if drive == "velocity":
+        return np.outer([position_gain, 0.0, 0.0], np.ones(n)), [None] * n
+    stiffness, damping = robot.column("stiffness"), robot.column("damping")
+    resistance = np.maximum(timestep * stiffness + damping, WEAKEST)
+    return np.stack([stiffness, damping, np.ones(n)]) / resistance, (1 / resistance).tolist()

@@ -1,0 +1,181 @@
+"""What ODE says that it built, for the parity check.
+
+ODE tells no corners of a mesh, so each is measured: a plane is moved towards it until it touches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Pose, Scene
+from pytest_simbench.simulator import PreparedRobot, lazy_import
+from pytest_simbench.simulator.quantities import touches
+from pytest_simbench.simulator.shapes import DIRECTIONS, box_corners, outlines, placed, reach
+
+from .axes import Axis
+from .contacts import Part
+from .drives import Drives
+from .library import HI_STOP, LO_STOP, MOST_FORCE, SOFTNESS, Mesh, damping, library, pose_of
+
+ode = lazy_import("ode")
+
+
+class ReadBack:
+    """Reads the quantities of `simulator.quantities` that ODE tells.
+
+    Args:
+        world: of ODE.
+        timestep: that the world is stepped with [s].
+        ground, bodies, links: the parts of the world.
+        axes: its joints.
+        drives: the motors, or None.
+        scene, prepared: names of what was built; no value is taken from them.
+    """
+
+    def __init__(
+        self,
+        world: Any,
+        timestep: float,
+        ground: Part,
+        bodies: Mapping[str, Part],
+        links: Mapping[str, Part],
+        axes: Mapping[str, Axis],
+        drives: Drives | None,
+        scene: Scene,
+        prepared: PreparedRobot | None,
+    ) -> None:
+        self.world, self.timestep, self.ground = world, timestep, ground
+        self.bodies, self.links, self.axes, self.drives = bodies, links, axes, drives
+        self.scene, self.prepared = scene, prepared
+        self.probe = ode.GeomPlane(None, (0.0, 0.0, 1.0), 0.0)
+
+    def all(self) -> dict[str, Any]:
+        """Every quantity that ODE tells, by its name."""
+        (_, _, up), height = self.ground.geoms[0].getParams()
+        reported: dict[str, Any] = {
+            "gravity": self.world.getGravity(),
+            "timestep": self.timestep,
+            "ground/friction": self.ground.friction,
+            "ground/restitution": self.ground.bounce,
+            "ground/height": height / up,
+        }
+        for name, part in self.bodies.items():
+            reported |= self._part(f"body/{name}", part)
+            free = part.body is not None and not part.body.isKinematic()
+            reported[f"body/{name}/dynamic"] = float(free and part.body.getNumJoints() == 0)
+        for name, part in self.links.items():
+            reported |= self._part(f"link/{name}", part)
+        if self.prepared is not None and self.drives is not None:
+            for name, axis in self.axes.items():
+                reported |= self._joint(f"joint/{name}", name, axis, self.drives)
+            reported["gripper/coupled"] = float(self.drives.pinion.holds)
+        return reported | touches(self.scene, self.prepared, self._can_touch)
+
+    def _part(self, prefix: str, part: Part) -> dict[str, Any]:
+        """Pose, shapes, surface and inertia of a body or link."""
+        frame = self._frame(part)
+        found: dict[str, Any] = {f"{prefix}/pose": frame.as_array()}
+        meshes = [self._measured(geom, frame) for geom in part.geoms if isinstance(geom, Mesh)]
+        boxes = [
+            reach(placed(box_corners(geom.getLengths()), frame.inverse() * pose_of(geom)))
+            for geom in part.geoms
+            if not isinstance(geom, Mesh)
+        ]
+        found |= outlines(prefix, boxes, meshes)
+        if part.geoms:
+            found[f"{prefix}/friction"] = part.friction
+            found[f"{prefix}/restitution"] = part.bounce
+        if part.body is not None:
+            found |= self._inertial(prefix, part)
+        return found
+
+    def _frame(self, part: Part) -> Pose:
+        """The scene's frame of a body or link, in the world."""
+        if part.body is not None:
+            return _pose(part.body) * part.frame
+        if part in self.bodies.values():
+            return pose_of(part.geoms[0])
+        return part.frame
+
+    def _inertial(self, prefix: str, part: Part) -> dict[str, Any]:
+        mass, frame = part.body.getMass(), part.frame.inverse()
+        return {
+            f"{prefix}/mass": mass.mass,
+            f"{prefix}/com": placed(np.array([mass.c]), frame)[0],
+            f"{prefix}/inertia": frame.rotation() @ np.array(mass.I) @ frame.rotation().T,
+            f"{prefix}/gravity": float(part.body.getGravityMode()),
+            f"{prefix}/damping": damping(part.body) / self.timestep,
+        }
+
+    def _measured(self, mesh: Mesh, frame: Pose) -> FloatArray:
+        """The reach of a mesh in a frame: how far a plane stands off when it just touches."""
+        origin, reaches = np.asarray(frame.position), []
+        for direction in DIRECTIONS @ frame.rotation().T:
+            normal, offset = -direction, origin @ direction
+            offset -= 10.0  # far inside: every corner is below such a plane
+            while True:
+                self.probe.setParams(tuple(normal), -offset)
+                depths = [c.getContactGeomParams()[2] for c in ode.collide(mesh, self.probe)]
+                if not depths or max(depths) <= 1e-12:
+                    break
+                offset += max(depths)
+            reaches.append(offset - origin @ direction)
+        return np.array(reaches)
+
+    def _joint(self, prefix: str, name: str, axis: Axis, drives: Drives) -> dict[str, Any]:
+        joint = axis.joint
+        limits = np.array([joint.getParam(LO_STOP), joint.getParam(HI_STOP)])
+        resistance = 1 / joint.getParam(SOFTNESS)
+        stiffness = resistance * drives.gain(axis)
+        found: dict[str, Any] = {
+            f"{prefix}/axis": _motion(axis, self._frame(self._child(axis))),
+            f"{prefix}/limits": limits + axis.zero,
+            f"{prefix}/initial_position": axis.position(),
+            f"{prefix}/effort_limit": joint.getParam(MOST_FORCE),
+            f"{prefix}/stiffness": stiffness,
+            f"{prefix}/damping": resistance - self.timestep * stiffness,
+            f"{prefix}/armature": 0.0,
+        }
+        if name in drives.rotors:
+            softness = drives.rotors[name].motor.getParam(SOFTNESS)
+            found[f"{prefix}/armature"] = self.timestep / softness
+        elif axis in drives.pinion.fingers:
+            found[f"{prefix}/armature"] = drives.pinion.inertia / 2
+        return found
+
+    def _child(self, axis: Axis) -> Part:
+        return next(part for part in self.links.values() if part.body is axis.child)
+
+    def _can_touch(self, a: str, b: str) -> bool:
+        pairs = [(x, y) for x in self._named(a).geoms for y in self._named(b).geoms]
+        return all(_collide(x._id(), y._id()) for x, y in pairs)
+
+    def _named(self, name: str) -> Part:
+        kind, _, rest = name.partition("/")
+        if kind == "ground":
+            return self.ground
+        return self.bodies[rest] if kind == "body" else self.links[rest]
+
+
+def _collide(x: int, y: int) -> bool:
+    """Whether ODE asks about a pair of geoms: both enabled, and one wants the other's category."""
+    tell = library()
+    wanted = tell.dGeomGetCategoryBits(x) & tell.dGeomGetCollideBits(y)
+    wanted |= tell.dGeomGetCategoryBits(y) & tell.dGeomGetCollideBits(x)
+    return bool(wanted and tell.dGeomIsEnabled(x) and tell.dGeomIsEnabled(y))
+
+
+def _pose(body: Any) -> Pose:
+    return Pose.from_array([*body.getPosition(), *body.getQuaternion()])
+
+
+def _motion(axis: Axis, frame: Pose) -> FloatArray:
+    """Velocity of the child's frame at unit joint speed, in that frame: angular, linear, (6,)."""
+    turn, direction = frame.rotation().T, np.array(axis.joint.getAxis())
+    if not axis.hinged:
+        return np.concatenate([np.zeros(3), turn @ direction])
+    arm = np.asarray(frame.position) - axis.joint.getAnchor()
+    return np.concatenate([turn @ direction, turn @ np.cross(direction, arm)])

@@ -1,0 +1,136 @@
+"""The scene as bodies, geoms and joints of ODE.
+
+The origin of a body of ODE is its centre of mass; its axes are those of the link. A hinge tells
+angles from -180 to 180 degrees: its zero is put into the middle of the joint's range, since one
+joint of a Panda turns to 215. ODE has no stops beyond 180 degrees from there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import Box, FloatArray, Pose
+from pytest_simbench.simulator import PreparedRobot, lazy_import
+from pytest_simbench.simulator.kinematics import link_poses, motion_subspace
+from pytest_simbench.simulator.mesh_check import TRIANGLE
+from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
+
+from .axes import Axis
+from .contacts import BASE, FIXED, FREE, GROUND, LINK, Part
+from .library import HI_STOP, LO_STOP, Mesh, place
+
+ode = lazy_import("ode")
+
+
+def add_ground(space: Any, friction: float) -> Part:
+    """The plane z = 0."""
+    ground = Part(None, friction)
+    ground.add(ode.GeomPlane(space, (0.0, 0.0, 1.0), 0.0), GROUND)
+    return ground
+
+
+def add_box(world: Any, space: Any, box: Box) -> Part:
+    """A box, fixed or free."""
+    geom = ode.GeomBox(space, box.size)
+    part = Part(None, box.friction)
+    part.add(geom, FIXED if box.fixed else FREE)
+    if box.fixed:
+        place(geom, box.pose)
+        return part
+    part.body = _body(world, box.mass, np.diag(box.inertia()), box.pose)
+    geom.setBody(part.body)
+    return part
+
+
+def add_links(world: Any, space: Any, prepared: PreparedRobot) -> dict[str, Part]:
+    """The robot's links by name, in the middle of every joint's range."""
+    poses = link_poses(prepared, middle(prepared))
+    return {
+        name: _add_link(world, space, link, poses[name], prepared)
+        for name, link in prepared.links.items()
+    }
+
+
+def _add_link(world: Any, space: Any, link: Link, pose: Pose, prepared: PreparedRobot) -> Part:
+    fixed = link.name == prepared.root
+    x, y, z = (0.0, 0.0, 0.0) if fixed else (float(value) for value in link.centre)
+    frame = Pose.at(-x, -y, -z)  # in the body's
+    part = Part(None, prepared.robot.friction, frame)
+    if not fixed:
+        part.body = _body(world, link.mass, link.inertia, pose * frame.inverse())
+    for shape in link.shapes:
+        geom = _geom(space, shape)
+        place(geom, (pose if fixed else frame) * shape.pose, part.body)
+        part.add(geom, BASE if fixed else LINK)
+    return part
+
+
+def add_joints(world: Any, prepared: PreparedRobot, links: Mapping[str, Part]) -> dict[str, Axis]:
+    """The joints by name; the links stand in the middle of every joint's range."""
+    places, zeros = link_poses(prepared, middle(prepared)), middle(prepared)
+    axes = {}
+    for joint in prepared.joints:
+        lower, upper = prepared.limits[joint.name] - zeros[joint.name]
+        axis = Axis(
+            _joint(world, joint, links, places[joint.child]),
+            zeros[joint.name],
+            wide=joint.kind == "revolute" and upper - lower > math.tau,
+        )
+        axis.joint.setParam(LO_STOP, lower)
+        axis.joint.setParam(HI_STOP, upper)
+        axes[joint.name] = axis
+    return axes
+
+
+def _joint(world: Any, joint: MovingJoint, links: Mapping[str, Part], pose: Pose) -> Any:
+    hinged = joint.kind == "revolute"
+    made = ode.HingeJoint(world) if hinged else ode.SliderJoint(world)
+    made.attach(links[joint.child].body, links[joint.parent].body)
+    direction = pose.rotation() @ (motion_subspace(joint)[:3] + motion_subspace(joint)[3:])
+    if hinged:
+        made.setAnchor(pose.position)
+    made.setAxis(tuple(direction))
+    return made
+
+
+def put_links(
+    prepared: PreparedRobot, links: Mapping[str, Part], positions: Mapping[str, float]
+) -> None:
+    """Put the links where they stand at joint positions [rad or m]."""
+    poses = link_poses(prepared, positions)
+    for joint in prepared.joints:
+        part = links[joint.child]
+        _put(part.body, poses[joint.child] * part.frame.inverse())
+
+
+def middle(prepared: PreparedRobot) -> dict[str, float]:
+    """The middle of every joint's range [rad or m]."""
+    return {name: float(np.mean(limits)) for name, limits in prepared.limits.items()}
+
+
+def _body(world: Any, mass: float, inertia: FloatArray, pose: Pose) -> Any:
+    """A body; inertia about its origin, in its axes."""
+    weight = ode.Mass()
+    i = inertia
+    weight.setParameters(mass, 0, 0, 0, i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2])
+    body = ode.Body(world)
+    body.setMass(weight)
+    _put(body, pose)
+    return body
+
+
+def _put(body: Any, pose: Pose) -> None:
+    body.setPosition(pose.position)
+    body.setQuaternion(pose.quaternion)
+
+
+def _geom(space: Any, shape: Shape) -> Any:
+    if shape.size is not None:
+        return ode.GeomBox(space, shape.size)
+    data = Path(shape.mesh or "").read_bytes()  # a binary STL, as `mesh_check` saw to
+    return Mesh(space, np.frombuffer(data, TRIANGLE, offset=84)["corners"].astype(float))

@@ -1,0 +1,112 @@
+"""What only ODE's adapter has to show: it runs in the system's Python, counts whole turns, and its
+drives of the kind `velocity` do what Webots' motors do."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pytest_simbench.sims.ode.adapter import ODE
+
+from pytest_simbench.client.environments import interpreter
+from pytest_simbench.client.world import World
+from pytest_simbench.scene import FloatArray, Robot, Trajectory
+from pytest_simbench.testing import scenes
+
+from .worlds import Worlds
+
+
+@pytest.fixture(scope="module")
+def worlds() -> Iterator[Worlds]:
+    with Worlds(ODE) as worlds:
+        yield worlds
+
+
+def to(world: World, goal: FloatArray, seconds: float = 1.0) -> None:
+    """Lead all joints to set points, at an even speed."""
+    start = world.joints[0]
+    share = np.linspace(0.0, 1.0, round(seconds / 0.004) + 1)[:, None]
+    position = start + share * (goal - start)
+    velocity = np.repeat([(goal - start) / seconds], len(share), axis=0)
+    velocity[-1] = 0.0  # the last set points hold on
+    world.follow(Trajectory(0.004, position, velocity, 0 * position))
+
+
+def test_the_worker_runs_in_the_systems_python(worlds: Worlds) -> None:
+    python = interpreter(ODE.info)
+    assert python is not None
+    version = subprocess.check_output([python, "-c", "import sys; print(*sys.version_info[:3])"])
+    assert worlds.worker.python_version == ".".join(version.decode().split())
+
+
+def test_what_is_not_here_is_told(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytester.makeconftest(
+        """
+from pathlib import Path
+from pytest_simbench.client.system import SystemPython
+SystemPython.python = Path("/no/such/python3")
+"""
+    )
+    result = pytester.runpytest_subprocess("--sim=ode")
+    assert result.ret == 4
+    result.stderr.fnmatch_lines(["*ode needs the system's Python, and /no/such/python3 does not *"])
+
+
+def test_a_record_has_the_versions_of_both_libraries(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        """
+from tests.tiny import Falling
+
+def test_falling(repeat):
+    repeat(Falling())
+"""
+    )
+    result = pytester.runpytest_subprocess("--sim=ode", "--reps=1", "--sim-output=out")
+    assert result.ret == 0, result.stdout.str()
+    record = json.loads((pytester.path / "out" / "records.jsonl").read_text().splitlines()[0])
+    assert record["versions"]["Py3ODE"] == ODE.info.tested_version
+    assert record["versions"]["libode"][0].isdigit()
+
+
+def turning_on(robot: Robot, folder: Path) -> Robot:
+    """The same robot, whose joint 7 turns by 12 rad."""
+    text = Path(robot.urdf).read_text("utf-8").replace('"-2.8973"', '"-6.0"')
+    path = folder / "panda.urdf"
+    path.write_text(text.replace('"2.8973"', '"6.0"'), "utf-8")
+    return replace(robot, urdf=str(path))
+
+
+def test_whole_turns_are_counted(worlds: Worlds, tmp_path: Path) -> None:
+    """ODE tells angles from -180 to 180 degrees; a restore brings back the count, too."""
+    robot = turning_on(scenes.arm(), tmp_path)
+    world = worlds.load(scenes.arm_alone(robot))
+    goal = robot.column("initial_position")
+    seen = []
+    for angle in (4.5, -4.5):
+        goal[6] = angle
+        to(world, goal, 3.0)
+        world.wait(0.5)
+        seen.append(float(world.joints[0, 6]))
+        if angle > 0:
+            world.save()
+    np.testing.assert_allclose(seen, [4.5, -4.5], atol=0.01)
+    world.restore()
+    assert float(world.joints[0, 6]) == seen[0]
+
+
+@pytest.mark.parametrize(("drive", "behind"), [("velocity", 0.1), ("spring", 0.0)])
+def test_webots_motors_lag(worlds: Worlds, drive: str, behind: float) -> None:
+    """By speed / P, since they know no set point of velocity; springs do not."""
+    robot = scenes.arm()
+    world = worlds.load(scenes.arm_alone(robot), drive=drive)
+    goal = robot.column("initial_position")
+    goal[0] += 0.5
+    to(world, goal, 1.0)
+    assert goal[0] - world.joints[0, 0] == pytest.approx(0.5 * behind, abs=2e-3)
