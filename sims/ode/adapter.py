@@ -18,6 +18,7 @@ from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
+    NotSupportedError,
     PreparedRobot,
     SeedsSeen,
     Settings,
@@ -148,6 +149,7 @@ class ODE(Simulator):
     settings: ODESettings
 
     def load(self, scene: Scene) -> None:
+        _check_hand(scene)
         self.scene, s = scene, self.settings
         self._steps = 0
         library().dRandSetSeed(SEED)
@@ -256,3 +258,10 @@ class ODE(Simulator):
     def versions(self) -> dict[str, str]:
         number = library_path().partition(".so.")[2]
         return {**super().versions(), **({"libode": number} if number else {})}
+
+
+def _check_hand(scene: Scene) -> None:
+    """Refuse a hand before anything is built: what ODE frees half built crashes."""
+    fingers = 2 if scene.robot is None else len(scene.robot.gripper.joints)
+    if fingers != 2:
+        raise NotSupportedError(f"ode couples two fingers; the robot's hand has {fingers}")

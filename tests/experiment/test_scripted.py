@@ -139,7 +139,12 @@ def test_the_start_is_disturbed_as_asked_for(case: Case, task: Task, scale: floa
     assert (record.seed, record.jitter) == (42, scale)
     one = Jitter()
     expected = task.scene(42, Jitter(scale * one.distance, scale * one.angle))
-    assert repetition.process.scene == expected
+    there = repetition.process.scene
+    assert replace(there, robot=expected.robot) == expected
+    assert there.robot is not None
+    assert expected.robot is not None
+    files = {key: getattr(expected.robot, key) for key in ("urdf", "srdf", "packages")}
+    assert replace(there.robot, **files) == expected.robot  # it travels without its paths
     nominal = task.scene(42, Jitter(0.0, 0.0))
     for body, still in zip(expected.free_bodies, nominal.free_bodies, strict=True):
         assert (body.pose == still.pose) == (scale == 0.0)

@@ -55,7 +55,7 @@ def gains(p: float, d: float) -> Callable[[Drake], None]:
 
 
 def coupling(s: Drake) -> None:
-    s.plant.SetConstraintActiveStatus(s.context, s.world.coupling, False)
+    s.plant.SetConstraintActiveStatus(s.context, s.world.couplings[0], False)
 
 
 def slippery(owner: str) -> Callable[[Drake], None]:

@@ -204,8 +204,8 @@ def bullet_com(s: Any) -> None:
 def bullet_uncoupled(s: Any) -> None:
     import pybullet
 
-    pybullet.removeConstraint(s._coupling, physicsClientId=s.client)
-    s._coupling = pybullet.createConstraint(
+    pybullet.removeConstraint(s._couplings[0], physicsClientId=s.client)
+    s._couplings[0] = pybullet.createConstraint(
         s._bodies["cube"], -1, -1, -1, pybullet.JOINT_FIXED, [0] * 3, [0] * 3, [0] * 3,
         physicsClientId=s.client,
     )  # fmt: skip
@@ -393,7 +393,7 @@ def drake_margin(name: str) -> Plant:
 
 
 def drake_coupling(s: Any) -> None:
-    s.plant.SetConstraintActiveStatus(s.context, s.world.coupling, False)
+    s.plant.SetConstraintActiveStatus(s.context, s.world.couplings[0], False)
 
 
 DRAKE: dict[str, Plant] = {
