@@ -173,7 +173,7 @@ class ODE(Simulator):
             self._load_robot(self.prepared)
         links = [part.body for part in self._links.values() if part.body is not None]
         self._moving = [*self._free, *links]
-        if self._drives is not None:
+        if self._drives is not None and self._drives.pinion is not None:
             self._moving.append(self._drives.pinion.body)
         self._names = [body_id(body) for body in self._moving]
 

@@ -71,7 +71,8 @@ class ReadBack:
         if self.prepared is not None and self.drives is not None:
             for name, axis in self.axes.items():
                 reported |= self._joint(f"joint/{name}", name, axis, self.drives)
-            reported["gripper/coupled"] = float(self.drives.pinion.holds)
+            if self.drives.pinion is not None:
+                reported["gripper/coupled"] = float(self.drives.pinion.holds)
         return reported | touches(self.scene, self.prepared, self._can_touch)
 
     def _part(self, prefix: str, part: Part) -> dict[str, Any]:
@@ -142,8 +143,8 @@ class ReadBack:
         if name in drives.rotors:
             softness = drives.rotors[name].motor.getParam(SOFTNESS)
             found[f"{prefix}/armature"] = self.timestep / softness
-        elif axis in drives.pinion.fingers:
-            found[f"{prefix}/armature"] = drives.pinion.inertia / 2
+        elif drives.pinion is not None and axis in drives.pinion.fingers:
+            found[f"{prefix}/armature"] = drives.pinion.inertia / len(drives.pinion.fingers)
         return found
 
     def _child(self, axis: Axis) -> Part:

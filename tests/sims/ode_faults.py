@@ -95,7 +95,7 @@ def damped(name: str) -> Callable[[Any], None]:
 
 
 def step(s: Any) -> None:
-    s.settings = replace(s.settings, timestep=0.002)
+    s.settings = replace(s.settings, timestep=0.003)
 
 
 def joint(parameter: int, share: float) -> Callable[[Any], None]:
