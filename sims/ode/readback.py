@@ -58,8 +58,8 @@ class ReadBack:
         reported: dict[str, Any] = {
             "gravity": self.world.getGravity(),
             "timestep": self.timestep,
-            "ground/friction": self.ground.friction,
-            "ground/restitution": self.ground.bounce,
+            "ground/friction": self.ground.surface.friction,
+            "ground/restitution": self.ground.surface.bounce,
             "ground/height": height / up,
         }
         for name, part in self.bodies.items():
@@ -71,8 +71,8 @@ class ReadBack:
         if self.prepared is not None and self.drives is not None:
             for name, axis in self.axes.items():
                 reported |= self._joint(f"joint/{name}", name, axis, self.drives)
-            if self.drives.pinion is not None:
-                reported["gripper/coupled"] = float(self.drives.pinion.holds)
+            pinion, couplings = self.drives.pinion, self.prepared.robot.gripper.couplings
+            reported["gripper/coupled"] = float(pinion.holds if pinion else not couplings)
         return reported | touches(self.scene, self.prepared, self._can_touch)
 
     def _part(self, prefix: str, part: Part) -> dict[str, Any]:
@@ -87,8 +87,8 @@ class ReadBack:
         ]
         found |= outlines(prefix, boxes, meshes)
         if part.geoms:
-            found[f"{prefix}/friction"] = part.friction
-            found[f"{prefix}/restitution"] = part.bounce
+            found[f"{prefix}/friction"] = part.surface.friction
+            found[f"{prefix}/restitution"] = part.surface.bounce
         if part.body is not None:
             found |= self._inertial(prefix, part)
         return found
