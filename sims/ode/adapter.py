@@ -97,7 +97,7 @@ class State:
     bodies: list[tuple[Any, ...]]
     rotations: list[tuple[bytes, bytes]]
     awake: list[bool]
-    turns: list[tuple[int, float]]
+    turns: list[tuple[float, ...]]
     commanded: tuple[FloatArray, FloatArray, FloatArray] | None
     seed: int
 
@@ -175,7 +175,7 @@ class ODE(Simulator):
             self._load_robot(self.prepared)
         links = [part.body for part in self._links.values() if part.body is not None]
         self._moving = [*self._free, *links]
-        if self._drives is not None:
+        if self._drives is not None and self._drives.pinion is not None:
             self._moving.append(self._drives.pinion.body)
         self._names = [body_id(body) for body in self._moving]
 
@@ -231,7 +231,7 @@ class ODE(Simulator):
         rotations = [turned(name) for name in self._names]
         commanded = None if self._drives is None else self._drives.commanded
         awake = [bool(body.isEnabled()) for body in self._moving]
-        turns = [axis.turn for axis in self._axes.values()]
+        turns = [tuple(axis.turn) for axis in self._axes.values()]
         seed = library().dRandGetSeed()
         return State(self._steps, bodies, rotations, awake, turns, commanded, seed)
 
@@ -247,7 +247,7 @@ class ODE(Simulator):
             body.setAngularVel(angular)
             body.enable() if awake else body.disable()
         for axis, turns in zip(self._axes.values(), state.turns, strict=True):
-            axis.turn = turns
+            axis.turn[:] = turns
         if self._drives is not None and state.commanded is not None:
             self._drives.command(*state.commanded)
         library().dRandSetSeed(state.seed)

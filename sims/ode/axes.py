@@ -29,9 +29,10 @@ class Axis:
     def __init__(self, joint: Any, zero: float, wide: bool = False) -> None:
         self.joint, self.zero = joint, zero
         self.child, self.parent = joint.getBody(0), joint.getBody(1)
-        self.hinged, self.turn = isinstance(joint, ode.HingeJoint), (0, 0.0)
-        self._told: Callable[[], float] = joint.getAngle if self.hinged else joint.getPosition
-        self.angle = self._unwrapped if wide else self._told
+        self.hinged = isinstance(joint, ode.HingeJoint)
+        self.turn: list[float] = [0.0, 0.0]
+        told: Callable[[], float] = joint.getAngle if self.hinged else joint.getPosition
+        self.angle = _counted(told, self.turn) if wide else told
         rate = joint.getAngleRate if self.hinged else joint.getPositionRate
         self.rate: Callable[[], float] = rate
 
@@ -39,9 +40,14 @@ class Axis:
         """[rad or m]."""
         return self.zero + self.angle()
 
-    def _unwrapped(self) -> float:
-        turns, last = self.turn
-        told = self._told()
-        turns += round((last - told) / math.tau)
-        self.turn = turns, told
-        return told + turns * math.tau
+
+def _counted(told: Callable[[], float], turn: list[float]) -> Callable[[], float]:
+    """The angle with whole turns added, which are counted in `turn`."""
+
+    def angle() -> float:
+        now = told()
+        turn[0] += round((turn[1] - now) / math.tau)
+        turn[1] = now
+        return now + turn[0] * math.tau
+
+    return angle

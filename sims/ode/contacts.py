@@ -29,26 +29,45 @@ TOUCHES = {
 
 
 @dataclass
-class Part:
-    """A body or link of the scene, as the contacts know it.
+class Surface:
+    """What contacts know of a shape.
 
     Attributes:
         body: of ODE, its origin the centre of mass; None for what is fixed.
         friction: Coulomb's coefficient; a pair has the smaller one.
         bounce: coefficient of restitution; a pair has the smaller one.
-        frame: of the scene's body or link, in the frame of ODE's body, or in the world.
-        geoms: its shapes.
     """
 
     body: Any
     friction: float
-    frame: Pose = field(default_factory=Pose)
     bounce: float = 0.0
+
+
+@dataclass
+class Part:
+    """A body or link of the scene.
+
+    A shape knows its surface and not its part: in a circle of them Python would destroy ODE's
+    objects in any order, and ODE dies of that.
+
+    Attributes:
+        surface: of all its shapes.
+        frame: of the scene's body or link, in the frame of ODE's body, or in the world.
+        geoms: its shapes.
+    """
+
+    surface: Surface
+    frame: Pose = field(default_factory=Pose)
     geoms: list[Any] = field(default_factory=list)
+
+    @property
+    def body(self) -> Any:
+        """Of ODE; None for what is fixed."""
+        return self.surface.body
 
     def add(self, geom: Any, category: int) -> None:
         """Make a geom one of its shapes."""
-        geom.attribs["part"] = self
+        geom.attribs["surface"] = self.surface
         library().dGeomSetCategoryBits(geom._id(), category)
         library().dGeomSetCollideBits(geom._id(), TOUCHES[category])
         self.geoms.append(geom)
@@ -91,7 +110,7 @@ class Contacts:
         self._group.empty()
 
     def _near(self, _: Any, first: Any, second: Any) -> None:
-        a, b = first.attribs["part"], second.attribs["part"]
+        a, b = first.attribs["surface"], second.attribs["surface"]
         one, other = a.body, b.body
         if not ((one is not None and one.isEnabled()) or (other is not None and other.isEnabled())):
             return  # both asleep, or one asleep upon what never moves

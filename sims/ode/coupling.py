@@ -1,13 +1,15 @@
-"""What couples the fingers: a pinion between two racks.
+"""What couples the fingers: a pinion between racks.
 
 pyode wraps no gears. But the friction row of a contact, without a limit, is what holds two teeth
 together: it keeps the velocities of two bodies equal at a point, along one direction. So a small
-body, hinged to the hand, touches each finger at a point of its rim, the two opposite to each other.
-It carries the fingers' rotors. The points are thought: nothing is there to collide.
+body, hinged to the hand, touches each finger at a point of its rim: two fingers that face each
+other at opposite points. It carries the fingers' rotors. The points are thought: nothing is there
+to collide.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -31,38 +33,42 @@ LIGHTEST = 1e-6
 CORRECTED = 0.2
 """Share of the difference between the fingers that is corrected in a step."""
 
+PARALLEL = 1e-6
+"""Sine of the angle below which two directions are one."""
+
 SLACK = 1.0
 """Softness of the contacts across the teeth [m/(N s)]: the racks do not press. With 1e10 ODE ended
 the process (an assertion of its LCP solver: a pivot of 0)."""
 
 
 class Pinion:
-    """Two sliding fingers that move alike.
+    """Sliding fingers that move alike.
 
     Args:
         world: of ODE.
-        first, second: joints of the fingers, which slide in the same hand.
+        fingers: their joints; they slide in the same hand, in one plane.
         inertia: of the fingers' rotors, together [kg].
         timestep: [s].
 
     Attributes:
-        fingers: both joints.
+        fingers: their joints.
         body: of ODE.
 
     Raises:
-        NotSupportedError: fingers that turn, or are not of one hand.
+        NotSupportedError: fingers that turn, are not of one hand, or slide in no plane.
     """
 
     def __init__(
-        self, world: Any, first: Axis, second: Axis, inertia: float, timestep: float
+        self, world: Any, fingers: Sequence[Axis], inertia: float, timestep: float
     ) -> None:
-        if first.hinged or second.hinged or first.parent is None:
-            raise NotSupportedError("ode couples two fingers that slide in one hand, no others")
-        self._world, self.fingers, self._hand = world, (first, second), first.parent
-        self._correction = CORRECTED / timestep / 2
-        centre = np.mean([first.child.getPosition(), second.child.getPosition()], axis=0)
-        directions = [np.array(axis.joint.getAxis()) for axis in self.fingers]
-        shaft = _across(directions[0])
+        hand = fingers[0].parent
+        if hand is None or any(axis.hinged or axis.parent is not hand for axis in fingers):
+            raise NotSupportedError("ode couples fingers that slide in one hand, no others")
+        self._world, self.fingers, self._hand = world, tuple(fingers), hand
+        self._correction = CORRECTED / timestep / len(fingers)
+        centre = np.mean([axis.child.getPosition() for axis in fingers], axis=0)
+        directions = [np.array(axis.joint.getAxis()) for axis in fingers]
+        shaft = _across(directions)
         self._arms = [
             self._hand.vectorFromWorld(tuple(np.cross(direction, shaft)))
             for direction in directions
@@ -94,15 +100,15 @@ class Pinion:
     def mesh(self) -> None:
         """Before a step: hold the fingers to the pinion where it is now."""
         self.release()
-        first, second = self.fingers
-        apart = self._correction * (first.position() - second.position())
+        positions = [axis.position() for axis in self.fingers]
         x, y, z = self.body.getPosition()
-        for axis, arm, speed in zip(self.fingers, self._arms, (-apart, apart), strict=True):
+        for axis, arm, position in zip(self.fingers, self._arms, positions, strict=True):
+            apart = sum(position - other for other in positions)
             u, v, w = normal = self._hand.vectorToWorld(arm)
             at = (x + RADIUS * u, y + RADIUS * v, z + RADIUS * w)
             self._contact.setContactGeomParams(at, normal, 0.0)
             self._contact.setFDir1(axis.joint.getAxis())
-            self._contact.setMotion1(speed)
+            self._contact.setMotion1(-self._correction * apart)
             rack = ode.ContactJoint(self._world, self._group, self._contact)
             rack.attach(axis.child, self.body)
             self._racks.append(rack)
@@ -113,10 +119,16 @@ class Pinion:
         self._racks.clear()
 
 
-def _across(direction: FloatArray) -> FloatArray:
-    """A unit vector at right angles to another."""
-    other = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
-    return np.asarray(other / np.linalg.norm(other))
+def _across(directions: Sequence[FloatArray]) -> FloatArray:
+    """A unit vector at right angles to all."""
+    first = directions[0]
+    others = [other for other in directions if np.linalg.norm(np.cross(first, other)) > PARALLEL]
+    second = others[0] if others else np.eye(3)[np.argmin(np.abs(first))]
+    found = np.cross(first, second)
+    found /= np.linalg.norm(found)
+    if any(abs(found @ direction) > PARALLEL for direction in directions):
+        raise NotSupportedError("ode couples fingers that slide in one plane, no others")
+    return np.asarray(found)
 
 
 def _teeth() -> Any:

@@ -77,7 +77,7 @@ class Drives:
 
     Attributes:
         rotors: of the arm's joints, by name.
-        pinion: couples the fingers, and has their rotors.
+        pinion: couples the fingers, and has their rotors; None for fewer than two.
         commanded: the last set points: position, velocity, effort.
 
     Raises:
@@ -103,9 +103,11 @@ class Drives:
             if soft is not None:
                 axis.joint.setParam(SOFTNESS, soft)
         inertias = dict(zip(robot.joint_names, robot.column("armature"), strict=True))
-        fingers = [inertias.pop(name) for name in robot.gripper.joints]
-        first, second = (axes[name] for name in robot.gripper.joints)
-        self.pinion = Pinion(world, first, second, sum(fingers), timestep)
+        self.pinion: Pinion | None = None
+        if len(robot.gripper.joints) > 1:
+            rotors = sum(inertias.pop(name) for name in robot.gripper.joints)
+            fingers = [axes[name] for name in robot.gripper.joints]
+            self.pinion = Pinion(world, fingers, rotors, timestep)
         self.rotors = {
             name: Rotor(world, axes[name], inertia, timestep)
             for name, inertia in inertias.items()
@@ -117,7 +119,8 @@ class Drives:
         ]
         start = robot.column("initial_position")
         self.command(start, 0 * start, 0 * start)
-        self.pinion.mesh()
+        if self.pinion is not None:
+            self.pinion.mesh()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         """Set points of all joints."""
@@ -135,7 +138,8 @@ class Drives:
             tell(VELOCITY, asked - gain * angle())
         for rotor in self.rotors.values():
             rotor.turn()
-        self.pinion.mesh()
+        if self.pinion is not None:
+            self.pinion.mesh()
 
     def state(self) -> FloatArray:
         """Positions and velocities, (2, n_joints)."""

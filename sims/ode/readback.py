@@ -58,8 +58,8 @@ class ReadBack:
         reported: dict[str, Any] = {
             "gravity": self.world.getGravity(),
             "timestep": self.timestep,
-            "ground/friction": self.ground.friction,
-            "ground/restitution": self.ground.bounce,
+            "ground/friction": self.ground.surface.friction,
+            "ground/restitution": self.ground.surface.bounce,
             "ground/height": height / up,
         }
         for name, part in self.bodies.items():
@@ -71,7 +71,8 @@ class ReadBack:
         if self.prepared is not None and self.drives is not None:
             for name, axis in self.axes.items():
                 reported |= self._joint(f"joint/{name}", name, axis, self.drives)
-            reported["gripper/coupled"] = float(self.drives.pinion.holds)
+            pinion, couplings = self.drives.pinion, self.prepared.robot.gripper.couplings
+            reported["gripper/coupled"] = float(pinion.holds if pinion else not couplings)
         return reported | touches(self.scene, self.prepared, self._can_touch)
 
     def _part(self, prefix: str, part: Part) -> dict[str, Any]:
@@ -86,8 +87,8 @@ class ReadBack:
         ]
         found |= outlines(prefix, boxes, meshes)
         if part.geoms:
-            found[f"{prefix}/friction"] = part.friction
-            found[f"{prefix}/restitution"] = part.bounce
+            found[f"{prefix}/friction"] = part.surface.friction
+            found[f"{prefix}/restitution"] = part.surface.bounce
         if part.body is not None:
             found |= self._inertial(prefix, part)
         return found
@@ -142,8 +143,8 @@ class ReadBack:
         if name in drives.rotors:
             softness = drives.rotors[name].motor.getParam(SOFTNESS)
             found[f"{prefix}/armature"] = self.timestep / softness
-        elif axis in drives.pinion.fingers:
-            found[f"{prefix}/armature"] = drives.pinion.inertia / 2
+        elif drives.pinion is not None and axis in drives.pinion.fingers:
+            found[f"{prefix}/armature"] = drives.pinion.inertia / len(drives.pinion.fingers)
         return found
 
     def _child(self, axis: Axis) -> Part:

@@ -21,7 +21,7 @@ from pytest_simbench.simulator.mesh_check import TRIANGLE
 from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
 
 from .axes import Axis
-from .contacts import BASE, FIXED, FREE, GROUND, LINK, Part
+from .contacts import BASE, FIXED, FREE, GROUND, LINK, Part, Surface
 from .library import HI_STOP, LO_STOP, Mesh, place
 
 ode = lazy_import("ode")
@@ -29,7 +29,7 @@ ode = lazy_import("ode")
 
 def add_ground(space: Any, friction: float) -> Part:
     """The plane z = 0."""
-    ground = Part(None, friction)
+    ground = Part(Surface(None, friction))
     ground.add(ode.GeomPlane(space, (0.0, 0.0, 1.0), 0.0), GROUND)
     return ground
 
@@ -37,12 +37,12 @@ def add_ground(space: Any, friction: float) -> Part:
 def add_box(world: Any, space: Any, box: Box) -> Part:
     """A box, fixed or free."""
     geom = ode.GeomBox(space, box.size)
-    part = Part(None, box.friction)
+    part = Part(Surface(None, box.friction))
     part.add(geom, FIXED if box.fixed else FREE)
     if box.fixed:
         place(geom, box.pose)
         return part
-    part.body = _body(world, box.mass, np.diag(box.inertia()), box.pose)
+    part.surface.body = _body(world, box.mass, np.diag(box.inertia()), box.pose)
     geom.setBody(part.body)
     return part
 
@@ -60,9 +60,9 @@ def _add_link(world: Any, space: Any, link: Link, pose: Pose, prepared: Prepared
     fixed = link.name == prepared.root
     x, y, z = (0.0, 0.0, 0.0) if fixed else (float(value) for value in link.centre)
     frame = Pose.at(-x, -y, -z)  # in the body's
-    part = Part(None, prepared.robot.friction, frame)
+    part = Part(Surface(None, prepared.robot.friction), frame)
     if not fixed:
-        part.body = _body(world, link.mass, link.inertia, pose * frame.inverse())
+        part.surface.body = _body(world, link.mass, link.inertia, pose * frame.inverse())
     for shape in link.shapes:
         geom = _geom(space, shape)
         place(geom, (pose if fixed else frame) * shape.pose, part.body)

@@ -18,6 +18,7 @@ from pytest_simbench.client.world import World
 from pytest_simbench.scene import FloatArray, Robot, Trajectory
 from pytest_simbench.testing import scenes
 
+from .ode_faults import Mortal
 from .worlds import Worlds
 
 
@@ -99,6 +100,13 @@ def test_whole_turns_are_counted(worlds: Worlds, tmp_path: Path) -> None:
     np.testing.assert_allclose(seen, [4.5, -4.5], atol=0.01)
     world.restore()
     assert float(world.joints[0, 6]) == seen[0]
+
+
+def test_a_world_ends_without_the_collector(tmp_path: Path) -> None:
+    """A worker that loaded a second arm died by SIGSEGV while collecting the first."""
+    with Worlds(Mortal) as worlds:
+        world = worlds.load(scenes.arm_alone(turning_on(scenes.arm(), tmp_path)))
+        assert world.contact_count() == 0
 
 
 @pytest.mark.parametrize(("drive", "behind"), [("velocity", 0.1), ("spring", 0.0)])
