@@ -97,8 +97,8 @@ class MotionLimits:
         velocity: of each arm joint [rad/s].
         acceleration: [rad/s^2].
         jerk: [rad/s^3].
-        levers: distance of the fingertips from each arm joint's axis at most [m]: a turn by dq moves
-            them about levers[i] dq. Collisions are checked by it.
+        levers: distance of the fingertips from each arm joint's axis [m]: a turn of joint i by dq
+            moves them about levers[i] dq. Collisions are checked by it.
         finger_speed: of each finger [m/s].
     """
 
