@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import psutil
@@ -13,6 +14,10 @@ from pytest_simbench.client.environments import interpreter, missing
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter, registered
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    # So it is for what a script starts in the background, and for all that this starts in turn.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile("simbench-tests", deadline=None)  # speed is measured in benchmarks/
 settings.load_profile("simbench-tests")
