@@ -65,7 +65,8 @@ def test_a_taken_short_name_leaves_the_long_one(pytester: pytest.Pytester, optio
     pytester.makepyfile(FALLING)
     long = {"--sim-name": ["--sim-name=mujoco"], "--sim-reps": [], "--sim-gui": [],
             "--sim-protocol": ["--sim-protocol=fast"], "--sim-jitter": ["--sim-jitter=0"],
-            "--sim-headless": ["--sim-headless"], "--sim-list": []}[flag]  # fmt: skip
+            "--sim-headless": ["--sim-headless"], "--sim-list": [],
+            "--sim-robot": ["--sim-robot=panda"], "--sim-robots": []}[flag]  # fmt: skip
     sim = ["--sim=mujoco"] if short != "--sim" else []
     result = pytester.runpytest_subprocess(*sim, *long, "--sim-reps=2", short, "--sim-output=out")
     result.assert_outcomes(passed=1)
