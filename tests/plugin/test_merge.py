@@ -72,7 +72,7 @@ def test_a_record_leads_nowhere(
     (found,) = RunFolder(whole).read().records
     assert found.details["log"] == ""
     kept = {path.name for path in whole.rglob("*") if path.suffix not in (".png", "")}
-    assert kept == {"records.jsonl", "report.html", "report.md", "report.csv"}
+    assert kept == {"records.jsonl", "outcome.json", "report.html", "report.md", "report.csv"}
     if log not in ("logs", "logs/pipe.log"):
         assert "not copied: " in capsys.readouterr().out
 

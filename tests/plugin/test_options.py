@@ -30,7 +30,7 @@ FINE = {
     "sim_jitter": {"zero"}, "sim_seed": {"zero"},
     "sim_output": PATHS, "sim_baseline": PATHS, "sim_resume": PATHS, "sim_merge": PATHS,
     "sim_report": PATHS, "sim_badge": PATHS,
-    "sim_gui": {"zero"}, "sim_headless": {"zero"}, "sim_fresh": {"zero"},
+    "sim_gui": {"zero"}, "sim_headless": {"zero"}, "sim_fresh": {"zero"}, "sim_pictures": {"zero"},
     "sim_strict": {"zero"},
 }  # fmt: skip
 """Values that an option may have after all."""
