@@ -5,6 +5,9 @@ from __future__ import annotations
 import signal
 from pathlib import Path
 
+# pytester takes out again what a test imports first; of matplotlib a part would then come twice.
+import matplotlib.backends.backend_agg
+import matplotlib.figure  # noqa: F401
 import psutil
 import pytest
 from hypothesis import settings
