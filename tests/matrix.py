@@ -94,13 +94,14 @@ def contents(wheel: Path) -> dict[str, bytes]:
 def wrong_content(wheel: dict[str, bytes], other: dict[str, bytes], source: Path) -> str:
     """What is wrong with the wheel of the sdist: against that of the tree, and the tree itself."""
     package = "pytest_simbench"
-    wanted = {f"{package}/py.typed"}
+    wanted: set[str] = set()
     for folder, inside in (
         (package, package),
         *((n, f"{package}/{n}") for n in ("sims", "suites")),
     ):
         tree = source / folder
-        wanted |= {f"{inside}/{path.relative_to(tree)}" for path in tree.rglob("*.py")}
+        files = (p for p in tree.rglob("*") if p.is_file() and p.parent.name != "__pycache__")
+        wanted |= {f"{inside}/{path.relative_to(tree)}" for path in files}
     found = {name for name in wheel if ".dist-info/" not in name}
     if found != wanted:
         return f"missing in the wheel: {wanted - found}; too much: {found - wanted}"
