@@ -17,6 +17,10 @@ from pytest_simbench.client.errors import DisplayError, exit_text
 SCREEN = "1280x960x24"
 """Width, height [pixels] and colour depth [bits]."""
 
+OPTIONS = ("-screen", "0", SCREEN, "-nolisten", "tcp", "-noreset")
+"""Of Xvfb. Without ``-noreset`` it begins anew when its last client leaves, and refuses a client
+that comes meanwhile: a Vulkan driver looks at the display and leaves just before SAPIEN comes."""
+
 START_TIMEOUT = 30.0
 """For Xvfb to tell the number of its display [s]; it takes about 0.1 s."""
 
@@ -76,7 +80,7 @@ def _start() -> tuple[str, subprocess.Popen[bytes]]:
     try:
         # A session of its own: Ctrl-C is for pytest.
         process = subprocess.Popen(
-            [program, "-displayfd", str(write), "-screen", "0", SCREEN, "-nolisten", "tcp"],
+            [program, "-displayfd", str(write), *OPTIONS],
             pass_fds=[write],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import socket
+import struct
 import subprocess
 import sys
 import time
@@ -51,6 +53,21 @@ def test_one_for_all_and_gone_at_the_end(displays: Displays) -> None:
     assert displays.problem(first) == ""
     displays.close()
     assert not server.is_running()
+
+
+def greeting(display: str) -> bytes:
+    """The first byte that an X server answers to a client, who leaves then: 1 is a welcome."""
+    hello = b"l\0" + struct.pack("<5H", 11, 0, 0, 0, 0)  # little-endian, protocol 11.0, no key
+    with socket.socket(socket.AF_UNIX) as client:
+        client.settimeout(10.0)
+        client.connect(f"/tmp/.X11-unix/X{display.removeprefix(':')}")
+        client.sendall(hello)
+        return client.recv(8)[:1]
+
+
+def test_who_comes_when_the_last_has_left_is_welcome(displays: Displays) -> None:
+    display = displays.environment()["DISPLAY"]
+    assert [greeting(display) for _ in range(100)] == [b"\1"] * 100
 
 
 def test_the_user_s_own_comes_first(displays: Displays, monkeypatch: pytest.MonkeyPatch) -> None:
