@@ -189,26 +189,3 @@ def test_a_run_of_before_is_shown_with_a_note(pytester: pytest.Pytester, package
     package.unlink()
     run(pytester, "--sim-merge", "a", "--sim-output=whole")
     assert "does not say what its metrics mean" in Path("whole/report.md").read_text()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["none"], "--sim-report none: cannot read records from *none*No such file*"),
-        (["empty"], "--sim-report empty: it holds no repetition"),
-        (["bad"], "--sim-report bad: *bad/records.jsonl:1: not JSON*"),
-        (["a", "./a"], "--sim-report ./a: the run is given twice"),
-        (["a", "b"], "--sim-report: a and b overlap: both have seed 2022 of *"),
-        (["a", "--sim-output=b"], "--sim-report: *b holds another run; give another --sim-output"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
-)
-def test_bad_input_is_one_sentence(
-    pytester: pytest.Pytester, request: pytest.FixtureRequest, arguments: list[str], message: str
-) -> None:
-    real = Path(request.config.rootpath, "tests/measure/stacking_records.jsonl")
-    first = real.read_text().splitlines()[0] + "\n"
-    for name, text in (("a", first), ("b", first), ("bad", "no record\n"), ("empty", "")):
-        pytester.mkdir(name).joinpath("records.jsonl").write_text(text)
-    result = run(pytester, "--sim-report", *arguments, ret=pytest.ExitCode.USAGE_ERROR)
-    result.stderr.fnmatch_lines([f"ERROR: {message}"])

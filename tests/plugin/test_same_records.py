@@ -161,6 +161,18 @@ def test_resuming_is_refused_with_the_difference(pytester: pytest.Pytester, fold
         (["--sim-merge", "a", "b"], "--sim-merge: a and b overlap: both have seed 2022 of *"),
         (["--sim-merge", "a", "--sim-output=b"], "--sim-merge: *b already holds a run; *"),
         (["--sim-merge", "empty"], "--sim-merge: none of the runs holds a repetition that ended"),
+        (
+            ["--sim-report", "none"],
+            "--sim-report none: cannot read records from *No such file*",
+        ),
+        (["--sim-report", "empty"], "--sim-report empty: it holds no repetition"),
+        (["--sim-report", "bad"], "--sim-report bad: *bad/records.jsonl:1: not JSON*"),
+        (["--sim-report", "a", "./a"], "--sim-report ./a: the run is given twice"),
+        (["--sim-report", "a", "b"], "--sim-report: a and b overlap: both have seed 2022 of *"),
+        (
+            ["--sim-report", "a", "--sim-output=b"],
+            "--sim-report: *b holds another run; *",
+        ),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )

@@ -10,7 +10,6 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from pytest_simbench.client.errors import Where, WorkerError, WorkerExited
@@ -22,10 +21,9 @@ from pytest_simbench.repeatability.motions import Difference
 from pytest_simbench.repeatability.perturbation import Perturbation, described
 from pytest_simbench.repeatability.replay_result import Again, Replay
 from pytest_simbench.repeatability.search import Finding, bounds_in_words, search, to_wire
-from pytest_simbench.repeatability.stability import Sensitivity, Stability, sensitivity, stability
+from pytest_simbench.repeatability.stability import Stability
 from pytest_simbench.tasks import Jitter, Throwing
 from pytest_simbench.tasks.base import Outcome
-from pytest_simbench.tasks.moments import Moment
 from tests.repeatability.scripted import METRICS, Scripted, episode, motion, operation
 
 search_module = sys.modules[search.__module__]
@@ -47,6 +45,13 @@ def moved(x: float, metrics: dict[str, float | None] = ALL, **details: object) -
 
 def dead(perturbed: Perturbed) -> WorkerError:
     return WorkerExited("it is gone", Where("sim", "headless"))
+
+
+def toppling(perturbed: Perturbed) -> Episode:
+    """Beyond 0.5 mm one of four falls, beyond 0.8 mm another."""
+    x = abs(shift(perturbed))
+    fallen = ["one"] * (x > 4.5e-4) + ["two"] * (x > 7.5e-4)
+    return moved(shift(perturbed), {**ALL, "standing": 1 - len(fallen) / 4}, toppled=fallen)
 
 
 def test_how_far_a_cube_goes_another_way() -> None:
@@ -129,151 +134,6 @@ def test_effects_of_what_is_none() -> None:
 
 def test_what_counts_as_changed() -> None:
     assert changed({"a": 1.0, "b": None, "c": 0.5}, {"a": 1.0, "b": 0.0}) == ["b", "c"]
-
-
-GROWING = [
-    # at 0.1 s after the first motion began, at 0.2 s, the cube is 1, 2, ... displacements away
-    ([0.0], [1.0]),
-    ([0.2, 0.4], [1.0, 2.0]),
-    ([0.5, 0.9, 1.4], [3.0, 4.0, 6.0]),
-    ([2.0, 6.0], [5.0, 1.0]),
-]
-TAPE = [
-    operation("wait", "settle", 0.4),
-    operation("follow", "swing", 1.0),
-    operation("wait", "swing", 4.6),
-]
-
-
-def growing(perturbed: Perturbed) -> Episode:
-    x = shift(perturbed)
-    return episode(
-        ALL, [motion(t, [0.1 + x * g for g in way], [0.5] * len(t)) for t, way in GROWING], TAPE
-    )
-
-
-@pytest.mark.parametrize("steps", [2, -2])
-def test_growth_per_displacement(steps: int) -> None:
-    """From the end of the settling on, at 0.4 s, with the commands of the unperturbed run."""
-    experiment = Scripted(growing)
-    perturbation = Perturbation("x", steps, "a")
-    moments = [Moment("swung", "swing", 1), Moment("at first", "settle"), Moment("never", "swim")]
-    found = sensitivity(experiment, perturbation, moments)  # type: ignore[arg-type]
-    assert experiment.asked == [((), None), ((perturbation,), TAPE)]
-    assert found.simulator == "sim"
-    assert found.perturbation == f"{0.1 * steps:g} mm in x of a"
-    assert found.ratio == {
-        0.1: pytest.approx(3.0),
-        1.0: pytest.approx(6.0),
-        5.0: pytest.approx(1.0),
-        20.0: None,
-    }
-    assert found.largest == pytest.approx(6.0)
-    assert found.until == {
-        "swung": pytest.approx(6.0),
-        "at first": pytest.approx(1.0),
-        "never": None,
-    }
-    assert found.sentence == (
-        f"mm per mm after {0.1 * steps:g} mm in x of a: 3 at 0.1 s, 6 at 1 s, 1 at 5 s, "
-        "6 until swung, 1 until at first; most 6"
-    )
-    assert found.to_wire() == {
-        "perturbation": found.perturbation,
-        "ratio": {
-            "0.1": found.ratio[0.1],
-            "1": found.ratio[1.0],
-            "5": found.ratio[5.0],
-            "20": None,
-        },
-        "until": found.until,
-        "largest": found.largest,
-        "sentence": found.sentence,
-    }
-
-
-def test_a_world_that_is_left_alone_begins_at_once() -> None:
-    """No motion, so times count from 0."""
-
-    def run(perturbed: Perturbed) -> Episode:
-        found = growing(perturbed)
-        return episode(ALL, found.motions, [operation("wait", "fall", 1.0)] * 3)
-
-    found = sensitivity(Scripted(run), Perturbation("x", 1, "a"))  # type: ignore[arg-type]
-    assert found.ratio[0.1] == pytest.approx(1.0)
-    assert found.ratio[1.0] == pytest.approx(6.0)
-
-
-def test_only_what_comes_before_is_judged() -> None:
-    grown = Sensitivity("sim", "it", {0.1: 1.0, 5.0: 4.0, 20.0: None}, 9.0, {"a": 2.0, "b": None})
-    grown.assert_below(4.5, until=5.0)
-    grown.assert_below(2.5, until="a")
-    with pytest.raises(AssertionError) as caught:
-        grown.assert_below(4.0, until=5.0)
-    assert str(caught.value) == f"sim: {grown.sentence}; expected below 4 until 5 s"
-    with pytest.raises(AssertionError) as caught:
-        grown.assert_below(9.0, until="b")
-    assert str(caught.value) == "sim: the task never came to b"
-    with pytest.raises(ValueError, match="^no moment is named 'c'; there are: a, b$"):
-        grown.assert_below(9.0, until="c")
-    with pytest.raises(ValueError, match="^no moment is named 'c'; there are: none$"):
-        Sensitivity("sim", "it", {}, 9.0).assert_below(9.0, until="c")
-
-
-def test_no_growth_is_told_of_what_is_no_displacement() -> None:
-    experiment = Scripted(growing)
-    with pytest.raises(ValueError, match="^sensitivity is told per millimetre, not for 1 deg of"):
-        sensitivity(experiment, Perturbation("yaw", 10, "a"))  # type: ignore[arg-type]
-    assert not experiment.asked
-
-
-def toppling(perturbed: Perturbed) -> Episode:
-    """Beyond 0.5 mm one of four falls, beyond 0.8 mm another."""
-    x = abs(shift(perturbed))
-    fallen = ["one"] * (x > 4.5e-4) + ["two"] * (x > 7.5e-4)
-    return moved(shift(perturbed), {**ALL, "standing": 1 - len(fallen) / 4}, toppled=fallen)
-
-
-def test_stability_of_a_known_world() -> None:
-    experiment = Scripted(toppling)
-    found = stability(experiment, {"x": 1e-3}, examples=12, at_most=1)  # type: ignore[arg-type]
-    assert len(experiment.asked) == 13
-    trials = [toppling(asked[0]).counts["standing"] for asked in experiment.asked[1:]]
-    assert list(found.kept) == trials
-    assert found.unchanged == trials.count(1.0)
-    assert (found.simulator, found.bounds) == ("sim", "1 mm in x")
-    worst = min(experiment.asked[1:], key=lambda asked: toppling(asked[0]).counts["standing"] or 0)
-    assert min(trials) < 1.0
-    names = {0.75: "topples one", 0.5: "topples one and two"}
-    assert found.worst == f"{worst[0][0]} {names[min(trials)]}"
-    assert found.share.mean == pytest.approx(np.mean(trials))
-    assert found.same.mean == pytest.approx(found.unchanged / 12)
-    again = stability(Scripted(toppling), {"x": 1e-3}, examples=12, at_most=1)  # type: ignore[arg-type]
-    assert again == found
-    other = Scripted(toppling)
-    stability(other, {"x": 1e-3}, examples=12, at_most=1, random_seed=1)  # type: ignore[arg-type]
-    assert other.asked != experiment.asked
-
-
-def test_what_a_stability_says() -> None:
-    kept = [1.0, 0.5, 1.0, 1.0, 1.0]
-    found = Stability("sim", kept, 4, "1 mm in x", "it topples one")
-    low, high = (100 * end for end in (found.share.low, found.share.high))
-    assert found.sentence == (
-        f"kept 90 % [{low:.0f}, {high:.0f}] within 1 mm in x; the same outcome in 4 of 5; worst: "
-        "it topples one"
-    )
-    assert found.to_wire() == {
-        "kept": kept,
-        "unchanged": 4,
-        "bounds": "1 mm in x",
-        "worst": "it topples one",
-        "sentence": found.sentence,
-    }
-    with pytest.raises(AssertionError) as caught:
-        Stability("sim", [0.0] * 9, 0, "1 mm in x", "").assert_kept_at_least(0.9)
-    assert str(caught.value).startswith("sim: at least 90 % should be kept, but kept 0 % [0, ")
-    assert "worst" not in str(caught.value)
 
 
 def test_a_search_of_a_known_world(monkeypatch: pytest.MonkeyPatch) -> None:

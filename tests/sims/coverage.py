@@ -1,10 +1,14 @@
-"""Which quantities no planted fault changes."""
+"""Changes that are planted in a loaded world, and which quantities none of them changes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from typing import Any
 
 from pytest_simbench.testing.faults import FAULTS
+
+Plant = Callable[[Any], None]
+"""Changes a quantity in the engine of a loaded simulator, behind the adapter's back."""
 
 
 def pattern(quantity: str) -> str:

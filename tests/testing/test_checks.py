@@ -12,7 +12,7 @@ from pytest_simbench.client.errors import WorkerError, WorldParityError
 from pytest_simbench.simulator import Simulator
 from pytest_simbench.testing import CHECKS, ConformanceFailure, ConformanceTest, Subject
 
-from . import wrong
+from . import wrong, wrong_robots
 
 FAULTS: list[tuple[type[Simulator], str]] = [
     (wrong.ImportsEngine, "imports_without_engine"),
@@ -32,37 +32,37 @@ FAULTS: list[tuple[type[Simulator], str]] = [
     (wrong.Shaking, "tower_stands"),
     (wrong.HalfFriction, "slides_above_mu"),
     (wrong.HalfFriction, "slides_alike_diagonally"),
-    (wrong.SlipperyHand, "sticks_below_mu"),
+    (wrong_robots.SlipperyHand, "sticks_below_mu"),
     (wrong.AngularDamping, "cube_spins_on"),
     (wrong.WrongMass, "collision_keeps_momentum"),
     (wrong.NoContacts, "contacts_counted"),
-    (wrong.SoftDrives, "static_hold"),
-    (wrong.SoftDrivesNotTold, "static_hold"),
-    (wrong.NoFeedForward, "tracks_trajectory"),
+    (wrong_robots.SoftDrives, "static_hold"),
+    (wrong_robots.SoftDrivesNotTold, "static_hold"),
+    (wrong_robots.NoFeedForward, "tracks_trajectory"),
     (wrong.EchoLimits, "planted_faults_are_seen"),
     (wrong.EchoGroundFriction, "planted_faults_are_seen"),
     (wrong.EchoLinkInertia, "planted_faults_are_seen"),
     (wrong.EchoScene, "planted_faults_are_seen"),
-    (wrong.StickyFingers, "squeeze_bounds_the_grip"),
-    (wrong.DoubleSqueeze, "squeeze_bounds_the_grip"),
-    (wrong.Teleports, "squeeze_bounds_the_grip"),
-    (wrong.Teleports, "held_weight_is_felt"),
-    (wrong.Magnet, "open_hand_holds_nothing"),
-    (wrong.OneFloats, "every_body_falls"),
-    (wrong.GhostLink, "links_are_felt"),
-    (wrong.FatLink, "links_are_felt"),
-    (wrong.Bouncy, "nothing_bounces"),
-    (wrong.WrongCentre, "limp_arm_falls"),
-    (wrong.StiffJoint, "limp_arm_falls"),
-    (wrong.WeightlessLink, "limp_arm_falls"),
-    (wrong.NoLimits, "joints_stop_at_their_limits"),
-    (wrong.StrongWrist, "every_effort_limit_counts"),
+    (wrong_robots.StickyFingers, "squeeze_bounds_the_grip"),
+    (wrong_robots.DoubleSqueeze, "squeeze_bounds_the_grip"),
+    (wrong_robots.Teleports, "squeeze_bounds_the_grip"),
+    (wrong_robots.Teleports, "held_weight_is_felt"),
+    (wrong_robots.Magnet, "open_hand_holds_nothing"),
+    (wrong_robots.OneFloats, "every_body_falls"),
+    (wrong_robots.GhostLink, "links_are_felt"),
+    (wrong_robots.FatLink, "links_are_felt"),
+    (wrong_robots.Bouncy, "nothing_bounces"),
+    (wrong_robots.WrongCentre, "limp_arm_falls"),
+    (wrong_robots.StiffJoint, "limp_arm_falls"),
+    (wrong_robots.WeightlessLink, "limp_arm_falls"),
+    (wrong_robots.NoLimits, "joints_stop_at_their_limits"),
+    (wrong_robots.StrongWrist, "every_effort_limit_counts"),
     (wrong.Meddler, "reading_changes_nothing"),
-    (wrong.TiltedAxis, "parity_in_any_posture"),
-    (wrong.NoEffortLimit, "effort_limit_bounds_acceleration"),
-    (wrong.NoEffortLimit, "weak_joint_sags"),
-    (wrong.FreeFingers, "fingers_stay_coupled"),
-    (wrong.SlipperyHand, "grip_holds"),
+    (wrong_robots.TiltedAxis, "parity_in_any_posture"),
+    (wrong_robots.NoEffortLimit, "effort_limit_bounds_acceleration"),
+    (wrong_robots.NoEffortLimit, "weak_joint_sags"),
+    (wrong_robots.FreeFingers, "fingers_stay_coupled"),
+    (wrong_robots.SlipperyHand, "grip_holds"),
     (wrong.ForgetsCommand, "restore_repeats"),
     (wrong.RoundsState, "restore_continues"),
     (wrong.Noisy, "restore_in_the_grip"),
@@ -89,7 +89,7 @@ def test_parity_check_runs_while_loading() -> None:
 
 def test_springs_that_are_declared_not_to_be_told_may_sag_as_springs_do() -> None:
     """An engine without drives of its own: the adapter computes the law of `scene.Joint`."""
-    ConformanceTest(Subject(wrong.DrivesNotTold), CHECKS["static_hold"])()
+    ConformanceTest(Subject(wrong_robots.DrivesNotTold), CHECKS["static_hold"])()
 
 
 OWN_PACKAGE = {
@@ -129,8 +129,8 @@ def test_an_adapter_may_live_in_its_engines_own_package(
 @pytest.mark.parametrize("name", ["static_hold", "planted_faults_are_seen", "links_are_felt"])
 def test_laws_of_robots_are_skipped_where_an_adapter_declares_that_it_has_none(name: str) -> None:
     with pytest.raises(pytest.skip.Exception, match="there are no robots here"):
-        ConformanceTest(Subject(wrong.NoRobots), CHECKS[name])()
+        ConformanceTest(Subject(wrong_robots.NoRobots), CHECKS[name])()
 
 
 def test_laws_of_boxes_hold_where_there_are_no_robots() -> None:
-    ConformanceTest(Subject(wrong.NoRobots), CHECKS["free_fall"])()
+    ConformanceTest(Subject(wrong_robots.NoRobots), CHECKS["free_fall"])()

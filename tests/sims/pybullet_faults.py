@@ -1,0 +1,100 @@
+"""Changes of a loaded world in PyBullet itself, through its client."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .coverage import Plant
+
+
+def bullet(name: str, link: str = "", **change: Any) -> Plant:
+    def plant(s: Any) -> None:
+        import pybullet
+
+        body = {**s._bodies, "ground": s._ground, "robot": s._robot}[name]
+        number = s._links[link] if link else -1
+        pybullet.changeDynamics(body, number, physicsClientId=s.client, **change)
+
+    return plant
+
+
+def timestep(s: Any) -> None:
+    import pybullet
+
+    pybullet.setTimeStep(0.002, physicsClientId=s.client)
+
+
+def height(s: Any) -> None:
+    import pybullet
+
+    pybullet.resetBasePositionAndOrientation(
+        s._ground, [0, 0, 0.01], [0, 0, 0, 1], physicsClientId=s.client
+    )
+
+
+def gravity(s: Any) -> None:
+    import pybullet
+
+    pybullet.setGravity(0, 0, -9.7, physicsClientId=s.client)
+
+
+def table(s: Any) -> None:
+    import pybullet
+
+    pybullet.resetBasePositionAndOrientation(
+        s._bodies["table"], [0.8, 0, 0.138], [0, 0, 0, 1], physicsClientId=s.client
+    )
+
+
+def held(s: Any) -> None:
+    import pybullet
+
+    pybullet.createConstraint(
+        s._bodies["cube"], -1, -1, -1, pybullet.JOINT_FIXED, [0] * 3, [0] * 3, [0] * 3,
+        physicsClientId=s.client,
+    )  # fmt: skip
+
+
+def com(s: Any) -> None:
+    """A cube like the other, its centre of mass aside, in its place."""
+    import pybullet
+
+    pybullet.removeBody(s._bodies["cube"], physicsClientId=s.client)
+    half = [0.025] * 3
+    shape = pybullet.createCollisionShape(
+        pybullet.GEOM_BOX, halfExtents=half, physicsClientId=s.client
+    )
+    s._bodies["cube"] = pybullet.createMultiBody(
+        0.1, shape, -1, [0.6, -0.1, 0.325], baseInertialFramePosition=[0.01, 0, 0],
+        physicsClientId=s.client,
+    )  # fmt: skip
+
+
+def uncoupled(s: Any) -> None:
+    import pybullet
+
+    pybullet.removeConstraint(s._couplings[0], physicsClientId=s.client)
+    s._couplings[0] = pybullet.createConstraint(
+        s._bodies["cube"], -1, -1, -1, pybullet.JOINT_FIXED, [0] * 3, [0] * 3, [0] * 3,
+        physicsClientId=s.client,
+    )  # fmt: skip
+
+
+FAULTS: dict[str, Plant] = {
+    "timestep": timestep,
+    "ground/height": height,
+    "ground/restitution": bullet("ground", restitution=0.5),
+    "body/cube/restitution": bullet("cube", restitution=0.5),
+    "body/cube/margin": bullet("cube", collisionMargin=0.005),
+    "body/cube/com": com,
+    "body/cube/dynamic": held,
+    "link/panda_link4/restitution": bullet("robot", "panda_link4", restitution=0.5),
+    "gripper/coupled": uncoupled,
+    "gravity": gravity,
+    "body/table/pose": table,
+    "body/cube/mass": bullet("cube", mass=1.0),
+    "body/cube/inertia": bullet("cube", localInertiaDiagonal=[1e-4, 1e-4, 1e-4]),
+    "body/cube/friction": bullet("cube", lateralFriction=0.5),
+    "link/panda_leftfinger/friction": bullet("robot", "panda_leftfinger", lateralFriction=0.5),
+    "link/panda_link4/mass": bullet("robot", "panda_link4", mass=5.0),
+}
