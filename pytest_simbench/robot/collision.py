@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
+from itertools import product
 
 import coal
 import numpy as np
@@ -18,6 +19,9 @@ MARGIN = 0.012
 
 HELD_SLACK = 0.002
 """The held cube is checked smaller by this on each face [m]: it may rest where it stands."""
+
+FLATNESS = 0.0005
+"""What stands back by less belongs to the hand's front [m]."""
 
 GROUND = "ground"
 
@@ -122,6 +126,29 @@ class PlanningScene:
         """What is in the hand."""
         return None if self.held is None else self._free[self.held]
 
+    def front(self, above: float) -> tuple[float, float]:
+        """The face with which the closed hand pushes along its tool frame's x [m]: how far it
+        stands before the tool centre point, and how wide it is.
+
+        Args:
+            above: how far above the tool centre point it may touch what it pushes [m].
+        """
+        model = self.model
+        fingers = np.full(len(model.robot.joints) - model.arm, model.robot.gripper.closed)
+        q = np.concatenate([model.robot.column("initial_position")[: model.arm], fingers])
+        pin.updateGeometryPlacements(model.pin, model.data, self._geometry, self._exact, q)
+        tool = pin.updateFramePlacement(model.pin, model.data, model.tool)
+        carrier = model.pin.frames[model.tool].parentJoint
+        corners = [
+            _below(tool.actInv(self._exact.oMg[link]), shape.geometry, above)
+            for link in self._links
+            if (shape := self._geometry.geometryObjects[link]).parentJoint >= carrier
+        ]
+        points = np.concatenate(corners)
+        depth = float(points[:, 0].max())
+        face = points[points[:, 0] > depth - FLATNESS, 1]
+        return depth, float(face.max() - face.min())
+
     def _activate(self, ignored: Iterable[str] = ()) -> None:
         """Switch off the pairs of ignored bodies, of the held cube's place, of cubes not held."""
         off = {self._bodies[name] for name in ignored}
@@ -171,3 +198,23 @@ class PlanningScene:
                         return objects[first].name, objects[second].name
                 return "robot", "obstacle"
         return None
+
+
+def _below(placement: pin.SE3, shape: coal.CollisionGeometry, above: float) -> FloatArray:
+    """Corners of the part of a convex shape that lies at most so far above the tool centre point,
+    in the tool frame, whose z points down; (n, 3)."""
+    if isinstance(shape, coal.Box):
+        corners = np.array(list(product((-1, 1), repeat=3))) * shape.halfSide
+    else:
+        corners = np.asarray(shape.points())
+    corners = corners @ placement.rotation.T + placement.translation
+    low = corners[:, 2] >= -above
+    # what cuts the plane between any two corners lies in the shape, and all edges are among them
+    a, b = _segments(corners[low], corners[~low])
+    share = ((-above - a[:, 2]) / (b[:, 2] - a[:, 2]))[:, None]
+    return np.concatenate([corners[low], a + share * (b - a)])
+
+
+def _segments(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """All segments from one set of points to another, their ends (n * m, 3) each."""
+    return np.repeat(first, len(second), axis=0), np.tile(second, (len(first), 1))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pinocchio as pin
 
@@ -100,17 +102,39 @@ def straight_line(
     turn = pin.log3(first.rotation.T @ last.rotation)
     length = float(np.linalg.norm(last.translation - first.translation))
     steps = max(2, int(np.ceil(max(length / spacing, float(np.linalg.norm(turn)) / 0.1))))
+    line = [
+        pin.SE3(
+            first.rotation @ pin.exp3(share * turn),
+            (1 - share) * first.translation + share * last.translation,
+        )
+        for share in np.linspace(0, 1, steps + 1)[1:]
+    ]
+    return _joint_path(model, start, line, "straight line")
+
+
+def tool_path(model: RobotModel, start: FloatArray, poses: Sequence[Pose]) -> FloatArray:
+    """Joint positions along a path of the tool, (n + 1, arm), the first of them `start`.
+
+    Args:
+        start: arm joints at the beginning.
+        poses: tool poses in the world, about 1 cm from each other.
+
+    Raises:
+        Unreachable: the path leaves the workspace or jumps to another arm configuration.
+    """
+    return _joint_path(model, start, [pin.SE3(pose.matrix()) for pose in poses], "path")
+
+
+def _joint_path(
+    model: RobotModel, start: FloatArray, poses: Sequence[pin.SE3], what: str
+) -> FloatArray:
     path = [np.asarray(start, dtype=float)]
-    for share in np.linspace(0, 1, steps + 1)[1:]:
-        rotation = first.rotation @ pin.exp3(share * turn)
-        position = (1 - share) * first.translation + share * last.translation
-        goal = model.base.actInv(pin.SE3(rotation, position))
-        solution = _descend(model, goal, path[-1])
+    for pose in poses:
+        solution = _descend(model, model.base.actInv(pose), path[-1])
         if solution is None:
-            raise Unreachable(
-                f"unreachable: straight line to {tuple(np.round(position, 3).tolist())}"
-            )
+            position = tuple(np.round(pose.translation, 3).tolist())
+            raise Unreachable(f"unreachable: {what} to {position}")
         path.append(solution)
     if np.abs(np.diff(np.array(path), axis=0)).max() > 0.5:
-        raise Unreachable("unreachable: the straight line needs a jump of the arm's configuration")
+        raise Unreachable(f"unreachable: the {what} needs a jump of the arm's configuration")
     return np.array(path)

@@ -10,7 +10,7 @@ of checks, and the shortcuts are our own.
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +18,7 @@ from ompl import base, geometric, util
 
 from pytest_simbench.robot.collision import PlanningScene
 from pytest_simbench.robot.errors import InCollision, NoPath, PlanningError
-from pytest_simbench.robot.kinematics import straight_line
+from pytest_simbench.robot.kinematics import straight_line, tool_path
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.throw import (
     Throw,
@@ -106,12 +106,46 @@ class MotionPlanner:
             Unreachable: the line leaves the workspace.
             InCollision: something else is in the way.
         """
-        timed = along_path(straight_line(self.model, start, target), self.limits, speed=speed)
+        path = straight_line(self.model, start, target)
+        timed = along_path(path, self.limits, speed=speed)
+        return self._touching_only(timed, fingers, ignored, "straight line")
+
+    def move_along(
+        self,
+        start: FloatArray,
+        poses: Sequence[Pose],
+        fingers: float,
+        *,
+        tool_speed: float,
+        ignored: Iterable[str] = (),
+    ) -> Trajectory:
+        """The tool through poses that lie close to each other; `ignored` bodies may be touched.
+
+        Args:
+            poses: of the tool in the world, about 1 cm from each other.
+            tool_speed: mean speed of the tool centre point [m/s]; slower where the joints' limits
+                ask for it.
+
+        Raises:
+            Unreachable: the path leaves the workspace.
+            InCollision: something else is in the way.
+        """
+        path = tool_path(self.model, start, poses)
+        points = [self.model.tool_pose(start).position, *(pose.position for pose in poses)]
+        length = float(np.linalg.norm(np.diff(np.array(points), axis=0), axis=1).sum())
+        fastest = along_path(path, self.limits).duration
+        timed = along_path(path, self.limits, speed=min(1.0, fastest * tool_speed / length))
+        return self._touching_only(timed, fingers, ignored, "path")
+
+    def _touching_only(
+        self, timed: Timed, fingers: float, ignored: Iterable[str], what: str
+    ) -> Trajectory:
+        """The trajectory of a motion that may touch the bodies in `ignored` and nothing else."""
         touching = self.scene.first_collision(
             self._thinned(timed.position), ignored=ignored, margin=False
         )
         if touching is not None:
-            raise InCollision(f"straight line blocked: {' and '.join(touching)}")
+            raise InCollision(f"{what} blocked: {' and '.join(touching)}")
         return self._trajectory(timed, fingers)
 
     def move_fingers(

@@ -2,8 +2,18 @@
 
 from pytest_simbench.tasks.base import Jitter, Outcome, Task
 from pytest_simbench.tasks.moments import Moment
+from pytest_simbench.tasks.pushing import Pushing
 from pytest_simbench.tasks.stacking import Stacking
 from pytest_simbench.tasks.throwing import Throwing
 from pytest_simbench.tasks.towers import LeaningTowers
 
-__all__ = ["Jitter", "LeaningTowers", "Moment", "Outcome", "Stacking", "Task", "Throwing"]
+__all__ = [
+    "Jitter",
+    "LeaningTowers",
+    "Moment",
+    "Outcome",
+    "Pushing",
+    "Stacking",
+    "Task",
+    "Throwing",
+]

@@ -1,12 +1,13 @@
 """One arm in one world: plan, send, follow, look again.
 
 `pick`, `place` and `throw` are made of the verbs that a task may use too: `go_to`, `go_to_pose`,
-`move_straight`, `follow`, `close_hand`, `open_hand`. Waiting is the world's: `world.wait`.
+`move_straight`, `move_along`, `follow`, `close_hand`, `open_hand`. Waiting is the world's:
+`world.wait`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -205,6 +206,33 @@ class Manipulator:
                 )
             )
         )
+
+    def move_along(
+        self,
+        poses: Sequence[Pose],
+        *,
+        tool_speed: float,
+        ignored: tuple[str, ...] = (),
+        log_period: float | None = None,
+    ) -> Motion | None:
+        """Motion of the tool centre point through poses in the world, without a stop.
+
+        Args:
+            poses: about 1 cm from each other.
+            tool_speed: mean speed of the tool centre point [m/s].
+            ignored: names of bodies that may be touched, for instance the one to be pushed.
+            log_period: as of `follow`.
+
+        Raises:
+            PlanningError: the path leaves the workspace, or something else is in the way.
+        """
+        self._refresh()
+        trajectory = self._planned(
+            lambda: self.planner.move_along(
+                self.arm, poses, self.fingers, tool_speed=tool_speed, ignored=ignored
+            )
+        )
+        return self.follow(trajectory, log_period=log_period)
 
     def follow(self, trajectory: Trajectory, *, log_period: float | None = None) -> Motion | None:
         """Follow a trajectory of one's own; it must begin at the commanded set points.

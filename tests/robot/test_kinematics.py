@@ -14,6 +14,7 @@ from pytest_simbench.robot.kinematics import (
     inverse_kinematics,
     straight_line,
     tool_over,
+    tool_path,
     top_down_grasps,
 )
 from pytest_simbench.robot.model import RobotModel
@@ -66,3 +67,26 @@ def test_a_straight_line_is_straight(ready: FloatArray) -> None:
     tips = np.array([MODEL.tool_pose(q).position for q in path])
     assert np.allclose(tips[:, :2], [0.4, 0.1], atol=1e-5)
     assert (np.diff(tips[:, 2]) < 0).all()
+
+
+def test_a_path_goes_through_its_poses(ready: FloatArray) -> None:
+    start = inverse_kinematics(MODEL, tool_over(Pose.at(0.4, 0.0, 0.3), 0.0), ready)
+    poses = [tool_over(Pose.at(0.4, 0.01 * k, 0.3), 0.05 * k) for k in range(1, 12)]
+    path = tool_path(MODEL, start, poses)
+    assert np.array_equal(path[0], start)
+    for q, pose in zip(path[1:], poses, strict=True):
+        assert np.allclose(MODEL.tool_pose(q).matrix(), pose.matrix(), atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("end", "message"),
+    [
+        (tool_over(Pose.at(1.5, 0.0, 0.3), 0.0), r"^unreachable: path to \(1.5, 0.0, 0.3\)$"),
+        (tool_over(Pose.at(0.4, 0.0, 0.3), 1.0), "^unreachable: the path needs a jump of the arm"),
+    ],
+    ids=["too far", "jump"],
+)
+def test_a_path_that_cannot_be_followed_says_so(end: Pose, message: str, ready: FloatArray) -> None:
+    start = inverse_kinematics(MODEL, tool_over(Pose.at(0.4, 0.0, 0.3), 0.0), ready)
+    with pytest.raises(Unreachable, match=message):
+        tool_path(MODEL, start, [end])

@@ -101,3 +101,39 @@ def test_feed_forward_carries_the_arm(planner: MotionPlanner, ready: FloatArray)
     expected = model.inverse_dynamics(planner.gravity, q, zero, zero)[0, :7]
     assert np.allclose(still.effort[:, :7], expected, atol=0.2)
     assert (still.effort[:, 7:] == 0).all()
+
+
+def test_a_path_at_a_speed_of_the_tool(
+    planner: MotionPlanner, model: RobotModel, ready: FloatArray
+) -> None:
+    start = inverse_kinematics(model, tool_over(Pose.at(0.4, 0.0, 0.5), 0.0), ready)
+    poses = [tool_over(Pose.at(0.4, 0.01 * k, 0.5), 0.02 * k) for k in range(1, 21)]
+    slow = planner.move_along(start, poses, 0.0, tool_speed=0.05)
+    assert slow.duration == pytest.approx(0.2 / 0.05, rel=0.01)
+    assert np.allclose(slow.position[-1, 7:], 0.0)
+    fast = planner.move_along(start, poses, 0.0, tool_speed=50.0)  # beyond the joints' limits
+    assert 0.2 < fast.duration < 2.0
+    tips = np.array([model.tool_pose(q).position for q in fast.position[:, :7]])
+    assert np.allclose(tips[:, [0, 2]], [0.4, 0.5], atol=1e-3)
+
+
+def test_a_path_touches_only_what_it_may(model: RobotModel, ready: FloatArray) -> None:
+    block = Box("block", (0.1, 0.1, 0.05), Pose.at(0.5, 0.0, 0.295), mass=0.1)
+    scene = PlanningScene(model, Scene("path", (block,), panda()))
+    planner = MotionPlanner(model, scene, np.random.default_rng(0), (0.0, 0.0, -9.81))
+    start = inverse_kinematics(model, tool_over(Pose.at(0.38, 0.0, 0.3), 0.0), ready)
+    poses = [tool_over(Pose.at(0.38 + 0.01 * k, 0.0, 0.3), 0.0) for k in range(1, 13)]
+    planner.move_along(start, poses, 0.0, tool_speed=0.1, ignored=("block",))
+    with pytest.raises(InCollision, match=r"^path blocked: panda_\w+ and block$"):
+        planner.move_along(start, poses, 0.0, tool_speed=0.1)
+
+
+def test_the_front_of_the_closed_hand(model: RobotModel) -> None:
+    """Boxes of franka_description's fingers: 17.5 mm thick at the tips, each 15.2 mm wide; from
+    24 mm above the tool centre point on they are 22 mm thick."""
+    scene = PlanningScene(model, Scene("front", (), panda()))
+    assert scene.front(0.005) == pytest.approx((0.00875, 0.03036), abs=1e-5)
+    depth, width = scene.front(0.02)
+    assert depth == pytest.approx(0.00875, abs=1e-5)
+    assert 0.0304 < width < 0.052
+    assert scene.front(0.03) == pytest.approx((0.011, 0.052), abs=1e-5)

@@ -1,0 +1,223 @@
+"""A third task, not of the study: push a block with the closed hand, along a line or round a curve.
+
+The hand moves slowly, so theory says where the block goes: it stays at rest against the hand, on a
+line always, and on a curve that is not too sharp (`limit_surface`). What a simulator adds to that
+(creep along the hand, a turn, a lead, a tilt) is its error.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from pytest_simbench.client.world import Motion, World
+from pytest_simbench.robot.collision import PlanningScene
+from pytest_simbench.robot.errors import PlanningError, Unreachable
+from pytest_simbench.robot.kinematics import inverse_kinematics, tool_over, tool_path
+from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.robot.panda import panda
+from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene
+from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, distance, generators
+from pytest_simbench.tasks.limit_surface import smallest_turning_radius
+from pytest_simbench.tasks.manipulator import APPROACH, Manipulator
+from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.tasks.moments import Moment
+
+BLOCK_SIZE = (0.10, 0.10, 0.05)
+"""[m]. It slides before it tips wherever the hand touches it: mu times its height is a quarter of
+its length."""
+
+BLOCK_MASS = 0.2
+"""[kg]: light wood, 0.4 g/cm^3. The arm's springs give way by less than 1 mm to push it."""
+
+FRICTION = 0.5
+"""Of ground, block and hand. With 1.0, as between the study's cubes, a hand that gives way jams on
+the block's edge: it is pressed down, and the harder it pushes, the harder."""
+
+START = Pose.at(0.45, 0.0, BLOCK_SIZE[2] / 2)
+"""Of the block: on the ground, in the middle of where arms of 0.85 m work."""
+
+TOOL_HEIGHT = 0.035
+"""Of the tool centre point [m]: the fingertips touch the upper half of the block, and what is wider
+above them clears it by 9 mm."""
+
+GAP = 0.01
+"""Between hand and block before the push [m]."""
+
+SPACING = 0.01
+"""Of the way points [m]."""
+
+SAMPLING = 0.02
+"""Between samples of the block's way [s]."""
+
+TIPPED = math.radians(10.0)
+"""A block is tipped beyond this tilt [rad]: what it creeps and sinks is a tenth of it."""
+
+RED = (0.80, 0.25, 0.20, 1.0)
+
+
+@dataclass(frozen=True)
+class Pushing(Task):
+    """Push a block.
+
+    Attributes:
+        length: of the way of the block's centre [m].
+        turn: by which the block's heading turns on the way, evenly [rad]; 0: a straight line.
+        tool_speed: mean speed of the hand [m/s]. At 0.05 a block that is let go slides on by
+            0.25 mm (v^2 / 2 mu g), so the push is quasi-static.
+        settle: from the end of the push to the count [s].
+        robot: that pushes; None: the Panda.
+    """
+
+    name: ClassVar[str] = "pushing"
+    study_timeout: ClassVar[float] = 600.0
+    counted: ClassVar[str] = "blocks pushed"
+    moments: ClassVar[tuple[Moment, ...]] = (Moment("before the push", "push"),)
+
+    length: float = 0.2
+    turn: float = 0.0
+    tool_speed: float = 0.05
+    settle: float = 1.0
+    robot: Robot | None = None
+
+    @property
+    def arm(self) -> Robot:
+        """The robot that pushes, its surface as slippery as the block's."""
+        return replace(self.robot or panda(), friction=FRICTION)
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]:
+        return (
+            Metric("position_error", "position error", unit="m", better="lower", least=0,
+                   doc="distance of the block's centre from the end of its way, "
+                       f"{self.settle:g} s after the push"),
+            Metric("heading_error", "heading error", unit="deg", better="lower", least=0,
+                   doc="angle of the block to the end of its way, then"),
+            Metric("path_error", "path error", unit="m", better="lower", least=0,
+                   doc="largest distance of the block's centre from its way during the push"),
+            Metric("tipped", "tipped", kind="yes_no", better="lower",
+                   doc="the block tilted by more than 10 degrees at any time"),
+        )  # fmt: skip
+
+    @property
+    def references(self) -> Mapping[str, float]:  # type: ignore[override]
+        """Of quasi-static theory, where it keeps the block at rest against the hand."""
+        if abs(self.turn) * self.sharpest > self.length:
+            return {}
+        return {"position_error": 0.0, "heading_error": 0.0, "path_error": 0.0}
+
+    @property
+    def sharpest(self) -> float:
+        """Radius of the sharpest curve round which the hand can push the block [m]."""
+        _, width = _front(self.arm)
+        return smallest_turning_radius(BLOCK_SIZE[0], BLOCK_SIZE[1], width)
+
+    def smoke(self) -> Pushing:
+        return replace(self, length=self.length / 4, turn=self.turn / 4)
+
+    def scene(self, seed: int, jitter: Jitter) -> Scene:
+        pose = jitter.disturbed(START, generators(seed)[0])
+        block = Box("block", BLOCK_SIZE, pose, BLOCK_MASS, FRICTION, RED)
+        return Scene("pushing", (block,), self.arm, ground_friction=FRICTION)
+
+    def at(self, way: float) -> Pose:
+        """The block when its centre has gone so far along its way [m]; before the start, which is
+        at 0, the way is straight."""
+        if way <= 0.0 or self.turn == 0.0:
+            return START.translated(x=way)
+        radius, angle = self.length / self.turn, way / self.length * self.turn
+        moved = START.translated(x=radius * math.sin(angle), y=radius * (1 - math.cos(angle)))
+        return moved * Pose.at(0.0, 0.0, 0.0, yaw=angle)
+
+    def tools(self) -> list[Pose]:
+        """Tool poses of the push, from behind the block to the end of its way."""
+        depth, _ = _front(self.arm)
+        behind = Pose.at(-BLOCK_SIZE[0] / 2 - depth, 0.0, TOOL_HEIGHT - START.position[2])
+        steps = math.ceil((GAP + self.length) / SPACING)
+        ways = np.linspace(-GAP, self.length, steps + 1)
+        return [tool_over(self.at(float(way)) * behind, self._heading(float(way))) for way in ways]
+
+    def problem(self) -> str | None:
+        """The hand does not close to a flat front, or the way is out of reach."""
+        robot = self.arm
+        model = RobotModel(robot)
+        if not model.has_parallel_fingers:
+            return f"robot {robot.name!r} has no hand with two parallel fingers to push with"
+        home = robot.column("initial_position")[: model.arm]
+        first, *others = self.tools()
+        try:
+            above = inverse_kinematics(
+                model, first.translated(z=APPROACH), home, np.random.default_rng(0)
+            )
+            tool_path(model, inverse_kinematics(model, first, above), others)
+        except Unreachable as error:
+            return f"robot {robot.name!r} cannot push the block: {error}; place its base elsewhere"
+        return None
+
+    def perform(self, world: World, seed: int, count: Count) -> Outcome:
+        with world.phase("settle start"):
+            world.wait(0.2)
+        hand = Manipulator(world, generators(seed)[2])
+        first, *others = self.tools()
+        pushed: Motion | None = None
+        details: dict[str, object] = {}
+        world.mark("start")
+        try:
+            with world.phase("approach"):
+                hand.close_hand()
+                hand.go_to_pose(first.translated(z=APPROACH), speed=hand.speeds.free)
+                hand.move_straight(first, speed=hand.speeds.contact)
+            with world.phase("push"):
+                pushed = hand.move_along(
+                    others, tool_speed=self.tool_speed, ignored=("block",), log_period=SAMPLING
+                )
+        except PlanningError as error:
+            details["failed_push"] = str(error)
+        world.mark("end")
+        with world.phase("settle"):
+            world.wait(self.settle)
+        return self._score(world.pose("block"), pushed, count, details)
+
+    def _score(
+        self, end: Pose, pushed: Motion | None, count: Count, details: dict[str, object]
+    ) -> Outcome:
+        goal = self.at(self.length)
+        error = distance(end, goal)
+        rows = np.empty((0, 13)) if pushed is None else pushed.bodies[:, 0]
+        tilt = max(_tilt(pose) for pose in (end, *map(Pose.from_array, rows)))
+        count(int(error < GAP), 1)
+        return Outcome(
+            {
+                "position_error": error,
+                "heading_error": math.degrees(abs((goal.inverse() * end).yaw)),
+                "path_error": self._off_the_way(rows[:, :3]) if len(rows) else None,
+                "tipped": float(tilt > TIPPED),
+            },
+            {**details, "end": [*end.position, *end.quaternion], "largest_tilt": tilt},
+        )
+
+    def _heading(self, way: float) -> float:
+        return max(0.0, way) / self.length * self.turn
+
+    def _off_the_way(self, positions: FloatArray) -> float:
+        """Largest distance on the ground from the way [m]."""
+        ways = np.linspace(0.0, self.length, 1 + math.ceil(self.length / 1e-4))  # to 0.05 mm
+        points = np.array([self.at(float(way)).position[:2] for way in ways])
+        gaps = np.linalg.norm(positions[:, None, :2] - points[None], axis=2)
+        return float(gaps.min(axis=1).max())
+
+
+def _front(robot: Robot) -> tuple[float, float]:
+    """Of the closed hand where it can touch the block."""
+    planning = PlanningScene(RobotModel(robot), Scene("front", (), robot))
+    return planning.front(BLOCK_SIZE[2] - TOOL_HEIGHT)
+
+
+def _tilt(pose: Pose) -> float:
+    """Of the block's top from the horizontal [rad], up to pi: a block on its side is no upright
+    one, as a cube would be."""
+    return math.acos(float(np.clip(pose.rotation()[2, 2], -1.0, 1.0)))
