@@ -115,7 +115,9 @@ def robot_told(robot: Robot | None) -> dict[str, str]:
         return {}
     wire = with_content({"robot": robot.to_wire()}, robot)["robot"]
     meshes = sorted(wire[CONTENT].pop("meshes"))  # named by their content
-    data = json.dumps([wire, meshes, asdict(robot.limits) if robot.limits else None])
+    limits = asdict(robot.limits) if robot.limits else None
+    swing = [robot.swing] if robot.swing else []
+    data = json.dumps([wire, meshes, limits, *swing])
     return {"name": robot.name, "digest": hashlib.sha256(data.encode()).hexdigest()[:12]}
 
 

@@ -79,7 +79,7 @@ def _robots(config: pytest.Config) -> int:
 
 def _robot_line(robot: Robot) -> str:
     """Name, size and hand of a robot, and what it cannot do."""
-    from pytest_simbench.tasks import Stacking, Throwing
+    from pytest_simbench.tasks import Pushing, Stacking, Throwing
 
     arm, fingers = len(robot.arm_joints), len(robot.gripper.joints)
     x, y, z = robot.base.position
@@ -87,7 +87,7 @@ def _robot_line(robot: Robot) -> str:
         f"{robot.name}: {arm} arm joints, {fingers} fingers that open to "
         f"{robot.gripper.opened:g} m, base at ({x:g}, {y:g}, {z:g})"
     )
-    tasks = (Stacking(robot=robot), Throwing(robot=robot))
+    tasks = (task(robot=robot) for task in (Stacking, Throwing, Pushing))
     return "".join([line, *(f"\n    no {t.name}: {p}" for t in tasks if (p := t.problem()))])
 
 

@@ -105,6 +105,7 @@ class _Reader:
         measured, limits = "levers" in arm, self._limits(arm, names)
         arm.close()
         hand = self._hand()
+        swing = self._swing(len(names)) if "throw" in table else None
         position, yaw = table.each("base", 3, 0.0), table.number("yaw", 0.0)
         srdf = self._path(table.text("srdf")) if "srdf" in table else None
         robot = Robot(
@@ -117,6 +118,7 @@ class _Reader:
             tool_frame=hand.tool_frame,
             base=Pose.at(*position, yaw=yaw),
             friction=table.number("friction", 1.0, least=0.0),
+            swing=swing,
         )
         table.close()
         robot = _with_files(robot, hand, srdf)
@@ -169,6 +171,13 @@ class _Reader:
             levers=arm.each("levers", n, 1.0, least=SMALLEST),
             finger_speed=1.0,
         )
+
+    def _swing(self, n: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Arm joints before and after a throw."""
+        throw = self.table.table("throw")
+        swing = throw.each("start", n), throw.each("end", n)
+        throw.close()
+        return swing
 
     def _hand(self) -> _Hand:
         hand = self.table.table("hand")

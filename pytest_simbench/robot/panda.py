@@ -107,4 +107,5 @@ def panda(*, squeeze: float = SQUEEZE, friction: float = 1.0, base: Pose | None 
         base=base or Pose(),
         friction=friction,
         limits=LIMITS,
+        swing=(WIND_UP, THROW_END),
     )

@@ -13,7 +13,6 @@ import numpy as np
 
 from pytest_simbench.robot.errors import PlanningError, RobotError
 from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.panda import THROW_END, WIND_UP
 from pytest_simbench.robot.timing import TICK, Timed, line_move, synchronised_move
 from pytest_simbench.scene import Box, FloatArray, Robot
 
@@ -66,11 +65,13 @@ def swing_of(robot: Robot) -> tuple[FloatArray, FloatArray]:
     Raises:
         RobotError: none is known for this robot.
     """
-    if robot.name != "panda":
+    if robot.swing is None:
         raise RobotError(
-            f"robot {robot.name!r} has no swing for the throw: throwing is for the panda"
+            f"robot {robot.name!r} has no swing for the throw: write one into its file, under "
+            "[throw]; python -m pytest_simbench.robot.swing FILE looks for one"
         )
-    return np.array(WIND_UP), np.array(THROW_END)
+    start, end = robot.swing
+    return np.array(start), np.array(end)
 
 
 def study_swing(model: RobotModel, start: FloatArray, goal: FloatArray) -> tuple[Timed, float]:

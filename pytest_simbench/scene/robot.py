@@ -13,6 +13,7 @@ from pytest_simbench.scene.checks import (
     SceneError,
     check_name,
     check_number,
+    check_numbers,
     check_pose,
 )
 from pytest_simbench.scene.pose import FloatArray, Pose
@@ -124,6 +125,10 @@ class MotionLimits:
         return np.array(getattr(self, what), dtype=float)
 
 
+ON_THIS_SIDE = ("limits", "swing")
+"""What simulators are not told of a robot."""
+
+
 @dataclass(frozen=True)
 class Robot:
     """A fixed-base arm with a gripper.
@@ -141,6 +146,8 @@ class Robot:
         friction: of every link's surface.
         limits: of the arm's motion; None for a robot that no task moves. They stay on this side:
             simulators are not told, and a robot that came over the wire has none.
+        swing: arm joints before and after a throw, each (n_arm,) [rad]; None where none is known.
+            It stays on this side too.
     """
 
     name: str
@@ -153,6 +160,7 @@ class Robot:
     base: Pose = field(default_factory=Pose)
     friction: float = 1.0
     limits: MotionLimits | None = field(default=None, compare=False)
+    swing: tuple[tuple[float, ...], tuple[float, ...]] | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         check_name(self.name, "a robot")
@@ -177,6 +185,8 @@ class Robot:
                 f"robot {self.name!r} has {len(self.arm_joints)} arm joints and limits of motion "
                 f"of {len(self.limits.velocity)}"
             )
+        for end in self.swing or ():
+            check_numbers(end, len(self.arm_joints), f"the swing [rad] of {self.name!r}")
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -196,7 +206,7 @@ class Robot:
         return np.array([getattr(joint, attribute) for joint in self.joints], dtype=float)
 
     def to_wire(self) -> dict[str, Any]:
-        told = {key: value for key, value in self.__dict__.items() if key != "limits"}
+        told = {key: value for key, value in self.__dict__.items() if key not in ON_THIS_SIDE}
         return {
             **told,
             "packages": dict(self.packages),

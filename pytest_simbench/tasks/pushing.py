@@ -1,7 +1,7 @@
 """A third task, not of the study: push a block with the closed hand, along a line or round a curve.
 
 The hand moves slowly, so theory says where the block goes: it stays at rest against the hand, on a
-line always, and on a curve that is not too sharp (`limit_surface`). What a simulator adds to that
+line always, and on a curve that is not too sharp (`sliding`). What a simulator adds to that
 (creep along the hand, a turn, a lead, a tilt) is its error.
 """
 
@@ -22,10 +22,10 @@ from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import panda
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, distance, generators
-from pytest_simbench.tasks.limit_surface import smallest_turning_radius
 from pytest_simbench.tasks.manipulator import APPROACH, Manipulator
 from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.moments import Moment
+from pytest_simbench.tasks.sliding import smallest_turning_radius
 
 BLOCK_SIZE = (0.10, 0.10, 0.05)
 """[m]. It slides before it tips wherever the hand touches it: mu times its height is a quarter of

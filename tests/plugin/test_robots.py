@@ -161,8 +161,9 @@ def test_the_list_of_robots(pytester: pytest.Pytester) -> None:
         [
             "panda: 7 arm joints, 2 fingers that open to 0.035 m, base at (0, 0, 0)",
             "ur5: 6 arm joints, 2 fingers*",
-            "    no throwing: robot 'ur5' has no swing*",
             "small: 3 arm joints, 2 fingers that open to 0.04 m, base at (0.1, 0, 0.2)",
             "    no stacking: robot 'small' cannot handle a cube at (0.20, -0.30, 0.33): it is *",
+            "    no throwing: robot 'small' has no swing for the throw: write one into its file*",
+            "    no pushing: robot 'small' cannot push the block: unreachable: *",
         ]
     )
