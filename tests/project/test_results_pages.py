@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 sys.path.append(str(DOCS))  # for the scripts, which are no package
 
+import make_pushing  # noqa: E402
 import make_results  # noqa: E402
 import published_runs  # noqa: E402
 
@@ -31,10 +32,16 @@ def test_the_tables_are_up_to_date() -> None:
         assert path.read_text("utf-8") == text, "run `python docs/make_results.py --tables`"
 
 
+def test_the_tables_of_pushing_are_up_to_date() -> None:
+    told = "run `python docs/make_pushing.py`"
+    assert make_pushing.PAGE.read_text("utf-8") == make_pushing.page(), told
+    assert make_pushing.page().count("| ODE |") == 2  # tuned and default
+
+
 def test_no_profile_was_chosen_on_a_published_seed() -> None:
     seeds = {
         int(line["seed"])
-        for task in published_runs.TASKS
+        for task in (*published_runs.TASKS, "pushing")
         for line in csv.DictReader((DOCS / "data" / f"{task}.csv").open(encoding="utf-8"))
     }
     seen = [
