@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -43,6 +43,7 @@ def inverse_kinematics(
     near: FloatArray,
     rng: np.random.Generator | None = None,
     restarts: int = 10,
+    wanted: Callable[[FloatArray], bool] = lambda arm: True,
 ) -> FloatArray:
     """Arm joints (arm,) [rad] that bring the tool to `target`.
 
@@ -50,6 +51,7 @@ def inverse_kinematics(
         near: where the search starts; solutions near it are found first.
         rng: draws further starts within the limits; None for no restarts.
         restarts: how many of them.
+        wanted: whether a solution will do; the first one is returned if none does.
 
     Raises:
         Unreachable: no start led to the target.
@@ -58,10 +60,14 @@ def inverse_kinematics(
     starts = [np.asarray(near, dtype=float)]
     if rng is not None:
         starts += list(rng.uniform(model.lower, model.upper, (restarts, model.arm)))
+    first: FloatArray | None = None
     for start in starts:
         solution = _descend(model, goal, start)
-        if solution is not None:
+        if solution is not None and wanted(solution):
             return solution
+        first = solution if first is None else first
+    if first is not None:
+        return first
     x, y, z = target.position
     raise Unreachable(f"unreachable: tool at ({x:.3f}, {y:.3f}, {z:.3f})")
 

@@ -185,7 +185,13 @@ class Manipulator:
         Raises:
             PlanningError: the pose is out of reach, touches something, or no way was found.
         """
-        goal = self._planned(lambda: inverse_kinematics(self.model, tool, self.arm, self.rng))
+        self._refresh()
+        goal = self._planned(
+            lambda: inverse_kinematics(
+                self.model, tool, self.arm, self.rng,
+                wanted=lambda arm: self.planning.collision(arm) is None,
+            )
+        )  # fmt: skip
         self.go_to(goal, speed=speed)
 
     def move_straight(self, tool: Pose, *, speed: float, ignored: tuple[str, ...] = ()) -> None:

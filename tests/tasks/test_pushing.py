@@ -163,6 +163,14 @@ def test_a_built_in_robot_can_do_it(name: str) -> None:
     assert CURVE.on(robot).arm.friction == CURVE.arm.friction < panda().friction
 
 
+def test_an_arm_takes_an_elbow_that_is_free() -> None:
+    """The first solution for the UR5's place behind the block has its forearm in the ground."""
+    task = LINE.on(find("ur5"))
+    outcome, _ = perform(task, seed=3, jitter=EXACT, process=PushedProcess())
+    assert "failed_push" not in outcome.details
+    assert outcome.metrics["position_error"] == pytest.approx(0.0, abs=2e-4)
+
+
 def test_what_a_robot_cannot_do_is_a_sentence(tmp_path: Path) -> None:
     problem = LINE.on(read_robot(small_arm(tmp_path))).problem()
     assert problem is not None
