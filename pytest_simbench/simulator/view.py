@@ -6,9 +6,9 @@ import math
 
 from pytest_simbench.scene import Vector3
 
-EYE: Vector3 = (1.1, -2.6, 1.25)
-"""Of the camera, in the world [m]: beside the table, the robot on the left, what it throws flies to
-the right."""
+EYE: Vector3 = (2.0, -2.1, 1.35)
+"""Of the camera, in the world [m]: the robot stands on the left, what it throws comes nearer on the
+right."""
 
 LOOK_AT: Vector3 = (0.6, 0.0, 0.45)
 """The middle of the picture, in the world [m]; z is up."""

@@ -36,6 +36,8 @@ mujoco = lazy_import("mujoco")
 ROBOT, WORLD = 1, 2
 """Collision groups: the robot's links touch everything but each other."""
 
+LINK_COLOUR, GROUND_COLOUR = (0.9, 0.9, 0.9, 1.0), (0.5, 0.5, 0.5, 1.0)
+
 
 @dataclass(frozen=True)
 class MuJoCoSettings(Settings):
@@ -117,6 +119,7 @@ class MuJoCo(Simulator):
         if scene.robot is not None:
             for geom in spec.geoms:
                 self._set_surface(geom, scene.robot.friction, ROBOT, 0)
+                geom.rgba = LINK_COLOUR
             for joint in scene.robot.joints:
                 _add_drive(spec, joint)
             for pair in scene.robot.gripper.couplings:
@@ -125,7 +128,7 @@ class MuJoCo(Simulator):
             name="ground",
             type=mujoco.mjtGeom.mjGEOM_PLANE,
             size=[0, 0, 0.5],
-            rgba=[0.5, 0.5, 0.5, 1],
+            rgba=GROUND_COLOUR,
         )
         self._set_surface(ground, scene.ground_friction, WORLD, WORLD | ROBOT)
         for box in scene.bodies:
