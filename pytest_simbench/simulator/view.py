@@ -10,7 +10,7 @@ EYE: Vector3 = (2.0, -2.1, 1.35)
 """Of the camera, in the world [m]: the robot stands on the left, what it throws comes nearer on the
 right."""
 
-LOOK_AT: Vector3 = (0.6, 0.0, 0.45)
+LOOK_AT: Vector3 = (0.6, 0.0, 0.5)
 """The middle of the picture, in the world [m]; z is up."""
 
 FIELD_OF_VIEW = math.radians(40.0)

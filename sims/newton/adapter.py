@@ -242,6 +242,7 @@ class Newton(Simulator):
         model = self.solver.mj_model
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
         model.geom_rgba[:, :3] = self.model.shape_color.numpy()[self._shapes()]
+        model.vis.headlight.diffuse[:] = 0.9  # Newton's model has no other light
         with renderer(mujoco, model, width, height) as drawing:
             drawing.update_scene(self.solver.mj_data, camera(mujoco))
             return np.array(drawing.render())
