@@ -86,7 +86,7 @@ def loop(name: str, **more: int) -> list[float]:
         text=True,
         check=True,
     ).stdout
-    return [float(line) for line in output.splitlines()[-1 - len(more) :]]
+    return [float(line) for line in output.splitlines()[-1 - 2 * len(more) :]]
 
 
 def worker(name: str) -> tuple[float, float]:

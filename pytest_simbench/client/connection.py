@@ -64,6 +64,8 @@ class Connection:
         popen: the process on this machine (of ssh, for another host); None before it is started,
             and for a socket.
         heard: `time.monotonic()` of the last sign of life.
+        on_frame: takes the frames of a film, in execnet's thread: a worker that draws faster than
+            they are taken waits. None: nobody asked for any.
     """
 
     def __init__(
@@ -71,6 +73,7 @@ class Connection:
     ) -> None:
         self.popen: subprocess.Popen[bytes] | None = None
         self.heard = time.monotonic()
+        self.on_frame: Callable[[Any], None] | None = None
         self._environment = environment
         self._log = log
         self._inbox: SimpleQueue[Any] = SimpleQueue()
@@ -119,6 +122,9 @@ class Connection:
         if isinstance(message, dict) and "alive" in message:
             if message["alive"] != self._simulated:  # time that stands still is no sign of life
                 self._simulated, self.heard = message["alive"], time.monotonic()
+        elif self.on_frame is not None and isinstance(message, dict) and "frame" in message:
+            self.on_frame(message["frame"])
+            self.heard = time.monotonic()
         elif message is _END or self._inbox.qsize() < MOST_WAITING:
             self.heard = time.monotonic()
             self._inbox.put(message)

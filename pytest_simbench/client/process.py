@@ -29,6 +29,7 @@ from pytest_simbench.client.errors import (
     WorkerStartError,
     exit_text,
 )
+from pytest_simbench.client.frame import Frame
 from pytest_simbench.client.launch import Constructed, Launch
 from pytest_simbench.client.logs import shorten_log, tail_of_log
 from pytest_simbench.worker.text import named, readable
@@ -181,6 +182,30 @@ class WorkerProcess:
             real_time=real_time,
         )
         return Constructed(**answer)
+
+    def film(
+        self, take: Callable[[Frame], None] | None, period: float, size: tuple[int, int]
+    ) -> None:
+        """Have a picture of the loaded world taken every `period` [s] of simulated time.
+
+        Args:
+            take: gets each frame, in another thread, while a motion is asked for; must not raise.
+                The time that drawing takes puts the deadline off. None: no more pictures.
+            period: [s].
+            size: width and height [pixels].
+        """
+
+        def arrived(data: Any) -> None:
+            frame = Frame.from_wire(data, size)
+            if self.deadline is not None:
+                self.deadline += frame.seconds
+            if take is not None:
+                take(frame)
+
+        self._connection.on_frame = None if take is None else arrived
+        width, height = size
+        wanted = None if take is None else period
+        self.request("film", period=wanted, width=width, height=height)
 
     def _unread(self) -> None:
         """Something came between two requests: the end, or what nobody asked for."""

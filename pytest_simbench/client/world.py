@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_simbench.client.errors import Diverged, EngineFailed
+from pytest_simbench.client.frame import Frame
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.stopwatch import Stopwatch
 from pytest_simbench.scene import FloatArray, Pose, Scene, Trajectory
@@ -19,6 +20,9 @@ from pytest_simbench.scene.plausibility import implausible
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.files import FileError
 from pytest_simbench.simulator.robot_files import with_content
+
+TRACE_PERIOD = 0.02
+"""Between two samples of a trace [s]: 50 Hz. A task's own log is thinned to that."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +64,10 @@ class World:
         bodies: rows of the free bodies, (n_free, 13): position [m], quaternion w, x, y, z, linear
             [m/s] and angular velocity [rad/s], in the world frame.
         excused: differences from the scene that the adapter declares.
-        trace: samples at `trace_period` of everything since loading, if asked for.
+        trace: samples at `trace_period` of everything since loading, if asked for; up to 50 Hz
+            where the task itself sampled.
         phases: when each phase began, in simulated time [s], and its name.
+        moments: what the task noted, and when [s].
         stopwatch: wall seconds of this repetition by kind; `plan` is the task's to measure.
         timeline: wall seconds from launch of the moments that the task marked.
     """
@@ -84,6 +90,7 @@ class World:
         self.time = 0.0
         self.trace: list[Motion] = []
         self.phases: list[tuple[float, str]] = []
+        self.moments: list[tuple[str, float]] = []
         self._saved: dict[str, tuple[list[Motion], list[tuple[float, str]]]] = {}
         self._trace_period = trace_period
         self._after_phase: Callable[[World, str], None] = lambda world, name: None
@@ -144,6 +151,10 @@ class World:
         """Note the wall time since launch under the name of this moment ("start", "end")."""
         self.timeline[moment] = self.stopwatch.elapsed()
 
+    def note(self, moment: str, time: float) -> None:
+        """Tell what happened at a simulated time [s], for pictures of it (`Task.pictured`)."""
+        self.moments.append((moment, time))
+
     def pose(self, name: str) -> Pose:
         """Present pose of a free body, by name."""
         return Pose.from_array(self.bodies[self._names.index(name)])
@@ -180,11 +191,11 @@ class World:
         return motion if log_period is not None else None
 
     def _thinned(self, motion: Motion) -> Motion:
-        """A denser log, reduced to about the trace's period."""
-        if len(motion) < 2 or self._trace_period is None:
+        """A denser log, reduced to about `TRACE_PERIOD`."""
+        if len(motion) < 2:
             return motion
         period = (motion.time[-1] - motion.time[0]) / (len(motion) - 1)
-        every = slice(None, None, max(1, round(self._trace_period / period)))
+        every = slice(None, None, max(1, round(TRACE_PERIOD / period)))
         return Motion(motion.time[every], motion.joints[every], motion.bodies[every])
 
     def save(self, name: str = "saved") -> None:
@@ -206,6 +217,12 @@ class World:
         """An offscreen picture, (height, width, 3)."""
         picture: NDArray[np.uint8] = self.process.request("render", width=width, height=height)
         return picture
+
+    def film(
+        self, take: Callable[[Frame], None] | None, period: float, size: tuple[int, int]
+    ) -> None:
+        """Offscreen pictures along the way, see `WorkerProcess.film`."""
+        self.process.film(take, period, size)
 
     def stats(self) -> dict[str, Any]:
         """The worker's clocks of stepping and its exact memory peak."""

@@ -52,7 +52,10 @@ class Case:
         jitter: scale of the start jitter; 1 is 1 mm and 1 degree.
         trace: whose motion is kept: of the first repetition (`first`), also of failed ones
             (`first-and-failed`), of these alone (`retain-on-failure`), of all (`on`), of none
-            (`off`). Failed ones are known only afterwards, so all are sampled for them.
+            (`off`). Failed ones are known only afterwards, so all are sampled for them, at 10 Hz.
+        video: which repetitions are filmed: one more, of the first seed (`first`; see
+            `photographer`), all (`on`), all but only failed ones are kept (`retain-on-failure`),
+            none (`off`).
         costly_start: the engine compiles when it starts; one worker serves several repetitions.
         compile_timeout: of the compiling [s].
         fresh: start a new worker for each repetition all the same.
@@ -80,6 +83,7 @@ class Case:
     seed: int = 2022
     jitter: float = 1.0
     trace: str = "off"
+    video: str = "off"
     costly_start: bool = False
     compile_timeout: float = 0.0
     fresh: bool = False

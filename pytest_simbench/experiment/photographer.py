@@ -1,37 +1,55 @@
-"""Pictures by the engine's own renderer, of a repetition of their own: what was measured stays
-without them, and goes the same way where the engine is deterministic."""
+"""Pictures and a film by the engine's own renderer, of a repetition of their own: what was measured
+stays without them, and goes the same way where the engine is deterministic."""
 
 from __future__ import annotations
 
+from pytest_simbench.experiment.camera import Camera
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import file_stem
 from pytest_simbench.experiment.repetition import Repetition
-from pytest_simbench.recordings.album import FOLDER, Album
+from pytest_simbench.recordings import album, film
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.worker.text import named
 
 
-def photograph(experiment: Experiment) -> str:
-    """Repeat the first seed once more, with pictures, into `pictures/` of the run folder.
+def draws(simulator: str) -> str:
+    """Why there are no pictures by this simulator, as a sentence, or nothing."""
+    if Capability.OFFSCREEN in adapter(simulator).info.capabilities:
+        return ""
+    return f"{simulator} has no renderer of its own: no pictures and no videos"
+
+
+def photograph(experiment: Experiment, *, pictures: bool = True, video: bool = False) -> str:
+    """Repeat the first seed once more, into `pictures/` and `videos/` of the run folder; what is
+    there already stays.
+
+    Args:
+        experiment: to repeat.
+        pictures: whether an album is made.
+        video: whether a film is made.
 
     Returns:
         Why there is none, as a sentence, or nothing.
     """
     case = experiment.case
-    if Capability.OFFSCREEN not in adapter(case.simulator).info.capabilities:
-        return f"{case.simulator} has no renderer of its own: no pictures"
-    path = case.folder / FOLDER / f"{file_stem(experiment, 1)}.npz"
-    if path.exists():
+    if told := draws(case.simulator):
+        return told
+    stem = file_stem(experiment, 1)
+    paths = case.folder / album.FOLDER / f"{stem}.npz", case.folder / film.FOLDER / f"{stem}.mp4"
+    taken = album.Album() if pictures and not paths[0].exists() else None
+    filmed = film.Film(paths[1]) if video and not paths[1].exists() else None
+    if taken is None and filmed is None:
         return ""
-    album = Album()
-    beside = experiment.in_case(folder=case.folder / FOLDER, trace="off")
-    _, error = Repetition(beside, 1, album=album).run()
+    camera = Camera(taken, filmed, experiment.task.pictured)
+    beside = experiment.in_case(folder=case.folder / album.FOLDER, trace="off", video="first")
+    _, error = Repetition(beside, 1, camera=camera).run()
     if error is not None and not isinstance(error, Exception):
         raise error
-    if album.pictures:
+    if taken is not None and taken.pictures:
         try:
-            album.write(path)
+            taken.write(paths[0])
         except OSError as wrong:
-            error = wrong
-    return "" if error is None else f"{case.simulator}: pictures end early: {named(error)}"
+            error = error or wrong
+    problem = camera.problem if error is None else named(error)
+    return f"{case.simulator}: pictures end early: {problem}" if problem else ""

@@ -22,21 +22,20 @@ from pytest_simbench.client.launch import Constructed
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.resources import ResourceSampler
 from pytest_simbench.client.stopwatch import Stopwatch
-from pytest_simbench.client.world import Motion, World
+from pytest_simbench.client.world import TRACE_PERIOD, Motion, World
+from pytest_simbench.experiment.camera import Camera
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import file_stem, record_of, settings
 from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.workers import IdleWorkers
-from pytest_simbench.recordings.album import Album
+from pytest_simbench.recordings import film
 from pytest_simbench.recordings.trace import FOLDER, Trace
 from pytest_simbench.records.record import Failure, Record, Status
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.choices import seeds_seen
 from pytest_simbench.tasks.base import Outcome
+from pytest_simbench.worker.stepping import CHECK_PERIOD
 from pytest_simbench.worker.text import LONGEST, named, readable, told
-
-TRACE_PERIOD = 0.02
-"""Sampling of `--sim-trace` [s]: 50 Hz."""
 
 
 class Repetition:
@@ -51,8 +50,8 @@ class Repetition:
         interrupts: held from the moment that the task has ended or failed, so that the record
             is made; the caller ends the block when it has kept it.
         on_phase, on_count: progress, see `tasks.base`.
-        album: takes pictures by the engine's own renderer. They cost time and memory, so nothing
-            else of such a repetition should count.
+        camera: takes pictures by the engine's own renderer, see there; default: one for the film
+            that the case asks for of every repetition.
     """
 
     def __init__(
@@ -64,15 +63,15 @@ class Repetition:
         interrupts: Interrupts | None = None,
         on_phase: Callable[[str], None] = lambda name: None,
         on_count: Callable[[int, int], None] = lambda done, total: None,
-        album: Album | None = None,
+        camera: Camera | None = None,
     ) -> None:
-        self._album = album
         self.experiment = experiment
         self.case = case = experiment.case
         self.number = number
         self.seed = experiment.seed(number)
         self.where = Where(case.simulator, case.mode, number, self.seed)
         self.stopwatch = Stopwatch()
+        self._camera = camera or self._filming()
         self._idle = idle if idle is not None and case.reuses_worker else None
         self._reused = False
         self._on_phase = on_phase
@@ -100,6 +99,7 @@ class Repetition:
         problem = self._write_trace(failed=error is not None)
         if problem:
             outcome.details["trace"] = problem
+        outcome.details.update(self._end_film(failed=error is not None))
         return self._record(outcome, error, resources), error
 
     def probe(self) -> tuple[Record, BaseException | None]:
@@ -136,16 +136,18 @@ class Repetition:
             self.experiment.scene(self.seed),
             stopwatch=self.stopwatch,
             on_phase=self._enter,
-            trace_period=TRACE_PERIOD if self._keeps(failed=True) else None,
-            after_phase=self._look,
+            trace_period=self._trace_period(),
+            after_phase=self._leave,
         )
+        if self._camera is not None:
+            self._camera.enter(world, self.where.phase)
         outcome = self.experiment.task.perform(world, self.seed, self._on_count)
         self._stats = world.stats()
         return outcome
 
-    def _look(self, world: World, phase: str) -> None:
-        if self._album is not None:
-            self._album.look(group(phase), world.render)
+    def _leave(self, world: World, phase: str) -> None:
+        if self._camera is not None:
+            self._camera.leave(world, group(phase))
 
     def _construct(self) -> WorkerProcess:
         """Launch the worker and give the simulator its settings."""
@@ -199,6 +201,8 @@ class Repetition:
         self.where.phase = phase
         if self._sampler is not None:
             self._sampler.phase = group(phase)
+        if self._camera is not None and self._world is not None:
+            self._camera.enter(self._world, group(phase))
         self._on_phase(phase)
 
     def _finish(self, error: BaseException | None) -> dict[str, Any]:
@@ -261,6 +265,29 @@ class Repetition:
             if log and self.case.folder in log.parents
             else ""
         )
+
+    def _filming(self) -> Camera | None:
+        """For the film of a repetition that counts."""
+        if self.case.video not in ("on", "retain-on-failure"):
+            return None
+        name = file_stem(self.experiment, self.number)
+        return Camera(film=film.Film(self.case.folder / film.FOLDER / f"{name}.mp4"))
+
+    def _end_film(self, *, failed: bool) -> dict[str, Any]:
+        """What the record tells of it: that there was one, and why it ended early."""
+        camera = self._camera
+        if camera is None:
+            return {}
+        camera.finish(self._world, keep=failed or self.case.video != "retain-on-failure")
+        filmed = {"filmed": True} if camera.film is not None and camera.film.frames else {}
+        return {**filmed, **({"video": camera.problem} if camera.problem else {})}
+
+    def _trace_period(self) -> float | None:
+        """Of samples of the motion [s]. Which repetition fails is known at its end: until then a
+        sample of each look at the state must do, which costs nothing."""
+        if self._keeps(failed=False):
+            return TRACE_PERIOD
+        return CHECK_PERIOD if self._keeps(failed=True) else None
 
     def _keeps(self, *, failed: bool) -> bool:
         """Whether the motion of this repetition is kept."""

@@ -113,6 +113,7 @@ def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: A
         display=_display(this) if mode == "gui" else None,
         protocol=PROTOCOLS[options.value(config, "sim_protocol")],
         trace=recording.trace_mode(config),
+        video=recording.video_mode(config, name),
         **{name: options.value(config, f"sim_{name}") for name in OF_CASES},
         **more,
     )

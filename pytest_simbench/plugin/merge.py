@@ -174,7 +174,7 @@ def report_runs(config: pytest.Config) -> int:
         written = write_files(target, summaries, in_order(whole.records), True, compared, run)
     recorded = [*wrong, publish(config, whole.records, together([o.passed for o in outcomes]))]
     if target is not None and not others:
-        recorded = recording.record(config, folder.path, target, whole.records)
+        recorded += recording.record(config, folder.path, target, whole.records)
     elif options.value(config, recording.RECORD):
         recorded.append("no recordings: join the runs with --sim-merge first")
     _print(config, summaries, [*runs.problems, *written.problems, *recorded])
@@ -243,8 +243,13 @@ def _locked(config: pytest.Config) -> RunFolder:
     return folder
 
 
+BESIDE = ("traces/{}.npz", "pictures/{}.npz", "videos/{}.mp4")
+"""What else a run folder may hold of a repetition, named as its log is."""
+
+
 def _copy(records: list[Merged], folders: dict[str, RunFolder], to: RunFolder) -> list[str]:
-    """Write the records, with their logs and traces under the names that they have in the whole.
+    """Write the records, with their logs and what else there is of them (`BESIDE`) under the names
+    that they have in the whole.
 
     Returns:
         What was refused, one sentence each.
@@ -253,13 +258,13 @@ def _copy(records: list[Merged], folders: dict[str, RunFolder], to: RunFolder) -
 
     refused: dict[str, None] = {}
     for item in records:
-        stem, folder = file_stem_of(item.record), folders[item.run]
+        was, stem, folder = file_stem_of(item.was), file_stem_of(item.record), folders[item.run]
         details = dict(item.record.details)
         if log := item.was.details.get("log") or "":
             details["log"] = ""
         for source, target in (
             (log, f"logs/{stem}.log"),
-            (f"traces/{file_stem_of(item.was)}.npz", f"traces/{stem}.npz"),
+            *((name.format(was), name.format(stem)) for name in BESIDE),
         ):
             try:
                 if source and _copied(folder.inside(source), to, target) and source == log:

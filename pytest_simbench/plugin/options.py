@@ -115,13 +115,18 @@ OPTIONS = (
            metavar="MB"),
     Option("--sim-output", File(), "folder of the run (default: .simbench/TIME-ID)", metavar="DIR"),
     Option("--sim-trace", Choice(("first", "first-and-failed", "retain-on-failure", "on", "off")),
-           "keep the motion of joints and bodies at 50 Hz, for replay and recordings: of the first "
-           "repetition of each test (first), also of failed ones (first-and-failed), of these "
-           "alone (retain-on-failure), of all (on), of none (off)", "first", metavar="WHEN"),
+           "keep the motion of joints and bodies, for replay and recordings: of the first "
+           "repetition of each test at 50 Hz and of failed ones at 10 Hz (first-and-failed), of "
+           "one of these (first, retain-on-failure), of all (on), of none (off)",
+           "first-and-failed", metavar="WHEN"),
     Option("--sim-record", Choice(("mcap",)), "write each repetition's motion as a rosbag2 folder "
            "(MCAP), for Foxglove, PlotJuggler and ros2 bag", metavar="FORMAT"),
     Option("--sim-pictures", Flag(), "take pictures with each simulator's own renderer, in a "
            "repetition that is not measured, for a contact sheet", False),
+    Option("--sim-video", Choice(("off", "first", "on", "retain-on-failure")), "have each "
+           "simulator film with its own renderer, as mp4: the first seed, in a repetition that is "
+           "not measured (first), each repetition (on), each but only failed ones are kept "
+           "(retain-on-failure)", "off", metavar="WHEN"),
     Option("--sim-badge", File(), "write the result as JSON for a badge of shields.io into this "
            "file", metavar="FILE"),
     Option("--sim-threshold", Assignments("METRIC=NUMBER", numbers=True), "change a threshold of "

@@ -1,11 +1,13 @@
-"""`--sim-trace` and `--sim-record`: what is kept of the motion of repetitions.
+"""`--sim-trace`, `--sim-record`, `--sim-pictures`, `--sim-video`: what is kept to be looked at.
 
 Imported at plugin load: standard library and pytest only; everything else is imported late.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import shutil
+import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,9 +16,11 @@ import pytest
 from pytest_simbench.plugin import options
 
 if TYPE_CHECKING:
+    from pytest_simbench.experiment.experiment import Experiment
     from pytest_simbench.records.record import Record
+    from pytest_simbench.report.progress import Progress
 
-RECORD, TRACE = "sim_record", "sim_trace"
+RECORD, TRACE, PICTURES, VIDEO = "sim_record", "sim_trace", "sim_pictures", "sim_video"
 
 
 def trace_mode(config: pytest.Config) -> str:
@@ -26,12 +30,58 @@ def trace_mode(config: pytest.Config) -> str:
     return str(options.value(config, TRACE))
 
 
+def video_mode(config: pytest.Config, simulator: str) -> str:
+    """Which repetitions of a simulator are filmed: `--sim-video`, none without a renderer."""
+    mode = str(options.value(config, VIDEO))
+    if mode != "off":
+        from pytest_simbench.experiment.photographer import draws
+
+        mode = "off" if draws(simulator) else mode
+    return mode
+
+
+def photograph(
+    config: pytest.Config,
+    experiment: Experiment,
+    records: Sequence[Record],
+    tell: Callable[[str], object],
+) -> None:
+    """Have the pictures and the film taken that are of a repetition of their own.
+
+    Args:
+        config: of pytest.
+        experiment: whose repetitions have been done.
+        records: of them; they tell what became of their own films.
+        tell: takes a sentence for the end of the run.
+    """
+    pictures, video = options.value(config, PICTURES), options.value(config, VIDEO)
+    if not pictures and video == "off":
+        return
+    from pytest_simbench.experiment import photographer
+
+    told = photographer.draws(experiment.case.simulator)
+    if not told and (pictures or video == "first"):
+        told = photographer.photograph(experiment, pictures=pictures, video=video == "first")
+    ended = next((r.details["video"] for r in records if "video" in r.details), None)
+    for problem in (told, f"{experiment.case.simulator}: no video: {ended}" if ended else ""):
+        if problem:
+            tell(problem)
+
+
 def check(config: pytest.Config) -> None:
     """Complain of a recording that cannot be made, before anything runs.
 
     Raises:
-        pytest.UsageError: there will be no motion to record, or what writes it is not installed.
+        pytest.UsageError: there will be no motion to record, or what writes is not installed.
     """
+    if options.value(config, VIDEO) != "off":
+        from pytest_simbench.recordings import film
+
+        try:
+            film.check_available()
+        except film.FilmsUnavailable as error:
+            video = options.value(config, VIDEO)
+            raise pytest.UsageError(f"--sim-video={video}: {error}") from None
     if not options.value(config, RECORD):
         return
     if trace_mode(config) == "off":
@@ -46,7 +96,13 @@ def check(config: pytest.Config) -> None:
         raise pytest.UsageError(f"--sim-record=mcap: {error}") from None
 
 
-def record(config: pytest.Config, run: Path, target: Path, records: Sequence[Record]) -> list[str]:
+def record(
+    config: pytest.Config,
+    run: Path,
+    target: Path,
+    records: Sequence[Record],
+    progress: Progress | None = None,
+) -> list[str]:
     """Write the recordings that were asked for.
 
     Args:
@@ -54,6 +110,7 @@ def record(config: pytest.Config, run: Path, target: Path, records: Sequence[Rec
         run: folder of the run, which holds the traces.
         target: folder to write to.
         records: of the run.
+        progress: the live line; None: one on standard output.
 
     Returns:
         Lines for the terminal.
@@ -63,8 +120,18 @@ def record(config: pytest.Config, run: Path, target: Path, records: Sequence[Rec
     from pytest_simbench.report.files import shown
     from pytest_simbench.report.recorded import FOLDER, write_bags
 
-    count, problems = write_bags(run, target, records)
+    count, problems = write_bags(run, target, records, progress or _printed())
     if not count:
         return [*problems, "no recordings: the run has no traces; see --sim-trace"]
     many = f"{count} recording{'s' if count > 1 else ''}"
     return [*problems, f"{many}: {shown(target / FOLDER, config.invocation_params.dir)}"]
+
+
+def _printed() -> Progress:
+    """For a command, which has no terminal of pytest's."""
+    from pytest_simbench.report.progress import Progress
+
+    def write(text: str) -> None:
+        print(text, end="", flush=True)
+
+    return Progress(write, sys.stdout.isatty(), shutil.get_terminal_size().columns)

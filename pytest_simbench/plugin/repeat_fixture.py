@@ -14,7 +14,7 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.sequential import Plan, SequentialResultSet
 from pytest_simbench.measure.results import ResultSet
-from pytest_simbench.plugin import options
+from pytest_simbench.plugin import options, recording
 from pytest_simbench.plugin.arguments import can_do
 from pytest_simbench.plugin.benchmark import give_rounds
 from pytest_simbench.plugin.resume import NotResumed
@@ -65,11 +65,7 @@ class RepeatFixture:
         else:
             number = wanted or number_mark(self.node, "reps") or self.case.protocol.repetitions
             result = ResultSet(up_to(int(number)), experiment.metrics)
-        if options.value(self.node.config, "sim_pictures"):
-            from pytest_simbench.experiment.photographer import photograph
-
-            if told := photograph(experiment):
-                self.run.tell(told)
+        recording.photograph(self.node.config, experiment, result.records, self.run.tell)
         result.strict = options.value(self.node.config, "sim_strict")
         self.results.append(result)
         return result

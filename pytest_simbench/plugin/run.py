@@ -251,6 +251,8 @@ class Run:
         from pytest_simbench.report.page import PAGE_NAME
         from pytest_simbench.report.tables import render_run
 
+        path, records = self.folder.path, self.reading.records
+        recorded = recording.record(self.config, path, path, records, self.progress)
         written = write_report(self.folder, self.reading, comparison.found if comparison else None)
         unsaved = self.folder.flush()
         problems = [*self._problems, *self.reading.problems, *self.reading.refused]
@@ -265,8 +267,7 @@ class Run:
         outcome = Outcome(passed, *(comparison.found or () if comparison else ()))
         problems.append(write_outcome(self.folder.path, outcome))
         problems.append(publish(self.config, self.reading.records, passed))
-        folder = self.folder.path
-        problems += recording.record(self.config, folder, folder, self.reading.records)
+        problems += recorded
         if written.complete and not unsaved:
             self.page = self.folder.path / PAGE_NAME
         else:

@@ -15,7 +15,7 @@ paths to mesh files would not travel.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +24,7 @@ import numpy as np
 
 from pytest_simbench.recordings.figure import relative
 from pytest_simbench.recordings.trace import Trace
-from pytest_simbench.records.text import in_one_line
+from pytest_simbench.records.text import for_terminal, in_one_line
 from pytest_simbench.scene import Box, FloatArray, Pose
 
 if TYPE_CHECKING:
@@ -37,14 +37,6 @@ WORLD = "world"
 
 METAL = (0.9, 0.9, 0.92, 1.0)
 """Colour of the robot's links: red, green, blue, alpha."""
-
-ONE = (1.0, 1.0, 1.0)
-"""Scale of a mesh."""
-
-NANOSECONDS = 10**9
-
-INFO = 20
-"""Level of a message about what is normal (rcl_interfaces/msg/Log)."""
 
 
 class BagsUnavailable(ImportError):
@@ -88,7 +80,7 @@ def write_bag(trace: Trace, folder: Path, told: dict[str, str] | None = None) ->
         for name, text in (told or {}).items():
             writer.set_custom_data(name, in_one_line(text))
         with writer:
-            _Bag(writer).write(trace)
+            _Bag(writer, trace).write()
         if folder.exists():
             shutil.rmtree(folder)
         inner.rename(folder)
@@ -98,194 +90,90 @@ def write_bag(trace: Trace, folder: Path, told: dict[str, str] | None = None) ->
 
 
 class _Bag:
-    """The messages of one bag."""
+    """The topics of one bag."""
 
-    def __init__(self, writer: Writer) -> None:
-        from rosbags.typesys import Stores, get_typestore
+    def __init__(self, writer: Writer, trace: Trace) -> None:
+        from pytest_simbench.recordings.messages import NANOSECONDS, Messages
 
         self._writer = writer
-        self._store = get_typestore(Stores.ROS2_JAZZY)
+        self._trace = trace
+        self._messages = Messages()
+        self._times = np.rint(trace.time * NANOSECONDS).astype(np.int64).tolist()
+        self._phases = [(max(0, round(t * NANOSECONDS)), name) for t, name in trace.phases]
 
-    def write(self, trace: Trace) -> None:
-        """Write all topics, in the order of time."""
-        nanoseconds = np.rint(trace.time * NANOSECONDS).astype(np.int64)
-        start = int(nanoseconds[0])
-        latched = [
-            ("/tf_static", "tf2_msgs/msg/TFMessage", self._static(trace, start)),
-            ("/markers", "visualization_msgs/msg/MarkerArray", self._markers(trace, start)),
-        ]
-        if trace.figure is not None:
-            text = self._message("std_msgs/msg/String", data=trace.figure.urdf)
-            latched.append(("/robot_description", "std_msgs/msg/String", text))
-        for topic, kind, message in latched:
-            self._topic(topic, kind, latched=True)(start, message)
-        phases = iter(trace.phases)
-        self._samples(trace, nanoseconds, self._log(phases))
+    def write(self) -> None:
+        """Write all messages, in the order of time."""
+        start, figure, make = self._times[0], self._trace.figure, self._messages.make
+        transforms, markers = self._static(start), list(self._markers(start))
+        told = make("tf2_msgs/msg/TFMessage", transforms=transforms)
+        self._topic("/tf_static", "tf2_msgs/msg/TFMessage", latched=True)(start, told)
+        told = make("visualization_msgs/msg/MarkerArray", markers=markers)
+        self._topic("/markers", "visualization_msgs/msg/MarkerArray", latched=True)(start, told)
+        if figure is not None:
+            told = make("std_msgs/msg/String", data=_lines(figure.urdf))
+            self._topic("/robot_description", "std_msgs/msg/String", latched=True)(start, told)
+        self._samples()
 
-    def _samples(
-        self, trace: Trace, nanoseconds: np.ndarray, log: Callable[[int, bool], None]
-    ) -> None:
+    def _samples(self) -> None:
+        """What moves, sample by sample, and the phases in between."""
         clock = self._topic("/clock", "rosgraph_msgs/msg/Clock")
         tf = self._topic("/tf", "tf2_msgs/msg/TFMessage")
         joints = self._topic("/joint_states", "sensor_msgs/msg/JointState")
-        names = [in_one_line(name) for name in trace.joint_names]
-        frames = list(_moving(trace))
-        transform = self._store.types["geometry_msgs/msg/TransformStamped"]
-        none = np.zeros(0)
-        for k, now in enumerate(map(int, nanoseconds)):
-            stamp = self._stamp(now)
-            header = self._message("std_msgs/msg/Header", stamp=stamp, frame_id=WORLD)
-            log(now, k == len(nanoseconds) - 1)
-            clock(now, self._message("rosgraph_msgs/msg/Clock", clock=stamp))
+        log = self._topic("/rosout", "rcl_interfaces/msg/Log")
+        messages, make, trace = self._messages, self._messages.make, self._trace
+        names, frames = [in_one_line(name) for name in trace.joint_names], list(_moving(trace))
+        none, waiting = np.zeros(0), list(self._phases)
+        for k, now in enumerate(self._times):
+            last = k == len(self._times) - 1
+            while waiting and (last or waiting[0][0] <= now):  # each with its own stamp
+                began, name = waiting.pop(0)
+                log(began, messages.log(began, "phase", name))
+            clock(now, make("rosgraph_msgs/msg/Clock", clock=messages.stamp(now)))
             if names:
-                positions, velocities = trace.joints[k]
-                state = {"name": names, "position": positions, "velocity": velocities}
-                kind = "sensor_msgs/msg/JointState"
-                joints(now, self._message(kind, header=header, effort=none, **state))
+                header, (position, velocity) = messages.header(now, WORLD), trace.joints[k]
+                state = {"name": names, "position": position, "velocity": velocity, "effort": none}
+                joints(now, make("sensor_msgs/msg/JointState", header=header, **state))
             found = [
-                transform(
-                    header=self._message("std_msgs/msg/Header", stamp=stamp, frame_id=parent),
-                    child_frame_id=child,
-                    transform=self._transform(poses[k]),
-                )
-                for parent, child, poses in frames
+                messages.transform(now, parent, child, poses[k]) for parent, child, poses in frames
             ]
             if found:
-                tf(now, self._message("tf2_msgs/msg/TFMessage", transforms=found))
+                tf(now, make("tf2_msgs/msg/TFMessage", transforms=found))
 
-    def _log(self, phases: Iterator[tuple[float, str]]) -> Callable[[int, bool], None]:
-        """Writes the phases that have begun by a time, each with its own stamp."""
-        write = self._topic("/rosout", "rcl_interfaces/msg/Log")
-        waiting = list(phases)
-
-        def until(now: int, last: bool) -> None:
-            while waiting and (last or waiting[0][0] * NANOSECONDS <= now):
-                began, name = waiting.pop(0)
-                at = max(0, round(began * NANOSECONDS))
-                message = self._message(
-                    "rcl_interfaces/msg/Log",
-                    stamp=self._stamp(at),
-                    level=INFO,
-                    name="phase",
-                    msg=in_one_line(name),
-                    file="",
-                    function="",
-                    line=0,
-                )
-                write(at, message)
-
-        return until
-
-    def _static(self, trace: Trace, start: int) -> Any:
+    def _static(self, start: int) -> list[Any]:
+        """Where that is which never moves."""
+        trace = self._trace
         poses = [(frame_of(box), box.pose) for box in trace.fixed]
         if trace.figure is not None:
-            poses.insert(0, (in_one_line(trace.figure.root), Pose()))
-        stamp = self._stamp(start)
-        found = [
-            self._message(
-                "geometry_msgs/msg/TransformStamped",
-                header=self._message("std_msgs/msg/Header", stamp=stamp, frame_id=WORLD),
-                child_frame_id=child,
-                transform=self._transform(pose.as_array()),
-            )
-            for child, pose in poses
-        ]
-        return self._message("tf2_msgs/msg/TFMessage", transforms=found)
+            poses.insert(0, (trace.figure.root, Pose()))
+        transform = self._messages.transform
+        return [transform(start, WORLD, child, pose.as_array()) for child, pose in poses]
 
-    def _markers(self, trace: Trace, start: int) -> Any:
+    def _markers(self, start: int) -> Iterator[Any]:
         """A marker for each shape, in the frame of its link or body; it moves with that frame."""
-        marker: Any = self._store.types["visualization_msgs/msg/Marker"]
-        found = [
-            self._marker(
-                start, frame_of(box), "bodies", k, marker.CUBE, Pose(), box.size, box.colour
-            )
-            for k, box in enumerate(trace.boxes)
-        ]
+        trace, messages = self._trace, self._messages
+        for k, box in enumerate(trace.boxes):
+            place = (start, frame_of(box), "bodies", k)
+            yield messages.box(*place, Pose(), box.size, box.colour)
         for k, part in enumerate(trace.figure.parts if trace.figure else ()):
             assert trace.figure is not None
-            link = in_one_line(part.link)
-            kind, size, corners = marker.CUBE, part.size, np.zeros((0, 3))
+            place = (start, part.link, "robot", k)
             if part.mesh is not None:
-                kind = marker.TRIANGLE_LIST
                 corners = trace.figure.meshes[part.mesh].triangles.reshape(-1, 3)
-            found.append(
-                self._marker(start, link, "robot", k, kind, part.pose, size or ONE, METAL, corners)
-            )
-        return self._message("visualization_msgs/msg/MarkerArray", markers=found)
-
-    def _marker(
-        self,
-        start: int,
-        frame: str,
-        namespace: str,
-        number: int,
-        kind: int,
-        pose: Pose,
-        size: Sequence[float],
-        colour: Sequence[float],
-        corners: Sequence[Sequence[float]] | FloatArray = (),
-    ) -> Any:
-        stamp = self._stamp(start)
-        transform = self._transform(pose.as_array())
-        point = self._store.types["geometry_msgs/msg/Point"]
-        position = point(*map(float, pose.position))
-        return self._message(
-            "visualization_msgs/msg/Marker",
-            header=self._message("std_msgs/msg/Header", stamp=stamp, frame_id=frame),
-            ns=namespace,
-            id=number,
-            type=kind,
-            action=0,
-            pose=self._message(
-                "geometry_msgs/msg/Pose", position=position, orientation=transform.rotation
-            ),
-            scale=self._message("geometry_msgs/msg/Vector3", **dict(zip("xyz", size, strict=True))),
-            color=self._message("std_msgs/msg/ColorRGBA", **dict(zip("rgba", colour, strict=True))),
-            lifetime=self._message("builtin_interfaces/msg/Duration", sec=0, nanosec=0),
-            frame_locked=True,
-            points=[point(*map(float, corner)) for corner in corners],
-            colors=[],
-            texture_resource="",
-            texture=self._message(
-                "sensor_msgs/msg/CompressedImage",
-                header=self._message("std_msgs/msg/Header", stamp=stamp, frame_id=""),
-                format="",
-                data=np.zeros(0, dtype=np.uint8),
-            ),
-            uv_coordinates=[],
-            text="",
-            mesh_resource="",
-            mesh_file=self._message(
-                "visualization_msgs/msg/MeshFile", filename="", data=np.zeros(0, dtype=np.uint8)
-            ),
-            mesh_use_embedded_materials=False,
-        )
+                yield messages.triangles(*place, part.pose, corners, METAL)
+            elif part.size is not None:
+                yield messages.box(*place, part.pose, part.size, METAL)
 
     def _topic(self, name: str, kind: str, latched: bool = False) -> Callable[[int, Any], None]:
         """Adds a topic; what writes a message of it at a time [ns]."""
+        store = self._messages.store
         connection = self._writer.add_connection(
-            name, kind, typestore=self._store, offered_qos_profiles=[_qos(latched)]
+            name, kind, typestore=store, offered_qos_profiles=[_qos(latched)]
         )
 
         def write(now: int, message: Any) -> None:
-            self._writer.write(connection, now, self._store.serialize_cdr(message, kind))
+            self._writer.write(connection, now, store.serialize_cdr(message, kind))
 
         return write
-
-    def _message(self, kind: str, **fields: Any) -> Any:
-        return self._store.types[kind](**fields)
-
-    def _stamp(self, nanoseconds: int) -> Any:
-        sec, nanosec = divmod(nanoseconds, NANOSECONDS)
-        return self._message("builtin_interfaces/msg/Time", sec=sec, nanosec=nanosec)
-
-    def _transform(self, pose: FloatArray) -> Any:
-        x, y, z, qw, qx, qy, qz = map(float, pose)
-        return self._message(
-            "geometry_msgs/msg/Transform",
-            translation=self._message("geometry_msgs/msg/Vector3", x=x, y=y, z=z),
-            rotation=self._message("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
-        )
 
 
 def frame_of(box: Box) -> str:
@@ -299,9 +187,14 @@ def _moving(trace: Trace) -> Iterator[tuple[str, str, FloatArray]]:
         names = list(trace.joint_names)
         for hinge in trace.figure.hinges:
             poses = relative(hinge, trace.joints[:, 0, names.index(hinge.name)])
-            yield in_one_line(hinge.parent), in_one_line(hinge.child), poses
+            yield hinge.parent, hinge.child, poses
     for k, box in enumerate(trace.free):
         yield WORLD, frame_of(box), trace.bodies[:, k, :7]
+
+
+def _lines(text: str) -> str:
+    """A text of any length and many lines, all of them printable."""
+    return for_terminal(text, longest=10 * len(text) + 1)  # `\\U0010ffff` for one character
 
 
 def _qos(latched: bool) -> Any:

@@ -1,16 +1,19 @@
-"""Recordings of a run's repetitions in its folder: a bag for each trace, see `recordings.bag`."""
+"""What a run's folder holds of its repetitions: traces, videos, and a bag for each trace."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from pytest_simbench.experiment.identity import file_stem_of
+from pytest_simbench.recordings import film
 from pytest_simbench.recordings import trace as traces
 from pytest_simbench.recordings.bag import write_bag
 from pytest_simbench.recordings.trace import Trace, TraceError
 from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.records.record import Record
+from pytest_simbench.report.progress import Progress
 
 FOLDER = "recordings"
 """In the run folder."""
@@ -26,32 +29,55 @@ def trace_of(run: Path, record: Record) -> Path | None:
     return path if path.is_file() else None
 
 
-def write_bags(run: Path, target: Path, records: Sequence[Record]) -> tuple[int, list[str]]:
+def video_of(run: Path, record: Record) -> str:
+    """The address of a repetition's video in the run folder; empty where there is none."""
+    address = f"{film.FOLDER}/{file_stem_of(record)}.mp4"
+    try:
+        return address if inside(run, address).is_file() else ""
+    except FolderError:
+        return ""
+
+
+def write_bags(
+    run: Path, target: Path, records: Sequence[Record], progress: Progress
+) -> tuple[int, list[str]]:
     """Write a bag for each repetition that has a trace; those that are up to date stay.
 
     Args:
         run: folder of the run.
         target: folder in which `recordings/` is.
         records: of the run.
+        progress: told of each; a bag takes some seconds.
 
     Returns:
         How many there are now; and what could not be written, one sentence each.
     """
     count, problems = 0, []
+    waiting: list[tuple[Record, Path, Path]] = []
     for record in records:
         try:
             path = trace_of(run, record)
-            if path is None:
-                continue
-            folder = inside(target, f"{FOLDER}/{path.stem}")
-            if not _up_to_date(folder, path):
-                folder.parent.mkdir(parents=True, exist_ok=True)
-                write_bag(Trace.read(path), folder, _told(record))
-            count += 1
-        except (FolderError, TraceError) as error:
+            if path is not None:
+                folder = inside(target, f"{FOLDER}/{path.stem}")
+                written = _up_to_date(folder, path)
+                count += written
+                waiting += [(record, path, folder)] * (not written)
+        except FolderError as error:
+            problems.append(f"no recording: {error}")
+    progress.start_test(FOLDER, len(waiting))
+    for number, (record, path, folder) in enumerate(waiting, start=1):
+        progress.repetition(number, record.seed)
+        began, status = time.monotonic(), "failed"
+        try:
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            write_bag(Trace.read(path), folder, _told(record))
+            count, status = count + 1, "ok"
+        except TraceError as error:
             problems.append(f"no recording: {error}")
         except OSError as error:
             problems.append(f"no recording in {target / FOLDER}: {error.strerror or error}")
+        progress.end_repetition(status, time.monotonic() - began)
+    progress.end_test()
     return count, list(dict.fromkeys(problems))
 
 

@@ -1,4 +1,5 @@
-"""The contact sheet of a task: a row of pictures for each simulator, a column for each phase.
+"""The contact sheet of a task: a row of pictures for each simulator, a column for each phase and
+moment.
 
 Each picture is by the engine's own renderer. matplotlib, an optional extra, puts them together.
 """
@@ -8,6 +9,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from pathlib import Path
+from statistics import fmean
 
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.recordings.album import FOLDER, Album
@@ -50,28 +52,28 @@ def draw_sheet(rows: Sequence[tuple[Record, Album]]) -> bytes:
     Raises:
         FiguresUnavailable: matplotlib is not installed.
     """
-    phases = list(dict.fromkeys(phase for _, album in rows for phase in album.pictures))
+    columns = _columns([album for _, album in rows])
     several = len({record.simulator for record, _ in rows}) < len(rows)
     width, height = (
         margin + cell * count
-        for margin, cell, count in zip(MARGIN, CELL, (len(phases), len(rows)), strict=True)
+        for margin, cell, count in zip(MARGIN, CELL, (len(columns), len(rows)), strict=True)
     )
     with drawing():
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(width, height), facecolor="white")
         grid = figure.add_gridspec(
-            len(rows), len(phases), left=MARGIN[0] / width, right=1, bottom=0,
+            len(rows), len(columns), left=MARGIN[0] / width, right=1, bottom=0,
             top=1 - MARGIN[1] / height, wspace=0.01, hspace=0.01,
         )  # fmt: skip
         for line, (record, album) in enumerate(rows):
-            for column, phase in enumerate(phases):
+            for column, shown in enumerate(columns):
                 axes = figure.add_subplot(grid[line, column])
                 axes.set_axis_off()
-                if phase in album.pictures:
-                    axes.imshow(album.pictures[phase])
+                if shown in album.pictures:
+                    axes.imshow(album.pictures[shown])
                 if line == 0:
-                    axes.set_title(for_figure(f"after {phase}"), fontsize=9)
+                    axes.set_title(for_figure(shown), fontsize=9)
                 if column == 0:
                     name = record.label if several else record.simulator
                     axes.text(
@@ -81,6 +83,15 @@ def draw_sheet(rows: Sequence[tuple[Record, Album]]) -> bytes:
         picture = io.BytesIO()
         figure.savefig(picture, format="png", dpi=DPI)
     return picture.getvalue()
+
+
+def _columns(albums: Sequence[Album]) -> list[str]:
+    """What the pictures show, in the order of time (the mean over the albums)."""
+    times: dict[str, list[float]] = {}
+    for album in albums:
+        for shown, time in album.times.items():
+            times.setdefault(shown, []).append(time)
+    return sorted(times, key=lambda shown: fmean(times[shown]))
 
 
 def sheets(run: Path, records: Sequence[Record]) -> tuple[dict[str, bytes], list[str]]:

@@ -177,6 +177,8 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str, ends: 
     notes += [again] * bool(again)
     if any(record.contended for record in done):
         notes.append("repetitions ran in parallel: its times and CPU are contended")
+    if any(record.details.get("filmed") for record in done):
+        notes.append("repetitions were filmed: CPU and RAM are those of simulator and renderer")
     if any(record.reused_worker for record in done):
         notes.append("one worker served several repetitions: launch and memory are not fresh")
     return Row(

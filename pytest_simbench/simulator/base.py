@@ -104,7 +104,8 @@ class Simulator(ABC):
         raise self._missing("contact count")
 
     def render(self, width: int, height: int) -> NDArray[np.uint8]:
-        """A picture of the world without a window, (height, width, 3), RGB."""
+        """A picture of the world without a window, (height, width, 3), RGB; from where
+        `simulator.view` says, so that those of two engines can be compared."""
         raise self._missing("offscreen picture")
 
     def refresh_window(self) -> None:  # noqa: B027 - a window may draw itself

@@ -77,6 +77,7 @@ class Task(ABC):
         references: metric name to the value of a perfect simulator, where there is one.
         counted: what progress counts: "cubes placed" shows as `4/15 cubes placed`.
         moments: where replays save and restore, and until which a disturbance is followed.
+        pictured: phases within which the task notes moments (`World.note`); pictures show them.
     """
 
     name: ClassVar[str]
@@ -84,6 +85,7 @@ class Task(ABC):
     references: ClassVar[Mapping[str, float]] = {}
     counted: ClassVar[str] = ""
     moments: ClassVar[tuple[Moment, ...]] = ()
+    pictured: ClassVar[tuple[str, ...]] = ()
 
     @property
     @abstractmethod

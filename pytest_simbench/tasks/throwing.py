@@ -92,6 +92,7 @@ class Throwing(Task):
         Moment("in the grip", "wind up"),
         Moment("after the swing", "throw", 1),
     )
+    pictured: ClassVar[tuple[str, ...]] = ("throw",)
 
     release_fraction: float = 0.5
     wind_up_speed: float = 0.25
@@ -217,7 +218,12 @@ class Throwing(Task):
         held = world.scene.body("projectile")
         gravity = np.asarray(world.scene.gravity)
         cube = world.scene.free_bodies.index(held)
-        return Thrown(manipulator.model, motion, cube, held, started, perfect, gravity)
+        thrown = Thrown(manipulator.model, motion, cube, held, started, perfect, gravity)
+        if thrown.flight is not None:
+            world.note("release", float(motion.time[thrown.flight.first]))
+            if thrown.flight.last < len(motion) - 1:
+                world.note("impact", float(motion.time[thrown.flight.last]))
+        return thrown
 
 
 @cache

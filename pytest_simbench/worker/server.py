@@ -2,8 +2,9 @@
 
 Imports nothing but the rooms `scene` and `simulator`, numpy and the standard library, so that it
 runs in an interpreter that holds nothing but the engine. Each request is a dict
-`{"op": name, ...}`; the answer is `{"ok": result}` or `{"error": {type, message}}`, and in between
-`{"alive": simulated time}` may come any number of times.
+`{"op": name, ...}`; the answer is `{"ok": result}` or `{"error": {type, message}}`. In between may
+come any number of times `{"alive": simulated time}`, and `{"frame": {time, seconds, picture or
+problem}}` while a film is taken.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import importlib
 import os
 import sys
+import time
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
@@ -27,7 +29,7 @@ from pytest_simbench.simulator.robot_check import check_names
 from pytest_simbench.simulator.robot_files import received
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.worker.state import check_following, check_log, check_start, checked_state
-from pytest_simbench.worker.stepping import Stepper
+from pytest_simbench.worker.stepping import Film, Stepper
 from pytest_simbench.worker.text import LONGEST_LOGGED, named, readable, told
 from pytest_simbench.worker.wire import pack, unpack
 
@@ -175,6 +177,31 @@ class Server:
 
     def do_render(self, width: int, height: int) -> Any:
         return self._constructed().render(width, height)
+
+    def do_film(self, period: float | None, width: int, height: int) -> float | None:
+        """Send a picture every `period` [s] of simulated time from now on, or stop (None).
+
+        Returns:
+            The period that there is, of whole steps [s].
+        """
+        stepper, timestep = self._loaded(), self._constructed().settings.timestep
+        if period is None:
+            stepper.film = None
+            return None
+        every = max(1, round(period / timestep))
+        stepper.film = Film(every, lambda: self._shoot(width, height))
+        return every * timestep
+
+    def _shoot(self, width: int, height: int) -> None:
+        """Send one picture; the first that cannot be drawn is told, and the film's last."""
+        began = time.perf_counter()
+        frame: dict[str, Any] = {"time": self._constructed().time}
+        try:
+            frame["picture"] = pack(self._constructed().render(width, height))
+        except Exception as error:  # a film is not what is measured
+            frame["problem"] = told(error) if isinstance(error, SimulatorError) else named(error)
+            self._loaded().film = None
+        self.send({"frame": {**frame, "seconds": time.perf_counter() - began}})
 
     def do_stats(self) -> dict[str, Any]:
         """Clocks of the stepping loop and of the control workload, and the exact memory peak."""

@@ -21,7 +21,8 @@ WINDOW_PERIOD = 1 / 30
 a picture takes, so that half of the time is left for stepping."""
 
 CHECK_PERIOD = 0.1
-"""Simulated time between two looks at the state for values that are not finite [s]."""
+"""Simulated time between two looks at the state for values that are not finite [s]. A log of this
+period is made of these looks, and costs next to nothing."""
 
 LOOK_PERIOD = 0.01
 """Simulated time between two looks at the wall clock, for window and pacing [s]."""
@@ -68,10 +69,19 @@ class Log:
         }
 
 
+@dataclass(frozen=True)
+class Film:
+    """A picture every so many steps, counted since loading; `shoot` takes and sends one."""
+
+    every: int
+    shoot: Callable[[], None]
+
+
 class Stepper:
     """Steps one simulator through trajectories and waits, and keeps its clocks.
 
     Attributes:
+        film: pictures along the way, outside of the measured stepping time; None: none.
         clocks: totals since loading.
         control: the workload that shows the machine's speed meanwhile.
         real_time: wait for the wall clock after each step, as the study's simulators did.
@@ -84,6 +94,7 @@ class Stepper:
         self._clock = Clock()
         self.control = Control(self._clock)
         self.real_time = False
+        self.film: Film | None = None
         self._next_picture = 0.0
 
     def follow(self, trajectory: Trajectory, log_period: float | None) -> dict[str, Any]:
@@ -116,6 +127,7 @@ class Stepper:
         check_every = max(1, round(CHECK_PERIOD / timestep))
         watched = simulator.gui or self.real_time
         look_every = max(1, round((LOOK_PERIOD if watched else CHECK_PERIOD) / timestep))
+        film_every = self.film.every if self.film is not None else 0
         log = Log()
         step, command, clock = simulator.step, simulator.command, self._clock
         totals, keep_up = self.clocks, self.control.keep_up
@@ -127,7 +139,8 @@ class Stepper:
                 command(*rows[k - 1])
             step()
             logs = log_every and k % log_every == 0
-            if not logs and k % look_every and k % check_every and k < steps:
+            films = film_every and (totals.steps + k) % film_every == 0
+            if not (logs or films) and k % look_every and k % check_every and k < steps:
                 continue
             stopped, waited_now = clock()
             totals.wall += stopped - resumed
@@ -136,10 +149,12 @@ class Stepper:
             if logs:
                 log.sample(simulator)
             if k % check_every == 0:
-                self._check_finite()
+                self._check_finite(log if logs else None)
             if stopped - beat > HEARTBEAT_PERIOD:
                 beat = stopped
                 self.heartbeat(simulator.time)
+            if films and self.film is not None:
+                self.film.shoot()
             if simulator.gui and stopped > self._next_picture:
                 simulator.refresh_window()
                 drawn = time.perf_counter()
@@ -157,11 +172,12 @@ class Stepper:
         self._check_finite()
         return log.arrays() if log.times else {}
 
-    def _check_finite(self) -> None:
+    def _check_finite(self, log: Log | None = None) -> None:
+        """Look at the present state, or at the log's last sample where that is it."""
         simulator = self.simulator
         for what, state in (
-            ("joints", simulator.joint_state()),
-            ("bodies", simulator.body_state()),
+            ("joints", log.joints[-1] if log else simulator.joint_state()),
+            ("bodies", log.bodies[-1] if log else simulator.body_state()),
         ):
             if not np.isfinite(state).all():
                 raise DivergedError(

@@ -44,6 +44,7 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
+from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
 
 from .readback import ReadBack
 from .world import DrakeSettings, World, transform
@@ -220,7 +221,7 @@ class Drake(Simulator):
             engine = geometry.MakeRenderEngineVtk(look)
             self.scene_graph.AddRenderer(context, "vtk", engine)
             self._has_camera = True
-        lens = sensors.CameraInfo(width, height, np.pi / 4)
+        lens = sensors.CameraInfo(width, height, FIELD_OF_VIEW)
         core = geometry.RenderCameraCore(
             "vtk", lens, geometry.ClippingRange(0.05, 20.0), math.RigidTransform()
         )
@@ -249,10 +250,6 @@ class Drake(Simulator):
             if name not in ("settings", "gui"):
                 delattr(self, name)
         gc.collect()  # pydrake's parts keep each other alive; Meshcat would keep its port
-
-
-EYE, LOOK_AT = (2.0, -1.4, 1.3), (0.5, 0.0, 0.35)
-"""Of the camera, in the world [m]."""
 
 
 def _camera() -> Any:

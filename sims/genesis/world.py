@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
+from math import degrees
 from typing import Any, Literal
 
 import numpy as np
 
 from pytest_simbench.scene import Box, Scene
 from pytest_simbench.simulator import PreparedRobot, Settings, lazy_import
+from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
 
 genesis = lazy_import("genesis")
 
 LEAST_FRICTION = 0.01
 """A material must have at least this coefficient, and so has every contact (`func_add_contact`)."""
-
-EYE, LOOK_AT = (2.0, 1.6, 1.3), (0.5, 0.0, 0.35)
-"""Of camera and window [m]."""
-
-FIELD_OF_VIEW = 40.0
-"""[degrees]."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +77,10 @@ def new_world(scene: Scene, settings: GenesisSettings, *, window: bool) -> Any:
         ),
         vis_options=options.VisOptions(show_world_frame=False),
         viewer_options=options.ViewerOptions(
-            res=(1024, 768), camera_pos=EYE, camera_lookat=LOOK_AT, camera_fov=FIELD_OF_VIEW
+            res=(1024, 768),
+            camera_pos=EYE,
+            camera_lookat=LOOK_AT,
+            camera_fov=degrees(FIELD_OF_VIEW),
         ),
         profiling_options=options.ProfilingOptions(show_FPS=False),
         show_viewer=window,
@@ -129,7 +128,7 @@ def add_camera(world: Any, width: int, height: int) -> Any:
         lookat=LOOK_AT,
         up=(0.0, 0.0, 1.0),
         model="pinhole",
-        fov=FIELD_OF_VIEW,
+        fov=degrees(FIELD_OF_VIEW),
         aperture=2.0,
         focus_dist=None,
         GUI=False,

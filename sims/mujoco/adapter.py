@@ -28,13 +28,15 @@ from pytest_simbench.simulator import (
     lazy_import,
 )
 
-from .pictures import DISABLED, renderer
+from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack
 
 mujoco = lazy_import("mujoco")
 
 ROBOT, WORLD = 1, 2
 """Collision groups: the robot's links touch everything but each other."""
+
+LINK_COLOUR, GROUND_COLOUR = (0.9, 0.9, 0.9, 1.0), (0.5, 0.5, 0.5, 1.0)
 
 
 @dataclass(frozen=True)
@@ -117,6 +119,7 @@ class MuJoCo(Simulator):
         if scene.robot is not None:
             for geom in spec.geoms:
                 self._set_surface(geom, scene.robot.friction, ROBOT, 0)
+                geom.rgba = LINK_COLOUR
             for joint in scene.robot.joints:
                 _add_drive(spec, joint)
             for pair in scene.robot.gripper.couplings:
@@ -125,7 +128,7 @@ class MuJoCo(Simulator):
             name="ground",
             type=mujoco.mjtGeom.mjGEOM_PLANE,
             size=[0, 0, 0.5],
-            rgba=[0.5, 0.5, 0.5, 1],
+            rgba=GROUND_COLOUR,
         )
         self._set_surface(ground, scene.ground_friction, WORLD, WORLD | ROBOT)
         for box in scene.bodies:
@@ -241,7 +244,7 @@ class MuJoCo(Simulator):
             height,
         ):
             self._renderer = renderer(mujoco, self.model, width, height)
-        self._renderer.update_scene(self.data, _camera())
+        self._renderer.update_scene(self.data, camera(mujoco))
         return np.array(self._renderer.render())
 
     def _open_window(self) -> None:
@@ -250,10 +253,10 @@ class MuJoCo(Simulator):
         self._viewer = mujoco.viewer.launch_passive(
             self.model, self.data, show_left_ui=False, show_right_ui=False
         )
-        camera = _camera()
+        view = camera(mujoco)
         with self._viewer.lock():
             for name in ("lookat", "distance", "azimuth", "elevation"):
-                setattr(self._viewer.cam, name, getattr(camera, name))
+                setattr(self._viewer.cam, name, getattr(view, name))
 
     def refresh_window(self) -> None:
         if self._viewer is not None:
@@ -318,10 +321,3 @@ def _rotations(quaternions: FloatArray) -> FloatArray:
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
     return np.array(rows).transpose(2, 0, 1)
-
-
-def _camera() -> Any:
-    camera = mujoco.MjvCamera()
-    camera.lookat[:] = [0.5, 0.0, 0.35]
-    camera.distance, camera.azimuth, camera.elevation = 2.2, 140.0, -25.0
-    return camera

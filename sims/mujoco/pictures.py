@@ -8,8 +8,13 @@ and the driver comes with the first picture.
 from __future__ import annotations
 
 import importlib
+import math
 import os
 from typing import Any
+
+import numpy as np
+
+from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
 
 DISABLED = {"MUJOCO_GL": "disabled"}
 """The environment of a headless import."""
@@ -21,4 +26,16 @@ def renderer(mujoco: Any, model: Any, width: int, height: int) -> Any:
     if not hasattr(context, "GLContext"):
         os.environ["MUJOCO_GL"] = "egl"
         importlib.reload(context)
+    model.vis.global_.fovy = math.degrees(FIELD_OF_VIEW)
+    model.vis.quality.shadowsize = 1024  # of 4096: a software renderer is twice as fast
+    model.vis.headlight.ambient[:] = 0.4
     return mujoco.Renderer(model, height, width)
+
+
+def camera(mujoco: Any) -> Any:
+    """An `MjvCamera` at the place that all engines share."""
+    found, (x, y, z) = mujoco.MjvCamera(), np.subtract(LOOK_AT, EYE)
+    found.lookat[:], found.distance = LOOK_AT, math.hypot(x, y, z)
+    found.azimuth = math.degrees(math.atan2(y, x))
+    found.elevation = math.degrees(math.asin(z / found.distance))
+    return found

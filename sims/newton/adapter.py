@@ -30,7 +30,7 @@ from pytest_simbench.simulator import (
     lazy_import,
 )
 
-from ..mujoco.pictures import DISABLED, renderer
+from ..mujoco.pictures import DISABLED, camera, renderer
 from ..mujoco.readback import Numbers, ReadBack
 from .world import NewtonSettings, build_model, make_solver, names
 
@@ -241,13 +241,10 @@ class Newton(Simulator):
         """A picture by MuJoCo, whose renderer needs no display."""
         model = self.solver.mj_model
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
-        model.vis.headlight.ambient[:] = 0.4
         model.geom_rgba[:, :3] = self.model.shape_color.numpy()[self._shapes()]
-        camera = mujoco.MjvCamera()
-        camera.lookat[:] = _LOOK_AT
-        camera.distance, camera.azimuth, camera.elevation = 2.2, 140.0, -25.0
+        model.vis.headlight.diffuse[:] = 0.9  # Newton's model has no other light
         with renderer(mujoco, model, width, height) as drawing:
-            drawing.update_scene(self.solver.mj_data, camera)
+            drawing.update_scene(self.solver.mj_data, camera(mujoco))
             return np.array(drawing.render())
 
     def _open_window(self) -> None:
@@ -275,9 +272,6 @@ class Newton(Simulator):
 
         return {name: version(name) for name in ("newton", "warp-lang", "mujoco", "mujoco-warp")}
 
-
-_LOOK_AT = (0.5, 0.0, 0.35)
-"""What the offscreen camera looks at [m]."""
 
 _STATE = ("joint_q", "joint_qd", "body_q", "body_qd")
 """Arrays of Newton's state."""

@@ -40,6 +40,10 @@ physx = lazy_import("sapien.physx")
 ROBOT, WORLD = 1, 2
 """Collision groups: the robot's links touch everything but each other."""
 
+PACKED = [4, 5, 6, 0, 1, 2, 3, *range(7, 13)]
+"""Columns of `body_state` in the rows that SAPIEN packs: quaternion first. These rows, one for each
+free body, are the first of what `PhysxCpuSystem.pack` gives, in single precision."""
+
 
 @dataclass(frozen=True)
 class SAPIENSettings(Settings):
@@ -156,7 +160,8 @@ class SAPIEN(Simulator):
         self._world = sapien.Scene([self._system])
         self._ground = self._add_ground(scene.ground_friction)
         self._bodies = {box.name: self._add_box(box) for box in scene.bodies}
-        self._free = [self._bodies[box.name] for box in scene.free_bodies]
+        packed = self._system.rigid_dynamic_components
+        self._rows = [packed.index(self._bodies[box.name]) for box in scene.free_bodies]
         self._robot: Any = None
         self._joints: list[Any] = []
         self._links: dict[str, Any] = {}
@@ -282,11 +287,9 @@ class SAPIEN(Simulator):
         return self._steps * self.settings.timestep
 
     def body_state(self) -> FloatArray:
-        state = np.empty((len(self._free), 13))
-        for row, body in zip(state, self._free, strict=True):
-            row[:7] = _pose(body)
-            row[7:10], row[10:] = body.linear_velocity, body.angular_velocity
-        return state
+        # All in one call; body by body it takes ten times as long, a third of the stepping.
+        packed = np.frombuffer(self._system.pack(), np.float32, count=13 * len(self._rows))
+        return packed.reshape(-1, 13)[self._rows][:, PACKED].astype(float)
 
     def joint_state(self) -> FloatArray:
         if self._robot is None:
@@ -340,8 +343,3 @@ def _drop_visuals(path: Path) -> None:
         for visual in link.findall("visual"):
             link.remove(visual)
     tree.write(path)
-
-
-def _pose(component: Any) -> FloatArray:
-    pose = component.entity.pose
-    return np.concatenate([pose.p, pose.q])

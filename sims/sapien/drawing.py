@@ -16,16 +16,11 @@ from numpy.typing import NDArray
 
 from pytest_simbench.scene import Pose, Scene, Vector3
 from pytest_simbench.simulator import PreparedRobot, UnavailableError, lazy_import
+from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
 
 sapien = lazy_import("sapien")
 rendering = lazy_import("sapien.render")
 viewing = lazy_import("sapien.utils.viewer")
-
-EYE, TARGET = np.array([2.0, 1.6, 1.3]), np.array([0.5, 0.0, 0.35])
-"""Of camera and window [m]."""
-
-FIELD_OF_VIEW = math.radians(40.0)
-"""Vertical [rad]."""
 
 NEAR, FAR = 0.1, 100.0
 """What the camera sees [m]."""
@@ -159,7 +154,7 @@ def _pose(pose: Pose) -> Any:
 
 def _looking() -> Any:
     """From the eye to the target; SAPIEN's cameras look along x, with z up."""
-    forward = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
+    forward = np.subtract(LOOK_AT, EYE) / np.linalg.norm(np.subtract(LOOK_AT, EYE))
     left = np.cross([0.0, 0.0, 1.0], forward)
     left /= np.linalg.norm(left)
     matrix = np.eye(4)

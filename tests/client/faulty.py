@@ -50,6 +50,13 @@ SPOIL: dict[str, Callable[[Any], None]] = {"mujoco": _spoil_mujoco, "pybullet": 
 HEAVIER = {"mujoco": _heavier_mujoco, "pybullet": _heavier_pybullet}
 
 
+class Blind(MuJoCo):
+    """Draws nothing."""
+
+    def render(self, width: int, height: int) -> Any:
+        raise self._missing("offscreen picture")
+
+
 class Faulty(Simulator):
     """Does `fault` once its time has come."""
 

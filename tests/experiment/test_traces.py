@@ -62,7 +62,8 @@ def test_the_motion_of_the_engine_is_in_it(case: Case) -> None:
 
 
 def test_what_is_not_kept_is_not_sampled(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Sampling takes up to a third of the time of stepping (benchmarks/README.md)."""
+    """Sampling takes time (benchmarks/README.md): what is kept only if it fails is made of the
+    looks at the state that are taken anyway."""
     sampled = []
     real = Repetition._write_trace
 
@@ -72,6 +73,24 @@ def test_what_is_not_kept_is_not_sampled(case: Case, monkeypatch: pytest.MonkeyP
         return real(self, failed=failed)
 
     monkeypatch.setattr(Repetition, "_write_trace", count)
-    for number in (1, 2):
-        Repetition(Experiment(replace(case, trace="first"), Falling()), number).run()
-    assert sampled == [30, 0]
+    for mode in ("first", "first-and-failed"):
+        for number in (1, 2):
+            Repetition(Experiment(replace(case, trace=mode), Falling()), number).run()
+    assert sampled == [30, 0, 30, 6]
+
+
+def test_a_task_that_samples_itself_keeps_that(case: Case) -> None:
+    """Of a throw that failed there is more than ten samples a second."""
+
+    @dataclass(frozen=True)
+    class Watched(Falling):
+        def perform(self, world: World, seed: int, count: Count) -> Outcome:
+            world.wait(0.2, log_period=0.0)
+            world.wait(0.2)
+            raise RuntimeError("bad luck")
+
+    case = replace(case, trace="first-and-failed")
+    Repetition(Experiment(case, Watched()), 2).run()
+    (path,) = (case.folder / FOLDER).iterdir()
+    apart = np.diff(Trace.read(path).time)
+    assert sorted(set(apart.round(3))) == [0.02, 0.1, 0.119]

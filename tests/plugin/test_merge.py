@@ -32,7 +32,8 @@ def merge(pytester: pytest.Pytester, *runs: str, output: str = "whole") -> int:
 def test_logs_and_traces_are_copied_under_names_of_ours(pytester: pytest.Pytester) -> None:
     for name, seed in (("a", 1), ("b", 2)):
         found = saved(pytester.path / name, seed, "logs/x-1.log")
-        for path in ("logs/x-1.log", f"traces/{file_stem_of(found)}.npz"):
+        stem = file_stem_of(found)
+        for path in ("logs/x-1.log", f"traces/{stem}.npz", f"videos/{stem}.mp4"):
             file = pytester.path / name / path
             file.parent.mkdir(exist_ok=True)
             file.write_text(f"{path} of {name}")
@@ -46,6 +47,8 @@ def test_logs_and_traces_are_copied_under_names_of_ours(pytester: pytest.Pyteste
     assert [log[-6:] for log in logs] == ["-1.log", "-2.log"]
     traces = [Path(log.replace("logs", "traces")).with_suffix(".npz") for log in logs]
     assert [(whole / t).read_text()[-4:] for t in traces] == ["of a", "of b"]
+    videos = [Path(log.replace("logs", "videos")).with_suffix(".mp4") for log in logs]
+    assert [(whole / v).read_text()[-4:] for v in videos] == ["of a", "of b"]
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,5 @@
-"""`--sim-record`: a bag for each repetition, at the end of a run and from its folder alone."""
+"""`--sim-record`: a bag for each repetition, at the end of a run and from its folder alone.
+`--sim-pictures` and `--sim-video`: what is taken beside the repetitions that count."""
 
 from __future__ import annotations
 
@@ -39,7 +40,15 @@ def test_each_repetition_gets_a_bag(pytester: pytest.Pytester, more: list[str]) 
         "--sim=mujoco", "--sim-output=o", "--sim-record=mcap", *more
     )
     result.assert_outcomes(passed=1)
-    result.stdout.fnmatch_lines(["2 recordings: o/recordings", "report: o/report.html"])
+    result.stdout.fnmatch_lines(
+        [
+            "recordings  repetition 1 of 2  ok after *",
+            "recordings  repetition 2 of 2  ok after *",
+            "*simulator comparison*",
+            "2 recordings: o/recordings",
+            "report: o/report.html",
+        ]
+    )
     bags = sorted((pytester.path / "o" / "recordings").iterdir())
     traces = sorted((pytester.path / "o" / "traces").iterdir())
     assert [bag.name for bag in bags] == [trace.stem for trace in traces]
@@ -76,6 +85,7 @@ def test_a_run_without_traces_says_so(pytester: pytest.Pytester) -> None:
     ("arguments", "message"),
     [
         (["--sim-record=avi"], "--sim-record=avi: choose from mcap"),
+        (["--sim-video=all"], "--sim-video=all: choose from off, first, on, retain-on-failure"),
         (["--sim-record=mcap", "--sim-trace=off"], "leave --sim-trace=off out"),
     ],
 )
@@ -88,30 +98,45 @@ def test_what_cannot_be_recorded_is_refused_before_anything_runs(
     result.stderr.fnmatch_lines([f"ERROR: *{message}"])
 
 
-def test_missing_rosbags_is_one_sentence_before_anything_runs(pytester: pytest.Pytester) -> None:
+@pytest.mark.parametrize(
+    ("package", "option", "extra"),
+    [("rosbags", "--sim-record=mcap", "ros"), ("av", "--sim-video=first", "video")],
+)
+def test_a_missing_package_is_one_sentence_before_anything_runs(
+    pytester: pytest.Pytester, package: str, option: str, extra: str
+) -> None:
     pytester.makepyfile(TEST)
     pytester.makeconftest(
-        """
+        f"""
         import importlib.util
         find = importlib.util.find_spec
-        importlib.util.find_spec = lambda name, *a: None if name == "rosbags" else find(name, *a)
+        importlib.util.find_spec = lambda name, *a: None if name == "{package}" else find(name, *a)
         """
     )
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-record=mcap")
+    result = pytester.runpytest_subprocess("--sim=mujoco", option)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(["ERROR: --sim-record=mcap: *pip install 'pytest-simbench[[]ros]'"])
+    result.stderr.fnmatch_lines([f"ERROR: {option}: *pip install 'pytest-simbench[[]{extra}]'"])
     assert "Traceback" not in result.stdout.str() + result.stderr.str()
 
 
-def test_pictures_are_taken_beside_what_is_measured(pytester: pytest.Pytester) -> None:
+def test_pictures_and_videos_are_taken_beside_what_is_measured(pytester: pytest.Pytester) -> None:
     pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
-    pytester.makepyfile(TEST)
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=o", "--sim-pictures")
-    result.assert_outcomes(passed=1)
+    pytester.makepyfile(TEST + TEST.replace("def test_falling", "def test_again"))
+    result = pytester.runpytest_subprocess(
+        "--sim=mujoco,dart", "--sim-output=o", "--sim-pictures", "--sim-video=first"
+    )
+    result.assert_outcomes(passed=4)
+    told = "dart has no renderer of its own: no pictures and no videos"
+    assert result.stdout.str().count(told) == 1
     folder = pytester.path / "o"
-    assert len((folder / "records.jsonl").read_text().splitlines()) == 2
+    assert len((folder / "records.jsonl").read_text().splitlines()) == 8
+    assert "filmed" not in (folder / "records.jsonl").read_text()
     assert (folder / "falling_pictures.png").read_bytes().startswith(b"\x89PNG")
-    assert 'src="data:image/png;base64,' in (folder / "report.html").read_text(encoding="utf-8")
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert 'src="data:image/png;base64,' in page
+    videos = sorted(path.name for path in (folder / "videos").iterdir())
+    assert [name.partition("_mujoco")[0] for name in videos] == ["test_again", "test_falling"]
+    assert all(f'href="videos/{name}"' in page for name in videos)
     (folder / "falling_pictures.png").unlink()
     pytester.runpytest_subprocess("--sim-report=o")
     assert (folder / "falling_pictures.png").exists()

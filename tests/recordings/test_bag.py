@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +18,7 @@ from pytest_simbench.recordings import bag
 from pytest_simbench.recordings.bag import BagsUnavailable, frame_of, write_bag
 from pytest_simbench.recordings.trace import Trace
 from tests.hostile import HOSTILE
-from tests.recordings.samples import motion, trace
+from tests.recordings.samples import SAMPLES, motion, trace
 
 LATCHED = {"/tf_static", "/markers", "/robot_description"}
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -145,15 +148,61 @@ def test_phases_are_log_messages_at_their_own_time(tmp_path: Path) -> None:
     ]  # fmt: skip
 
 
-def test_hostile_names_stay_text(tmp_path: Path) -> None:
-    phases = [(0.1 * k, text) for k, text in enumerate(HOSTILE)]
-    told = {"simulator": HOSTILE[0], "test": HOSTILE[4]}
-    write_bag(trace(phases=phases), tmp_path / "x", told)
-    found = [message.msg for _, message in messages(tmp_path / "x")["/rosout"]]
-    assert len(found) == len(HOSTILE)
-    assert all(text.isprintable() for text in found)
+def named(hostile: Sequence[str]) -> Trace:
+    """A stranger's trace: each name of the robot's is one of these texts, its description is all of
+    them. A body refuses such names."""
+    kept = trace(phases=[(0.01 * k, text) for k, text in enumerate(hostile)])
+    assert kept.figure is not None
+    text = itertools.cycle(hostile)
+    links = {name: f"{name} {next(text)}" for name in kept.figure.links}
+    joints = {name: f"{name} {next(text)}" for name in kept.joint_names}
+    hinges = [
+        replace(h, name=joints[h.name], parent=links[h.parent], child=links[h.child])
+        for h in kept.figure.hinges
+    ]
+    parts = [replace(part, link=links[part.link]) for part in kept.figure.parts]
+    root, urdf = links[kept.figure.root], "\n".join(hostile)
+    figure = replace(kept.figure, root=root, hinges=hinges, parts=parts, urdf=urdf)
+    return replace(kept, figure=figure, joint_names=list(joints.values()))
+
+
+def texts(message: Any) -> Iterator[str]:
+    """All texts in a message and the messages in it."""
+    if isinstance(message, str):
+        yield message
+    elif isinstance(message, list):
+        for item in message:
+            yield from texts(item)
+    elif is_dataclass(message):
+        for field in fields(message):
+            yield from texts(getattr(message, field.name))
+
+
+@pytest.mark.parametrize("read", [messages, messages_of_mcap])
+def test_hostile_names_stay_text(read: Any, tmp_path: Path) -> None:
+    """Of links, joints, phases, the robot's description, and what metadata tell."""
+    hostile = (*HOSTILE[:10], "x\x00y", "\u2028\u2029", "A" * 5000)
+    told = {f"text {k}": text for k, text in enumerate(HOSTILE)}
+    write_bag(named(hostile), tmp_path / "x", told)
+    found = read(tmp_path / "x")
+    assert len(found["/tf"]) == SAMPLES
+    assert len(found["/rosout"]) == len(hostile)
+    seen = {t for sent in found.values() for _, message in sent for t in texts(message)}
+    assert sum("owned" in text for text in seen) > 2
+    description = found["/robot_description"][0][1].data
+    assert [t for t in (seen - {description}) if not t.isprintable()] == []
+    assert all(line.isprintable() for line in description.split("\n"))
     metadata = (tmp_path / "x" / "metadata.yaml").read_text()
     assert all(line.isprintable() for line in metadata.splitlines())
+
+
+def test_the_lines_of_a_description_stay_lines(tmp_path: Path) -> None:
+    kept = trace()
+    assert kept.figure is not None
+    urdf = "<robot>\n" + "<a/>" * 10_000 + "\x1b\n</robot>"
+    write_bag(replace(kept, figure=replace(kept.figure, urdf=urdf)), tmp_path / "x")
+    data = messages(tmp_path / "x")["/robot_description"][0][1].data
+    assert data == urdf.replace("\x1b", "\\x1b")
 
 
 def test_a_scene_without_a_robot_is_a_bag_too(tmp_path: Path) -> None:

@@ -20,13 +20,19 @@ ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftsh
 """CI is root in a container, and has no graphics card."""
 
 
+PLAIN = ["--no-sandbox"]
+"""The page is put together without a graphics card too, as in many virtual machines."""
+
+
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
+def browser(request: pytest.FixtureRequest) -> Iterator[Browser]:
+    """With `ARGUMENTS`, or others by indirect parametrisation."""
     playwright = pytest.importorskip("playwright.sync_api", reason="needs the extra 'test'")
     if BROWSER is None:
         pytest.skip("no chromium here: apt-get install chromium")
+    arguments = getattr(request, "param", ARGUMENTS)
     with playwright.sync_playwright() as started:
-        found = started.chromium.launch(executable_path=BROWSER, args=ARGUMENTS)
+        found = started.chromium.launch(executable_path=BROWSER, args=arguments)
         yield found
         found.close()
 

@@ -25,9 +25,9 @@ COLOURS = {"red": (255, 0, 0), "green": (0, 255, 0), "blue": (0, 0, 255)}
 def keep(run: Path, made: Record, **phases: str) -> Record:
     """An album in a run folder: pictures of one colour each, by phase."""
     album = Album()
-    for phase, colour in phases.items():
+    for time, (phase, colour) in enumerate(phases.items()):
         picture = np.full((36, 48, 3), COLOURS[colour], dtype=np.uint8)
-        album.pictures[phase] = picture
+        album.add(phase, time, picture)
     album.write(run / "pictures" / f"{file_stem_of(made)}.npz")
     return made
 
@@ -64,6 +64,23 @@ def test_pictures_stand_by_simulator_and_phase(tmp_path: Path) -> None:
     }  # fmt: skip
 
 
+def test_a_moment_that_one_alone_has_stands_at_its_time(tmp_path: Path) -> None:
+    """Columns: pick, impact, place. Only the second simulator hit anything."""
+    kept = [
+        keep(tmp_path, record("drake"), pick="red", later="red", place="green"),
+        keep(tmp_path, record("mujoco"), pick="blue", impact="green", place="blue"),
+    ]
+    path = tmp_path / "pictures" / f"{file_stem_of(kept[0])}.npz"
+    album = Album.read(path)
+    del album.pictures["later"]
+    album.write(path)
+    picture = seen(sheets(tmp_path, kept)[0]["stacking"])
+    height, width = picture.shape[:2]
+    middle = width - int(1.5 * 220)
+    assert tuple(picture[int(height * 0.3), middle]) == (255, 255, 255)
+    assert tuple(picture[int(height * 0.75), middle]) == COLOURS["green"]
+
+
 def test_it_is_in_the_folder_and_on_the_page(tmp_path: Path) -> None:
     kept = [keep(tmp_path, record("drake"), pick="red")]
     written = write_files(tmp_path, summarise(kept, METRICS, {}), kept)
@@ -78,7 +95,7 @@ def test_hostile_names_do_no_harm(tmp_path: Path) -> None:
     for text in HOSTILE:
         made = record(text, test=f"t[{text}]")
         album = Album()
-        album.pictures[text] = np.zeros((3, 4, 3), dtype=np.uint8)
+        album.add(text, 0.0, np.zeros((3, 4, 3), dtype=np.uint8))
         album.write(tmp_path / "pictures" / f"{file_stem_of(made)}.npz")
         drawn, problems = sheets(tmp_path, [made])
         assert problems == []

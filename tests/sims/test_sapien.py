@@ -372,3 +372,26 @@ def test_another_scene_is_caught(quantity: str, built: Scene) -> None:
     """What SAPIEN cannot change once it is built."""
     with world(built) as simulator, pytest.raises(ParityError, match=f"{quantity}: scene .*"):
         compare(simulator)
+
+
+def test_bodies_are_read_in_one_call_as_each_tells_itself() -> None:
+    """With fixed boxes and a robot among them, moving, and after a restore."""
+    scene = Stacking(levels=1).scene(3, Jitter())
+    simulator = SAPIEN(SAPIEN.profiles["tuned"])
+    simulator.load(scene)
+    saved = simulator.save()
+    for _ in range(20):
+        simulator.step()
+
+    def told() -> list[list[float]]:
+        bodies = [simulator._bodies[box.name] for box in scene.free_bodies]
+        return [
+            [*b.entity.pose.p, *b.entity.pose.q, *b.linear_velocity, *b.angular_velocity]
+            for b in bodies
+        ]
+
+    assert np.abs(simulator.body_state()[:, 7:]).max() > 1e-3
+    np.testing.assert_array_equal(simulator.body_state(), told())
+    simulator.restore(saved)
+    np.testing.assert_array_equal(simulator.body_state(), told())
+    simulator.close()

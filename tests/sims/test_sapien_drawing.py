@@ -9,16 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pytest_simbench.sims.sapien.adapter import SAPIEN
-from pytest_simbench.sims.sapien.drawing import EYE, FIELD_OF_VIEW, TARGET
 
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import UnavailableError
 from pytest_simbench.testing import scenes
 
-pytest.importorskip("sapien")
+from .pixels import HEIGHT, RED, WIDTH, pixel, red
 
-WIDTH, HEIGHT = 320, 240
-RED = (0.9, 0.05, 0.05, 1.0)
+pytest.importorskip("sapien")
 
 
 @contextmanager
@@ -35,21 +33,8 @@ def drawn(scene: Scene) -> Iterator[SAPIEN]:
         simulator.close()
 
 
-def pixel(point: FloatArray) -> tuple[int, int]:
-    """Row and column of a point in the picture of a pinhole camera at `EYE`, upright."""
-    forward = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    down = np.cross(forward, right)
-    offset = point - EYE
-    focal = HEIGHT / 2 / np.tan(FIELD_OF_VIEW / 2)
-    x, y = focal * np.array([offset @ right, offset @ down]) / (offset @ forward)
-    return int(HEIGHT / 2 + y), int(WIDTH / 2 + x)
-
-
 def red_at(simulator: SAPIEN, point: FloatArray) -> bool:
-    red, green, blue = simulator.render(WIDTH, HEIGHT)[pixel(point)].astype(int)
-    return bool(red > 2 * max(green, blue))
+    return bool(red(simulator.render(WIDTH, HEIGHT))[pixel(point)])
 
 
 def test_a_picture_shows_a_falling_cube_where_it_is_also_after_a_restore() -> None:

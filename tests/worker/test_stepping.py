@@ -13,7 +13,7 @@ from pytest_simbench.robot.panda import panda
 from pytest_simbench.scene import Box, Pose, Scene, Trajectory
 from pytest_simbench.simulator import DivergedError
 from pytest_simbench.worker import control
-from pytest_simbench.worker.stepping import Stepper
+from pytest_simbench.worker.stepping import CHECK_PERIOD, Film, Stepper
 from tests.worker.toys import Toy
 
 CUBE = Box("cube", (0.05, 0.05, 0.05), Pose.at(0.5, 0.0, 0.5, yaw=0.3), mass=0.1)
@@ -35,6 +35,24 @@ def test_time_and_clocks_advance_together(stepper: Stepper) -> None:
     stepper.wait(0.1, None)
     assert stepper.clocks.steps == 350
     assert stepper.clocks.simulated == pytest.approx(0.35)
+
+
+def test_a_state_that_is_sampled_is_not_read_again_to_be_checked() -> None:
+    """So samples of that period cost nothing; the last look is at the end of each operation."""
+    toy = Toy()
+    log = Stepper(toy, lambda at: None).wait(1.0, CHECK_PERIOD)
+    assert (len(log["time"]), toy.looked) == (10, 11)
+    Stepper(toy, lambda at: None).wait(1.0, None)
+    assert toy.looked == 22
+
+
+def test_pictures_go_on_from_one_operation_to_the_next() -> None:
+    toy, times = Toy(), []
+    stepper = Stepper(toy, lambda at: None)
+    stepper.film = Film(20, lambda: times.append(toy.time))
+    for duration in (0.05, 0.02, 0.06):
+        stepper.wait(duration, None)
+    assert times == pytest.approx([0.04, 0.08, 0.12])
 
 
 def stepping(toy: Toy, beat: Callable[[float], None] = lambda at: None) -> Stepper:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +21,7 @@ from pytest_simbench.report.page import setup
 from pytest_simbench.report.page.cells import Of, Table, from_columns, labelled, of, study
 from pytest_simbench.report.page.pictures import Picture, pictures
 from pytest_simbench.report.page.strips import Strip, strips
+from pytest_simbench.report.recorded import video_of
 from pytest_simbench.report.replay.groups import Group, links
 from pytest_simbench.report.summary import TaskSummary
 
@@ -41,11 +42,14 @@ class FailureBlock:
     repetitions: str
     log: str
     tail: str
+    replay: str
+    video: str
 
 
 @dataclass(frozen=True)
 class TaskPart:
-    """One task; of its replays what each shows, and the address; its contact sheet as base64."""
+    """One task; of its replays and videos what each shows, and the address; its contact sheet as
+    base64."""
 
     title: str
     answer: Sequence[str]
@@ -56,6 +60,7 @@ class TaskPart:
     pictures: Sequence[Picture]
     notes: Sequence[str]
     replays: Sequence[tuple[str, str]]
+    videos: Sequence[tuple[str, str]]
     sheet: str
 
 
@@ -107,7 +112,8 @@ def page(
         """Its place among the page's repetitions, where it is put when first asked for."""
         if id(record) not in numbers:
             numbers[id(record)] = len(repetitions)
-            repetitions.append(_repetition(record, replay.get(id(record), "")))
+            links_of = replay.get(id(record), ""), video_of(folder, record)
+            repetitions.append(_repetition(record, *links_of))
         return numbers[id(record)]
 
     problems: dict[str, None] = {}
@@ -123,13 +129,19 @@ def page(
                 study(summary),
                 strips(summary, rows, number),
                 _tables(summary),
-                _causes(summary, rows),
+                _causes(summary, rows, lambda r: (replay.get(id(r), ""), video_of(folder, r))),
                 drawn,
                 columns.notes(summary),
                 [
                     (f"seed {group.seed}, {_simulators(group)}", replay[id(group.shown[0][0])])
                     for group in replays
                     if group.task == summary.task
+                ],
+                [
+                    (f"{record.label}, seed {record.seed}", address)
+                    for row in rows
+                    for record in row
+                    if (address := video_of(folder, record))
                 ],
                 b64encode((sheets or {}).get(summary.task, b"")).decode("ascii"),
             )
@@ -162,7 +174,12 @@ def _tables(summary: TaskSummary) -> list[Table]:
     ]
 
 
-def _causes(summary: TaskSummary, rows: Sequence[Sequence[Record]]) -> list[FailureBlock]:
+def _causes(
+    summary: TaskSummary,
+    rows: Sequence[Sequence[Record]],
+    recorded: Callable[[Record], tuple[str, str]],
+) -> list[FailureBlock]:
+    """Of each row; `recorded` gives the addresses of a repetition's replay and video."""
     found = []
     for row, records in zip(summary.rows, rows, strict=True):
         for cause in row.causes:
@@ -178,6 +195,7 @@ def _causes(summary: TaskSummary, rows: Sequence[Sequence[Record]]) -> list[Fail
                     columns.numbers(cause.repetitions, 10),
                     cause.log,
                     for_terminal("\n".join(tail[-TAIL:])),
+                    *recorded(first),
                 )
             )
     return found
@@ -212,7 +230,7 @@ def _simulators(group: Group) -> str:
     return group.shown[0][0].simulator if count == 1 else f"{count} side by side"
 
 
-def _repetition(record: Record, replay: str) -> dict[str, Any]:
+def _repetition(record: Record, replay: str, video: str) -> dict[str, Any]:
     """What a dot tells of its repetition."""
     error = record.error
     found = {
@@ -225,6 +243,7 @@ def _repetition(record: Record, replay: str) -> dict[str, Any]:
         "log": str(record.details.get("log") or ""),
         "command": command(record),
         "replay": replay,
+        "video": video,
     }
     return {k: for_terminal(v) if isinstance(v, str) else v for k, v in found.items()}
 

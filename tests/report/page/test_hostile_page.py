@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 
+from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import Line, append
 from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.page import context, page_of
 from pytest_simbench.report.summary import summarise
 from tests.hostile import HOSTILE, assert_harmless_terminal
-from tests.report.samples import METRICS, failed, stacking_run, throwing_run
+from tests.report.samples import METRICS, failed, record, stacking_run, throwing_run
 from tests.report.test_hostile import ALL, declared, records
 
 MORE = (
@@ -79,8 +81,9 @@ def addresses(page: str) -> list[str]:
 
 
 def harmless(address: str) -> bool:
-    """A place on the page, or a log of the run folder."""
-    return bool(re.fullmatch(r"#[A-Za-z0-9_-]+|logs/[A-Za-z0-9_=-][A-Za-z0-9_.=-]*\.log", address))
+    """A place on the page, or a log or a video of the run folder."""
+    plain = r"#[A-Za-z0-9_-]+|(logs|videos)/[A-Za-z0-9_=-][A-Za-z0-9_.=-]*\.(log|mp4)"
+    return bool(re.fullmatch(plain, address))
 
 
 @pytest.fixture(scope="module")
@@ -174,3 +177,21 @@ def test_only_a_log_of_the_run_is_a_link(log: str, linked: bool, tmp_path: Path)
     page = made([failed("WorkerDied", "load", "gone", details={"log": log})], tmp_path)
     found = [address for address in addresses(page) if not address.startswith("#")]
     assert found == ([log] if linked else [])
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_videos_are_linked_and_their_names_do_no_harm(tmp_path: Path) -> None:
+    """With the task, and with the cause of a failure."""
+    text = "".join((ALL, *MORE))
+    found = [record(text, test=f"t[{text}]"), failed("WorkerDied", "load", "gone"), record("drake")]
+    for shown in found[:2]:
+        path = tmp_path / "videos" / f"{file_stem_of(shown)}.mp4"
+        path.parent.mkdir(exist_ok=True)
+        path.touch()
+    page = made(found, tmp_path)
+    videos = [address for address in addresses(page) if address.startswith("videos/")]
+    assert all(map(harmless, videos))
+    stems = [file_stem_of(shown) for shown in found]
+    assert Counter(videos) == {f"videos/{stems[0]}.mp4": 1, f"videos/{stems[1]}.mp4": 2}
+    cause = page[page.index('class="cause"') : page.index("Every repetition")]
+    assert f'href="videos/{stems[1]}.mp4"' in cause

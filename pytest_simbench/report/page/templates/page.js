@@ -76,9 +76,10 @@
       line.append(plain ? element("a", found.log, { href: found.log }) : element("code", found.log));
       lines.push(line);
     }
-    if (found.replay) {
+    for (const name of ["replay", "video"]) {
+      if (!found[name]) continue;
       const line = element("span", "");
-      line.append(element("a", "replay", { href: found.replay }));
+      line.append(element("a", name, { href: found[name] }));
       lines.push(line);
     }
     if (found.command) {
