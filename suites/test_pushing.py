@@ -5,15 +5,18 @@ block stays at rest against the hand, so its errors are 0 but for the jitter of 
 Change thresholds with `--sim-threshold position_error=0.005`.
 """
 
-import pytest
-
-from pytest_simbench.tasks import Pushing
+from pytest_simbench.tasks import CurvePushing, Pushing
 
 
-@pytest.mark.parametrize("turn", [0.0, 0.785], ids=["line", "curve"])  # 45 degrees
-def test_pushing(repeat, threshold, turn):
-    result = repeat(Pushing(turn=turn))
+def test_pushing(repeat, threshold):
+    check(repeat(Pushing()), threshold)
 
+
+def test_pushing_curve(repeat, threshold):
+    check(repeat(CurvePushing()), threshold)
+
+
+def check(result, threshold):
     result.assert_failures_at_most(threshold("failures", 0.15))
     result.assert_at_most("position_error", threshold("position_error", 0.01))
     result.assert_at_most("heading_error", threshold("heading_error", 5.0))

@@ -2,12 +2,13 @@
 
 from pytest_simbench.tasks.base import Jitter, Outcome, Task
 from pytest_simbench.tasks.moments import Moment
-from pytest_simbench.tasks.pushing import Pushing
+from pytest_simbench.tasks.pushing import CurvePushing, Pushing
 from pytest_simbench.tasks.stacking import Stacking
 from pytest_simbench.tasks.throwing import Throwing
 from pytest_simbench.tasks.towers import LeaningTowers
 
 __all__ = [
+    "CurvePushing",
     "Jitter",
     "LeaningTowers",
     "Moment",

@@ -18,13 +18,13 @@ from pytest_simbench.robot.kinematics import DOWNWARD
 from pytest_simbench.robot.panda import panda
 from pytest_simbench.robot.registry import find
 from pytest_simbench.scene import FloatArray, Pose
-from pytest_simbench.tasks import Jitter, Pushing
+from pytest_simbench.tasks import CurvePushing, Jitter, Pushing
 from pytest_simbench.tasks.pushing import BLOCK_SIZE, START
 from tests.conftest import case_of
 from tests.robot.small_arm import small_arm
 from tests.tasks.scripted import Mishap, ScriptedProcess, fail, move, perform, slip
 
-LINE, CURVE = Pushing(), Pushing(turn=math.radians(45))
+LINE, CURVE = Pushing(), CurvePushing()
 EXACT = Jitter(0.0, 0.0)
 CONTACT = 0.00875 + BLOCK_SIZE[0] / 2
 """From the tool centre point to the block's: the Panda's fingertips are 17.5 mm thick [m]."""
