@@ -19,6 +19,7 @@ from pytest_simbench.plugin.values import (
     Limits,
     Number,
     Repetitions,
+    Simulators,
     Word,
     Words,
 )
@@ -80,8 +81,11 @@ def name_of(flag: str) -> str:
 
 
 OPTIONS = (
-    Option("--sim-name", Words(), "simulators to run: names, or all (default: every installed one)",
-           [], "--sim", "NAME"),
+    Option("--sim-name", Simulators(), "simulators to run: names, or all (default: every installed "
+           "one); NAME==VERSION is a release of it, NAME@PYTHON or NAME@LABEL=PYTHON a build of "
+           "your own in that interpreter", [], "--sim", "NAME"),
+    Option("--sim-install-missing", Flag(), "before the run, make the environments that the "
+           "simulators of --sim need and that are not there", False),
     Option("--sim-robot", File(), "robot that does the tasks: a name (pytest --robots) or a robot "
            "file that ends in .toml (default: panda)", None, "--robot", "NAME|FILE"),
     Option("--sim-gui", Flag(), "run in the simulators' own windows", False, "--gui"),
@@ -152,11 +156,18 @@ OPTIONS = (
     Option("--sim-robots", Flag(), "list the known robots, check the one of --robot, and exit",
            False, "--robots", ini=False),
     Option("--sim-install", Words(), "make the environment of a simulator that needs one of its "
-           "own, and exit", metavar="NAME", ini=False),
+           "own, or of a release (NAME==VERSION), and exit", metavar="NAME", ini=False),
+    Option("--sim-uninstall", Words(), "remove such environments and exit", metavar="NAME",
+           ini=False),
+    Option("--sim-environments", Flag(), "list the environments that are there, with their sizes, "
+           "and exit", False, ini=False),
 )  # fmt: skip
 """All options. Only their tests know them besides this table; docs/options.md is made of it."""
 
-COMMANDS = ("sim_install", "sim_merge", "sim_report", "sim_list", "sim_robots")
+COMMANDS = (
+    "sim_install", "sim_uninstall", "sim_environments", "sim_merge", "sim_report", "sim_list",
+    "sim_robots",
+)  # fmt: skip
 """Options that do their work and exit, see `plugin.commands`."""
 
 _BY_NAME = {item.name: item for item in OPTIONS}

@@ -200,6 +200,20 @@ class Words(Kind):
         return [_word(part, text) for text in texts or [""] for part in text.split(",")]
 
 
+class Simulators(Words):
+    """Names of simulators, separated by commas; behind an @ stands the path of an interpreter."""
+
+    def read(self, texts: Sequence[str]) -> list[str]:
+        found = []
+        for text in texts or [""]:
+            for part in text.split(","):
+                name, at, path = part.strip().partition("@")
+                found.append(_word(name, text) + at + (File().read([path]) if at else ""))
+                if not part.isprintable():
+                    raise BadValue(text, "an interpreter's path has printable characters")
+        return found
+
+
 class File(Kind):
     """A path, of which this machine's file system could have a file."""
 
@@ -259,7 +273,7 @@ class Assignments(Kind):
         return found
 
     def _pair(self, part: str, whole: str) -> tuple[str, Any]:
-        key, _, value = (side.strip() for side in part.partition("="))
+        key, _, value = (side.strip() for side in _partition(part))
         if not (key and value):
             raise BadValue(whole, f"write it as {self.form}")
         if len(key) > LONGEST_WORD or len(value) > LONGEST_PATH or not part.isprintable():
@@ -270,6 +284,12 @@ class Assignments(Kind):
             return key, ANY_NUMBER.read([value])
         except BadValue:
             raise BadValue(part, "the value must be a finite number") from None
+
+
+def _partition(pair: str) -> tuple[str, str, str]:
+    """A pair taken apart at its first `=` that is not of a version (`mujoco==3.3.7.timestep=1`)."""
+    found = re.search(r"(?<!=)=(?!=)", pair)
+    return (pair, "", "") if found is None else (pair[: found.start()], "=", pair[found.end() :])
 
 
 class Limits(Kind):

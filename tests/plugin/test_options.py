@@ -31,11 +31,12 @@ FINE = {
     "sim_output": PATHS, "sim_baseline": PATHS, "sim_resume": PATHS, "sim_merge": PATHS,
     "sim_report": PATHS, "sim_badge": PATHS,
     "sim_gui": {"zero"}, "sim_headless": {"zero"}, "sim_fresh": {"zero"}, "sim_pictures": {"zero"},
+    "sim_install_missing": {"zero"},
     "sim_strict": {"zero"},
 }  # fmt: skip
 """Values that an option may have after all."""
 
-LATER = {"sim_install", "sim_profile"}
+LATER = {"sim_install", "sim_profile", "sim_uninstall"}
 """Options of names that are looked up when they are used: any word will do for a start."""
 
 Configure = Callable[..., pytest.Config]
