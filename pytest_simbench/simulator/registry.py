@@ -143,7 +143,8 @@ def adapter(name: str) -> type[Simulator]:
     version = VersionedName.of(name)
     if version.kind:
         cls = adapter(version.base)
-        return type(cls.__name__, (cls,), {"info": cls.info.of_version(version)})
+        place = {"__module__": cls.__module__, "__qualname__": cls.__qualname__}
+        return type(cls.__name__, (cls,), {**place, "info": cls.info.of_version(version)})
     if name in registry().broken:
         raise SimulatorError(registry().broken[name])
     entry = registry().entries[name]
