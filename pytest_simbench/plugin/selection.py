@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from pytest_simbench.plugin import options
+from pytest_simbench.plugin.history import releases_of
 from pytest_simbench.plugin.interpreters import checked_specification, interpreter_path
 from pytest_simbench.plugin.simulator_names import install_missing, progress, read_names
 from pytest_simbench.plugin.values import BadValue, shown
@@ -104,6 +105,7 @@ def _select(config: pytest.Config) -> Selection:
     _check_profile(options.value(config, "sim_profile"))
     asked = options.value(config, "sim_name")
     names, builds = read_names([name for name in asked if name != "all"], config)
+    names += releases_of(config)
     changes: dict[str, dict[str, str]] = {}
     for key, text in options.value(config, "sim_set").items():
         name, _, setting = key.rpartition(".")
@@ -127,7 +129,7 @@ def _select(config: pytest.Config) -> Selection:
             f"{name} has both --sim-python and --sim-spec; a specification names its own "
             "interpreter (python=...), so give one of them"
         )
-    if options.value(config, "sim_install_missing") and not hasattr(config, "workerinput"):
+    if _installs(config):
         install_missing(names, progress())
     everything = known() if not names or "all" in asked else []
     selection = Selection(
@@ -148,11 +150,17 @@ def _select(config: pytest.Config) -> Selection:
         reason = selection.missing(name)
         if reason:
             raise pytest.UsageError(reason)
-    if asked:
+    if asked or names:
         return selection
     return replace(
         selection, simulators=tuple(n for n in selection.simulators if not selection.missing(n))
     )
+
+
+def _installs(config: pytest.Config) -> bool:
+    """Whether missing environments are made before the run; xdist's workers find them made."""
+    asked = ("sim_install_missing", "sim_history")
+    return any(options.value(config, name) for name in asked) and not hasattr(config, "workerinput")
 
 
 def _robot(text: str | None) -> Robot | None:

@@ -214,6 +214,49 @@ class Simulators(Words):
         return found
 
 
+@dataclass(frozen=True)
+class Releases:
+    """The last `number` releases of a simulator; of each minor version the last, if `minor`."""
+
+    name: str
+    number: int
+    minor: bool
+
+
+class LastReleases(Kind):
+    """`NAME:N` or `NAME:N:minor`, a `Releases`."""
+
+    def read(self, texts: Sequence[str]) -> Releases:
+        found = re.fullmatch(r"([\w-]{1,100}):(\d{1,3})(:minor)?", texts[-1].strip(), re.ASCII)
+        if found is None or not 2 <= int(found[2]) <= 100:
+            raise BadValue(texts[-1], "write it as NAME:N or NAME:N:minor, with N from 2 to 100")
+        return Releases(found[1], int(found[2]), bool(found[3]))
+
+
+@dataclass(frozen=True)
+class Span:
+    """Releases of a simulator from a good one to a bad one, and the metric that is worse in it."""
+
+    name: str
+    good: str
+    bad: str
+    metric: str
+
+
+class Bisection(Kind):
+    """`NAME:GOOD..BAD` and `METRIC`, a `Span`."""
+
+    def read(self, texts: Sequence[str]) -> Span:
+        version = r"(\d[\w.+!-]{0,60}?)"
+        form = rf"([\w-]{{1,100}}):{version}\.\.{version}"
+        found = re.fullmatch(form, texts[0].strip(), re.ASCII)
+        if found is None or found[2] == found[3]:
+            raise BadValue(texts[0], "write it as NAME:GOOD..BAD METRIC, with two releases")
+        if len(texts) != 2 or not re.fullmatch(r"\w{1,100}", texts[-1], re.ASCII):
+            raise BadValue(texts[-1], "write it as NAME:GOOD..BAD METRIC")
+        return Span(found[1], found[2], found[3], texts[1])
+
+
 class File(Kind):
     """A path, of which this machine's file system could have a file."""
 

@@ -88,8 +88,9 @@ def test_bad_values_on_the_command_line(configure: Configure, name: str) -> None
     found = {
         what: complaint(configure, [f"{option.flag}={text}"]) for what, text in bad(option).items()
     }
-    if option.arguments.get("nargs") == "+":
-        found = {w: complaint(configure, [option.flag, t]) for w, t in bad(option).items()}
+    if option.arguments.get("nargs") in ("+", 2):
+        more = ["placed"] if option.arguments["nargs"] == 2 else []
+        found = {w: complaint(configure, [option.flag, t, *more]) for w, t in bad(option).items()}
     assert {what: text for what, text in found.items() if not is_sentence(text, name)} == {}
 
 
