@@ -156,8 +156,8 @@ class SimulatorInfo:
         if not release_numbers(version) or release_numbers(version) >= oldest:
             return ""
         return (
-            f"the adapter runs with {self.distribution} {self.oldest_version} to "
-            f"{self.tested_version}, not with {version}"
+            f"the adapter was tested with {self.distribution} {self.tested_range} and runs with "
+            f"nothing older, not with {version}"
         )
 
     def tested(self, version: str) -> bool:
@@ -170,7 +170,7 @@ class SimulatorInfo:
     @property
     def tested_range(self) -> str:
         """The versions that the adapter was tested with, for tables."""
-        if not self.oldest_version:
+        if self.oldest_version in ("", self.tested_version):
             return self.tested_version
         return f"{self.oldest_version} to {self.tested_version}"
 
