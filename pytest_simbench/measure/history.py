@@ -127,8 +127,14 @@ def _changed(course: Course, rows: int) -> Course:
     found = change_points(present, rows=rows)
     if course.metric.name in COSTS:
         found = [c for c in found if abs(c.after - c.before) > SMALLEST * abs(c.before)]
-    small = course.metric.smallest_difference
-    return replace(course, changes=tuple(c for c in found if abs(c.after - c.before) >= small))
+    return replace(course, changes=tuple(c for c in found if _matters(course.metric, c)))
+
+
+def _matters(metric: Metric, change: ChangePoint) -> bool:
+    """Whether a change is one that means anything, and that a reader sees in three digits: a
+    deterministic engine's rounding is significant too."""
+    shown = metric.format(change.before) != metric.format(change.after)
+    return shown and abs(change.after - change.before) >= metric.smallest_difference
 
 
 def sentences(history: History) -> list[str]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 OLDEST = "1.40.0"
-"""The oldest one that was tried and runs. 1.37 does not tell a shape's convex hull, which the parity
-check asks for; 1.36 makes no hull of points."""
+"""The oldest one that was tried and runs. 1.37 does not tell a shape's convex hull, which the
+parity check asks for; 1.36 makes no hull of points."""
 
 
 def without_sampled_ports(config: Any) -> dict[str, bool]:

@@ -53,6 +53,14 @@ def test_a_small_change_of_a_cost_is_the_machines() -> None:
     assert sentences(history) == ["no change is supported by these repetitions"]
 
 
+def test_a_deterministic_engines_rounding_is_not_told() -> None:
+    found = [replace(r, metrics={"placed": 0.9 + (r.seed % 5) / 50 + tiny})
+             for v, tiny in (("1", 0), ("2", 0), ("3", 1e-7), ("4", 1e-7))
+             for r in release(v, 1.0)]  # fmt: skip
+    (history,) = histories(found, {"stacking": METRICS})
+    assert sentences(history) == ["no change is supported by these repetitions"]
+
+
 def test_a_release_that_fails_is_named_with_its_message() -> None:
     broken = [
         replace(failed(k), simulator="engine==3", test="test_stacking[engine==3-headless]")

@@ -179,7 +179,10 @@ def test_any_help_text_renders(
     """argparse expands %, in whichever text it stands."""
     from pytest_simbench.plugin import spellings
 
-    changed = [Option(o.flag, o.kind, text, metavar=o.metavar, ini=False) for o in OPTIONS]
+    changed = [
+        Option(o.flag, o.kind, text, metavar=o.metavar, ini=False, arguments=o.arguments)
+        for o in OPTIONS
+    ]
     monkeypatch.setattr(spellings, "OPTIONS", changed)
     result = pytester.inline_run("--help")
     assert result.ret == 0

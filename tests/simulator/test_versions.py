@@ -67,7 +67,7 @@ def test_only_the_newest_is_tested_where_no_older_one_was_tried() -> None:
 
 
 def test_an_older_release_is_refused_in_one_sentence() -> None:
-    with pytest.raises(SimulatorError, match=r"^sim==1.1: .* engine 1.2 to 1.10.0 .*, not with 1.1$"):
+    with pytest.raises(SimulatorError, match=r"^sim==1.1: .* 1.2 to 1.10.0 .*, not with 1.1$"):
         INFO.of_version(VersionedName("sim", "==", "1.1"))
 
 
