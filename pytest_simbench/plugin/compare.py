@@ -89,7 +89,9 @@ class Comparison:
         return render_markdown(self._report, self.baseline.name, bool(self.limits))
 
 
-def prepare(config: pytest.Config, saved: list[dict[str, Any]]) -> Comparison | None:
+def prepare(
+    config: pytest.Config, saved: list[dict[str, Any]], simulators: Sequence[str] = ()
+) -> Comparison | None:
     """The comparison that the options ask for; None when nothing is to be compared with.
 
     Limits in the ini file hold whenever there is a baseline and wait for one otherwise; limits on
@@ -98,12 +100,13 @@ def prepare(config: pytest.Config, saved: list[dict[str, Any]]) -> Comparison | 
     Args:
         config: of the run.
         saved: contents of the pytest-benchmark files that `--benchmark-compare` chose.
+        simulators: of the run, of which `--sim-baseline` may name one.
 
     Raises:
         pytest.UsageError: no baseline, a malformed one, a malformed limit, an unknown metric.
     """
     text = options.value(config, "sim_compare_fail")
-    beside = _beside(config)
+    beside = _beside(config, simulators)
     if beside is not None:
         here = Reading(f"{beside[0]} in this run")
         try:
@@ -124,17 +127,15 @@ def prepare(config: pytest.Config, saved: list[dict[str, Any]]) -> Comparison | 
         raise pytest.UsageError(f"--sim-compare-fail: {error}") from None
 
 
-def _beside(config: pytest.Config) -> Beside | None:
+def _beside(config: pytest.Config, names: Sequence[str]) -> Beside | None:
     """The simulator of this run that `--sim-baseline` names, if it names one.
 
     Raises:
         pytest.UsageError: no other version of it is in the run.
     """
-    from pytest_simbench.plugin.session import session_of
     from pytest_simbench.simulator.versions import base_name
 
     given = options.value(config, "sim_baseline")
-    names = session_of(config).selection.simulators if given else ()
     if given not in names:
         return None
     base = base_name(given)
