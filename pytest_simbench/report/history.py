@@ -97,4 +97,8 @@ def _panel(axis: Any, course: Course) -> None:
     unit = "%" if metric.bounded else metric.unit
     axis.set_ylabel(for_figure(f"{metric.title}\n{unit}" if unit else metric.title), fontsize=8)
     axis.margins(y=0.15)
+    low, high = axis.get_ylim()
+    least = 4 * scale * metric.smallest_difference  # a deterministic engine's rounding is no course
+    if high - low < least:
+        axis.set_ylim((low + high - least) / 2, (low + high + least) / 2)
     axis.grid(axis="y", alpha=0.4)
