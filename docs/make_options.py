@@ -65,7 +65,8 @@ def page() -> str:
 
 def option_row(option: Option) -> tuple[str, str, str, str]:
     """The cells of an option."""
-    typed = f"{option.flag} {option.metavar or ''}".strip()
+    values = option.metavar or ""
+    typed = " ".join([option.flag, *([values] if isinstance(values, str) else values)]).strip()
     default = "" if option.default in (None, False, [], {}) else f"`{option.default}`"
     meaning = option.help + ("" if option.ini else " (*no ini*)")
     return f"`{typed}`", f"`{option.short}`" if option.short else "", default, meaning

@@ -1,9 +1,9 @@
 """Interpreters of their own for engines whose packages clash with pytest's or with each other's.
 
-One folder per simulator, a plain virtual environment with the adapter's pinned requirements and
-nothing else: the worker's code reaches it from here. `pytest --sim-install NAME` makes it, and it
-is found by its place. A marker file, written last, tells a finished environment from half of one
-and remembers what was installed. Compiled kernels are kept in its `cache` folder.
+One folder per simulator and release, a plain virtual environment with the adapter's pinned
+requirements and nothing else: the worker's code reaches it from here. `pytest --sim-install NAME`
+makes it, and it is found by its place. A marker file, written last, tells a finished environment
+from half of one and remembers what was installed. Compiled kernels are kept in its `cache` folder.
 """
 
 from __future__ import annotations
@@ -11,17 +11,18 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import subprocess
-import sys
-from collections.abc import Mapping
+import time
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import distributions
 from importlib.util import find_spec
 from pathlib import Path
 
+from pytest_simbench.client import installing, package_index
 from pytest_simbench.client.system import SystemPython
 from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.info import SimulatorInfo
+from pytest_simbench.simulator.versions import RELEASE, VersionedName
 
 MARKER = "simbench.json"
 VARIABLE = "SIMBENCH_ENVIRONMENTS"
@@ -50,7 +51,7 @@ class Environment:
 
     @classmethod
     def of(cls, info: SimulatorInfo, root: Path | None = None) -> Environment:
-        return cls(info, (root or default_folder()) / info.name)
+        return cls(info, (root or default_folder()) / (info.home or info.name))
 
     @property
     def python(self) -> Path:
@@ -94,32 +95,66 @@ class Environment:
         """Environment variables that keep compiled kernels between runs."""
         return cache_variables(self.info.caches, self.folder / "cache")
 
-    def create(self) -> None:
-        """Make it anew, showing what pip says.
+    def create(self, tell: installing.Tell = lambda text: None) -> None:
+        """Make it anew, unless another process has made it meanwhile.
+
+        Args:
+            tell: shows progress: lines that end, and lines that the next one overwrites.
 
         Raises:
-            SimulatorError: the packages do not install; what is there stays half installed.
+            SimulatorError: there is no such release, or the packages do not install; what is
+                there stays half installed.
         """
         if not self.info.requirements:
             raise SimulatorError(
                 f"{self.info.name} needs no environment of its own: {self.info.install}"
             )
-        if self.folder.exists():
-            shutil.rmtree(self.folder)
-        self.folder.parent.mkdir(parents=True, exist_ok=True)
-        pip = [str(self.python), "-m", "pip", "install", "--disable-pip-version-check"]
-        for command in (
-            [sys.executable, "-m", "venv", str(self.folder)],
-            [*pip, *self.info.requirements],
-        ):
-            status = subprocess.run(command, check=False).returncode
-            if status:
+        self._check_release()
+        with installing.alone(self.folder, tell):
+            if self.folder.exists() and self.problem is None:
+                return
+            began = time.monotonic()
+            try:
+                installing.install(self.folder, self.info.requirements, tell)
+            except SimulatorError as error:
                 raise SimulatorError(
-                    f"{' '.join(command)} ended with exit status {status}; the environment of "
-                    f"{self.info.name} is only half installed"
-                )
-        marker = {"requirements": list(self.info.requirements)}
-        (self.folder / MARKER).write_text(json.dumps(marker) + "\n", "utf-8")
+                    f"the environment of {self.info.name} is only half installed: {error}"
+                ) from None
+            marker = {"requirements": list(self.info.requirements)}
+            (self.folder / MARKER).write_text(json.dumps(marker) + "\n", "utf-8")
+            tell(f"{installing.progress(self.folder, time.monotonic() - began)}\n")
+
+    def _check_release(self) -> None:
+        """Complain of a release that there is not, where a package index can be asked."""
+        name = VersionedName.of(self.info.name)
+        if name.kind != RELEASE:
+            return
+        try:
+            known = package_index.releases(self.info.distribution)
+        except package_index.PackageIndexError:
+            return
+        problem = package_index.unreleased(self.info.distribution, name.which, known)
+        if problem:
+            raise SimulatorError(f"{self.info.name}: {problem}")
+
+
+def remove(folder: Path) -> None:
+    """Take an environment off the disk, with what it has compiled.
+
+    Raises:
+        OSError: somebody else's files.
+    """
+    with installing.alone(folder, lambda text: None):
+        # Without its marker, what a break leaves is half installed.
+        (folder / MARKER).unlink(missing_ok=True)
+        shutil.rmtree(folder)
+
+
+def existing(root: Path | None = None) -> Iterator[Path]:
+    """The folders of the environments that are there, also of half-made ones, by name."""
+    root = root or default_folder()
+    if root.is_dir():
+        yield from sorted(p for p in root.iterdir() if p.is_dir() and not p.name.startswith("."))
 
 
 def cache_variables(caches: Mapping[str, str], folder: Path) -> dict[str, str]:
@@ -133,13 +168,12 @@ def cache_variables(caches: Mapping[str, str], folder: Path) -> dict[str, str]:
 
 def missing(info: SimulatorInfo) -> str | None:
     """Why an engine can be imported neither here nor where it lives, and what mends it."""
-    absent = _absent(info)
-    if not absent:
-        return None
-    other = outside(info)
-    if other is not None:
+    other, absent = outside(info), _absent(info)
+    if other is not None and (absent or VersionedName.of(info.name).kind):
         return other.problem
-    return f"{info.name} is not installed (no module {absent[0]}); install it: {info.install}"
+    if absent:
+        return f"{info.name} is not installed (no module {absent[0]}); install it: {info.install}"
+    return None
 
 
 def outside(info: SimulatorInfo) -> Environment | SystemPython | None:

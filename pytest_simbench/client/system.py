@@ -79,12 +79,15 @@ class SystemPython:
         return found["version"] if found else None
 
     def _found(self) -> dict[str, Any] | None:
-        return _probed(str(self.python), self.info.distribution, ("numpy", *self.info.modules))
+        return look_into(str(self.python), self.info.distribution, ("numpy", *self.info.modules))
 
 
 @cache
-def _probed(python: str, distribution: str, modules: tuple[str, ...]) -> dict[str, Any] | None:
-    """What the interpreter answers; None where there is none."""
+def look_into(python: str, distribution: str, modules: tuple[str, ...]) -> dict[str, Any] | None:
+    """What an interpreter says of an engine: its Python, the engine's version, absent modules.
+
+    None where there is no interpreter that answers.
+    """
     command = [python, "-c", PROBE, distribution, *modules]
     try:
         answer = subprocess.run(command, capture_output=True, timeout=TIMEOUT, check=True).stdout

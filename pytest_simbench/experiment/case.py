@@ -15,7 +15,7 @@ from pytest_simbench.experiment.protocol import PROTOCOLS, Protocol
 from pytest_simbench.records.names import file_name
 from pytest_simbench.records.series import short
 from pytest_simbench.scene import Robot
-from pytest_simbench.simulator.registry import adapter, registered
+from pytest_simbench.simulator.registry import adapter, address
 
 
 class Display(Interface):
@@ -106,7 +106,7 @@ class Case:
         info = adapter(simulator).info
         return cls(
             simulator=simulator,
-            adapter=registered()[simulator].value,
+            adapter=address(simulator) or "",
             python=python or interpreter(info),
             environment=Environment.of(info).variables(),
             costly_start=info.costly_start,

@@ -78,11 +78,10 @@ def expected(experiment: Experiment, number: int = 1) -> Record:
 
 def settings(case: Case) -> dict[str, Any]:
     """The simulator's settings; empty for an adapter that is not registered under its name."""
-    from pytest_simbench.simulator.registry import adapter, registered
+    from pytest_simbench.simulator.registry import adapter, address
     from pytest_simbench.simulator.settings import changed, profile
 
-    entry = registered().get(case.simulator)
-    if entry is None or entry.value != case.adapter:
+    if address(case.simulator) != case.adapter:
         return {}  # its module may do anything when it is imported
     found = profile(adapter(case.simulator).profiles, case.profile, case.simulator)
     return changed(found, case.changes, case.simulator).to_wire()
@@ -91,10 +90,9 @@ def settings(case: Case) -> dict[str, Any]:
 def versions(case: Case) -> dict[str, str]:
     """The engine's version, where it is installed here or in the interpreter that it lives in."""
     from pytest_simbench.client.environments import outside
-    from pytest_simbench.simulator.registry import adapter, registered
+    from pytest_simbench.simulator.registry import adapter, address
 
-    entry = registered().get(case.simulator)
-    if entry is None or entry.value != case.adapter or case.spec:
+    if address(case.simulator) != case.adapter or case.spec:
         return {}
     info = adapter(case.simulator).info
     if case.python is None:

@@ -166,6 +166,26 @@ def run_gate(
     )
 
 
+def side_by_side(
+    records: Iterable[Record], name: str, others: Iterable[str]
+) -> tuple[tuple[Record, ...], tuple[Record, ...]]:
+    """One run as two: what a simulator scored, as the baseline of others, and what these scored.
+
+    Args:
+        records: of the run.
+        name: of the simulator, whose records are given again under the name of each other one.
+        others: the names of these.
+    """
+    records, others = list(records), list(others)
+    before = [
+        replace(record, simulator=other, test=record.test.replace(f"{name}-", f"{other}-", 1))
+        for other in others
+        for record in records
+        if record.simulator == name
+    ]
+    return tuple(before), tuple(record for record in records if record.simulator in others)
+
+
 def _robots(records: Sequence[Record]) -> list[str]:
     """Names of the robots that were chosen, sorted; of the tasks' own, one that says so."""
     return sorted({record.robot.get("name", "the tasks' own robot") for record in records})

@@ -1,5 +1,4 @@
-"""Options that do their work and exit: `--sims`, `--robots`, `--sim-install`, `--sim-merge`,
-`--sim-report`."""
+"""Options that do their work and exit: `--sims`, `--robots`; and where the others are."""
 
 from __future__ import annotations
 
@@ -26,30 +25,17 @@ def run_command(config: pytest.Config) -> int:
     Raises:
         pytest.UsageError: what is wrong with the input; one sentence.
     """
+    from pytest_simbench.plugin.bisect import bisect
+    from pytest_simbench.plugin.environments import install, list_environments, uninstall
     from pytest_simbench.plugin.merge import merge_runs, report_runs
 
     options.values(config)
     recording.check(config)
-    actions = (_install, merge_runs, report_runs, _list, _robots)
+    actions = (
+        install, uninstall, list_environments, bisect, merge_runs, report_runs, _list, _robots,
+    )  # fmt: skip
     commands = dict(zip(options.COMMANDS, actions, strict=True))
     return next(do(config) for name, do in commands.items() if options.given(config, name))
-
-
-def _install(config: pytest.Config) -> int:
-    """`--sim-install`: make the environments of simulators that need one of their own."""
-    from pytest_simbench.client.environments import Environment
-    from pytest_simbench.simulator.errors import SimulatorError
-    from pytest_simbench.simulator.registry import adapter
-
-    try:
-        for name in options.value(config, "sim_install"):
-            environment = Environment.of(adapter(name).info)
-            if environment.problem:
-                environment.create()
-            print(f"{name}: {environment.info.title} {environment.version()} is ready")
-    except SimulatorError as error:
-        raise pytest.UsageError(str(error)) from None
-    return 0
 
 
 def _list(config: pytest.Config) -> int:
@@ -109,7 +95,7 @@ def _here(selection: Selection, name: str) -> str:
     except Exception:  # not there, or metadata that nobody can read
         found = None
     place = other.place if other else "installed"
-    untested = "" if found == info.tested_version else ", UNTESTED"
+    untested = "" if info.tested(found or "") else ", UNTESTED"
     return f"version {found or 'unknown'}{untested}, {place}"
 
 
@@ -142,7 +128,7 @@ def _lines(selection: Selection) -> Iterator[str]:
         missing = selection.missing(name)
         yield f"{name}: {info.title} ({info.licence}), engine {info.engine}"
         yield f"    {'NOT HERE: ' + missing if missing else _here(selection, name)}"
-        yield f"    tested with version {info.tested_version}; {_size(info)}"
+        yield f"    tested with version {info.tested_range}; {_size(info)}"
         yield f"    modes: {', '.join(info.modes)}; profiles: {', '.join(cls.profiles)}"
         yield f"    can: {', '.join(sorted(info.capabilities))}"
         for deviation in info.deviations:

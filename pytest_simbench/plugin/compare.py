@@ -26,25 +26,36 @@ if TYPE_CHECKING:
     from pytest_simbench.measure.gate import GateReport
 
 
+Beside = tuple[str, Sequence[str]]
+"""A simulator, and others that are compared with it."""
+
+
 class Comparison:
     """This run against a baseline: made when all tests have ended, shown in the summary.
 
     Args:
         baseline: the run to compare with.
         limits: how much worse each metric may get; none: a table and no failures.
+        beside: a simulator of this very run, and its other versions, that are compared with it.
     """
 
-    def __init__(self, baseline: Reading, limits: Sequence[Limit] = ()) -> None:
+    def __init__(
+        self, baseline: Reading, limits: Sequence[Limit] = (), beside: Beside | None = None
+    ) -> None:
         self.baseline = baseline
         self.limits = tuple(limits)
+        self._beside = beside
         self._report: GateReport | None = None
 
     def make(self, run: Reading) -> None:
         """Compare with this run, which says what the metrics mean."""
-        from pytest_simbench.measure.gate import run_gate
+        from pytest_simbench.measure.gate import run_gate, side_by_side
 
+        before, now = self.baseline.records, run.records
+        if self._beside is not None:
+            before, now = side_by_side(run.records, *self._beside)
         metrics = {**self.baseline.metrics, **run.metrics}
-        report = run_gate(self.baseline.records, run.records, self.limits, metrics)
+        report = run_gate(before, now, self.limits, metrics)
         other = other_meanings(self.baseline.tasks, run.tasks)
         self._report = replace(report, differences=(*other, *report.differences))
 
@@ -78,7 +89,9 @@ class Comparison:
         return render_markdown(self._report, self.baseline.name, bool(self.limits))
 
 
-def prepare(config: pytest.Config, saved: list[dict[str, Any]]) -> Comparison | None:
+def prepare(
+    config: pytest.Config, saved: list[dict[str, Any]], simulators: Sequence[str] = ()
+) -> Comparison | None:
     """The comparison that the options ask for; None when nothing is to be compared with.
 
     Limits in the ini file hold whenever there is a baseline and wait for one otherwise; limits on
@@ -87,11 +100,20 @@ def prepare(config: pytest.Config, saved: list[dict[str, Any]]) -> Comparison | 
     Args:
         config: of the run.
         saved: contents of the pytest-benchmark files that `--benchmark-compare` chose.
+        simulators: of the run, of which `--sim-baseline` may name one.
 
     Raises:
         pytest.UsageError: no baseline, a malformed one, a malformed limit, an unknown metric.
     """
     text = options.value(config, "sim_compare_fail")
+    beside = _beside(config, simulators)
+    if beside is not None:
+        here = Reading(f"{beside[0]} in this run")
+        try:
+            found = _limits(text, here, typed=False) if text is not None else ()
+        except LimitError as error:
+            raise pytest.UsageError(f"--sim-compare-fail: {error}") from None
+        return Comparison(here, found, beside)
     typed = config.getoption("sim_compare_fail") is not None
     try:
         baseline = _baseline(config, saved, needed=typed)
@@ -103,6 +125,27 @@ def prepare(config: pytest.Config, saved: list[dict[str, Any]]) -> Comparison | 
         raise pytest.UsageError(str(error)) from None
     except (LimitError, UnknownMetric) as error:
         raise pytest.UsageError(f"--sim-compare-fail: {error}") from None
+
+
+def _beside(config: pytest.Config, names: Sequence[str]) -> Beside | None:
+    """The simulator of this run that `--sim-baseline` names, if it names one.
+
+    Raises:
+        pytest.UsageError: no other version of it is in the run.
+    """
+    from pytest_simbench.simulator.versions import base_name
+
+    given = options.value(config, "sim_baseline")
+    if given not in names:
+        return None
+    base = base_name(given)
+    others = [name for name in names if base_name(name) == base and name != given]
+    if not others:
+        raise pytest.UsageError(
+            f"--sim-baseline={given}: the run has no other version of {base} to compare with it; "
+            f"write --sim={given},{base}==VERSION"
+        )
+    return given, others
 
 
 def _baseline(config: pytest.Config, saved: list[dict[str, Any]], needed: bool) -> Reading | None:

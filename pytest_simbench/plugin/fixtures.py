@@ -107,7 +107,7 @@ def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: A
         mode=mode,
         profile=chosen.profile,
         folder=this.use(),
-        changes={**settings, **chosen.changes.get(name, {})},
+        changes={**settings, **chosen.changes_of(name)},
         spec=chosen.specs.get(name),
         robot=chosen.robot,
         display=_display(this) if mode == "gui" else None,

@@ -154,7 +154,7 @@ def report_runs(config: pytest.Config) -> int:
     Raises:
         pytest.UsageError: a run that cannot be read, or runs that are not parts of one.
     """
-    from pytest_simbench.report import repeatability
+    from pytest_simbench.report import history, repeatability
     from pytest_simbench.report.changes import render_terminal
     from pytest_simbench.report.files import Written, in_order, summaries_of, where, write_files
     from pytest_simbench.report.page import PAGE_NAME
@@ -164,6 +164,7 @@ def report_runs(config: pytest.Config) -> int:
     (first, folder), *others = runs.folders.items()
     whole = runs.merged("--sim-report")[1] if others else runs.readings[first]
     summaries, written = summaries_of(whole), Written()
+    histories = history.of_run(whole)
     outcomes, wrong = runs.outcomes()
     tables, problems = ([], []) if others else repeatability.write_tables(folder.path, target)
     if not (whole.records or tables or problems):
@@ -171,13 +172,17 @@ def report_runs(config: pytest.Config) -> int:
     if target is not None:
         run = None if others else folder.path
         compared = None if others else outcomes[0].compared
-        written = write_files(target, summaries, in_order(whole.records), True, compared, run)
+        written = write_files(
+            target, summaries, in_order(whole.records), True, compared, run, histories
+        )
     recorded = [*wrong, publish(config, whole.records, together([o.passed for o in outcomes]))]
     if target is not None and not others:
         recorded += recording.record(config, folder.path, target, whole.records)
     elif options.value(config, recording.RECORD):
         recorded.append("no recordings: join the runs with --sim-merge first")
     _print(config, summaries, [*runs.problems, *written.problems, *recorded])
+    for line in history.lines(histories, shutil.get_terminal_size().columns):
+        print(for_terminal(line))
     if not others and outcomes[0].compared is not None:
         name, report = outcomes[0].compared
         text = render_terminal(report, shutil.get_terminal_size().columns, bool(report.changes))

@@ -11,14 +11,17 @@ import pytest
 from pytest_simbench.plugin.values import (
     Assignments,
     BadValue,
+    Bisection,
     Choice,
     File,
     Files,
     Flag,
     Kind,
+    LastReleases,
     Limits,
     Number,
     Repetitions,
+    Simulators,
     Word,
     Words,
 )
@@ -59,7 +62,7 @@ class Option:
     help: str
     default: Any = None
     short: str = ""
-    metavar: str | None = None
+    metavar: str | tuple[str, ...] | None = None
     ini: bool = True
     arguments: Mapping[str, Any] = field(default_factory=dict)
 
@@ -80,10 +83,17 @@ def name_of(flag: str) -> str:
 
 
 OPTIONS = (
-    Option("--sim-name", Words(), "simulators to run: names, or all (default: every installed one)",
-           [], "--sim", "NAME"),
+    Option("--sim-name", Simulators(), "simulators to run: names, or all (default: every installed "
+           "one); NAME==VERSION is a release of it, NAME@PYTHON or NAME@LABEL=PYTHON a build of "
+           "your own in that interpreter", [], "--sim", "NAME"),
+    Option("--sim-install-missing", Flag(), "before the run, make the environments that the "
+           "simulators of --sim need and that are not there", False),
     Option("--sim-robot", File(), "robot that does the tasks: a name (pytest --robots) or a robot "
            "file that ends in .toml (default: panda)", None, "--robot", "NAME|FILE"),
+    Option("--sim-history", LastReleases(), "run the last N releases of a simulator, each in an "
+           "environment of its own that is made where it is missing; :minor, the last of each "
+           "minor version; what an earlier history here has recorded is not run again",
+           metavar="NAME:N[:minor]", ini=False),
     Option("--sim-gui", Flag(), "run in the simulators' own windows", False, "--gui"),
     Option("--sim-headless", Flag(), "run without windows (default; with --sim-gui: both)", False,
            "--headless"),
@@ -134,8 +144,9 @@ OPTIONS = (
     Option("--sim-strict", Flag(), "claims that the repetitions do not decide fail, also those "
            "that are not judged because there are too few", False),
     Option("--sim-baseline", File(), "run to compare with: a run folder, its records.jsonl, or a "
-           "--benchmark-json file (default: the run that --benchmark-compare chooses)",
-           metavar="PATH"),
+           "--benchmark-json file (default: the run that --benchmark-compare chooses); or a "
+           "simulator of this run, with which its other versions are compared",
+           metavar="PATH|NAME"),
     Option("--sim-compare-fail", Limits(), "fail when a metric is significantly worse than in the "
            "baseline, and by more than this: placed:5%,ram:10%,rtf:20%",
            metavar="METRIC:LIMIT,..."),
@@ -148,15 +159,26 @@ OPTIONS = (
     Option("--sim-report", Files(), "print the tables and write the report of runs again, from "
            "their folders alone, and exit; several are merged, and written where --sim-output says",
            metavar="RUN", ini=False, arguments={"nargs": "+", "action": "store"}),
+    Option("--sim-bisect", Bisection(), "run the tests on releases between a good and a bad one to "
+           "find the first in which METRIC is worse, and exit",
+           metavar=("NAME:GOOD..BAD", "METRIC"), ini=False,
+           arguments={"nargs": 2, "action": "store"}),
     Option("--sim-list", Flag(), "list the known simulators and exit", False, "--sims", ini=False),
     Option("--sim-robots", Flag(), "list the known robots, check the one of --robot, and exit",
            False, "--robots", ini=False),
     Option("--sim-install", Words(), "make the environment of a simulator that needs one of its "
-           "own, and exit", metavar="NAME", ini=False),
+           "own, or of a release (NAME==VERSION), and exit", metavar="NAME", ini=False),
+    Option("--sim-uninstall", Words(), "remove such environments and exit", metavar="NAME",
+           ini=False),
+    Option("--sim-environments", Flag(), "list the environments that are there, with their sizes, "
+           "and exit", False, ini=False),
 )  # fmt: skip
 """All options. Only their tests know them besides this table; docs/options.md is made of it."""
 
-COMMANDS = ("sim_install", "sim_merge", "sim_report", "sim_list", "sim_robots")
+COMMANDS = (
+    "sim_install", "sim_uninstall", "sim_environments", "sim_bisect", "sim_merge", "sim_report",
+    "sim_list", "sim_robots",
+)  # fmt: skip
 """Options that do their work and exit, see `plugin.commands`."""
 
 _BY_NAME = {item.name: item for item in OPTIONS}

@@ -44,6 +44,7 @@ class Run:
     def __init__(self, config: pytest.Config) -> None:
         self.config = config
         self._shared_by: dict[str, Any] | None = getattr(config, "workerinput", None)
+        self._problems: list[str] = []
         self.folder = RunFolder(self._choose_path())
         self.problem: str = (self._shared_by or {}).get("simbench_problem", "")
         self.displays = Displays()
@@ -53,9 +54,9 @@ class Run:
         self._attempts: Counter[tuple[str, str, str]] = Counter()
         self._lock = threading.Lock()
         self._progress: Progress | None = None
-        self._problems: list[str] = []
         self.resumed: Resumed | None = None
-        if config.getoption("sim_resume") is not None:
+        kept = options.value(config, "sim_history") is not None and self.folder.holds_run
+        if config.getoption("sim_resume") is not None or kept:
             from pytest_simbench.plugin.resume import Resumed
 
             self.resumed = Resumed(self.folder)
@@ -72,6 +73,12 @@ class Run:
         given = options.value(self.config, "sim_output")
         if given:
             return Path(self.config.invocation_params.dir, given)
+        history = options.value(self.config, "sim_history")
+        if history is not None:
+            from pytest_simbench.plugin.history import elsewhere, folder_of
+
+            self.tell(elsewhere(self.config, history.name))
+            return folder_of(self.config, history.name)
         return new_name(self.config.rootpath / RUNS)
 
     def lock(self) -> None:
@@ -212,7 +219,7 @@ class Run:
 
     def tell(self, problem: str) -> None:
         """A sentence for the end of the run."""
-        if problem not in self._problems:
+        if problem and problem not in self._problems:
             self._problems.append(problem)
 
     def of_test(self, test: str) -> list[str]:
@@ -247,6 +254,7 @@ class Run:
         from pytest_simbench.report.brief import render_brief
         from pytest_simbench.report.files import write_outcome, write_report
         from pytest_simbench.report.github import append_summary
+        from pytest_simbench.report.history import lines
         from pytest_simbench.report.outcome import Outcome
         from pytest_simbench.report.page import PAGE_NAME
         from pytest_simbench.report.tables import render_run
@@ -264,6 +272,10 @@ class Run:
             reporter.write_sep("=", "simulator comparison")
             show = render_run if self.config.get_verbosity() > 0 else render_brief
             reporter.write_line(show(written.summaries, reporter._tw.fullwidth))
+        if written.histories:
+            reporter.write_sep("=", "history")
+            for line in lines(written.histories, reporter._tw.fullwidth):
+                reporter.write_line(for_terminal(line))
         outcome = Outcome(passed, *(comparison.found or () if comparison else ()))
         problems.append(write_outcome(self.folder.path, outcome))
         problems.append(publish(self.config, self.reading.records, passed))

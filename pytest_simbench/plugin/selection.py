@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from pytest_simbench.plugin import options
+from pytest_simbench.plugin.history import releases_of
 from pytest_simbench.plugin.interpreters import checked_specification, interpreter_path
+from pytest_simbench.plugin.simulator_names import install_missing, progress, read_names
 from pytest_simbench.plugin.values import BadValue, shown
 
 if TYPE_CHECKING:
@@ -27,7 +30,8 @@ class Selection:
         explicit: the names that were asked for one by one; a missing one is an error.
         modes: `headless`, `gui`.
         profile: settings profile.
-        changes: simulator name to changed settings, as texts.
+        changes: simulator name to changed settings, as texts; those of a bare name hold for all
+            of its versions.
         pythons, specs: simulator name to interpreter or execnet specification.
         robot: that does the tasks; None for the tasks' own, the Panda.
     """
@@ -44,6 +48,12 @@ class Selection:
     def id_of(self, name: str, mode: str) -> str:
         """Of the parameter of a test; the default robot adds nothing."""
         return "-".join([name, mode, *([self.robot.name] if self.robot else [])])
+
+    def changes_of(self, name: str) -> dict[str, str]:
+        """Changed settings of a simulator."""
+        from pytest_simbench.simulator.versions import base_name
+
+        return {**self.changes.get(base_name(name), {}), **self.changes.get(name, {})}
 
     def missing(self, name: str) -> str | None:
         """Why a simulator cannot run here, with what mends it; None when it can."""
@@ -62,7 +72,7 @@ class Selection:
 
         try:
             settings = profile(adapter(name).profiles, self.profile, name)
-            changed(settings, self.changes.get(name, {}), name)
+            changed(settings, self.changes_of(name), name)
         except SettingsError as error:
             return str(error)
         return None
@@ -94,11 +104,12 @@ def _select(config: pytest.Config) -> Selection:
 
     _check_profile(options.value(config, "sim_profile"))
     asked = options.value(config, "sim_name")
-    names = [name for name in asked if name != "all"]
+    names, builds = read_names([name for name in asked if name != "all"], config)
+    names += releases_of(config)
     changes: dict[str, dict[str, str]] = {}
     for key, text in options.value(config, "sim_set").items():
-        name, _, setting = key.partition(".")
-        if not setting:
+        name, _, setting = key.rpartition(".")
+        if not (name and setting):
             raise pytest.UsageError(f"--sim-set={key}={text}: write it as SIM.SETTING=VALUE")
         changes.setdefault(name, {})[setting] = text
     pythons = {
@@ -118,13 +129,16 @@ def _select(config: pytest.Config) -> Selection:
             f"{name} has both --sim-python and --sim-spec; a specification names its own "
             "interpreter (python=...), so give one of them"
         )
+    if _installs(config):
+        install_missing(names, progress())
+    everything = known() if not names or "all" in asked else []
     selection = Selection(
-        tuple(known() if not names or "all" in asked else dict.fromkeys(names)),
+        tuple(dict.fromkeys([*everything, *names])),
         frozenset(names),
         _modes(config),
         options.value(config, "sim_profile"),
         changes,
-        pythons,
+        {**builds, **pythons},
         specs,
         _robot(options.value(config, "sim_robot")),
     )
@@ -136,11 +150,17 @@ def _select(config: pytest.Config) -> Selection:
         reason = selection.missing(name)
         if reason:
             raise pytest.UsageError(reason)
-    if asked:
+    if asked or names:
         return selection
     return replace(
         selection, simulators=tuple(n for n in selection.simulators if not selection.missing(n))
     )
+
+
+def _installs(config: pytest.Config) -> bool:
+    """Whether missing environments are made before the run; xdist's workers find them made."""
+    asked = ("sim_install_missing", "sim_history")
+    return any(options.value(config, name) for name in asked) and not hasattr(config, "workerinput")
 
 
 def _robot(text: str | None) -> Robot | None:
@@ -203,7 +223,14 @@ def _wanted(node: Any, name: str) -> bool:
     chosen: list[str] = []
     for mark in node.iter_markers("only_sim"):
         chosen += _names(mark, node)
-    return not chosen or name in chosen
+    return not chosen or _among(chosen, name)
+
+
+def _among(asked: Sequence[str], name: str) -> bool:
+    """Whether a simulator is one of those that a mark names: a bare name means every version."""
+    from pytest_simbench.simulator.versions import covers
+
+    return any(covers(other, name) for other in asked)
 
 
 def _marks(node: Any, name: str, mode: str, selection: Selection) -> list[pytest.MarkDecorator]:
@@ -220,10 +247,10 @@ def _marks(node: Any, name: str, mode: str, selection: Selection) -> list[pytest
     if mode not in info.modes:
         marks.append(pytest.mark.skip(reason=f"{name} has no window"))
     for mark in node.iter_markers("skip_sim"):
-        if name in _names(mark, node):
+        if _among(_names(mark, node), name):
             marks.append(pytest.mark.skip(reason=mark.kwargs.get("reason", f"skip_sim({name})")))
     for mark in node.iter_markers("xfail_sim"):
-        if name in _names(mark, node):
+        if _among(_names(mark, node), name):
             marks.append(pytest.mark.xfail(reason=mark.kwargs.get("reason", "")))
     for mark in node.iter_markers("needs"):
         _check_keywords(mark, node)

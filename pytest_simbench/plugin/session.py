@@ -96,7 +96,9 @@ class SimSession:
         if not self.in_worker and (asked or self.saved):
             from pytest_simbench.plugin.compare import prepare
 
-            self.comparison = prepare(config, self.saved)
+            named = options.value(config, "sim_baseline") is not None
+            names = self.selection.simulators if named else ()
+            self.comparison = prepare(config, self.saved, names)
 
     def parametrize(self, metafunc: pytest.Metafunc) -> None:
         """Make a test of each simulator and mode, as its marks say."""

@@ -69,7 +69,7 @@ def without_ours(args: Sequence[str]) -> list[str]:
             takes = None
             rest.append(arg)
         else:
-            takes = takes if takes == "+" else None
+            takes = takes - 1 if isinstance(takes, int) else takes if takes == "+" else None
             # A short name may turn out to be a conftest's own flag, which takes no value.
             if before in _SHORT and os.path.exists(arg):
                 rest.append(arg)

@@ -200,6 +200,63 @@ class Words(Kind):
         return [_word(part, text) for text in texts or [""] for part in text.split(",")]
 
 
+class Simulators(Words):
+    """Names of simulators, separated by commas; behind an @ stands the path of an interpreter."""
+
+    def read(self, texts: Sequence[str]) -> list[str]:
+        found = []
+        for text in texts or [""]:
+            for part in text.split(","):
+                name, at, path = part.strip().partition("@")
+                found.append(_word(name, text) + at + (File().read([path]) if at else ""))
+                if not part.isprintable():
+                    raise BadValue(text, "an interpreter's path has printable characters")
+        return found
+
+
+@dataclass(frozen=True)
+class Releases:
+    """The last `number` releases of a simulator; of each minor version the last, if `minor`."""
+
+    name: str
+    number: int
+    minor: bool
+
+
+class LastReleases(Kind):
+    """`NAME:N` or `NAME:N:minor`, a `Releases`."""
+
+    def read(self, texts: Sequence[str]) -> Releases:
+        found = re.fullmatch(r"([\w-]{1,100}):(\d{1,3})(:minor)?", texts[-1].strip(), re.ASCII)
+        if found is None or not 2 <= int(found[2]) <= 100:
+            raise BadValue(texts[-1], "write it as NAME:N or NAME:N:minor, with N from 2 to 100")
+        return Releases(found[1], int(found[2]), bool(found[3]))
+
+
+@dataclass(frozen=True)
+class Span:
+    """Releases of a simulator from a good one to a bad one, and the metric that is worse in it."""
+
+    name: str
+    good: str
+    bad: str
+    metric: str
+
+
+class Bisection(Kind):
+    """`NAME:GOOD..BAD` and `METRIC`, a `Span`."""
+
+    def read(self, texts: Sequence[str]) -> Span:
+        version = r"(\d[\w.+!-]{0,60}?)"
+        form = rf"([\w-]{{1,100}}):{version}\.\.{version}"
+        found = re.fullmatch(form, texts[0].strip(), re.ASCII)
+        if found is None or found[2] == found[3]:
+            raise BadValue(texts[0], "write it as NAME:GOOD..BAD METRIC, with two releases")
+        if len(texts) != 2 or not re.fullmatch(r"\w{1,100}", texts[-1], re.ASCII):
+            raise BadValue(texts[-1], "write it as NAME:GOOD..BAD METRIC")
+        return Span(found[1], found[2], found[3], texts[1])
+
+
 class File(Kind):
     """A path, of which this machine's file system could have a file."""
 
@@ -259,7 +316,7 @@ class Assignments(Kind):
         return found
 
     def _pair(self, part: str, whole: str) -> tuple[str, Any]:
-        key, _, value = (side.strip() for side in part.partition("="))
+        key, _, value = (side.strip() for side in _partition(part))
         if not (key and value):
             raise BadValue(whole, f"write it as {self.form}")
         if len(key) > LONGEST_WORD or len(value) > LONGEST_PATH or not part.isprintable():
@@ -270,6 +327,12 @@ class Assignments(Kind):
             return key, ANY_NUMBER.read([value])
         except BadValue:
             raise BadValue(part, "the value must be a finite number") from None
+
+
+def _partition(pair: str) -> tuple[str, str, str]:
+    """A pair taken apart at its first `=` that is not of a version (`mujoco==3.3.7.timestep=1`)."""
+    found = re.search(r"(?<!=)=(?!=)", pair)
+    return (pair, "", "") if found is None else (pair[: found.start()], "=", pair[found.end() :])
 
 
 class Limits(Kind):

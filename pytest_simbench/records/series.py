@@ -14,6 +14,7 @@ from pytest_simbench.records.configuration import (
     values,
 )
 from pytest_simbench.records.record import Record
+from pytest_simbench.simulator.versions import VersionedName, release_numbers
 
 TWIN = equal_to("twin")
 
@@ -89,8 +90,10 @@ class RowKey(NamedTuple):
 
     @property
     def order(self) -> tuple[object, ...]:
-        """Headless before GUI, as in the study's table."""
-        return (self.simulator, self.mode == "gui", *self[1:])
+        """Headless before GUI, as in the study's table; releases by their numbers."""
+        name = VersionedName.of(self.simulator)
+        version = (name.base, name.kind, release_numbers(name.which), self.simulator)
+        return (version, self.mode == "gui", *self[1:])
 
 
 class Series(NamedTuple):

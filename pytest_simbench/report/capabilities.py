@@ -33,7 +33,7 @@ def rows(infos: Sequence[SimulatorInfo]) -> dict[str, list[str]]:
     table["own environment"] = [_environment(info) for info in infos]
     table["compiles first"] = ["yes" if info.costly_start else "-" for info in infos]
     table["on disk MB"] = [str(info.install_size_mb or "?") for info in infos]
-    table["tested version"] = [info.tested_version for info in infos]
+    table["tested versions"] = [info.tested_range for info in infos]
     return table
 
 

@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
 
+from pytest_simbench.measure.history import History, sentences
 from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.text import for_csv, for_terminal
-from pytest_simbench.report import markdown
+from pytest_simbench.report import history, markdown
 from pytest_simbench.report import outcome as outcome_of
 from pytest_simbench.report.badge import badge
 from pytest_simbench.report.figures import FiguresUnavailable, write_figures
@@ -45,11 +46,13 @@ class Written:
         problems: one sentence each.
         complete: whether every file was written; pictures that need matplotlib are not missed.
         summaries: what the report tells of each task.
+        histories: of simulators of which there are several releases.
     """
 
     problems: tuple[str, ...] = ()
     complete: bool = True
     summaries: tuple[TaskSummary, ...] = ()
+    histories: tuple[History, ...] = ()
 
 
 def write_report(
@@ -68,8 +71,11 @@ def write_report(
     reading = reading or folder.read()
     records = in_order(reading.records)
     summaries = summaries_of(reading)
-    written = write_files(folder.path, summaries, records, comparison=comparison)
-    return replace(written, summaries=tuple(summaries))
+    histories = tuple(history.of_run(reading))
+    written = write_files(
+        folder.path, summaries, records, comparison=comparison, histories=histories
+    )
+    return replace(written, summaries=tuple(summaries), histories=histories)
 
 
 def summaries_of(reading: Reading) -> list[TaskSummary]:
@@ -90,6 +96,7 @@ def write_files(
     figures: bool = True,
     comparison: Compared | None = None,
     run: Path | None = None,
+    histories: Sequence[History] = (),
 ) -> Written:
     """Write all files; what cannot be written is told, and the rest is written all the same.
 
@@ -100,6 +107,7 @@ def write_files(
         figures: whether pictures are drawn too.
         comparison: with a baseline, where there is one.
         run: the run folder, where it is another: its results on repeatability are on the page.
+        histories: of simulators, drawn too.
     """
     problems: list[str] = []
     failed: list[str] = []
@@ -110,12 +118,13 @@ def write_files(
         return Written((f"no report: {_unwritable(folder, error)}",), False)
     if figures:
         try:
-            pictures = write_figures(folder, summaries)
+            pictures = write_figures(folder, summaries) + history.write_pictures(folder, histories)
         except FiguresUnavailable as error:
             problems.append(str(error))
         except OSError as error:
             failed.append(f"pictures: {_unwritable(folder, error)}")
-    text = markdown.render_run(summaries, [picture.name for picture in pictures])
+    told_of = {found.title: sentences(found) for found in histories}
+    text = markdown.render_run(summaries, [picture.name for picture in pictures], told_of)
     sheets, told = _sheets(run or folder, records) if figures else ({}, [])
     problems += told
     shown, replay, told = _replay(run or folder, records)

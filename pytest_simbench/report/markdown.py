@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from pytest_simbench.records.text import for_markdown
 from pytest_simbench.report import columns
@@ -11,16 +11,24 @@ from pytest_simbench.report.grid import Column
 from pytest_simbench.report.summary import TaskSummary
 
 
-def render_run(summaries: Sequence[TaskSummary], pictures: Sequence[str] = ()) -> str:
+def render_run(
+    summaries: Sequence[TaskSummary],
+    pictures: Sequence[str] = (),
+    histories: Mapping[str, Sequence[str]] | None = None,
+) -> str:
     """The whole report; ends with a newline.
 
     Args:
         summaries: from `summary.summarise`.
         pictures: addresses of pictures to show at the end, relative to the report.
+        histories: what changed over a simulator's releases, in sentences, by title.
     """
     if not summaries:
         return "No repetition was recorded.\n"
     parts = [render_task(summary) for summary in summaries]
+    for title, found in (histories or {}).items():
+        items = "\n".join(f"- {for_markdown(text)}" for text in found)
+        parts.append(f"## {for_markdown(f'History: {title}')}\n\n{items}")
     parts.append(f"How to read it: {for_markdown(columns.LEGEND)}")
     deviations = columns.deviations(summaries)
     if deviations:

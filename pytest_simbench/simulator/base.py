@@ -130,11 +130,11 @@ class Simulator(ABC):
         """A sentence when the engine is of another version than the adapter was tested with."""
         info = self.info
         found = self.versions().get(info.distribution, "of an unknown version")
-        if found == info.tested_version:
+        if info.tested(found):
             return ""
         return (
             f"UNTESTED VERSION: {info.distribution} {found} is here, the adapter was tested with "
-            f"{info.tested_version}; for that one: {info.install}"
+            f"{info.tested_range}; for the newest of them: {info.install}"
         )
 
     def _missing(self, what: str) -> NotSupportedError:

@@ -8,6 +8,8 @@ from enum import StrEnum
 from fnmatch import fnmatchcase
 
 from pytest_simbench.scene import Robot
+from pytest_simbench.simulator.errors import SimulatorError
+from pytest_simbench.simulator.versions import BUILD, VersionedName, release_numbers
 
 
 class Capability(StrEnum):
@@ -76,6 +78,8 @@ class SimulatorInfo:
         licence: of the engine.
         engine: physics engine inside.
         tested_version: newest version that passed the conformance kit.
+        oldest_version: oldest release that the adapter was tested with, and that it runs with;
+            empty where no other than the newest was tried.
         capabilities: what it can do.
         deviations: what it cannot express of a scene.
         costly_start: starting is so costly (kernels to compile) that one worker serves several
@@ -83,6 +87,9 @@ class SimulatorInfo:
         compile_timeout: the longest that `Simulator.compile` may take with cold caches [s].
         requirements: pinned requirements of an interpreter of its own, for an engine whose
             packages clash with pytest's or with another engine's; empty when it installs here.
+        companions: what an environment of another release needs beside the engine: requirements
+            by the oldest release that needs just these.
+        home: name of the environment; its own name where that is empty.
         system_packages: of Debian and Ubuntu, for an engine that comes with the operating system:
             its worker then runs in the system's Python. Name numpy's package too.
         caches: environment variables to be set to folders (named by the values) that are kept
@@ -105,11 +112,74 @@ class SimulatorInfo:
     costly_start: bool = False
     compile_timeout: float = 900.0
     requirements: tuple[str, ...] = ()
+    companions: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    home: str = ""
     system_packages: tuple[str, ...] = ()
     caches: Mapping[str, str] = field(default_factory=dict)
     install_size_mb: int | None = None
     environment: Mapping[str, str] = field(default_factory=dict)
     language: str = "unknown"
+    oldest_version: str = ""
+
+    def of_version(self, name: VersionedName) -> SimulatorInfo:
+        """Of a release or a build of the engine.
+
+        Raises:
+            SimulatorError: the adapter does not run with that release, or the engine has none.
+        """
+        whole = f"{name.base}{name.kind}{name.which}"
+        if name.kind == BUILD:  # whoever names it has installed it
+            return replace(
+                self, name=whole, requirements=(), system_packages=(), install=f"--sim {whole}=PATH"
+            )
+        if self.system_packages:
+            raise SimulatorError(
+                f"{whole}: {name.base} comes with packages of the system, which has no other "
+                f"release of it; name an interpreter that has one: {name.base}@PATH"
+            )
+        if refused := self.refused(name.which):
+            raise SimulatorError(f"{whole}: {refused}")
+        pin = f"{self.distribution}=={name.which}"
+        own = pin in self.requirements
+        return replace(
+            self,
+            name=whole,
+            home=name.base if own else "",
+            requirements=self.requirements if own else (pin, *self._companions(name.which)),
+            system_packages=(),
+            install=f"pytest --sim-install {whole}",
+        )
+
+    def refused(self, version: str) -> str:
+        """Why the adapter does not run with a version of the engine; empty if it does."""
+        oldest = release_numbers(self.oldest_version)
+        if not release_numbers(version) or release_numbers(version) >= oldest:
+            return ""
+        return (
+            f"the adapter was tested with {self.distribution} {self.tested_range} and runs with "
+            f"nothing older, not with {version}"
+        )
+
+    def tested(self, version: str) -> bool:
+        """Whether a version is one of those that the adapter was tested with."""
+        if version == self.tested_version:
+            return True
+        oldest, newest = map(release_numbers, (self.oldest_version, self.tested_version))
+        return bool(oldest) and oldest <= release_numbers(version) <= newest
+
+    @property
+    def tested_range(self) -> str:
+        """The versions that the adapter was tested with, for tables."""
+        if self.oldest_version in ("", self.tested_version):
+            return self.tested_version
+        return f"{self.oldest_version} to {self.tested_version}"
+
+    def _companions(self, version: str) -> tuple[str, ...]:
+        """What else a release needs; numpy is for the worker itself."""
+        wanted = release_numbers(version)
+        known = [v for v in self.companions if release_numbers(v) <= wanted]
+        newest = max(known, key=release_numbers, default=None)
+        return self.companions[newest] if newest is not None else ("numpy",)
 
     @property
     def modes(self) -> tuple[str, ...]:

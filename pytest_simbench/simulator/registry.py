@@ -11,6 +11,7 @@ from importlib.metadata import Distribution, EntryPoint, distributions
 from pytest_simbench.simulator.base import Simulator
 from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.info import SimulatorInfo
+from pytest_simbench.simulator.versions import VersionedName, base_name
 
 GROUP = "pytest_simbench.simulators"
 """Entry-point group in which adapters register, `name = "package.module:Class"`."""
@@ -103,9 +104,10 @@ def known() -> list[str]:
 
 
 def check_names(names: Iterable[str]) -> None:
-    """Raise `UnknownSimulatorError` for the first name that is not registered."""
+    """Raise `UnknownSimulatorError` for the first name that is not registered, whatever version of
+    it is meant."""
     for name in names:
-        if name not in known():
+        if base_name(name) not in known():
             raise UnknownSimulatorError(
                 f"unknown simulator {name!r}; choose from {', '.join(known())}, or all"
             )
@@ -121,15 +123,28 @@ def problem(name: str) -> str | None:
     return None
 
 
+def address(name: str) -> str | None:
+    """`module:Class` of a simulator's adapter, for its worker; None of one that is not usable."""
+    entry = registered().get(base_name(name))
+    return None if entry is None else entry.value
+
+
 @cache
 def adapter(name: str) -> type[Simulator]:
     """The adapter class of a simulator. Its engine is not imported.
+
+    Of a version (`mujoco==3.3.7`) it is the same class with an `info` of its own.
 
     Raises:
         UnknownSimulatorError: the message lists the known names.
         SimulatorError: the adapter cannot be used; the message says whose it is and why.
     """
     check_names([name])
+    version = VersionedName.of(name)
+    if version.kind:
+        cls = adapter(version.base)
+        place = {"__module__": cls.__module__, "__qualname__": cls.__qualname__}
+        return type(cls.__name__, (cls,), {**place, "info": cls.info.of_version(version)})
     if name in registry().broken:
         raise SimulatorError(registry().broken[name])
     entry = registry().entries[name]

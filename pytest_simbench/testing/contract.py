@@ -13,6 +13,7 @@ from pytest_simbench.client.errors import WorkerError
 from pytest_simbench.scene import Pose, Trajectory
 from pytest_simbench.simulator import Capability, Settings
 from pytest_simbench.simulator.settings import changed
+from pytest_simbench.simulator.versions import base_name
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
 from pytest_simbench.testing.subject import Subject, logged, require, require_close
@@ -61,7 +62,8 @@ def info_complete(subject: Subject) -> None:
     """Every text in `info` is filled in, its name is short, deviations give their reason."""
     info = subject.cls.info
     require(
-        re.fullmatch(r"[a-z][a-z0-9_]*", info.name), f"{info.name!r} is no lower-case identifier"
+        re.fullmatch(r"[a-z][a-z0-9_]*", base_name(info.name)),
+        f"{info.name!r} is no lower-case identifier",
     )
     for text in ("title", "distribution", "install", "licence", "engine", "tested_version"):
         require(getattr(info, text).strip(), f"info.{text} is empty")

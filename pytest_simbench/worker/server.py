@@ -110,10 +110,13 @@ class Server:
         self.saved.clear()
         reset_peak_rss()
         self.simulator = cls(settings, gui=gui)
+        versions = self.simulator.versions()
+        if refused := cls.info.refused(versions.get(cls.info.distribution, "")):
+            raise SimulatorError(refused)
         self.real_time = real_time
         return {
             "settings": settings.to_wire(),
-            "versions": self.simulator.versions(),
+            "versions": versions,
             "untested": self.simulator.untested(),
         }
 

@@ -82,6 +82,7 @@ class DART(Simulator):
         engine="DART",
         language="C++",
         tested_version="6.20.0",
+        oldest_version="6.20.0",  # older ones have neither the detector nor the solver of `tuned`
         capabilities=frozenset(
             {
                 Capability.WINDOW,

@@ -46,6 +46,7 @@ from pytest_simbench.simulator import (
 )
 from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
 
+from . import releases
 from .readback import ReadBack
 from .world import DrakeSettings, World, transform
 
@@ -69,6 +70,7 @@ class Drake(Simulator):
         engine="Drake SAP",
         language="C++",
         tested_version="1.51.1",
+        oldest_version=releases.OLDEST,
         capabilities=frozenset(
             {
                 Capability.WINDOW,

@@ -13,6 +13,7 @@ from pytest_simbench.simulator import PreparedRobot, lazy_import, one_value
 from pytest_simbench.simulator.quantities import touches
 from pytest_simbench.simulator.shapes import DIRECTIONS, box_corners, outlines, placed, reach
 
+from . import releases
 from .world import World
 
 geometry = lazy_import("pydrake.geometry")
@@ -48,7 +49,7 @@ class ReadBack:
     def _box(self, name: str, body: Any) -> dict[str, Any]:
         """A box; a fixed one is a shape of the world, whose frame is the shape's own."""
         world, prefix = self.world, f"body/{name}"
-        free = body.is_floating_base_body()
+        free = releases.is_floating(body)
         frame = math.RigidTransform()
         if not free:
             frame = self.inspector.GetPoseInFrame(world.shapes[name][0])

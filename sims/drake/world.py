@@ -12,6 +12,7 @@ from pytest_simbench.simulator import PreparedRobot, Settings, lazy_import
 from pytest_simbench.simulator.shapes import mesh_points
 from pytest_simbench.simulator.urdf import Link, Shape
 
+from . import releases
 from .shapes import (
     corner_centres,
     fitting_radius,
@@ -104,8 +105,8 @@ class World:
     def _options(self) -> Any:
         s = self.settings
         return plants.MultibodyPlantConfig(
+            **releases.without_sampled_ports(plants.MultibodyPlantConfig),
             time_step=s.timestep,
-            use_sampled_output_ports=False,  # they would add state, and only cost time here
             contact_model=s.contact_model,
             discrete_contact_approximation=s.approximation,
             sap_near_rigid_threshold=s.near_rigid_threshold,

@@ -28,6 +28,7 @@ from pytest_simbench.simulator import (
     lazy_import,
 )
 
+from . import releases
 from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack
 
@@ -78,6 +79,7 @@ class MuJoCo(Simulator):
         engine="MuJoCo",
         language="C, C++",
         tested_version="4.0.0",
+        oldest_version=releases.OLDEST,
         capabilities=frozenset(
             {
                 Capability.WINDOW,
@@ -135,6 +137,7 @@ class MuJoCo(Simulator):
             self._add_box(spec, box)
         spec.worldbody.add_light(pos=[0.5, 0, 3], dir=[0, 0, -1])
         self.model = model = spec.compile()
+        model.vis.global_.offwidth, model.vis.global_.offheight = 1920, 1080
         self.data = data = mujoco.MjData(model)
         self.scene = scene
 
@@ -167,7 +170,6 @@ class MuJoCo(Simulator):
         option.gravity = scene.gravity
         # On a state that is not finite MuJoCo would start over from its initial state, silently.
         option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-        spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1080
 
     def _set_surface(self, geom: Any, friction: float, group: int, touches: int) -> None:
         geom.friction[0] = friction
@@ -297,7 +299,7 @@ def _add_drive(spec: Any, joint: Any) -> None:
     )
     drive.gainprm[0] = joint.stiffness
     drive.biasprm[1], drive.biasprm[2] = -joint.stiffness, -joint.damping
-    spec.joint(joint.name).armature = joint.armature
+    releases.joint(spec, joint.name).armature = joint.armature
 
 
 def _couple_fingers(spec: Any, first: str, second: str) -> None:
@@ -307,7 +309,7 @@ def _couple_fingers(spec: Any, first: str, second: str) -> None:
         objtype=mujoco.mjtObj.mjOBJ_JOINT,
         name1=second,
         name2=first,
-        data=[0.0, 1.0, *[0.0] * 10],
+        data=releases.equality_data(mujoco, [0.0, 1.0]),
         solref=[2 * spec.option.timestep, 1.0],
     )
 

@@ -16,13 +16,15 @@ import numpy as np
 
 from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
 
+from .releases import gl_context
+
 DISABLED = {"MUJOCO_GL": "disabled"}
 """The environment of a headless import."""
 
 
 def renderer(mujoco: Any, model: Any, width: int, height: int) -> Any:
     """A `mujoco.Renderer`; loads the driver (EGL) where MuJoCo was imported without one."""
-    context = importlib.import_module("mujoco.rendering.classic.gl_context")
+    context = gl_context()
     if not hasattr(context, "GLContext"):
         os.environ["MUJOCO_GL"] = "egl"
         importlib.reload(context)

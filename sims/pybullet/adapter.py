@@ -94,6 +94,8 @@ class PyBullet(Simulator):
         engine="Bullet",
         language="C++",
         tested_version="3.2.7",
+        oldest_version="3.2.6",
+        companions={"3.2.6": ("numpy<2",), "3.2.7": ("numpy",)},  # what it was compiled for
         capabilities=frozenset(
             {
                 Capability.WINDOW,

@@ -104,6 +104,8 @@ class SAPIEN(Simulator):
         engine="PhysX 5",
         language="C++",
         tested_version="3.0.3",
+        oldest_version="3.0.0",
+        companions={"3.0.0": ("numpy", "setuptools<81")},  # pkg_resources
         capabilities=frozenset(
             {
                 Capability.WINDOW,

@@ -5,21 +5,26 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
+from pytest_simbench.client import installing
 from pytest_simbench.client.environments import (
     MARKER,
     Environment,
     cache_variables,
+    existing,
     interpreter,
     missing,
+    remove,
 )
 from pytest_simbench.simulator import SimulatorInfo
 from pytest_simbench.simulator.errors import SimulatorError
+from pytest_simbench.simulator.registry import adapter
 
 
 @pytest.fixture
@@ -55,6 +60,46 @@ def test_create(info: SimulatorInfo) -> None:
     assert interpreter(info) == str(environment.python)
     environment.create()  # over an old one
     assert environment.problem is None
+
+
+def test_two_that_make_the_same_wait_for_each_other(info: SimulatorInfo) -> None:
+    """The second one finds it made, and says meanwhile what it waits for."""
+    environment, told = Environment.of(info), []
+    with ThreadPoolExecutor() as pool, installing.alone(environment.folder, told.append):
+        second = pool.submit(environment.create, told.append)
+        while not told:
+            assert not second.done()
+        half_made(info)
+        (environment.folder / MARKER).write_text(json.dumps({"requirements": ["six==1.16.0"]}))
+        assert environment.problem is None
+    # flock belongs to an open file, so that a thread waits as another process would
+    assert told == ["another run is making the environment sixth; waiting for it\n"]
+    second.result()
+    assert environment.python.stat().st_size == 0  # nobody made it anew
+
+
+def test_what_is_there_and_removing_it(info: SimulatorInfo) -> None:
+    assert list(existing()) == []
+    environment = half_made(info)
+    with installing.alone(environment.folder, print):
+        assert list(existing()) == [environment.folder]
+    remove(environment.folder)
+    assert list(existing()) == []
+
+
+def test_a_release_lives_in_its_own_even_where_the_engine_is_installed_here(
+    info: SimulatorInfo,
+) -> None:
+    release = adapter("mujoco==3.3.7").info
+    assert "not there yet: pytest --sim-install mujoco==3.3.7" in str(missing(release))
+    assert Environment.of(release).folder.name == "mujoco==3.3.7"
+    assert missing(adapter("mujoco").info) is None
+
+
+def test_pips_configuration_is_uvs_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("UV_INDEX", "mine")
+    told = {"index-url": "a", "extra-index-url": "b c", "find-links": "d e", "timeout": "9"}
+    assert installing._as_uv(told) == {"UV_DEFAULT_INDEX": "a", "UV_FIND_LINKS": "d,e"}
 
 
 def test_one_that_does_not_install_stays_half_made(info: SimulatorInfo) -> None:

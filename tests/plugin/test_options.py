@@ -31,11 +31,13 @@ FINE = {
     "sim_output": PATHS, "sim_baseline": PATHS, "sim_resume": PATHS, "sim_merge": PATHS,
     "sim_report": PATHS, "sim_badge": PATHS,
     "sim_gui": {"zero"}, "sim_headless": {"zero"}, "sim_fresh": {"zero"}, "sim_pictures": {"zero"},
+    "sim_install_missing": {"zero"},
+    "sim_bisect": {"minus inf"},  # where a second value is missing then, for argparse
     "sim_strict": {"zero"},
 }  # fmt: skip
 """Values that an option may have after all."""
 
-LATER = {"sim_install", "sim_profile"}
+LATER = {"sim_install", "sim_profile", "sim_uninstall"}
 """Options of names that are looked up when they are used: any word will do for a start."""
 
 Configure = Callable[..., pytest.Config]
@@ -87,8 +89,9 @@ def test_bad_values_on_the_command_line(configure: Configure, name: str) -> None
     found = {
         what: complaint(configure, [f"{option.flag}={text}"]) for what, text in bad(option).items()
     }
-    if option.arguments.get("nargs") == "+":
-        found = {w: complaint(configure, [option.flag, t]) for w, t in bad(option).items()}
+    if option.arguments.get("nargs") in ("+", 2):
+        more = ["placed"] if option.arguments["nargs"] == 2 else []
+        found = {w: complaint(configure, [option.flag, t, *more]) for w, t in bad(option).items()}
     assert {what: text for what, text in found.items() if not is_sentence(text, name)} == {}
 
 
@@ -176,7 +179,10 @@ def test_any_help_text_renders(
     """argparse expands %, in whichever text it stands."""
     from pytest_simbench.plugin import spellings
 
-    changed = [Option(o.flag, o.kind, text, metavar=o.metavar, ini=False) for o in OPTIONS]
+    changed = [
+        Option(o.flag, o.kind, text, metavar=o.metavar, ini=False, arguments=o.arguments)
+        for o in OPTIONS
+    ]
     monkeypatch.setattr(spellings, "OPTIONS", changed)
     result = pytester.inline_run("--help")
     assert result.ret == 0

@@ -1,0 +1,213 @@
+"""`--sim-bisect NAME:GOOD..BAD METRIC`: the first release in which a metric is worse.
+
+Each step is a pytest run of its own, with the same tests and options, on one more release. All of
+them lie in one folder, that of `--sim-history` with the same settings: what is recorded there is
+not run again.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from pytest_simbench.plugin import options
+from pytest_simbench.plugin.values import Span, shown
+from pytest_simbench.records.text import for_terminal
+
+if TYPE_CHECKING:
+    from pytest_simbench.measure.results import ResultSet
+    from pytest_simbench.tasks.metrics import Metric
+
+
+def bisect(config: pytest.Config) -> int:
+    """Find it, say so, and return the exit code: 1 where the bad release is not worse.
+
+    Raises:
+        pytest.UsageError: no such simulator, release or metric; a run that ends with an error.
+    """
+    from pytest_simbench.measure.bisection import (
+        difference,
+        first_worse,
+        like_the_bad_one,
+        steps,
+    )
+
+    wanted: Span = options.value(config, "sim_bisect")
+    releases = _releases(wanted)
+    search = Search(config, wanted, releases)
+    last = len(releases) - 1
+    print(
+        f"bisecting {len(releases)} releases of {wanted.name}: {steps(len(releases))} steps, and "
+        "the ends"
+    )
+    search.run(0, last)
+    metric = search.metric()
+    good, bad = search.result(0), search.result(last)
+    for end, place in ((good, 0), (bad, last)):
+        if not (end.values(metric.name) if metric.name in end.known else len(end)):
+            raise pytest.UsageError(f"--sim-bisect: {search.told(place)}, so nothing tells worse")
+    found = difference(metric, good, bad)
+    if not found.significant():
+        print(
+            f"{search.told(0)}, {search.told(last)}: these repetitions do not show that it is "
+            f"worse (p = {found.p_value:.2g}), so there is nothing to find; try more of them, "
+            "--reps 40 for instance"
+        )
+        return 1
+
+    def is_worse(place: int) -> bool:
+        search.run(place)
+        worse = like_the_bad_one(metric, good, bad, search.result(place))
+        print(f"{search.told(place)}: {'worse' if worse else 'good'}", flush=True)
+        return worse
+
+    place = first_worse(len(releases), is_worse)
+    before = search.result(place - 1)
+    p_value = difference(metric, before, search.result(place)).p_value if before.ok else 1.0
+    print(
+        f"the first worse release is {releases[place]}: {search.told(place - 1)}, "
+        f"{search.told(place)} (p = {p_value:.2g})"
+    )
+    print(f"results: {search.folder}")
+    return 0
+
+
+def _releases(wanted: Span) -> list[str]:
+    """The releases from the good one to the bad one.
+
+    Raises:
+        pytest.UsageError: no such simulator or release; one sentence.
+    """
+    from pytest_simbench.client import package_index
+    from pytest_simbench.measure.bisection import between
+    from pytest_simbench.simulator.errors import SimulatorError
+    from pytest_simbench.simulator.registry import adapter
+
+    try:
+        info = adapter(wanted.name).info
+        known = package_index.releases(info.distribution)
+        for version in (wanted.good, wanted.bad):
+            problem = package_index.unreleased(info.distribution, version, known)
+            if problem or version not in known:
+                raise pytest.UsageError(f"--sim-bisect: {problem or f'write {version} in full'}")
+            if refused := info.refused(version):
+                raise pytest.UsageError(f"--sim-bisect: {refused}")
+    except SimulatorError as error:
+        raise pytest.UsageError(f"--sim-bisect: {error}") from None
+    return between(known, wanted.good, wanted.bad)
+
+
+class Search:
+    """The runs of a bisection.
+
+    Args:
+        config: of the command.
+        wanted: what it looks for.
+        releases: from the good one to the bad one.
+
+    Attributes:
+        folder: of all runs.
+    """
+
+    def __init__(self, config: pytest.Config, wanted: Span, releases: list[str]) -> None:
+        from pytest_simbench.plugin.history import folder_of
+
+        given = options.value(config, "sim_output")
+        here = config.invocation_params.dir
+        self.folder = Path(here, given) if given else folder_of(config, wanted.name)
+        self._config, self._wanted, self._releases = config, wanted, releases
+
+    def run(self, *places: int) -> None:
+        """Run the tests on some of the releases, unless the folder holds that."""
+        from pytest_simbench.records.folder import RunFolder
+
+        names = ",".join(self._name(place) for place in places)
+        keep = "--sim-resume" if RunFolder(self.folder).holds_run else "--sim-output"
+        command = [
+            *(sys.executable, "-m", "pytest", *self._arguments(), f"{keep}={self.folder}"),
+            *(f"--sim-name={names}", "--sim-install-missing", "-q"),
+        ]
+        done = subprocess.run(
+            command, cwd=self._config.invocation_params.dir, text=True, errors="replace",
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
+        )  # fmt: skip
+        if done.returncode not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED):
+            lines = [line for line in done.stdout.splitlines() if line.strip()]
+            raise pytest.UsageError(
+                f"--sim-bisect: the run on {names} ended with exit code {done.returncode}: "
+                f"{for_terminal(' '.join(lines[-3:]))[:600]}"
+            )
+
+    def metric(self) -> Metric:
+        """What is looked at.
+
+        Raises:
+            pytest.UsageError: no test has it, or several have, or neither direction is worse.
+        """
+        from pytest_simbench.measure.limits import FAILURES
+        from pytest_simbench.tasks.metrics import UnknownMetric
+
+        name, result = self._wanted.metric, self.result(0)
+        if name == FAILURES.name:
+            return FAILURES
+        try:
+            metric = result.metric(name)
+        except UnknownMetric as error:
+            raise pytest.UsageError(f"--sim-bisect: {error}") from None
+        if metric.better is None:
+            raise pytest.UsageError(f"--sim-bisect: {name} can be neither better nor worse")
+        return metric
+
+    def result(self, place: int) -> ResultSet:
+        """What a release scored.
+
+        Raises:
+            pytest.UsageError: the folder holds nothing of it, or several tests.
+        """
+        from pytest_simbench.measure.results import ResultSet
+        from pytest_simbench.records.folder import RunFolder
+        from pytest_simbench.records.series import series
+
+        reading = RunFolder(self.folder).read()
+        rows = [
+            row
+            for task in reading.metrics
+            for row in series(r for r in reading.records if r.task == task)
+            if row.key.simulator == self._name(place)
+        ]
+        if len(rows) > 1:
+            rows = [row for row in rows if self._has(reading.metrics[row.records[0].task])]
+        if len(rows) != 1:
+            what = "no test" if not rows else "more than one test"
+            raise pytest.UsageError(
+                f"--sim-bisect: {what} with {shown(self._wanted.metric)} has run on "
+                f"{self._name(place)}; choose one test, with its file or with -k"
+            )
+        records = rows[0].records
+        return ResultSet(records, reading.metrics[records[0].task])
+
+    def told(self, place: int) -> str:
+        """What a release scored, in words."""
+        name, result = self._wanted.metric, self.result(place)
+        failed = f", {len(result.failures)} failed" if result.failures else ""
+        if name in result.known and result.values(name):
+            mean = result.metric(name).format(result.interval(name).mean)
+            return f"{self._releases[place]} {name} {mean}{failed}"
+        return f"{self._releases[place]} {len(result.failures)} of {len(result)} failed"
+
+    def _name(self, place: int) -> str:
+        return f"{self._wanted.name}=={self._releases[place]}"
+
+    def _has(self, metrics: tuple[Metric, ...]) -> bool:
+        return self._wanted.metric in [metric.name for metric in metrics]
+
+    def _arguments(self) -> list[str]:
+        """The command line, without what this command is asked for."""
+        found = list(self._config.invocation_params.args)
+        place = found.index("--sim-bisect")
+        kept = [*found[:place], *found[place + 3 :]]
+        return [text for text in kept if not text.startswith("--sim-output=")]

@@ -1,0 +1,68 @@
+"""Change points: planted ones are found where they are, and chance gives none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from pytest_simbench.measure.change_points import change_points
+
+Row = list[dict[int, float]]
+
+
+def row(
+    levels: Sequence[float], rng: np.random.Generator, *, seeds: int = 10, ease: float = 3.0
+) -> Row:
+    """Values of releases with these true means and a spread of 1; seeds differ by `ease`."""
+    own = rng.normal(0, ease, seeds)
+    return [dict(enumerate(level + own + rng.normal(0, 1, seeds))) for level in levels]
+
+
+def places(found: Row) -> list[int]:
+    return [change.place for change in change_points(found)]
+
+
+def test_planted_changes_are_found_where_they_are() -> None:
+    """A step of two spreads, which ten repetitions of a release show, whatever the seeds' ease."""
+    rng = np.random.default_rng(1)
+    exact = [places(row([0] * 5 + [2] * 7, rng)) == [5] for _ in range(30)]
+    assert sum(exact) >= 26
+    both = [places(row([0] * 4 + [2] * 4 + [0] * 4, rng)) == [4, 8] for _ in range(30)]
+    assert sum(both) >= 24
+
+
+def test_the_levels_are_those_between_the_changes() -> None:
+    values = [{1: 1.0, 2: 3.0, 3: 2.0, 4: 2.0, 5: 2.5}] * 3
+    values += [{seed: x + 4 for seed, x in values[0].items()}] * 2
+    (found,) = change_points(values)
+    assert (found.place, found.before, found.after) == (3, pytest.approx(2.1), pytest.approx(6.1))
+    assert found.p_value < 0.01
+
+
+def test_without_a_change_one_row_in_twenty_has_one_at_most() -> None:
+    rng = np.random.default_rng(2)
+    false = sum(bool(places(row([0.0] * 8, rng))) for _ in range(200))
+    assert false <= 17  # 10 expected; more than 17 in 1 of 100 cases (binomial)
+
+
+def test_many_rows_share_the_error() -> None:
+    rng = np.random.default_rng(3)
+    found = row([0] * 3 + [1.2] * 3, rng, seeds=6)
+    (alone,) = change_points(found)
+    assert alone.p_value < 0.05
+    corrected = change_points(found, rows=10)
+    assert not corrected or corrected[0].p_value == pytest.approx(10 * alone.p_value)
+
+
+def test_what_never_varies_has_none_and_what_is_missing_is_left_out() -> None:
+    assert places([{1: 1.0, 2: 1.0}] * 6) == []
+    assert places([]) == []
+    assert places([{1: 2.0}]) == []
+    assert places([{1: 0.5}, {2: 0.5}]) == []
+    rng = np.random.default_rng(4)
+    found = row([0] * 4 + [3] * 4, rng)
+    for k, seed in ((0, 3), (2, 7), (5, 0), (7, 9)):
+        del found[k][seed]
+    assert places(found) == [4]

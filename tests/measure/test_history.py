@@ -1,0 +1,117 @@
+"""Histories of records, and the bisection: pure functions of what was planted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from pytest_simbench.measure.bisection import between, first_worse, like_the_bad_one, steps
+from pytest_simbench.measure.gate import side_by_side
+from pytest_simbench.measure.history import histories, sentences
+from pytest_simbench.measure.results import ResultSet
+from pytest_simbench.records.record import Record
+from tests.records.build import METRICS, failed, record
+
+PLACED = METRICS[0]
+
+
+def release(version: str, placed: float, *, ram: float = 160.0, n: int = 8) -> list[Record]:
+    """Repetitions of a release with that share of cubes, give or take one of 15."""
+    name = f"engine=={version}"
+    return [
+        record(
+            k,
+            simulator=name,
+            test=f"test_stacking[{name}-headless]",
+            versions={"engine": version},
+            metrics={"placed": placed - (k % 2) / 15},
+            resources={"rss_mb": {"mean": 100.0, "std": 1.0, "peak": ram + k % 3}},
+        )
+        for k in range(n)
+    ]
+
+
+def test_what_changed_with_which_release() -> None:
+    found = [*release("1.10", 0.6, ram=160), *release("1.2", 1.0), *release("1.9", 1.0),
+             *release("1.11", 0.6, ram=200), *release("1.8.1", 1.0)]  # fmt: skip
+    (history,) = histories(found, {"stacking": METRICS})
+    assert history.releases == ("1.2", "1.8.1", "1.9", "1.10", "1.11")
+    assert (history.simulator, history.task, history.variant) == (
+        "engine", "stacking", "headless tuned",
+    )  # fmt: skip
+    told = sentences(history)
+    assert any(t.startswith("placed fell with 1.10: 96.67 % -> 56.67 %, p = 0.0") for t in told)
+    assert any(t.startswith("peak RAM rose with 1.11: 161 MB -> 201 MB") for t in told)
+    assert len(told) == 2
+
+
+def test_a_small_change_of_a_cost_is_the_machines() -> None:
+    found = [r for v, ram in (("1", 160), ("2", 160), ("3", 170), ("4", 170))
+             for r in release(v, 1.0, ram=ram)]  # fmt: skip
+    (history,) = histories(found, {"stacking": METRICS})
+    assert sentences(history) == ["no change is supported by these repetitions"]
+
+
+def test_a_deterministic_engines_rounding_is_not_told() -> None:
+    found = [replace(r, metrics={"placed": 0.9 + (r.seed % 5) / 50 + tiny})
+             for v, tiny in (("1", 0), ("2", 0), ("3", 1e-7), ("4", 1e-7))
+             for r in release(v, 1.0)]  # fmt: skip
+    (history,) = histories(found, {"stacking": METRICS})
+    assert sentences(history) == ["no change is supported by these repetitions"]
+
+
+def test_a_release_that_fails_is_named_with_its_message() -> None:
+    broken = [
+        replace(failed(k), simulator="engine==3", test="test_stacking[engine==3-headless]")
+        for k in range(4)
+    ]
+    found = [*release("1", 1.0), *release("2", 1.0), *broken]
+    (history,) = histories(found, {"stacking": METRICS})
+    assert sentences(history)[-1] == (
+        "3: 4 of 4 repetitions failed, most often WorkerHung in settle: no answer for 30 s"
+    )
+
+
+def test_two_releases_and_other_names_are_no_history() -> None:
+    builds = [replace(r, simulator=f"engine@{k}") for k in range(3) for r in release("1", 1.0)]
+    assert histories([*release("1", 1.0), *release("2", 1.0)], {"stacking": METRICS}) == []
+    assert histories(builds, {"stacking": METRICS}) == []
+
+
+@pytest.mark.parametrize("number", range(2, 40))
+def test_the_first_worse_one_is_found_in_log2_steps(number: int) -> None:
+    for planted in range(1, number):
+        asked: list[int] = []
+
+        def is_worse(place: int, planted: int = planted, asked: list[int] = asked) -> bool:
+            asked.append(place)
+            return place >= planted
+
+        assert first_worse(number, is_worse) == planted
+        assert len(asked) <= steps(number)
+        assert not {0, number - 1} & set(asked)
+
+
+def test_a_release_is_like_the_one_that_it_is_nearer_to() -> None:
+    good, bad = (ResultSet(release(v, x), METRICS) for v, x in (("1", 1.0), ("9", 0.6)))
+    for placed, worse in ((0.95, False), (0.85, False), (0.75, True), (0.3, True)):
+        other = ResultSet(release("5", placed), METRICS)
+        assert like_the_bad_one(PLACED, good, bad, other) is worse
+    assert like_the_bad_one(PLACED, good, bad, ResultSet([failed(1)], METRICS))
+
+
+def test_releases_between_two() -> None:
+    known = ["1.0", "1.1", "1.2", "1.3"]
+    assert between(known, "1.1", "1.3") == ["1.1", "1.2", "1.3"]
+    assert between(known, "1.2", "1.0") == ["1.2", "1.1", "1.0"]
+    with pytest.raises(ValueError, match="list"):
+        between(known, "1.2", "9.9")
+
+
+def test_a_run_as_baseline_and_current() -> None:
+    found = [*release("1", 1.0), *release("2", 0.5), *release("3", 0.4)]
+    before, now = side_by_side(found, "engine==1", ["engine==2"])
+    assert {r.simulator for r in now} == {r.simulator for r in before} == {"engine==2"}
+    assert {r.test for r in before} == {"test_stacking[engine==2-headless]"}
+    assert {r.metrics["placed"] for r in before} == {r.metrics["placed"] for r in found[:8]}

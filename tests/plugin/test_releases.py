@@ -1,0 +1,79 @@
+"""A regression planted in one release of an engine: seen in the history, found by the bisection,
+stopped by the gate."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from tests.plugin.planted import plant
+
+
+@pytest.fixture
+def planted(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    environments = pytester.path / "environments"
+    index = plant(pytester.path, environments)
+    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(environments))
+    monkeypatch.setenv("PIP_INDEX_URL", index.as_uri())
+    monkeypatch.setenv("PIP_EXTRA_INDEX_URL", (pytester.path / "none").as_uri())
+    path = [str(pytester.path / "site"), *filter(None, [os.environ.get("PYTHONPATH")])]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path))
+
+
+@pytest.mark.usefixtures("planted")
+def test_history_bisection_and_gate(pytester: pytest.Pytester) -> None:
+    def recorded() -> int:
+        return len((folder / "records.jsonl").read_text().splitlines())
+
+    result = pytester.runpytest_subprocess("--sim-history=planted:4", "--reps=5")
+    result.assert_outcomes(passed=4)
+    result.stdout.fnmatch_lines(
+        ["planted, falling (headless tuned): 4 releases, 1.2 to 1.5",
+         "  landed fell with 1.3: 100 % -> 0 %, p = *"]
+    )  # fmt: skip
+    (folder,) = (pytester.path / ".simbench" / "history").iterdir()
+    assert recorded() == 20
+    assert list(folder.glob("planted_falling_history*.png"))
+
+    result = pytester.runpytest_subprocess(  # what the history has recorded is not run again
+        "--sim-bisect", "planted:1.2..1.5", "landed", "--reps=5", "test_planted.py"
+    )
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(
+        ["bisecting 4 releases of planted: 2 steps, and the ends",
+         "1.3 landed 0 %: worse",
+         "the first worse release is 1.3: 1.2 landed 100 %, 1.3 landed 0 % (p = 0.03*)",
+         f"results: {folder}"]
+    )  # fmt: skip
+    assert recorded() == 20
+
+    result = pytester.runpytest_subprocess(
+        "--sim=planted==1.2,planted==1.3", "--sim-baseline=planted==1.2", "--reps=5",
+        "--sim-compare-fail=landed:5%", f"--sim-resume={folder}",
+    )  # fmt: skip
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.assert_outcomes(passed=2)
+    result.stdout.fnmatch_lines(
+        ["baseline: planted==1.2 in this run",
+         '  versions.planted-engine was "1.2", is "1.3"',
+         "FAILED *[[]planted==1.3-headless[]]: landed fell from 100 % to 0 %"]
+    )  # fmt: skip
+
+
+@pytest.mark.usefixtures("planted")
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--sim-bisect", "planted:1.0..1.9", "landed"], "no planted-engine 1.9 for Python *"),
+        (["--sim=planted==1.2", "--sim-baseline=planted==1.2"], "*no other version of planted*"),
+        (["--sim-history=ode:3"], "--sim-history: ode comes with packages of the system*"),
+    ],
+)
+def test_wrong_input_is_one_sentence(
+    pytester: pytest.Pytester, arguments: list[str], message: str
+) -> None:
+    result = pytester.runpytest_subprocess(*arguments)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines([f"ERROR: *{message}"])
+    assert "Traceback" not in result.stdout.str() + result.stderr.str()

@@ -1,0 +1,117 @@
+"""Several versions of one simulator in one run: names, marks, settings, ids, records."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from pytest_simbench.client.environments import MARKER, Environment
+from pytest_simbench.plugin.selection import select
+from pytest_simbench.simulator.registry import adapter
+
+
+def wrapper(python: Path) -> Path:
+    """An interpreter of another name, which is this one."""
+    python.parent.mkdir(parents=True, exist_ok=True)
+    python.write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')
+    python.chmod(0o755)
+    return python
+
+
+@pytest.fixture
+def release(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The release that is installed here, in an environment of its own that is but a wrapper."""
+    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path / "environments"))
+    name = f"mujoco=={adapter('mujoco').info.tested_version}"
+    environment = Environment.of(adapter(name).info)
+    wrapper(environment.python)
+    told = {"requirements": list(environment.info.requirements)}
+    (environment.folder / MARKER).write_text(json.dumps(told))
+    return name
+
+
+def test_versions_side_by_side(pytester: pytest.Pytester, release: str) -> None:
+    wrapper(pytester.path / "mine" / "python")
+    pytester.makepyfile(
+        f"""
+        import pytest
+        from tests.tiny import Falling
+
+        def test_falling(repeat):
+            repeat(Falling())
+
+        @pytest.mark.only_sim("mujoco")
+        @pytest.mark.skip_sim("{release}", reason="this one not")
+        def test_marked(sim_case):
+            pass
+
+        @pytest.mark.only_sim("mujoco@mine")
+        def test_one(sim_case):
+            pass
+        """
+    )
+    result = pytester.runpytest_subprocess(
+        f"--sim=mujoco,{release},mujoco@mine=mine/python", "--reps=2", "--sim-output=out",
+        "--sim-set=mujoco.timestep=0.001", f"--sim-set={release}.timestep=0.004",
+    )  # fmt: skip
+    result.assert_outcomes(passed=6, skipped=1)
+    for name in ("mujoco", release, "mujoco@mine"):
+        result.stdout.fnmatch_lines([f"{name} *"])  # of a table
+    lines = (pytester.path / "out" / "records.jsonl").read_text().splitlines()
+    found = {
+        (record["simulator"], record["settings"]["timestep"], record["seed"])
+        for record in map(json.loads, lines)
+    }
+    tests = {record["test"].partition("::")[2] for record in map(json.loads, lines)}
+    assert tests == {f"test_falling[{name}-headless]" for name, _, _ in found}
+    steps = {"mujoco": 0.001, release: 0.004, "mujoco@mine": 0.001}
+    assert found == {(name, step, seed) for name, step in steps.items() for seed in (2022, 2023)}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--sim=mujoco==abc d"], "'abc d' is no version; write mujoco==3.3.7"),
+        (["--sim=nosuch==1.0"], "unknown simulator 'nosuch==1.0'; choose from "),
+        (["--sim=mujoco==3.3.7"], "not there yet: pytest --sim-install mujoco==3.3.7"),
+        (["--sim=mujoco@"], "give a path"),
+        (["--sim=mujoco@./nowhere"], "there is no such file"),
+        (["--sim=mujoco@a b=python"], "a label has letters"),
+        (["--sim=mujoco==3.3.7@python"], "a build has no release; write mujoco@PYTHON"),
+        (["--sim=mujoco@/bin/sh"], "/bin/sh does not run, or is no Python"),
+        (["--sim=mujoco@a=a/python,mujoco@a=b/python"], "another build is called mujoco@a too"),
+        (["--sim=nosuch@a=a/python"], "unknown simulator 'nosuch'"),
+    ],
+)
+def test_wrong_names_are_one_sentence(
+    pytester: pytest.Pytester, release: str, arguments: list[str], message: str
+) -> None:
+    wrapper(pytester.path / "a" / "python")
+    wrapper(pytester.path / "b" / "python")
+    with pytest.raises(pytest.UsageError) as raised:
+        select(pytester.parseconfig(*arguments))
+    assert message in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_build_without_a_label_is_called_by_its_version(
+    pytester: pytest.Pytester, release: str
+) -> None:
+    python = wrapper(pytester.path / "mine" / "python")
+    selection = select(pytester.parseconfig(f"--sim=mujoco@{python}"))
+    name = release.replace("==", "@")
+    assert selection.simulators == (name,)
+    assert selection.pythons == {name: str(python)}
+
+
+def test_the_environments_that_are_there(pytester: pytest.Pytester, release: str) -> None:
+    result = pytester.runpytest_subprocess("--sim-environments")
+    assert result.ret == 0
+    result.stdout.fnmatch_lines([f"{release}: 0 MB, MuJoCo *", "0 MB in *"])
+    for code, line in ((0, f"{release}: removed, 0 MB"), (4, "*choose from none is there")):
+        result = pytester.runpytest_subprocess("--sim-uninstall", release)
+        assert result.ret == code
+        (result.stdout if code == 0 else result.stderr).fnmatch_lines([line])
