@@ -26,7 +26,11 @@ KINDS = {
 
 
 class FileError(ValueError):
-    """A file that cannot be taken; the message names it and says why."""
+    """A file that cannot be taken; the message names it and says why, in printable characters: a
+    stranger may have chosen the path."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__("".join(c if c.isprintable() else repr(c)[1:-1] for c in message))
 
 
 def read_file(path: str | Path, largest: int, what: str = "the file") -> bytes:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from pytest_simbench.client.errors import EngineFailed
@@ -348,6 +348,8 @@ ATTRIBUTES: list[tuple[str, str]] = [
         st.sampled_from(["foot", "upper", "hand", "tip", "shoulder", "slide", "fixed", "../x"]),
     ),
 )
+@example(ATTRIBUTES.index(("mesh", "filename")), "\U00018d09")  # assigned to nothing yet
+@example(ATTRIBUTES.index(("mesh", "filename")), "\x1b[2Jx.stl")
 def test_whatever_an_attribute_holds_it_is_sound_or_refused(
     robot: Robot, place: int, value: str
 ) -> None:
