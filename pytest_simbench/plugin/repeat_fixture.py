@@ -82,11 +82,11 @@ class RepeatFixture:
         if missing:
             if self.run.resumed is not None and not self._may_resume:
                 with _refusals_fail_the_test():
-                    self.run.resumed.check_versions(experiment)
+                    self.run.resumed.check_versions(experiment, self.run.executor)
                 self._may_resume = True
             self.run.begin_lines()
-            jobs = options.value(self.node.config, "sim_jobs")
-            repeater = Repeater(experiment, jobs, self.run.progress, self.run.folder.append)
+            run = self.run
+            repeater = Repeater(experiment, run.executor, run.progress, run.folder.append)
             found |= {r.repetition: r for r in repeater.run(missing).records}
         return [found[k] for k in sorted(found)]
 

@@ -6,6 +6,7 @@ import json
 import threading
 from collections import Counter
 from collections.abc import Iterable
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.records.text import for_terminal
 
 if TYPE_CHECKING:
+    from pytest_simbench.experiment.executor import Executor
     from pytest_simbench.experiment.experiment import Experiment
     from pytest_simbench.plugin.compare import Comparison
     from pytest_simbench.plugin.resume import Resumed
@@ -125,6 +127,13 @@ class Run:
         if self.problem:
             pytest.fail(self.problem, pytrace=False)
         return self.folder.path
+
+    @cached_property
+    def executor(self) -> Executor:
+        """Where repetitions are carried out."""
+        from pytest_simbench.experiment.executor import LocalExecutor
+
+        return LocalExecutor(options.value(self.config, "sim_jobs"))
 
     @property
     def progress(self) -> Progress:

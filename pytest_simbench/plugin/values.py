@@ -164,6 +164,22 @@ class Repetitions(Kind):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class Jobs(Kind):
+    """A number up to `most`, or `auto`: one for each core that this process may use."""
+
+    most: int
+
+    def read(self, texts: Sequence[str]) -> int:
+        number = Number(1, self.most, whole=True)
+        if texts[-1].strip() == "auto":
+            return min(len(os.sched_getaffinity(0)), self.most)
+        try:
+            return int(number.read(texts))
+        except BadValue:
+            raise BadValue(texts[-1], f"{number.advice}, or auto") from None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Choice(Kind):
     """One of a few words."""
 
