@@ -14,6 +14,10 @@ from pytest_simbench.experiment.workers import IdleWorkers
 from pytest_simbench.records.record import Record
 
 
+class ExecutorError(Exception):
+    """Nothing can be carried out any more: a cluster is gone, for instance. One sentence."""
+
+
 class Carried(Interface):
     """One repetition, carried out wherever; `repetition.Repetition` is one."""
 
@@ -43,12 +47,12 @@ class Executor(ABC):
 
     The repeater calls `repetition` in as many threads as `jobs` says. All else of a test (records,
     progress, Ctrl-C, what ends it early) is the same wherever its repetitions run.
-
-    Attributes:
-        jobs: repetitions side by side, at most.
     """
 
-    jobs: int
+    @property
+    @abstractmethod
+    def jobs(self) -> int:
+        """Repetitions side by side, at most."""
 
     @abstractmethod
     def repetition(
@@ -86,8 +90,12 @@ class LocalExecutor(Executor):
     """
 
     def __init__(self, jobs: int = 1) -> None:
-        self.jobs = jobs
+        self._jobs = jobs
         self._idle = IdleWorkers()
+
+    @property
+    def jobs(self) -> int:
+        return self._jobs
 
     def repetition(
         self,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.executor import ExecutorError
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.sequential import Plan, SequentialResultSet
@@ -86,8 +87,9 @@ class RepeatFixture:
                 self._may_resume = True
             self.run.begin_lines()
             run = self.run
-            repeater = Repeater(experiment, run.executor, run.progress, run.folder.append)
-            found |= {r.repetition: r for r in repeater.run(missing).records}
+            with _refusals_fail_the_test():
+                repeater = Repeater(experiment, run.executor, run.progress, run.folder.append)
+                found |= {r.repetition: r for r in repeater.run(missing).records}
         return [found[k] for k in sorted(found)]
 
     def finish(self, benchmark: Any) -> None:
@@ -102,7 +104,7 @@ class RepeatFixture:
 def _refusals_fail_the_test() -> Iterator[None]:
     try:
         yield
-    except NotResumed as refusal:
+    except (NotResumed, ExecutorError) as refusal:
         pytest.fail(str(refusal), pytrace=False)
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from pytest_simbench.client.display import Displays
-from pytest_simbench.plugin import options, recording
+from pytest_simbench.plugin import cluster, options, recording
 from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import Record
@@ -131,6 +131,10 @@ class Run:
     @cached_property
     def executor(self) -> Executor:
         """Where repetitions are carried out."""
+        if cluster.asked(self.config):
+            from pytest_simbench.cluster.executor import ClusterExecutor
+
+            return ClusterExecutor(cluster.pool(self.config))
         from pytest_simbench.experiment.executor import LocalExecutor
 
         return LocalExecutor(options.value(self.config, "sim_jobs"))

@@ -207,6 +207,18 @@ def _word(text: str, whole: str) -> str:
     return word
 
 
+class Address(Kind):
+    """Where a scheduler listens: `tcp://HOST:PORT`, or `tls://` with Dask's own configuration."""
+
+    def read(self, texts: Sequence[str]) -> str:
+        text = texts[-1].strip()
+        form = r"(tcp|tls)://([\w.-]{1,253}|\[[0-9a-f:.]{2,45}\]):(\d{1,5})"
+        found = re.fullmatch(form, text, re.ASCII | re.IGNORECASE)
+        if not found or not 0 < int(found[3]) < 65536:
+            raise BadValue(texts[-1], "write it as tcp://HOST:PORT or tls://HOST:PORT")
+        return text
+
+
 class Words(Kind):
     """Names, separated by commas (in an ini file by blanks too)."""
 
