@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import os
 import signal
 import socket
 import sys
@@ -15,12 +16,16 @@ from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
 from pytest_simbench.cluster.offers import Node, here
+from pytest_simbench.cluster.pool import LOST_AFTER, SETTINGS
 from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.registry import check_names
 
 LOOPBACK = "127.0.0.1"
 PORT = 8786
 """Dask's own."""
+
+AGAIN = 5.0
+"""Between two attempts of a node to reach its head [s]."""
 
 LEAST_TCP = 11.0
 """Dask's least time-out of a connection [s]."""
@@ -29,6 +34,7 @@ LEAST_TCP = 11.0
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a head or a node until it is told to end."""
     given = _parser().parse_args(arguments)
+    os.environ.setdefault("DASK_LOGGING__DISTRIBUTED", "warning")  # its processes inherit it
     try:
         from distributed import Nanny, Scheduler  # noqa: F401
     except ImportError:
@@ -54,7 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     head.add_argument(
         "--lost-after",
         type=float,
-        default=30.0,
+        default=LOST_AFTER,
         metavar="SECONDS",
         help="silence after which a node counts as lost (default: %(default)s)",
     )
@@ -92,9 +98,12 @@ async def _head(given: argparse.Namespace) -> int:
             "distributed.comm.timeouts.tcp": f"{max(given.lost_after, LEAST_TCP):g}s",
         }
     )
-    async with Scheduler(host=given.host, port=given.port, dashboard_address=f"{given.host}:0") as scheduler:
+    async with Scheduler(
+        host=given.host, port=given.port, dashboard_address=f"{given.host}:0"
+    ) as scheduler:
+        scheduler.set_metadata(keys=[SETTINGS], value={"lost-after": given.lost_after})
         print(f"the head listens on {scheduler.address}", flush=True)
-        await _until_told(scheduler.finished)
+        await _either(scheduler.finished, _told())
     return 0
 
 
@@ -109,29 +118,42 @@ async def _node(given: argparse.Namespace) -> int:
     check_names(names or [])
     offers = here(given.slots, names)
     head = get_address_host(resolve_address(given.address))
-    nanny = Nanny(
-        given.address,
-        host=given.host or (LOOPBACK if head.startswith("127.") else get_ip(head)),
-        name=given.name,
-        nthreads=given.slots,
-        resources=offers,
-        memory_limit=0,
-        dashboard=False,
-        death_timeout=None,
-    )
-    async with nanny:
-        node = Node.of(nanny.worker_address or "", given.name, offers)
-        print(f"{node}; {given.slots} at once; it serves {given.address}", flush=True)
-        await _until_told(nanny.finished)
+    told = _told()
+    while not told.is_set():
+        nanny = Nanny(
+            given.address,
+            host=given.host or (LOOPBACK if head.startswith("127.") else get_ip(head)),
+            name=given.name,
+            nthreads=given.slots,
+            resources=offers,
+            memory_limit=0,
+            dashboard=False,
+        )
+        try:
+            async with nanny:
+                node = Node.of(nanny.worker_address or "", given.name, offers)
+                print(f"{node}; {given.slots} at once; it serves {given.address}", flush=True)
+                await _either(nanny.finished, told)
+        except (OSError, RuntimeError, TimeoutError, ValueError) as error:
+            reason = " ".join(f"{error.__cause__ or error}".split())
+            print(f"no head at {given.address} takes this node ({reason})", flush=True)
+        if not told.is_set():
+            print(f"it tries again every {AGAIN:g} s", flush=True)
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(told.wait(), AGAIN)
     return 0
 
 
-async def _until_told(finished: Callable[[], Awaitable[Any]]) -> None:
-    """Until it has ended, or this process gets SIGINT or SIGTERM."""
+def _told() -> asyncio.Event:
+    """Set when this process gets SIGINT or SIGTERM."""
     told = asyncio.Event()
-    loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, told.set)
+        asyncio.get_running_loop().add_signal_handler(number, told.set)
+    return told
+
+
+async def _either(finished: Callable[[], Awaitable[Any]], told: asyncio.Event) -> None:
+    """Until it has ended, or this process is told to."""
     waiting = [asyncio.ensure_future(finished()), asyncio.ensure_future(told.wait())]
     await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
     for task in waiting:

@@ -44,6 +44,8 @@ ATTEMPTS = 2
 MOST_AT_ONCE = 256
 """Repetitions that one client has under way; each has a thread that waits for it."""
 
+GONE = "its process ended, or its network is gone"
+
 ROOM = 16
 """More threads than twice the slots that are there now: nodes may come in the middle of a test."""
 
@@ -181,7 +183,7 @@ class RemoteRepetition:
                 if self._stop.is_set():
                     raise self._interrupted(None)
                 if not self.pool.lives(node):
-                    raise _Lost("its process ended, or its network is gone")
+                    raise _Lost(GONE)
                 shown = self._show(key, shown)
             return self._result(future, node)
         finally:
@@ -206,7 +208,8 @@ class RemoteRepetition:
             )
         error = future.exception()
         if isinstance(error, KilledWorker):
-            raise _Lost("its process ended, or its network is gone")
+            self.pool.give_up(node)
+            raise _Lost(GONE)
         if error is not None:
             raise TaskFailed(f"{node.name} cannot run it: {type(error).__name__}: {error}")
         answer: Mapping[str, Any] = future.result()

@@ -8,7 +8,9 @@ and bytes, and a record is read from it as from a file.
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, cast
@@ -25,6 +27,10 @@ from pytest_simbench.tasks.base import ROBOT, Task
 
 OF_THE_MACHINE = ("folder", "python", "spec", "environment", "display", "robot", "contended")
 """Attributes of a case that the node finds by itself."""
+
+
+_packing = threading.Lock()
+"""What cloudpickle sends by value is set for the whole process."""
 
 
 @dataclass(frozen=True)
@@ -120,17 +126,17 @@ class Job:
         return Experiment(case, task)
 
     def pack(self) -> bytes:
-        """For the way to a node."""
+        """For the way to a node. The task's class and its bases travel as code, where their
+        modules are the tests' own; what else these import must be there on the node."""
         import cloudpickle
 
-        module = sys.modules.get(type(self.task).__module__)
-        if module is None or _installed(module.__name__, getattr(module, "__file__", None)):
+        with _packing, ExitStack() as stack:
+            for name in {kind.__module__ for kind in type(self.task).__mro__}:
+                module = sys.modules.get(name)
+                if module is not None and not _installed(name, getattr(module, "__file__", None)):
+                    cloudpickle.register_pickle_by_value(module)
+                    stack.callback(cloudpickle.unregister_pickle_by_value, module)
             return cast("bytes", cloudpickle.dumps(self))
-        cloudpickle.register_pickle_by_value(module)
-        try:
-            return cast("bytes", cloudpickle.dumps(self))
-        finally:
-            cloudpickle.unregister_pickle_by_value(module)
 
     @classmethod
     def unpack(cls, data: bytes) -> Job:
@@ -141,9 +147,13 @@ class Job:
 
 
 def _installed(name: str, file: str | None) -> bool:
-    """Whether a module is there on every node: this package's, or of an installed distribution."""
-    return name.partition(".")[0] == "pytest_simbench" or (
-        file is None or "site-packages" in Path(file).parts
+    """Whether a module is there on every node: this package's, Python's, or a distribution's."""
+    top = name.partition(".")[0]
+    return (
+        file is None
+        or top == "pytest_simbench"
+        or top in sys.stdlib_module_names
+        or "site-packages" in Path(file).parts
     )
 
 

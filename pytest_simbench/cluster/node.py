@@ -7,6 +7,7 @@ worker waits for the next repetition of its case, for `IDLE` seconds.
 from __future__ import annotations
 
 import atexit
+import errno
 import shutil
 import tempfile
 import threading
@@ -20,7 +21,6 @@ from pathlib import Path
 from typing import Any
 
 from pytest_simbench.client.display import Displays
-from pytest_simbench.client.errors import WorkerError
 from pytest_simbench.cluster.job import Job, told
 from pytest_simbench.experiment.identity import file_stem
 from pytest_simbench.experiment.repetition import Repetition
@@ -35,6 +35,12 @@ LOOK_PERIOD = 0.5
 
 IDLE = 60.0
 """That a worker waits for the next repetition, where starting is costly [s]."""
+
+OF_THE_MACHINE = (
+    errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM,
+    errno.EAGAIN,
+)  # fmt: skip
+"""Errors that another machine may not have: a full disk, too many files or processes."""
 
 LARGEST_LOG = 2**20
 """Of a log that is sent back [bytes]; its end is kept. Workers' logs are cut to less."""
@@ -159,7 +165,7 @@ def carry_out(
         )
         started(repetition)
         record, error = repetition.run() if job.number else repetition.probe()
-        if isinstance(error, OSError) and not isinstance(error, WorkerError):
+        if isinstance(error, OSError) and error.errno in OF_THE_MACHINE:
             raise error
         lines = "" if error is None else "".join(traceback.format_exception(error))
         name = str(record.details.get("log") or "")
@@ -218,6 +224,8 @@ def run(data: bytes) -> dict[str, Any]:
     try:
         return carry_out(Job.unpack(data), worker.state.nthreads, progress, started)
     except OSError as error:
-        return {"lost": f"it cannot: {error.strerror or error}"}
+        if error.errno not in OF_THE_MACHINE:
+            raise
+        return {"lost": f"it cannot: {error.strerror}"}
     finally:
         ended.set()

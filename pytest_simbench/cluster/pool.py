@@ -26,6 +26,13 @@ CONNECT_TIMEOUT = 10.0
 LOOK_PERIOD = 0.25
 """Age of what is known of the nodes, at most, while somebody waits [s]."""
 
+LOST_AFTER = 30.0
+"""Silence of a node after which it is lost [s], unless the head says otherwise (`--lost-after`).
+Dask itself takes five minutes, and half a minute more to try whether the node can be restarted."""
+
+SETTINGS = "simbench"
+"""Key of the scheduler's metadata under which the head says so."""
+
 PATIENCE = 60.0
 """How long a job waits for a node that offers what it needs, when there is none left [s]."""
 
@@ -63,8 +70,12 @@ class Pool:
         self._known: Mapping[str, Node] = {}
         self._others: Mapping[str, int] = {}
         self._mine: dict[str, str] = {}
+        self._gone: set[str] = set()
         self._looked = float("-inf")
+        self._seen: dict[str, tuple[float, float]] = {}
         self._told: dict[str, Mapping[str, Any]] = {}
+        settings = self._client.get_metadata([SETTINGS], default={})
+        self.lost_after = float(settings.get("lost-after", LOST_AFTER))
         self._client.subscribe_topic(node_side.TOPIC, self._hear)
 
     def _hear(self, event: tuple[float, Mapping[str, Any]]) -> None:
@@ -87,7 +98,7 @@ class Pool:
             return tuple(sorted(self._known.values(), key=lambda node: (node.name, node.address)))
 
     def lives(self, node: Node) -> bool:
-        """Whether this process of a node is still there.
+        """Whether this process of a node is still there, and heard of.
 
         Raises:
             ExecutorError: the scheduler is gone.
@@ -107,13 +118,23 @@ class Pool:
                 f"the scheduler at {self.address} is gone ({error}); the records so far are kept, "
                 "and --sim-resume completes the run"
             ) from None
-        found = [Node.of(a, w.get("name"), w.get("resources", {})) for a, w in workers.items()]
-        self._known = {node.address: node for node in found if node is not None}
+        now = time.monotonic()
+        found = {}
+        for address, worker in workers.items():
+            node = Node.of(address, worker.get("name"), worker.get("resources", {}))
+            heard = worker.get("last_seen", 0.0)  # by the clock of the scheduler
+            if self._seen.get(address, (None, 0.0))[0] != heard:
+                self._seen[address] = heard, now
+            silent = now - self._seen[address][1] > self.lost_after
+            if node is not None and not silent and address not in self._gone:
+                found[address] = node
+        self._known = found
+        self._seen = {address: self._seen[address] for address in workers}
         self._others = {
             address: sum(key not in self._mine for key in keys)
             for address, keys in processing.items()
         }
-        self._looked = time.monotonic()
+        self._looked = now
 
     def reserve(
         self,
@@ -162,6 +183,12 @@ class Pool:
         return self._client.submit(
             node_side.run, data, key=key, workers=[node.address], pure=False, retries=0
         )
+
+    def give_up(self, node: Node) -> None:
+        """Send nothing any more to this process of a node: it is lost."""
+        with self._ready:
+            self._gone.add(node.address)
+            self._known = {a: n for a, n in self._known.items() if a not in self._gone}
 
     def release(self, key: str, future: Future | None = None) -> None:
         """Give a slot back, and end what may still run in it."""

@@ -84,8 +84,15 @@ class Repeater:
     def _kept(self, number: int, interrupts: Interrupts) -> tuple[Record, BaseException | None]:
         """Run one repetition and keep its record."""
         progress, experiment = self.progress, self.experiment
+        begun = False
+
+        def begin(node: str) -> None:
+            nonlocal begun
+            begun = True
+            progress.repetition(number, experiment.seed(number), node)
+
         hooks = Hooks(
-            begin=lambda node: progress.repetition(number, experiment.seed(number), node),
+            begin=begin,
             phase=progress.phase,
             count=lambda done, total: progress.count(done, total, experiment.task.counted),
         )
@@ -97,6 +104,8 @@ class Repeater:
         self._active.discard(repetition)
         if isinstance(error, Unavailable):  # nothing was simulated: there is nothing to record
             raise error
+        if error is not None and not begun and record.status == "interrupted":
+            raise error  # it waited for a node
         self.keep(record)
         progress.end_repetition(record.status, record.seconds["total"])
         return record, error

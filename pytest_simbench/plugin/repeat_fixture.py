@@ -104,8 +104,10 @@ class RepeatFixture:
 def _refusals_fail_the_test() -> Iterator[None]:
     try:
         yield
-    except (NotResumed, ExecutorError) as refusal:
-        pytest.fail(str(refusal), pytrace=False)
+        return
+    except (NotResumed, ExecutorError) as error:
+        refusal = str(error)
+    pytest.fail(refusal, pytrace=False)
 
 
 def _properties(result: ResultSet) -> Iterator[tuple[str, float]]:
