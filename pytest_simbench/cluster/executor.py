@@ -201,17 +201,17 @@ class RemoteRepetition:
     def _result(self, future: Future, node: Node) -> Mapping[str, Any]:
         from distributed.scheduler import KilledWorker
 
-        if future.cancelled():
+        if future.status == "error":
+            error = future.exception()
+            if not isinstance(error, KilledWorker):
+                raise TaskFailed(f"{node.name} cannot run it: {type(error).__name__}: {error}")
+            self.pool.give_up(node)
+            raise _Lost(GONE)
+        if future.status != "finished":
             raise ExecutorError(
                 f"the scheduler at {self.pool.address} is gone; the records so far are kept, and "
                 "--sim-resume completes the run"
             )
-        error = future.exception()
-        if isinstance(error, KilledWorker):
-            self.pool.give_up(node)
-            raise _Lost(GONE)
-        if error is not None:
-            raise TaskFailed(f"{node.name} cannot run it: {type(error).__name__}: {error}")
         answer: Mapping[str, Any] = future.result()
         if "lost" in answer:
             raise _Lost(str(answer["lost"]))
