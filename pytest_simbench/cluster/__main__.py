@@ -64,6 +64,9 @@ def _parser() -> argparse.ArgumentParser:
         metavar="SECONDS",
         help="silence after which a node counts as lost (default: %(default)s)",
     )
+    head.add_argument(
+        "--tls", action="store_true", help="encrypted, by the certificates of Dask's configuration"
+    )
     head.set_defaults(run=_head)
     node = kinds.add_parser("node", help="a machine that carries repetitions out")
     node.add_argument("address", help="of the head: tcp://head:8786, or tls://head:8786")
@@ -99,7 +102,10 @@ async def _head(given: argparse.Namespace) -> int:
         }
     )
     async with Scheduler(
-        host=given.host, port=given.port, dashboard_address=f"{given.host}:0"
+        host=given.host,
+        port=given.port,
+        protocol="tls" if given.tls else "tcp",
+        dashboard_address=f"{given.host}:0",
     ) as scheduler:
         scheduler.set_metadata(keys=[SETTINGS], value={"lost-after": given.lost_after})
         print(f"the head listens on {scheduler.address}", flush=True)

@@ -49,11 +49,16 @@ class Pool:
 
     def __init__(self, address: str) -> None:
         try:
-            from distributed import Client
+            from distributed import Client, Security
         except ImportError:
             raise ExecutorError(
                 "a cluster needs Dask: pip install 'pytest-simbench[cluster]'"
             ) from None
+        secret = Security().get_connection_args("client").get("ssl_context") is not None
+        if address.lower().startswith("tls") and not secret:
+            raise ExecutorError(
+                "tls:// needs certificates for the client in Dask's configuration (docs/cluster.md)"
+            )
         self.address = address
         self.name = uuid4().hex
         try:
