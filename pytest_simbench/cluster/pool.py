@@ -71,6 +71,12 @@ class Pool:
                 f"no scheduler of Dask answers at {address} ({reason}); start one: "
                 "python -m pytest_simbench.cluster head"
             ) from None
+        self._begin()
+        settings = self._client.get_metadata([SETTINGS], default={})
+        self.lost_after = float(settings.get("lost-after", LOST_AFTER))
+        self._client.subscribe_topic(node_side.TOPIC, self._hear)
+
+    def _begin(self) -> None:
         self._ready = threading.Condition()
         self._known: Mapping[str, Node] = {}
         self._others: Mapping[str, int] = {}
@@ -79,9 +85,6 @@ class Pool:
         self._looked = float("-inf")
         self._seen: dict[str, tuple[float, float]] = {}
         self._told: dict[str, Mapping[str, Any]] = {}
-        settings = self._client.get_metadata([SETTINGS], default={})
-        self.lost_after = float(settings.get("lost-after", LOST_AFTER))
-        self._client.subscribe_topic(node_side.TOPIC, self._hear)
 
     def _hear(self, event: tuple[float, Mapping[str, Any]]) -> None:
         message = event[1]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
+from queue import Empty, SimpleQueue
 from typing import Protocol as Interface
 
 from pytest_simbench.client.errors import Unavailable, WorkerError, WorldParityError
@@ -115,17 +116,24 @@ class Repeater:
             Interrupts() as interrupts,
             ThreadPoolExecutor(self.executor.jobs, thread_name_prefix="simbench") as pool,
         ):
-            pending: set[Future[Record]] = {pool.submit(self._one, k) for k in numbers}
+            # Not wait(): it looks at all that are left, each time that one has ended.
+            ended: SimpleQueue[Future[Record]] = SimpleQueue()
+            futures = [pool.submit(self._one, k) for k in numbers]
             done: list[Record] = []
             try:
-                while pending:
-                    finished, pending = wait(pending, timeout=0.5, return_when=FIRST_COMPLETED)
-                    done += [future.result() for future in finished]
+                for future in futures:
+                    future.add_done_callback(ended.put)
+                while len(done) < len(futures):
+                    try:
+                        future = ended.get(timeout=0.5)
+                    except Empty:  # a signal is handled between two looks at the latest
+                        continue
+                    done.append(future.result())
                 interrupts.hold()
             except BaseException:
                 interrupts.hold()
                 self._stopping.set()
-                for future in pending:
+                for future in futures:
                     future.cancel()
                 for repetition in list(self._active):
                     repetition.kill()

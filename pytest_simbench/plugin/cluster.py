@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import pytest
@@ -11,6 +12,7 @@ from pytest_simbench.plugin import options
 if TYPE_CHECKING:
     from pytest_simbench.cluster.offers import Node
     from pytest_simbench.cluster.pool import Pool
+    from pytest_simbench.records.record import Record
 
 _POOL: pytest.StashKey[Pool] = pytest.StashKey()
 
@@ -65,6 +67,18 @@ def nodes(config: pytest.Config) -> tuple[Node, ...]:
         pytest.UsageError: see `pool`.
     """
     return pool(config).nodes() if asked(config) else ()
+
+
+def lost(records: Iterable[Record]) -> str:
+    """How many repetitions were tried again, as a sentence for the end of the run, or nothing."""
+    again = [record for record in records if record.details.get("lost")]
+    if not again:
+        return ""
+    failed = sum(record.error is not None and record.error.type == "NodeLost" for record in again)
+    return (
+        f"nodes were lost: {len(again)} of the repetitions were tried again on another one, and "
+        f"{failed} of them failed for it; `lost` in the details of their records says more"
+    )
 
 
 def leave(config: pytest.Config) -> None:

@@ -277,7 +277,7 @@ class Run:
         written = write_report(self.folder, self.reading, comparison.found if comparison else None)
         unsaved = self.folder.flush()
         problems = [*self._problems, *self.reading.problems, *self.reading.refused]
-        problems += written.problems
+        problems += [*written.problems, cluster.lost(self.reading.records)]
         if written.summaries:
             changes = comparison.markdown() if comparison else ""
             page = markdown.render_run(written.summaries)

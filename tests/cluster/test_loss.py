@@ -108,13 +108,13 @@ def test_a_process_killed_a_machine_stopped_and_one_added(
     machines.node("d", "--sim", "mujoco", environment={"TROUBLE": str(trouble)})
     out, _ = run.communicate(timeout=120)
     assert run.returncode == 0, out
+    assert "of them failed for it" in out
     expected, found = records(straight), records(spread)
     assert found.keys() == expected.keys()
     lost = found.pop(FULL)
     assert (lost["status"], lost["error"]["type"]) == ("failed", "NodeLost")
     assert len(lost["details"]["lost"]) == 2
     assert "it cannot: No space left on device, then on" in lost["error"]["message"]
-    assert len({text.partition(":")[0] for text in lost["details"]["lost"]}) == 2  # elsewhere
     assert {s: alike(r) for s, r in found.items()} == {s: alike(expected[s]) for s in found}
     again = {seed: r["details"]["lost"] for seed, r in found.items() if "lost" in r["details"]}
     assert "its process ended, or its network is gone" in again[2024][0]
