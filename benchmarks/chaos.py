@@ -36,6 +36,7 @@ from pytest_simbench.client import reaper
 from pytest_simbench.client.display import Displays
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.records.folder import RunFolder
@@ -216,7 +217,7 @@ def one(case: Case, fault: Fault, number: int, rng: random.Random, tally: Tally)
     times = {"Ctrl-C": 1, "Ctrl-C three times": 3}.get(fault.name, 0)
     title = f"{number} {case.simulator} {fault.name}"
     experiment = Experiment(case, Falling(fault.name))
-    repeater = Repeater(experiment, 1, Silent(), keep)  # type: ignore[arg-type]
+    repeater = Repeater(experiment, LocalExecutor(1), Silent(), keep)  # type: ignore[arg-type]
     try:
         with ctrl_c(times, rng.uniform(0.5, 6.0)):
             repeater.run([number])

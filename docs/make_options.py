@@ -14,7 +14,14 @@ from pytest_simbench.plugin.options import OPTIONS, Option
 
 PAGE = Path(__file__).with_name("options.md")
 
-INTERNAL = ("sim_case", "simbench_case", "simbench_handle", "benchmark_rounds", "no_rounds")
+INTERNAL = (
+    "sim_case",
+    "simbench_case",
+    "simbench_case_here",
+    "simbench_handle",
+    "benchmark_rounds",
+    "no_rounds",
+)
 """Fixtures that tests do not ask for by name."""
 
 TEMPLATE = """\

@@ -88,6 +88,10 @@ class Unavailable(WorkerError):
     """This machine lacks what was asked for, a driver for instance; such a test is skipped."""
 
 
+class NodeLost(WorkerError):
+    """The machines of a cluster that carried the repetition out were lost."""
+
+
 class BadState(WorkerError):
     """An adapter returned what is no state of the scene: its shape, type or order is wrong."""
 

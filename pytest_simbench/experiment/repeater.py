@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
+from queue import Empty, SimpleQueue
 from typing import Protocol as Interface
 
 from pytest_simbench.client.errors import Unavailable, WorkerError, WorldParityError
+from pytest_simbench.experiment.executor import Carried, Executor, Hooks
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.interrupts import Interrupts
-from pytest_simbench.experiment.repetition import Repetition
-from pytest_simbench.experiment.workers import IdleWorkers
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import short
@@ -21,7 +21,7 @@ class ProgressLine(Interface):
     """What the live line is told; `report.progress.Progress` is one."""
 
     def start_test(self, test_id: str, repetitions: int, last: int | None = None) -> None: ...
-    def repetition(self, number: int, seed: int) -> None: ...
+    def repetition(self, number: int, seed: int, node: str = "") -> None: ...
     def phase(self, name: str) -> None: ...
     def count(self, done: int, total: int, noun: str = "") -> None: ...
     def end_repetition(self, status: str, seconds: float) -> None: ...
@@ -33,7 +33,7 @@ class Repeater:
 
     Args:
         experiment: what is repeated.
-        jobs: how many workers run side by side.
+        executor: where and how many side by side.
         progress: the live line.
         keep: takes every record at once, before anything else can go wrong.
     """
@@ -41,16 +41,15 @@ class Repeater:
     def __init__(
         self,
         experiment: Experiment,
-        jobs: int,
+        executor: Executor,
         progress: ProgressLine,
         keep: Callable[[Record], None],
     ) -> None:
-        self.experiment = experiment.in_case(contended=True) if jobs > 1 else experiment
-        self.jobs = jobs
+        self.experiment = experiment
+        self.executor = executor
         self.progress = progress
         self.keep = keep
-        self._idle = IdleWorkers()
-        self._active: set[Repetition] = set()
+        self._active: set[Carried] = set()
         self._stopping = threading.Event()
 
     def run(self, numbers: Iterable[int]) -> ResultSet:
@@ -65,12 +64,12 @@ class Repeater:
         name = short(self.experiment.case.test)
         self.progress.start_test(name, len(numbers), max(numbers, default=0))
         try:
-            if self.jobs > 1 and len(numbers) > 1:
+            if self.executor.jobs > 1 and len(numbers) > 1:
                 records = self._side_by_side(numbers)
             else:
                 records = [self._one(number) for number in numbers]
         finally:
-            self._idle.close()
+            self.executor.end_test()
             self.progress.end_test()
         return ResultSet(records, self.experiment.metrics)
 
@@ -85,23 +84,29 @@ class Repeater:
 
     def _kept(self, number: int, interrupts: Interrupts) -> tuple[Record, BaseException | None]:
         """Run one repetition and keep its record."""
-        progress = self.progress
-        repetition = Repetition(
-            self.experiment,
-            number,
-            idle=self._idle,
-            interrupts=interrupts,
-            on_phase=progress.phase,
-            on_count=lambda done, total: progress.count(done, total, self.experiment.task.counted),
+        progress, experiment = self.progress, self.experiment
+        begun = False
+
+        def begin(node: str) -> None:
+            nonlocal begun
+            begun = True
+            progress.repetition(number, experiment.seed(number), node)
+
+        hooks = Hooks(
+            begin=begin,
+            phase=progress.phase,
+            count=lambda done, total: progress.count(done, total, experiment.task.counted),
         )
+        repetition = self.executor.repetition(experiment, number, hooks, interrupts)
         self._active.add(repetition)
         if self._stopping.is_set():  # this thread took it up just before it could be cancelled
             repetition.kill()
-        progress.repetition(number, repetition.seed)
         record, error = repetition.run()
         self._active.discard(repetition)
         if isinstance(error, Unavailable):  # nothing was simulated: there is nothing to record
             raise error
+        if error is not None and not begun and record.status == "interrupted":
+            raise error  # it waited for a node
         self.keep(record)
         progress.end_repetition(record.status, record.seconds["total"])
         return record, error
@@ -109,19 +114,26 @@ class Repeater:
     def _side_by_side(self, numbers: list[int]) -> list[Record]:
         with (
             Interrupts() as interrupts,
-            ThreadPoolExecutor(self.jobs, thread_name_prefix="simbench") as pool,
+            ThreadPoolExecutor(self.executor.jobs, thread_name_prefix="simbench") as pool,
         ):
-            pending: set[Future[Record]] = {pool.submit(self._one, k) for k in numbers}
+            # Not wait(): it looks at all that are left, each time that one has ended.
+            ended: SimpleQueue[Future[Record]] = SimpleQueue()
+            futures = [pool.submit(self._one, k) for k in numbers]
             done: list[Record] = []
             try:
-                while pending:
-                    finished, pending = wait(pending, timeout=0.5, return_when=FIRST_COMPLETED)
-                    done += [future.result() for future in finished]
+                for future in futures:
+                    future.add_done_callback(ended.put)
+                while len(done) < len(futures):
+                    try:
+                        future = ended.get(timeout=0.5)
+                    except Empty:  # a signal is handled between two looks at the latest
+                        continue
+                    done.append(future.result())
                 interrupts.hold()
             except BaseException:
                 interrupts.hold()
                 self._stopping.set()
-                for future in pending:
+                for future in futures:
                     future.cancel()
                 for repetition in list(self._active):
                     repetition.kill()

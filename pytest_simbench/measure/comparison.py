@@ -23,6 +23,14 @@ ALPHA = 1 - CONFIDENCE
 PERMUTATIONS = 9999
 """Random permutations where not all are tried; p is then exact to about 0.002 at 0.05."""
 
+MANY = 100
+"""Values on each side from which permutations are drawn by ourselves, or not at all where their
+result is known. scipy takes 70 ms for so many, and hours and gigabytes at 100,000 records."""
+
+EFFECTIVE = 500.0
+"""So many values must carry a difference for its permutations to be normal; of rare failures only
+the failed ones do. A p value of 0.05 is then right to 0.003, also for counts."""
+
 COMMON_SEEDS = 0.9
 """Pair by seed when at least this share of the smaller side's seeds is on both sides."""
 
@@ -110,6 +118,13 @@ def _permutation(a: FloatArray, b: FloatArray, paired: bool, alternative: Altern
     if min(a.size, b.size) < 2:
         return 1.0  # one repetition cannot be told from chance; scipy refuses it
     scale = max(float(np.abs(a).max()), float(np.abs(b).max())) or 1.0
+    if min(a.size, b.size) > MANY:
+        if paired:
+            return _signs(b - a, scale, alternative)
+        both = np.concatenate([a, b]) - np.concatenate([a, b]).mean()
+        variance = float((both**2).sum()) / (both.size - 1) * (1 / a.size + 1 / b.size)
+        if _carrying(both) >= EFFECTIVE:
+            return _normal(float(b.mean() - a.mean()), variance, alternative)
 
     def mean_difference(second: Any, first: Any, axis: int = -1) -> Any:
         difference = np.mean(second, axis=axis) - np.mean(first, axis=axis)
@@ -123,8 +138,49 @@ def _permutation(a: FloatArray, b: FloatArray, paired: bool, alternative: Altern
         n_resamples=PERMUTATIONS,
         alternative=alternative,
         rng=np.random.default_rng(SEED),
+        batch=max(1, 10**8 // (a.size + b.size)),
     )
     return float(found.pvalue)
+
+
+def _signs(differences: FloatArray, scale: float, alternative: Alternative) -> float:
+    """The same of many pairs: each permutation changes the signs of some differences."""
+    parts = differences[np.abs(differences) > 1e-12 * scale]  # equal pairs change none
+    if parts.size < 2:
+        return 1.0
+    if _carrying(parts) >= EFFECTIVE:
+        return _normal(float(parts.sum()), float((parts**2).sum()), alternative)
+    rng, parts = np.random.default_rng(SEED), parts / scale / parts.size
+    bits = rng.integers(0, 256, (PERMUTATIONS, -(-parts.size // 8)), dtype=np.uint8)
+    flips = np.unpackbits(bits, axis=1, count=parts.size)
+    sums = np.concatenate([part.astype(float) @ parts for part in np.array_split(flips, 20)])
+    drawn, observed = np.round(parts.sum() - 2 * sums, 12), np.round(parts.sum(), 12)
+    less, greater = (
+        (1 + int((drawn <= observed).sum())) / (1 + PERMUTATIONS),
+        (1 + int((drawn >= observed).sum())) / (1 + PERMUTATIONS),
+    )
+    found = {"less": less, "greater": greater, "two-sided": 2 * min(less, greater)}
+    return min(1.0, found[alternative])
+
+
+def _carrying(parts: FloatArray) -> float:
+    """How many equal values would carry as much of the sum of squares as these do."""
+    largest = float(np.abs(parts).max())
+    squares = (parts / largest) ** 2 if largest else np.ones_like(parts)
+    return float(squares.sum()) ** 2 / float((squares**2).sum())
+
+
+def _normal(difference: float, variance: float, alternative: Alternative) -> float:
+    """What the permutations of many values give: a normal difference with mean 0. Its variance is
+    exact: sum(d^2) of the signs of pairs, and where n and m values change sides the variance of all
+    values times 1 / n + 1 / m."""
+    from scipy.special import ndtr
+
+    if not variance:
+        return 1.0
+    z = difference / math.sqrt(variance)
+    less = {"less": z, "greater": -z, "two-sided": -abs(z)}[alternative]
+    return min(1.0, float(ndtr(less)) * (2 if alternative == "two-sided" else 1))
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

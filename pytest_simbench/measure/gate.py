@@ -28,7 +28,7 @@ from pytest_simbench.measure.comparison import (
 )
 from pytest_simbench.measure.limits import FAILURES, Limit
 from pytest_simbench.measure.results import ResultSet
-from pytest_simbench.measure.speed import without_speed
+from pytest_simbench.measure.speed import POWER, without_speed
 from pytest_simbench.records.configuration import differences
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import by_test
@@ -155,6 +155,13 @@ def run_gate(
         if not any(change.limit == limit for change in changes)
     ]
     notes += [
+        f"{test}: {limit.metric} is not compared: it depends on the machine, which was another "
+        "one, and not every repetition has the control workload that takes the machine's speed out"
+        for test in common
+        for limit in limits
+        if _of_machines(before[test], after[test], limit.metric)
+    ]
+    notes += [
         f"{change.test}: {change.repetitions} are too few for a change of {change.metric.name} "
         f"to be significant among {len(changes)} comparisons"
         for change in changes
@@ -239,6 +246,8 @@ def _change(
         if evened is not None:
             normalised = True
             first, second = evened
+        elif _of_machines(old, new, metric.name):
+            return None
     else:
         return None
     if metric.better is None or not first or not second:
@@ -247,6 +256,16 @@ def _change(
     comparison = compare_by_seed(first, second, "two-sided" if both_ways else worse)
     loss = limit.loss(metric, comparison.first, comparison.second)
     return Change(test, metric, limit, comparison, comparison.p_value, loss, normalised)
+
+
+def _of_machines(old: ResultSet, new: ResultSet, name: str) -> bool:
+    """Whether a cost tells of two machines rather than of two versions."""
+    if name not in POWER or name in new.metrics or without_speed(name, old, new) is not None:
+        return False
+    first, second = (
+        {(r.host.get("cpu"), r.host.get("cores")) for r in side.ok} for side in (old, new)
+    )
+    return first != second
 
 
 def _failed(result: ResultSet) -> dict[int, float]:

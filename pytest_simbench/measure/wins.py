@@ -64,10 +64,12 @@ def wins(
     ]
     values = {(key, m.name): _values(run, m) for key, run in sides.items() for m in judged}
     found: list[tuple[Any, Any, Metric, MeanDifference]] = []
-    for (a, b), metric in ((p, m) for p in combinations(sides, 2) for m in judged):
-        first, second = values[a, metric.name], values[b, metric.name]
-        if comparable(a, b) and _testable(first, metric) and _testable(second, metric):
-            found.append((a, b, metric, compare_by_seed(first, second)))
+    pairs = [pair for pair in combinations(sides, 2) if comparable(*pair)]
+    testable = {(key, m.name) for key in sides for m in judged if _testable(values[key, m.name], m)}
+    for (a, b), metric in ((p, m) for p in pairs for m in judged):
+        first, second = (a, metric.name), (b, metric.name)
+        if first in testable and second in testable:
+            found.append((a, b, metric, compare_by_seed(values[first], values[second])))
     if not found:
         return []
     corrected = false_discovery_control([c.p_value for *_, c in found])

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench.plugin import arguments, benchmark, options, recording
+from pytest_simbench.plugin import arguments, benchmark, cluster, options, recording
 from pytest_simbench.plugin.session import session_of
 from pytest_simbench.plugin.spellings import is_conftest
 
@@ -99,6 +100,7 @@ def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: A
     name, mode = sim_case
     session = session_of(config)
     chosen, this = session.selection, session.run
+    elsewhere = cluster.asked(config)  # nodes find interpreters and displays themselves
     settings = more.pop("settings", {})
     return Case.of(
         name,
@@ -110,7 +112,7 @@ def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: A
         changes={**settings, **chosen.changes_of(name)},
         spec=chosen.specs.get(name),
         robot=chosen.robot,
-        display=_display(this) if mode == "gui" else None,
+        display=_display(this) if mode == "gui" and not elsewhere else None,
         protocol=PROTOCOLS[options.value(config, "sim_protocol")],
         trace=recording.trace_mode(config),
         video=recording.video_mode(config, name),
@@ -148,6 +150,25 @@ def simbench_case(
     )
 
 
+def _on_this_machine(config: pytest.Config, case: Case) -> Case:
+    """A case for a worker of this machine, whatever `--sim-cluster` says; skips the test where its
+    simulator is not here."""
+    if not cluster.asked(config):
+        return case
+    from pytest_simbench.client.environments import missing
+    from pytest_simbench.simulator.registry import adapter
+
+    if reason := missing(adapter(case.simulator).info):
+        pytest.skip(f"only `repeat` goes to the cluster, this runs here, and {reason}")
+    return replace(case, display=_display(session_of(config).run) if case.mode == "gui" else None)
+
+
+@pytest.fixture
+def simbench_case_here(request: pytest.FixtureRequest, simbench_case: Case) -> Case:
+    """The same for workers of this machine."""
+    return _on_this_machine(request.config, simbench_case)
+
+
 @pytest.fixture
 def repeat(
     request: pytest.FixtureRequest, simbench_case: Case, simbench_rounds: Any
@@ -167,7 +188,7 @@ def repeat(
 
 
 @pytest.fixture
-def replay(request: pytest.FixtureRequest, simbench_case: Case) -> Callable[..., Replay]:
+def replay(request: pytest.FixtureRequest, simbench_case_here: Case) -> Callable[..., Replay]:
     """Runs the first seed of a task again in every way: `replay(Throwing())`.
 
     Takes `moments=` in place of those that the task declares. The first run's motion is kept for
@@ -176,13 +197,13 @@ def replay(request: pytest.FixtureRequest, simbench_case: Case) -> Callable[...,
     from pytest_simbench.plugin.repeatability import ReplayFixture
 
     jobs = options.value(request.config, "sim_jobs")
-    run = ReplayFixture(simbench_case, session_of(request.config).run.displays, jobs)
+    run = ReplayFixture(simbench_case_here, session_of(request.config).run.displays, jobs)
     return lambda task, **more: run(arguments.checked_task(task, "replay"), **more)
 
 
 @pytest.fixture
 def perturb(
-    request: pytest.FixtureRequest, simbench_case: Case, sim_settings: dict[str, Any]
+    request: pytest.FixtureRequest, simbench_case_here: Case, sim_settings: dict[str, Any]
 ) -> Iterator[Callable[[Task], Perturber]]:
     """Perturbs the first seed of a task: `perturb(LeaningTowers()).search({"x": 0.01})`.
 
@@ -193,12 +214,12 @@ def perturb(
     from pytest_simbench.plugin.repeatability import Perturber
     from pytest_simbench.repeatability.episode import Episodes
 
-    own = SimulatorHandle(simbench_case)  # without a worker until an episode starts
+    own = SimulatorHandle(simbench_case_here)  # without a worker until an episode starts
     handle = own if sim_settings else request.getfixturevalue("simbench_handle")
     strict = options.value(request.config, "sim_strict")
 
     def perturb_task(task: Task) -> Perturber:
-        experiment = Experiment(simbench_case, arguments.checked_task(task, "perturb"))
+        experiment = Experiment(simbench_case_here, arguments.checked_task(task, "perturb"))
         arguments.can_do(experiment)
         return Perturber(Episodes(experiment, handle), strict)
 
@@ -247,16 +268,17 @@ def simbench_handle(
 
     timeout = options.value(request.config, "sim_timeout")
     case = _case(request.config, sim_case, "simulator", timeout=timeout)
+    case = _on_this_machine(request.config, case)
     with closing(SimulatorHandle(case)) as handle:
         yield handle
 
 
 @pytest.fixture
-def sim(simbench_case: Case) -> Iterator[Callable[[Scene], World]]:
+def sim(simbench_case_here: Case) -> Iterator[Callable[[Scene], World]]:
     """Loads a scene into a fresh world of the simulator: `world = sim(scene)`."""
     from pytest_simbench.experiment.handle import SimulatorHandle
 
-    with closing(SimulatorHandle(simbench_case)) as handle:
+    with closing(SimulatorHandle(simbench_case_here)) as handle:
         yield handle.world
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from pytest_simbench.plugin.values import (
+    Address,
     Assignments,
     BadValue,
     Bisection,
@@ -16,6 +17,7 @@ from pytest_simbench.plugin.values import (
     File,
     Files,
     Flag,
+    Jobs,
     Kind,
     LastReleases,
     Limits,
@@ -119,8 +121,10 @@ OPTIONS = (
            "simulator's worker; repeat the option for another one", {}, metavar="SIM=SPEC"),
     Option("--sim-fresh", Flag(), "a new worker for each repetition even where starting is costly",
            False),
-    Option("--sim-jobs", Number(1, 256, whole=True), "repetitions in parallel workers, at most 256 "
-           "(records are marked contended)", 1, metavar="N"),
+    Option("--sim-jobs", Jobs(256), "repetitions in parallel workers, at most 256 (records are "
+           "marked contended), or auto: one for each core", 1, metavar="N"),
+    Option("--sim-cluster", Address(), "scheduler of a cluster whose nodes carry the repetitions "
+           "out: tcp://head:8786 (docs/cluster.md)", metavar="ADDRESS"),
     Option("--sim-memory-limit", Number(1, 1e9), "memory a worker may use before it is killed",
            metavar="MB"),
     Option("--sim-output", File(), "folder of the run (default: .simbench/TIME-ID)", metavar="DIR"),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.executor import ExecutorError
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.sequential import Plan, SequentialResultSet
@@ -82,12 +83,13 @@ class RepeatFixture:
         if missing:
             if self.run.resumed is not None and not self._may_resume:
                 with _refusals_fail_the_test():
-                    self.run.resumed.check_versions(experiment)
+                    self.run.resumed.check_versions(experiment, self.run.executor)
                 self._may_resume = True
             self.run.begin_lines()
-            jobs = options.value(self.node.config, "sim_jobs")
-            repeater = Repeater(experiment, jobs, self.run.progress, self.run.folder.append)
-            found |= {r.repetition: r for r in repeater.run(missing).records}
+            run = self.run
+            with _refusals_fail_the_test():
+                repeater = Repeater(experiment, run.executor, run.progress, run.folder.append)
+                found |= {r.repetition: r for r in repeater.run(missing).records}
         return [found[k] for k in sorted(found)]
 
     def finish(self, benchmark: Any) -> None:
@@ -102,8 +104,10 @@ class RepeatFixture:
 def _refusals_fail_the_test() -> Iterator[None]:
     try:
         yield
-    except NotResumed as refusal:
-        pytest.fail(str(refusal), pytrace=False)
+        return
+    except (NotResumed, ExecutorError) as error:
+        refusal = str(error)
+    pytest.fail(refusal, pytrace=False)
 
 
 def _properties(result: ResultSet) -> Iterator[tuple[str, float]]:

@@ -22,6 +22,7 @@ from pytest_simbench.records.series import configurations, short
 
 if TYPE_CHECKING:
     from pytest_simbench.experiment.case import Case
+    from pytest_simbench.experiment.executor import Executor
     from pytest_simbench.experiment.experiment import Experiment
 
 
@@ -142,11 +143,12 @@ class Resumed:
             raise NotResumed(self._sentence(case, found))
         return {r.repetition: r for r in same if r.status != "interrupted"}
 
-    def check_versions(self, experiment: Experiment) -> None:
+    def check_versions(self, experiment: Experiment, executor: Executor) -> None:
         """Before repetitions are added: ask a worker for what only it can tell.
 
         Args:
             experiment: as asked for now.
+            executor: where they will run.
 
         Raises:
             NotResumed: the versions are not those of the run.
@@ -158,9 +160,7 @@ class Resumed:
         others = [r for r in ended if (r.simulator, r.mode) == (case.simulator, case.mode)]
         if not of_test and not others:
             return
-        from pytest_simbench.experiment.repetition import Repetition
-
-        now, error = Repetition(experiment, 0).probe()
+        now, error = executor.probe(experiment)
         if error is not None:
             raise error
         # Another test of the same simulator has a task and settings of its own.

@@ -6,19 +6,21 @@ import json
 import threading
 from collections import Counter
 from collections.abc import Iterable
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from pytest_simbench.client.display import Displays
-from pytest_simbench.plugin import options, recording
+from pytest_simbench.plugin import cluster, options, recording
 from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.text import for_terminal
 
 if TYPE_CHECKING:
+    from pytest_simbench.experiment.executor import Executor
     from pytest_simbench.experiment.experiment import Experiment
     from pytest_simbench.plugin.compare import Comparison
     from pytest_simbench.plugin.resume import Resumed
@@ -125,6 +127,17 @@ class Run:
         if self.problem:
             pytest.fail(self.problem, pytrace=False)
         return self.folder.path
+
+    @cached_property
+    def executor(self) -> Executor:
+        """Where repetitions are carried out."""
+        if cluster.asked(self.config):
+            from pytest_simbench.cluster.executor import ClusterExecutor
+
+            return ClusterExecutor(cluster.pool(self.config))
+        from pytest_simbench.experiment.executor import LocalExecutor
+
+        return LocalExecutor(options.value(self.config, "sim_jobs"))
 
     @property
     def progress(self) -> Progress:
@@ -264,7 +277,7 @@ class Run:
         written = write_report(self.folder, self.reading, comparison.found if comparison else None)
         unsaved = self.folder.flush()
         problems = [*self._problems, *self.reading.problems, *self.reading.refused]
-        problems += written.problems
+        problems += [*written.problems, cluster.lost(self.reading.records)]
         if written.summaries:
             changes = comparison.markdown() if comparison else ""
             page = markdown.render_run(written.summaries)

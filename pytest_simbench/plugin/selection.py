@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench.plugin import options
+from pytest_simbench.plugin import cluster, options
 from pytest_simbench.plugin.history import releases_of
 from pytest_simbench.plugin.interpreters import checked_specification, interpreter_path
 from pytest_simbench.plugin.simulator_names import install_missing, progress, read_names
 from pytest_simbench.plugin.values import BadValue, shown
 
 if TYPE_CHECKING:
+    from pytest_simbench.cluster.offers import Node
     from pytest_simbench.scene import Robot
     from pytest_simbench.simulator.info import SimulatorInfo
 
@@ -34,6 +35,7 @@ class Selection:
             of its versions.
         pythons, specs: simulator name to interpreter or execnet specification.
         robot: that does the tasks; None for the tasks' own, the Panda.
+        nodes: of the cluster that carries repetitions out; none for this machine.
     """
 
     simulators: tuple[str, ...]
@@ -44,6 +46,7 @@ class Selection:
     pythons: dict[str, str] = field(default_factory=dict)
     specs: dict[str, str] = field(default_factory=dict)
     robot: Robot | None = None
+    nodes: tuple[Node, ...] = ()
 
     def id_of(self, name: str, mode: str) -> str:
         """Of the parameter of a test; the default robot adds nothing."""
@@ -56,13 +59,19 @@ class Selection:
         return {**self.changes.get(base_name(name), {}), **self.changes.get(name, {})}
 
     def missing(self, name: str) -> str | None:
-        """Why a simulator cannot run here, with what mends it; None when it can."""
+        """Why a simulator cannot run here, or on the cluster, with what mends it; None when it
+        can."""
         from pytest_simbench.client.environments import missing
         from pytest_simbench.simulator.registry import problem
 
         found = problem(name) or self._settings_problem(name)
         if found or name in self.pythons or name in self.specs:
             return found
+        if self.nodes:
+            from pytest_simbench.cluster.offers import unmet
+
+            modes = [mode for mode in self.modes if mode in _info(name).modes]
+            return unmet(self.nodes, name, modes)
         return missing(_info(name))
 
     def _settings_problem(self, name: str) -> str | None:
@@ -141,6 +150,7 @@ def _select(config: pytest.Config) -> Selection:
         {**builds, **pythons},
         specs,
         _robot(options.value(config, "sim_robot")),
+        cluster.nodes(config),
     )
     for name in changes:
         problem = selection._settings_problem(name)

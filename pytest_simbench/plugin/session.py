@@ -11,14 +11,21 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench.plugin import options, recording
+from pytest_simbench.plugin import cluster, options, recording
 
 if TYPE_CHECKING:
     from pytest_simbench.plugin.compare import Comparison
     from pytest_simbench.plugin.run import Run
     from pytest_simbench.plugin.selection import Selection
 
-NAMING = ("sim_name", "sim_robot", "sim_profile", "sim_set", "sim_python", "sim_spec")
+NAMING = (
+    "sim_name",
+    "sim_robot",
+    "sim_profile",
+    "sim_set",
+    "sim_python",
+    "sim_spec",
+)
 """Options whose values name simulators or robots: they are held against what is registered, which
 takes imports."""
 
@@ -183,6 +190,7 @@ class SimSession:
 
     def close(self) -> None:
         """End what the run started."""
+        cluster.leave(self.config)
         if self.begun:
             self.run.close()
 

@@ -164,6 +164,22 @@ class Repetitions(Kind):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class Jobs(Kind):
+    """A number up to `most`, or `auto`: one for each core that this process may use."""
+
+    most: int
+
+    def read(self, texts: Sequence[str]) -> int:
+        number = Number(1, self.most, whole=True)
+        if texts[-1].strip() == "auto":
+            return min(len(os.sched_getaffinity(0)), self.most)
+        try:
+            return int(number.read(texts))
+        except BadValue:
+            raise BadValue(texts[-1], f"{number.advice}, or auto") from None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Choice(Kind):
     """One of a few words."""
 
@@ -189,6 +205,18 @@ def _word(text: str, whole: str) -> str:
     if len(word) > LONGEST_WORD or not word.isprintable():
         raise BadValue(whole, f"a name has at most {LONGEST_WORD} printable characters")
     return word
+
+
+class Address(Kind):
+    """Where a scheduler listens: `tcp://HOST:PORT`, or `tls://` with Dask's own configuration."""
+
+    def read(self, texts: Sequence[str]) -> str:
+        text = texts[-1].strip()
+        form = r"(tcp|tls)://([\w.-]{1,253}|\[[0-9a-f:.]{2,45}\]):(\d{1,5})"
+        found = re.fullmatch(form, text, re.ASCII | re.IGNORECASE)
+        if not found or not 0 < int(found[3]) < 65536:
+            raise BadValue(texts[-1], "write it as tcp://HOST:PORT or tls://HOST:PORT")
+        return text
 
 
 class Words(Kind):

@@ -7,6 +7,7 @@ written to a file again. Errors name the place inside the data.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -36,7 +37,9 @@ def plain(value: Any, where: str = "", depth: int = 0) -> Any:
         raise CheckError(f"{where[:60]!r} is nested more than {DEEPEST} levels deep")
     if isinstance(value, dict):
         return {
-            writable(key): plain(item, f"{where}.{key}" if where else str(key), depth + 1)
+            sys.intern(writable(key)): plain(
+                item, f"{where}.{key}" if where else str(key), depth + 1
+            )
             for key, item in value.items()
         }
     if isinstance(value, list):
@@ -52,7 +55,7 @@ def plain(value: Any, where: str = "", depth: int = 0) -> Any:
 
 def writable(text: str) -> str:
     """A text that can be encoded as UTF-8."""
-    return text.encode("utf-8", "replace").decode("utf-8")
+    return text if text.isascii() else text.encode("utf-8", "replace").decode("utf-8")
 
 
 def name(value: Any, where: str) -> str:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Literal, NamedTuple
 
 from pytest_simbench.records.description import TaskDescription
@@ -106,6 +107,7 @@ MEANING: tuple[Part, ...] = (
 """The same for what a folder says of a metric; within one folder there is one meaning."""
 
 
+@cache
 def equal_to(use: Use) -> tuple[str, ...]:
     """Names of the fields that must be equal for a use."""
     return tuple(part.name for part in PARTS if use in part.equal_to)
@@ -121,8 +123,45 @@ TASK = "task."
 """Before a task's parameters among the settings: known before anything ran."""
 
 
-def values(record: Record, use: Use) -> dict[str, Any]:
-    """What a record says of everything that must be equal: `settings.timestep` to 0.002."""
+class Known(NamedTuple):
+    """What was found of records that share everything of a use.
+
+    Attributes:
+        parts: the fields themselves, kept so that no other object gets their identity.
+        values: see `values`.
+        told: see `Told.of`.
+    """
+
+    parts: tuple[Any, ...]
+    values: dict[str, Any]
+    told: Told
+
+
+_found: dict[tuple[Any, ...], Known] = {}
+_MOST_FOUND = 1000
+
+
+def _known(record: Record, use: Use) -> Known:
+    """Of records that were read together, most share these fields, so it is found out once."""
+    parts = tuple(getattr(record, name) for name in equal_to(use))
+    same = (repr(p) if isinstance(p, str | int | float | None) else id(p) for p in parts)
+    unknown = partial(record)
+    key = (use, unknown, *same)
+    if key not in _found:
+        if len(_found) >= _MOST_FOUND:
+            _found.clear()
+        found = _values(record, use)
+        _found[key] = Known(parts, found, Told({k: text(v) for k, v in found.items()}, unknown))
+    return _found[key]
+
+
+def values(record: Record, use: Use) -> Mapping[str, Any]:
+    """What a record says of everything that must be equal: `settings.timestep` to 0.002. Records
+    that share all of it get the same object."""
+    return _known(record, use).values
+
+
+def _values(record: Record, use: Use) -> dict[str, Any]:
     return {
         key: value
         for name in equal_to(use)
@@ -163,8 +202,7 @@ class Told(NamedTuple):
 
     @classmethod
     def of(cls, record: Record, use: Use = "pool") -> Told:
-        found = {key: text(value) for key, value in values(record, use).items()}
-        return cls(found, partial(record))
+        return _known(record, use).told
 
     def agrees(self, other: Told) -> bool:
         """Whether nothing known contradicts that both are of one configuration."""
@@ -260,7 +298,7 @@ def _unknown(records: Sequence[Record], key: str) -> bool:
 def _each_value(records: Sequence[Record], use: Use) -> dict[str, list[str]]:
     """The different values of each key in a set of records, as JSON, sorted."""
     found: dict[str, set[str]] = {}
-    for record in records:
-        for key, value in values(record, use).items():
-            found.setdefault(key, set()).add(text(value))
+    for told in {id(told): told for told in (Told.of(record, use) for record in records)}.values():
+        for key, value in told.values.items():
+            found.setdefault(key, set()).add(value)
     return {key: sorted(known) for key, known in found.items()}

@@ -202,7 +202,21 @@ def _known(data: dict[str, Any]) -> dict[str, Any]:
     known["deviations"] = tuple(checked.name(text, "deviations") for text in deviations)
     if known.get("error") is not None:
         known["error"] = _failure(known["error"])
+    for name in _SHARED:
+        known[name] = _shared(known[name])
     return known
+
+
+_known_values: dict[str, Any] = {}
+
+
+def _shared(value: Any) -> Any:
+    """The same object for equal values: those of a run's records are nearly all equal, and a
+    hundred thousand records then have one of each."""
+    key = repr(value)
+    if len(_known_values) >= _MOST_SHARED:
+        _known_values.clear()
+    return _known_values.setdefault(key, value)
 
 
 def _failure(error: Mapping[str, Any]) -> Failure:
@@ -240,6 +254,10 @@ _OBJECTS = (
     "limits",
     "host",
 )
+_SHARED = ("settings", "versions", "robot", "limits", "host", "deviations")
+"""What records of a run have in common."""
+
+_MOST_SHARED = 1000
 _TYPES: dict[str, tuple[type, ...]] = {
     **dict.fromkeys((*_NAMES, "status"), (str,)),
     **dict.fromkeys(("repetition", "seed", "attempt"), (int,)),

@@ -162,8 +162,9 @@ def comparable(a: Series, b: Series) -> bool:
 def told(records: Sequence[Record], use: Use = "pool") -> dict[str, object]:
     """What the records of one configuration say of it together."""
     found: dict[str, object] = {}
-    for record in sorted(records, key=lambda r: not r.ok):
-        for key, value in values(record, use).items():
+    ordered = (values(record, use) for record in sorted(records, key=lambda r: not r.ok))
+    for each in {id(each): each for each in ordered}.values():
+        for key, value in each.items():
             found.setdefault(key, value)
     return found
 

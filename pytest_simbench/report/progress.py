@@ -26,15 +26,21 @@ class _Repetition:
 
     number: int
     began: float
+    node: str = ""
     phase: str = ""
     done: int = 0
     total: int = 0
     noun: str = ""
 
     def describe(self) -> str:
-        """Phase and count, for instance `place  9/15 cubes`."""
+        """Node, phase and count, for instance `on lab1  place  9/15 cubes`."""
         count = f"{self.done}/{self.total} {self.noun}".rstrip() if self.total else ""
-        return "  ".join(part for part in (self.phase, count) if part)
+        return "  ".join(part for part in (self.place, self.phase, count) if part)
+
+    @property
+    def place(self) -> str:
+        """Where it runs, unless that is this machine."""
+        return f"on {self.node}" if self.node else ""
 
 
 @dataclass
@@ -110,12 +116,15 @@ class Progress:
             self._last = self._clock() if not self._is_tty else float("-inf")
             self._update(force=self._is_tty)
 
-    def repetition(self, number: int, seed: int) -> None:
-        """The calling thread begins repetition `number`, counted from 1, with that seed."""
+    def repetition(self, number: int, seed: int, node: str = "") -> None:
+        """The calling thread begins repetition `number`, counted from 1, with that seed; on the
+        node of that name, where it is not this machine. Told again when it moves to another."""
         with self._lock:
             if self._test is None:
                 return
-            self._test.active[threading.get_ident()] = _Repetition(number, self._clock())
+            self._test.active[threading.get_ident()] = _Repetition(
+                number, self._clock(), in_one_line(node)
+            )
             self._test.jobs = max(self._test.jobs, len(self._test.active))
             self._update()
 
@@ -200,7 +209,7 @@ class Progress:
         """One plain line for a repetition that ended."""
         count = f"{ended.done}/{ended.total} {ended.noun}".rstrip() if ended.total else ""
         where = f"repetition {ended.number} of {test.last}"
-        parts = [test.id, where, outcome, count, self._left(test)]
+        parts = [test.id, where, ended.place, outcome, count, self._left(test)]
         self._write("  ".join(part for part in parts if part) + "\n")
         self._last = self._clock()
 

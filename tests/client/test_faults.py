@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.repetition import Repetition
@@ -154,7 +155,9 @@ def test_another_world_stops_the_run(engine: Case) -> None:
     case = faulty(engine, "WrongGravity")
 
     with pytest.raises(Exception, match=f"gravity: scene .*-9.80665.*{case.simulator} .*-20"):
-        Repeater(Experiment(case, Falling()), 1, Silent(), kept.append).run(range(1, 4))  # type: ignore[arg-type]
+        Repeater(Experiment(case, Falling()), LocalExecutor(1), Silent(), kept.append).run(
+            range(1, 4)
+        )  # type: ignore[arg-type]
     assert [record.error.type for record in kept if record.error] == ["WorldParityError"]
 
 

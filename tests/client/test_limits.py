@@ -16,6 +16,7 @@ import pytest
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.experiment.interrupts import Interrupts
@@ -158,7 +159,9 @@ def kept(case: Case, task: Falling, jobs: int = 1, last: int = 1) -> tuple[list[
     """Records of a run, and whether Ctrl-C got out of it."""
     records: list[Record] = []
     try:
-        Repeater(Experiment(case, task), jobs, Silent(), records.append).run(range(1, last + 1))  # type: ignore[arg-type]
+        Repeater(Experiment(case, task), LocalExecutor(jobs), Silent(), records.append).run(
+            range(1, last + 1)
+        )  # type: ignore[arg-type]
     except KeyboardInterrupt:
         return records, True
     return records, False
@@ -225,7 +228,7 @@ def test_an_interrupt_while_the_record_is_kept(case: Case) -> None:
         records.append(record)
 
     with pytest.raises(KeyboardInterrupt):
-        Repeater(Experiment(case, Falling()), 1, Silent(), keep).run([1, 2])  # type: ignore[arg-type]
+        Repeater(Experiment(case, Falling()), LocalExecutor(1), Silent(), keep).run([1, 2])  # type: ignore[arg-type]
     assert [record.status for record in records] == ["ok"]
 
 
@@ -258,7 +261,7 @@ def test_a_time_out_is_a_failure_also_while_the_run_is_interrupted(case: Case) -
                 repeater._stopping.set()  # Ctrl-C came, and has not reached this worker yet
 
     experiment = Experiment(replace(case, timeout=3.0), Falling(1e6))
-    repeater = Repeater(experiment, 2, Stopping(), records.append)  # type: ignore[arg-type]
+    repeater = Repeater(experiment, LocalExecutor(2), Stopping(), records.append)  # type: ignore[arg-type]
     repeater.run([1])
     assert [(r.status, r.error and r.error.type) for r in records] == [
         ("failed", "RepetitionTimeout")

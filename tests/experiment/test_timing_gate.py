@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.measure.gate import GateReport, run_gate
@@ -25,7 +26,7 @@ def repetitions(case: Case) -> list[Record]:
     kept: list[Record] = []
     case = replace(case, timeout=600.0, stall_timeout=120.0)  # a machine that is very busy
     progress = Progress(lambda text: None, is_tty=False)
-    Repeater(Experiment(case, TASK), 1, progress, kept.append).run(range(1, 7))
+    Repeater(Experiment(case, TASK), LocalExecutor(1), progress, kept.append).run(range(1, 7))
     assert all(record.ok for record in kept)
     return kept
 

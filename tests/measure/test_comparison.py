@@ -254,3 +254,33 @@ def test_equivalence_refuses_what_it_cannot_judge(
 ) -> None:
     with pytest.raises(ValueError, match=message):
         equivalence(first, second, margin)
+
+
+def rare(rng: np.random.Generator, n: int) -> Any:
+    return (rng.random(n) < 0.04).astype(float)
+
+
+@pytest.mark.parametrize("draw", [normal, tied, rare])
+@pytest.mark.parametrize("paired", [True, False])
+@pytest.mark.parametrize("alternative", ["two-sided", "less"])
+def test_many_values_are_judged_as_few_are(
+    draw: Callable[..., Any], paired: bool, alternative: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where scipy would take too long: within what 9999 random permutations leave open."""
+    rng = np.random.default_rng(8)
+    first, second = draw(rng, 400), draw(rng, 400)
+    second = np.where(rng.random(400) < 0.05, first + 0.4, second)
+    quick = compare(first, second, paired=paired, alternative=alternative).p_value
+    monkeypatch.setattr(comparison, "MANY", 10**9)
+    slow = compare(first, second, paired=paired, alternative=alternative).p_value
+    sides = 2 if alternative == "two-sided" else 1
+    drawn = sides * (2 * slow / sides * (1 - slow / sides) / 9999) ** 0.5  # of two such draws
+    assert quick == pytest.approx(slow, abs=0.003 + 4 * drawn)
+
+
+def test_one_failure_in_ten_thousand_is_no_difference() -> None:
+    none, one, seven = np.zeros(10_000), np.zeros(10_000), np.zeros(10_000)
+    one[3] = 1.0
+    seven[:7] = 1.0
+    assert compare(none, one, paired=True).p_value == 1.0
+    assert 0.01 < compare(none, seven, paired=True).p_value < 0.02  # 2 / 2**7, exactly

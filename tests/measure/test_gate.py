@@ -181,6 +181,18 @@ def test_without_a_control_nothing_is_taken_out() -> None:
     assert len(report.failures) == 1
 
 
+def test_another_machine_without_a_control_is_no_change_of_the_simulator() -> None:
+    rng = np.random.default_rng(1)
+    before, slow = timed(8.0, None, rng), timed(16.0, None, rng)
+    elsewhere = [replace(record, host={"cpu": "another", "cores": 8}) for record in slow]
+    assert len(run(before, slow, "rtf:20%").failures) == 1
+    report = run(before, elsewhere, "rtf:20%")
+    assert not report.failures
+    assert any("rtf is not compared: it depends on the machine" in note for note in report.notes)
+    with_control = [replace(r, host={"cpu": "another"}) for r in timed(16.0, 2e-4, rng)]
+    assert len(run(timed(8.0, 2e-4, rng), with_control, "rtf:20%").failures) == 1
+
+
 def test_differences_are_named_first() -> None:
     report = run(made([1.0] * 5), made([1.0] * 5, versions={"engine": "2.0"}), "placed:5%")
     assert report.differences == (

@@ -116,6 +116,14 @@ def test_ini_flags(pytester: pytest.Pytester, name: str, word: str, value: bool)
     assert options.value(pytester.parseconfig("-o", f"{name}={word}"), name) is value
 
 
+def test_jobs_auto_takes_the_cores_that_pytest_may_use(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("os.sched_getaffinity", lambda pid: {0, 1, 3})
+    assert options.value(pytester.parseconfig("--sim-jobs=auto"), "sim_jobs") == 3
+    assert options.value(pytester.parseconfig("-o", "sim_jobs=auto"), "sim_jobs") == 3
+
+
 @pytest.mark.parametrize("short", [o.short for o in OPTIONS if o.short])
 def test_short_names_are_the_same_option(pytester: pytest.Pytester, short: str) -> None:
     option = next(o for o in OPTIONS if o.short == short)

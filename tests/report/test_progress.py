@@ -147,6 +147,22 @@ def test_a_log_has_one_plain_line_for_each_repetition() -> None:
     ]
 
 
+def test_what_runs_on_a_cluster_says_where() -> None:
+    desk, log = Desk(is_tty=True), Desk(is_tty=False)
+    for one in (desk, log):
+        one.progress.start_test(TEST, 2)
+        one.progress.repetition(1, seed=7, node="lab1")
+        one.now += 1.0
+        one.progress.phase("place")
+    assert desk.screen == f"{TEST}  repetition 1 of 2  on lab1  place"
+    desk.progress.repetition(1, seed=7, node="lab2")
+    desk.now += 1.0
+    desk.progress.phase("launch")
+    assert desk.screen == f"{TEST}  repetition 1 of 2  on lab2  launch"
+    log.progress.end_repetition("ok", 9.5)
+    assert log.text == f"{TEST}  repetition 1 of 2  on lab1  ok after 9.5 s  about 10 s left\n"
+
+
 def test_a_log_of_a_long_repetition_shows_that_it_lives() -> None:
     desk = Desk(is_tty=False)
     desk.progress.start_test(TEST, 1)

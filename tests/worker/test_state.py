@@ -11,6 +11,7 @@ import pytest
 
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.repetition import Repetition
@@ -132,7 +133,7 @@ def test_an_honest_adapter_passes(case: Case) -> None:
 def test_it_ends_that_repetition_alone(case: Case) -> None:
     kept: list[Record] = []
     experiment = Experiment(misshapen(case, "too few bodies"), Falling())
-    Repeater(experiment, 1, Silent(), kept.append).run([1, 2])  # type: ignore[arg-type]
+    Repeater(experiment, LocalExecutor(1), Silent(), kept.append).run([1, 2])  # type: ignore[arg-type]
     assert [record.status for record in kept] == ["failed", "failed"]
 
 

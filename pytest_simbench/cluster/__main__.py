@@ -1,0 +1,172 @@
+"""`python -m pytest_simbench.cluster head` and `node tcp://head:8786`: the machines of a cluster.
+
+They listen on loopback unless told otherwise. TLS is Dask's own (docs/cluster.md).
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import os
+import signal
+import socket
+import sys
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Any
+
+from pytest_simbench.cluster.offers import Node, here
+from pytest_simbench.cluster.pool import LOST_AFTER, SETTINGS
+from pytest_simbench.simulator.errors import SimulatorError
+from pytest_simbench.simulator.registry import check_names
+
+LOOPBACK = "127.0.0.1"
+PORT = 8786
+"""Dask's own."""
+
+AGAIN = 5.0
+"""Between two attempts of a node to reach its head [s]."""
+
+LEAST_TCP = 11.0
+"""Dask's least time-out of a connection [s]."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a head or a node until it is told to end."""
+    given = _parser().parse_args(arguments)
+    os.environ.setdefault("DASK_LOGGING__DISTRIBUTED", "warning")  # its processes inherit it
+    try:
+        from distributed import Nanny, Scheduler  # noqa: F401
+    except ImportError:
+        print("a cluster needs Dask: pip install 'pytest-simbench[cluster]'", file=sys.stderr)
+        return 2
+    try:
+        return int(asyncio.run(given.run(given)))
+    except (SimulatorError, OSError, ValueError, RuntimeError, TimeoutError) as error:
+        print(f"ERROR: {' '.join(str(error).split())}", file=sys.stderr)
+        return 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m pytest_simbench.cluster", description="Repetitions on several machines."
+    )
+    kinds = parser.add_subparsers(required=True, metavar="head|node")
+    head = kinds.add_parser("head", help="the scheduler, which knows all nodes; one of it")
+    head.add_argument(
+        "--host", default=LOOPBACK, help="address to listen on (default: %(default)s)"
+    )
+    head.add_argument("--port", type=int, default=PORT, help="(default: %(default)s)")
+    head.add_argument(
+        "--lost-after",
+        type=float,
+        default=LOST_AFTER,
+        metavar="SECONDS",
+        help="silence after which a node counts as lost (default: %(default)s)",
+    )
+    head.add_argument(
+        "--tls", action="store_true", help="encrypted, by the certificates of Dask's configuration"
+    )
+    head.set_defaults(run=_head)
+    node = kinds.add_parser("node", help="a machine that carries repetitions out")
+    node.add_argument("address", help="of the head: tcp://head:8786, or tls://head:8786")
+    node.add_argument("--host", help="address to listen on (default: the one that faces the head)")
+    node.add_argument(
+        "--name", default=socket.gethostname(), help="in records (default: %(default)s)"
+    )
+    node.add_argument(
+        "--slots",
+        type=int,
+        default=1,
+        metavar="N",
+        help="repetitions at once; with more than one, records are contended (default: 1)",
+    )
+    node.add_argument(
+        "--sim", help="simulators to offer, with commas (default: all that are ready here)"
+    )
+    node.set_defaults(run=_node)
+    return parser
+
+
+async def _head(given: argparse.Namespace) -> int:
+    import dask
+    from distributed import Scheduler
+
+    if given.lost_after < 1.0:
+        raise ValueError("--lost-after: give at least 1 second")
+    dask.config.set(
+        {
+            "distributed.scheduler.allowed-failures": 0,
+            "distributed.scheduler.worker-ttl": f"{given.lost_after:g}s",
+            "distributed.comm.timeouts.tcp": f"{max(given.lost_after, LEAST_TCP):g}s",
+        }
+    )
+    async with Scheduler(
+        host=given.host,
+        port=given.port,
+        protocol="tls" if given.tls else "tcp",
+        dashboard_address=f"{given.host}:0",
+    ) as scheduler:
+        scheduler.set_metadata(keys=[SETTINGS], value={"lost-after": given.lost_after})
+        print(f"the head listens on {scheduler.address}", flush=True)
+        await _either(scheduler.finished, _told())
+    return 0
+
+
+async def _node(given: argparse.Namespace) -> int:
+    from distributed import Nanny
+    from distributed.comm import get_address_host, resolve_address
+    from distributed.utils import get_ip
+
+    names = [name.strip() for name in given.sim.split(",")] if given.sim else None
+    if given.slots < 1:
+        raise ValueError("--slots: give a whole number from 1")
+    check_names(names or [])
+    offers = here(given.slots, names)
+    head = get_address_host(resolve_address(given.address))
+    told = _told()
+    while not told.is_set():
+        nanny = Nanny(
+            given.address,
+            host=given.host or (LOOPBACK if head.startswith("127.") else get_ip(head)),
+            name=given.name,
+            nthreads=given.slots,
+            resources=offers,
+            memory_limit=0,
+            dashboard=False,
+        )
+        try:
+            async with nanny:
+                node = Node.of(nanny.worker_address or "", given.name, offers)
+                print(f"{node}; {given.slots} at once; it serves {given.address}", flush=True)
+                await _either(nanny.finished, told)
+        except (OSError, RuntimeError, TimeoutError, ValueError) as error:
+            reason = " ".join(f"{error.__cause__ or error}".split())
+            print(f"no head at {given.address} takes this node ({reason})", flush=True)
+        if not told.is_set():
+            print(f"it tries again every {AGAIN:g} s", flush=True)
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(told.wait(), AGAIN)
+    return 0
+
+
+def _told() -> asyncio.Event:
+    """Set when this process gets SIGINT or SIGTERM."""
+    told = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, told.set)
+    return told
+
+
+async def _either(finished: Callable[[], Awaitable[Any]], told: asyncio.Event) -> None:
+    """Until it has ended, or this process is told to."""
+    waiting = [asyncio.ensure_future(finished()), asyncio.ensure_future(told.wait())]
+    await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+    for task in waiting:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+
+
+if __name__ == "__main__":
+    sys.exit(main())

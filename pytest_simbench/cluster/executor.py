@@ -1,0 +1,267 @@
+"""The executor of a cluster: each repetition goes to a node.
+
+It is lost when the node's process ended (the simulator may have killed it), when its network is
+gone, or when the node says that it cannot (a full disk). Then it goes once more to another node,
+and the record says so (`details.lost`); after a second loss the repetition has failed. What a node
+sends after it was given up is not looked at, so there is one record for each repetition.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pytest_simbench.client.errors import Interrupted, NodeLost, Unavailable, Where
+from pytest_simbench.cluster.job import Job, TaskFailed, heard
+from pytest_simbench.cluster.offers import Node
+from pytest_simbench.cluster.pool import Pool
+from pytest_simbench.experiment.executor import Executor, ExecutorError, Hooks
+from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.identity import (
+    file_stem,
+    record_of,
+    robot_told,
+    scene_digest,
+    settings,
+)
+from pytest_simbench.experiment.interrupts import Interrupts
+from pytest_simbench.recordings.trace import FOLDER as TRACES
+from pytest_simbench.records.paths import FolderError, inside
+from pytest_simbench.records.record import Failure, Record, Status
+from pytest_simbench.worker.text import told
+
+if TYPE_CHECKING:
+    from distributed import Future
+
+ATTEMPTS = 2
+"""Of a repetition: after a lost node once more elsewhere."""
+
+MOST_AT_ONCE = 256
+"""Repetitions that one client has under way; each has a thread that waits for it."""
+
+GONE = "its process ended, or its network is gone"
+
+ROOM = 16
+"""More threads than twice the slots that are there now: nodes may come in the middle of a test."""
+
+LOOK_PERIOD = 0.5
+"""Between two looks at the node of a job under way [s]."""
+
+
+class ClusterExecutor(Executor):
+    """Repetitions on the nodes of a cluster.
+
+    Args:
+        pool: the nodes.
+    """
+
+    def __init__(self, pool: Pool) -> None:
+        self.pool = pool
+
+    @property
+    def jobs(self) -> int:
+        """More than there are slots: those without one wait for it."""
+        return min(MOST_AT_ONCE, ROOM + 2 * sum(node.slots for node in self.pool.nodes()))
+
+    def repetition(
+        self,
+        experiment: Experiment,
+        number: int,
+        hooks: Hooks | None = None,
+        interrupts: Interrupts | None = None,
+    ) -> RemoteRepetition:
+        return RemoteRepetition(
+            self.pool, experiment, number, hooks or Hooks(), interrupts or Interrupts()
+        )
+
+    def probe(self, experiment: Experiment) -> tuple[Record, BaseException | None]:
+        return RemoteRepetition(self.pool, experiment, 0, Hooks(), Interrupts()).run()
+
+
+class _Lost(Exception):
+    """The node of a job is lost; says how."""
+
+
+class RemoteRepetition:
+    """One repetition on a node. `run` once; `kill` from any thread."""
+
+    def __init__(
+        self,
+        pool: Pool,
+        experiment: Experiment,
+        number: int,
+        hooks: Hooks,
+        interrupts: Interrupts,
+    ) -> None:
+        self.pool = pool
+        self.experiment = experiment
+        self.case = case = experiment.case
+        self.number = number
+        self.hooks = hooks
+        self.where = Where(case.simulator, case.mode, number, experiment.seed(number))
+        self._interrupts = interrupts
+        self._stop = threading.Event()
+        self._lost: list[str] = []
+        self._node: Node | None = None
+
+    def kill(self) -> None:
+        """End it on its node, or its waiting for one."""
+        self._stop.set()
+
+    def run(self) -> tuple[Record, BaseException | None]:
+        """Carry it out; the record, and what ended it early if anything did."""
+        began = time.monotonic()
+        try:
+            answer = self._answer()
+            self._interrupts.hold()
+        except BaseException as error:
+            self._interrupts.hold()
+            return self._without_result(error, time.monotonic() - began), error
+        return self._received(answer)
+
+    def _answer(self) -> Mapping[str, Any]:
+        """What a node found.
+
+        Raises:
+            NodeLost: as many nodes as there may be were lost, or none is left.
+            ExecutorError: the cluster is gone.
+        """
+        data = Job.of(self.experiment, self.number, self.pool.name).pack()
+        avoid: set[str] = set()
+        while True:
+            reserved = self.pool.reserve(self._able, avoid, self._stop)
+            if self._stop.is_set():
+                raise self._interrupted(reserved)
+            if reserved is None:
+                raise NodeLost(self._why("no other node offers it"), self.where)
+            key, self._node = reserved
+            self.hooks.begin(self._node.name)
+            try:
+                answer = self._on(self._node, key, data)
+            except _Lost as lost:
+                self._lost.append(f"{self._node.name}: {lost}")
+                avoid.add(self._node.name)
+                if len(self._lost) == ATTEMPTS:
+                    raise NodeLost(self._why("it is not tried again"), self.where) from None
+                continue
+            lacks = (answer["error"] or {}).get("type") == Unavailable.__name__
+            avoid.add(self._node.name)
+            if lacks and any(self._able(n) and n.name not in avoid for n in self.pool.nodes()):
+                continue  # another node may have the device
+            return answer
+
+    def _able(self, node: Node) -> bool:
+        return node.has(self.case.simulator, self.case.mode)
+
+    def _why(self, end: str) -> str:
+        lost = f"it was lost on {', then on '.join(self._lost)}; " if self._lost else ""
+        return f"{lost}{end}"
+
+    def _interrupted(self, reserved: tuple[str, Node] | None) -> BaseException:
+        if reserved is not None:
+            self.pool.release(reserved[0])
+        return Interrupted("the run was interrupted", self.where)
+
+    def _on(self, node: Node, key: str, data: bytes) -> Mapping[str, Any]:
+        """Have a node carry it out.
+
+        Raises:
+            _Lost: the node is lost.
+            ExecutorError: the cluster is gone, or Dask cannot run anything there.
+        """
+        future = self.pool.submit(key, node, data)
+        done = threading.Event()
+        future.add_done_callback(lambda _: done.set())
+        try:
+            shown: Mapping[str, Any] = {}
+            while not done.wait(LOOK_PERIOD):
+                if self._stop.is_set():
+                    raise self._interrupted(None)
+                if not self.pool.lives(node):
+                    raise _Lost(GONE)
+                shown = self._show(key, shown)
+            return self._result(future, node)
+        finally:
+            self.pool.release(key, future)
+
+    def _show(self, key: str, shown: Mapping[str, Any]) -> Mapping[str, Any]:
+        now = self.pool.progress(key)
+        if now is not shown and now:
+            self.where.phase = now["phase"]
+            self.hooks.phase(now["phase"])
+            if now["total"]:
+                self.hooks.count(now["done"], now["total"])
+        return now
+
+    def _result(self, future: Future, node: Node) -> Mapping[str, Any]:
+        from distributed.scheduler import KilledWorker
+
+        if future.status == "error":
+            error = future.exception()
+            if not isinstance(error, KilledWorker):
+                raise TaskFailed(f"{node.name} cannot run it: {type(error).__name__}: {error}")
+            self.pool.give_up(node)
+            raise _Lost(GONE)
+        if future.status != "finished":
+            raise ExecutorError(
+                f"the scheduler at {self.pool.address} is gone; the records so far are kept, and "
+                "--sim-resume completes the run"
+            )
+        answer: Mapping[str, Any] = future.result()
+        if "lost" in answer:
+            raise _Lost(str(answer["lost"]))
+        return answer
+
+    def _received(self, answer: Mapping[str, Any]) -> tuple[Record, BaseException | None]:
+        """The record that a node sent, with what only this side knows; its files are written."""
+        assert self._node is not None
+        record = Record.from_json(answer["record"], f"the answer of {self._node.name}")
+        details = {**record.details, **({"lost": self._lost} if self._lost else {})}
+        of_robot: dict[str, Any] = {}
+        if self.experiment.robot is not None:  # its files came by content
+            task, robot = self.experiment.task, self.experiment.robot
+            of_robot = {"scene": scene_digest(task), "robot": robot_told(robot)}
+        stem = file_stem(self.experiment, self.number)
+        self._keep(str(details.get("log") or ""), "logs", answer["log"])
+        problem = self._keep(f"{TRACES}/{stem}.npz", TRACES, answer["trace"])
+        if problem:
+            details["trace"] = f"the trace could not be written: {problem}"
+        host = {**record.host, "node": self._node.name}
+        record = replace(record, details=details, host=host, **of_robot)
+        return record, heard(answer["error"], self.where)
+
+    def _keep(self, name: str, folder: str, data: bytes | None) -> str:
+        """Write a file of the node's into a folder of the run; why that failed, or nothing."""
+        if data is None or Path(name).parent != Path(folder):
+            return ""
+        try:
+            path = inside(self.case.folder, name)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+        except (OSError, FolderError) as error:
+            return told(error)
+        return ""
+
+    def _without_result(self, error: BaseException, seconds: float) -> Record:
+        """The record of a repetition of which no node told."""
+        status: Status = "failed" if isinstance(error, NodeLost | TaskFailed) else "interrupted"
+        what = error.what if isinstance(error, NodeLost) else told(error)
+        found: dict[str, Any] = {}
+        with suppress(Exception):
+            found = settings(self.case)
+        return record_of(
+            self.experiment,
+            self.number,
+            status=status,
+            settings=found,
+            versions={},
+            error=Failure(type(error).__name__, what, self.where.phase),
+            details={"lost": self._lost} if self._lost else {},
+            seconds={"total": seconds},
+            host={"node": self._node.name} if self._node else {},
+        )

@@ -1,0 +1,183 @@
+"""One repetition as data: what goes to a node, and what comes back.
+
+A task of the package is known on the node. One that a test defines travels as code, so who can
+reach the scheduler can run code on the nodes; that is so with Dask anyway. What comes back is text
+and bytes, and a record is read from it as from a file.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, cast
+
+from pytest_simbench.client import errors
+from pytest_simbench.client.environments import Environment, interpreter
+from pytest_simbench.client.errors import Where, WorkerError
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.scene import Robot
+from pytest_simbench.simulator.registry import adapter
+from pytest_simbench.simulator.robot_files import content_of, keep
+from pytest_simbench.tasks.base import ROBOT, Task
+
+OF_THE_MACHINE = ("folder", "python", "spec", "environment", "display", "robot", "contended")
+"""Attributes of a case that the node finds by itself."""
+
+
+_packing = threading.Lock()
+"""What cloudpickle sends by value is set for the whole process."""
+
+
+@dataclass(frozen=True)
+class SentRobot:
+    """A robot with its description by content.
+
+    Attributes:
+        robot: without its paths.
+        content: see `simulator.robot_files`.
+        srdf: text of that file.
+    """
+
+    robot: Robot
+    content: Mapping[str, Any]
+    srdf: str
+
+    @classmethod
+    def of(cls, robot: Robot) -> SentRobot:
+        """A robot, to be sent.
+
+        Raises:
+            DescriptionError: a file of it is missing or wrong.
+        """
+        srdf = Path(robot.srdf).read_text("utf-8") if robot.srdf else ""
+        return cls(replace(robot, urdf="", srdf="", packages={}), content_of(robot), srdf)
+
+    def here(self) -> Robot:
+        """The robot with paths of this machine.
+
+        Raises:
+            OSError: its files cannot be kept here.
+        """
+        urdf = str(keep(self.content["urdf"], self.content["meshes"]))
+        srdf = str(keep(self.srdf, {}, ".srdf")) if self.srdf else ""
+        return replace(self.robot, urdf=urdf, srdf=srdf)
+
+
+@dataclass(frozen=True)
+class Job:
+    """One repetition.
+
+    Attributes:
+        case: attributes of the case that hold everywhere.
+        task: as the test asks for it; its robot, if it has one, is in `task_robot`.
+        number: of the repetition; 0 starts and ends the simulator alone.
+        client: whose it is; others may repeat a test of the same name.
+        robot, task_robot: by content.
+    """
+
+    case: Mapping[str, Any]
+    task: Task
+    number: int
+    client: str = ""
+    robot: SentRobot | None = None
+    task_robot: SentRobot | None = None
+
+    @classmethod
+    def of(cls, experiment: Experiment, number: int, client: str = "") -> Job:
+        case, task = experiment.case, experiment.asked
+        kept = {f.name: getattr(case, f.name) for f in fields(case) if f.name not in OF_THE_MACHINE}
+        own = getattr(task, ROBOT, None)
+        own = own if isinstance(own, Robot) else None
+        return cls(
+            kept,
+            replace(task, **{ROBOT: None}) if own else task,  # type: ignore[type-var]
+            number,
+            client,
+            None if case.robot is None else SentRobot.of(case.robot),
+            None if own is None else SentRobot.of(own),
+        )
+
+    def experiment(self, folder: Path, **more: Any) -> Experiment:
+        """On this machine.
+
+        Args:
+            folder: for logs and traces.
+            more: further attributes of the case.
+
+        Raises:
+            OSError: the robot's files cannot be kept here.
+        """
+        info = adapter(self.case["simulator"]).info
+        case = Case(
+            **self.case,
+            folder=folder,
+            python=interpreter(info),
+            environment=Environment.of(info).variables(),
+            robot=None if self.robot is None else self.robot.here(),
+            **more,
+        )
+        own = self.task_robot
+        task = self.task if own is None else replace(self.task, **{ROBOT: own.here()})  # type: ignore[type-var]
+        return Experiment(case, task)
+
+    def pack(self) -> bytes:
+        """For the way to a node. The task's class and its bases travel as code, where their
+        modules are the tests' own; what else these import must be there on the node."""
+        import cloudpickle
+
+        with _packing, ExitStack() as stack:
+            for name in {kind.__module__ for kind in type(self.task).__mro__}:
+                module = sys.modules.get(name)
+                if module is not None and not _installed(name, getattr(module, "__file__", None)):
+                    cloudpickle.register_pickle_by_value(module)
+                    stack.callback(cloudpickle.unregister_pickle_by_value, module)
+            return cast("bytes", cloudpickle.dumps(self))
+
+    @classmethod
+    def unpack(cls, data: bytes) -> Job:
+        """On the node. It runs code of the client's."""
+        import cloudpickle
+
+        return cast("Job", cloudpickle.loads(data))
+
+
+def _installed(name: str, file: str | None) -> bool:
+    """Whether a module is there on every node: this package's, Python's, or a distribution's."""
+    top = name.partition(".")[0]
+    return (
+        file is None
+        or top == "pytest_simbench"
+        or top in sys.stdlib_module_names
+        or "site-packages" in Path(file).parts
+    )
+
+
+class TaskFailed(Exception):
+    """The task's own code raised on the node; the message ends with the node's traceback."""
+
+
+def told(error: BaseException | None, traceback: str = "") -> dict[str, str] | None:
+    """What ended a repetition early, as texts."""
+    if error is None:
+        return None
+    if isinstance(error, WorkerError):
+        found = {"what": error.what, "log_tail": error.log_tail, "phase": error.phase}
+    else:
+        found = {"what": str(error), "traceback": traceback}
+    return {"type": type(error).__name__, **found}
+
+
+def heard(said: Mapping[str, str] | None, where: Where) -> BaseException | None:
+    """The same as an error of this process."""
+    if said is None:
+        return None
+    where.phase = said.get("phase") or where.phase
+    kind = getattr(errors, said["type"], None)
+    if isinstance(kind, type) and issubclass(kind, WorkerError):
+        return kind(said["what"], where, said.get("log_tail", ""))
+    return TaskFailed(f"{said['type']}: {said['what']}\n{said.get('traceback', '')}".rstrip())

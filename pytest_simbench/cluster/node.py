@@ -1,0 +1,231 @@
+"""Carries one job out, in the process of a node that Dask runs.
+
+Logs and traces lie in a temporary folder until they are on their way. Where starting is costly a
+worker waits for the next repetition of its case, for `IDLE` seconds.
+"""
+
+from __future__ import annotations
+
+import atexit
+import errno
+import shutil
+import tempfile
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pytest_simbench.client.display import Displays
+from pytest_simbench.cluster.job import Job, told
+from pytest_simbench.experiment.identity import file_stem
+from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.experiment.workers import IdleWorkers
+from pytest_simbench.recordings.trace import FOLDER as TRACES
+
+TOPIC = "pytest-simbench"
+"""Of Dask's events that tell how far a repetition is."""
+
+LOOK_PERIOD = 0.5
+"""Between two looks whether somebody still wants the result, and two words of progress [s]."""
+
+IDLE = 60.0
+"""That a worker waits for the next repetition, where starting is costly [s]."""
+
+OF_THE_MACHINE = (
+    errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM,
+    errno.EAGAIN,
+)  # fmt: skip
+"""Errors that another machine may not have: a full disk, too many files or processes."""
+
+LARGEST_LOG = 2**20
+"""Of a log that is sent back [bytes]; its end is kept. Workers' logs are cut to less."""
+
+
+@dataclass
+class Bench:
+    """What repetitions of one case share on a node."""
+
+    folder: Path
+    idle: IdleWorkers = field(default_factory=IdleWorkers)
+    users: int = 0
+    left: float = 0.0
+
+    def close(self) -> None:
+        self.idle.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+class Benches:
+    """The benches of a node; those that nobody has used for a while are cleared away."""
+
+    def __init__(self) -> None:
+        self._by_case: dict[str, Bench] = {}
+        self._lock = threading.Lock()
+        atexit.register(self._clear, 0.0)
+
+    @contextmanager
+    def bench(self, job: Job) -> Iterator[Bench]:
+        """For one repetition.
+
+        Raises:
+            OSError: no folder can be made.
+        """
+        key = repr((job.client, sorted(job.case.items())))
+        with self._lock:
+            bench = self._by_case.get(key)
+            if bench is None:
+                bench = Bench(Path(tempfile.mkdtemp(prefix="simbench-node-")))
+                self._by_case[key] = bench
+            bench.users += 1
+        try:
+            yield bench
+        finally:
+            with self._lock:
+                bench.users -= 1
+                bench.left = time.monotonic()
+            costly = job.case["costly_start"] and not job.case["fresh"]
+            self._clear(IDLE if costly else 0.0, None if costly else bench)
+            if costly:
+                timer = threading.Timer(IDLE + 1.0, self._clear, (IDLE,))
+                timer.daemon = True
+                timer.start()
+
+    def _clear(self, after: float, only: Bench | None = None) -> None:
+        with self._lock:
+            now = time.monotonic()
+            old = {
+                key: bench
+                for key, bench in self._by_case.items()
+                if not bench.users and now - bench.left >= after and only in (None, bench)
+            }
+            for key in old:
+                del self._by_case[key]
+        for bench in old.values():
+            bench.close()
+
+
+@cache
+def benches() -> Benches:
+    """Those of this process."""
+    return Benches()
+
+
+@cache
+def displays() -> Displays:
+    """Those of this process."""
+    return Displays()
+
+
+@dataclass
+class Progress:
+    """How far a repetition is, as its hooks tell."""
+
+    phase: str = ""
+    done: int = 0
+    total: int = 0
+
+    def enter(self, phase: str) -> None:
+        self.phase = phase
+
+    def count(self, done: int, total: int) -> None:
+        self.done, self.total = done, total
+
+
+def carry_out(
+    job: Job, slots: int, progress: Progress, started: Callable[[Repetition], object]
+) -> dict[str, Any]:
+    """Carry a repetition out.
+
+    Args:
+        job: what to do.
+        slots: of the node; with several at once, records are contended.
+        progress: kept up to date.
+        started: told of the repetition before it runs, so that another thread may kill it.
+
+    Returns:
+        `record` (a line of JSON), `error` (see `job.told`), `log` and `trace` (bytes, or None).
+
+    Raises:
+        OSError: this machine cannot carry it out: its disk is full, for instance.
+    """
+    with benches().bench(job) as bench:
+        display = displays() if job.case["mode"] == "gui" else None
+        experiment = job.experiment(bench.folder, contended=slots > 1, display=display)
+        repetition = Repetition(
+            experiment,
+            job.number,
+            idle=bench.idle,
+            on_phase=progress.enter,
+            on_count=progress.count,
+        )
+        started(repetition)
+        record, error = repetition.run() if job.number else repetition.probe()
+        if isinstance(error, OSError) and error.errno in OF_THE_MACHINE:
+            raise error
+        lines = "" if error is None else "".join(traceback.format_exception(error))
+        name = str(record.details.get("log") or "")
+        trace = bench.folder / TRACES / f"{file_stem(experiment, job.number)}.npz"
+        return {
+            "record": record.to_json(),
+            "error": told(error, lines),
+            "log": _read(bench.folder / name) if name else None,
+            "trace": _taken(trace),
+        }
+
+
+def _read(path: Path) -> bytes | None:
+    with suppress(OSError):
+        return path.read_bytes()[-LARGEST_LOG:]
+    return None
+
+
+def _taken(path: Path) -> bytes | None:
+    """A file, which is gone then."""
+    with suppress(OSError):
+        data = path.read_bytes()
+        path.unlink()
+        return data
+    return None
+
+
+def run(data: bytes) -> dict[str, Any]:
+    """What Dask calls on a node.
+
+    Returns:
+        what `carry_out` does, or `lost`: why this node cannot carry it out, as text.
+    """
+    from distributed import get_worker
+
+    worker = get_worker()
+    key = worker.get_current_task()
+    progress, ended = Progress(), threading.Event()
+
+    def watch(repetition: Repetition) -> None:
+        """Tell of the progress, and end what nobody wants any more."""
+        before = Progress()
+        while not ended.wait(LOOK_PERIOD):
+            task = worker.state.tasks.get(key)
+            if task is None or task.state in ("cancelled", "released", "forgotten"):
+                repetition.kill()
+                return
+            now = Progress(progress.phase, progress.done, progress.total)
+            if now != before:
+                worker.log_event(TOPIC, {"key": key, **vars(now)})
+                before = now
+
+    def started(repetition: Repetition) -> None:
+        threading.Thread(target=watch, args=(repetition,), daemon=True).start()
+
+    try:
+        return carry_out(Job.unpack(data), worker.state.nthreads, progress, started)
+    except OSError as error:
+        if error.errno not in OF_THE_MACHINE:
+            raise
+        return {"lost": f"it cannot: {error.strerror}"}
+    finally:
+        ended.set()

@@ -1,0 +1,168 @@
+"""What a node offers, as names of Dask resources, and whether that is what a run needs.
+
+    simbench               its slots: repetitions that it carries out at once
+    simbench==0.1.0        version of pytest-simbench
+    python==3.11           of Python: a task that a test defines travels as code
+    mujoco==3.3.7          a simulator that is ready there, and the engine's version
+    display, gpu, vulkan   a display (its own or Xvfb), a GPU of NVIDIA's, a Vulkan device
+
+Names are all that Dask keeps, so versions stand in them. The amount of each is the number of slots.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from os import environ
+from pathlib import Path
+
+from pytest_simbench import __version__
+from pytest_simbench.client.environments import missing, outside
+from pytest_simbench.simulator.info import SimulatorInfo
+from pytest_simbench.simulator.registry import adapter, registered
+
+SLOTS = "simbench"
+DISPLAY, GPU, VULKAN = "display", "gpu", "vulkan"
+DEVICES = (DISPLAY, GPU, VULKAN)
+PYTHON = f"python=={sys.version_info.major}.{sys.version_info.minor}"
+PLUGIN = f"{SLOTS}=={__version__}"
+
+VULKAN_PROBE = """
+import ctypes
+vulkan = ctypes.CDLL("libvulkan.so.1")
+info = (ctypes.c_uint64 * 8)(1)  # VkInstanceCreateInfo: sType 1, all else empty
+instance, count = ctypes.c_void_p(), ctypes.c_uint32()
+assert vulkan.vkCreateInstance(info, None, ctypes.byref(instance)) == 0
+assert vulkan.vkEnumeratePhysicalDevices(instance, ctypes.byref(count), None) == 0
+assert count.value
+"""
+"""Ends well where there is a Vulkan device. In a process of its own: a driver may crash."""
+
+PROBE_TIMEOUT = 30.0
+"""For the probe of Vulkan [s]: a driver may hang."""
+
+
+def here(slots: int, names: Iterable[str] | None = None) -> dict[str, float]:
+    """What this machine offers, as Dask resources.
+
+    Args:
+        slots: repetitions at once.
+        names: simulators to offer; None for all that are ready here.
+    """
+    found = [SLOTS, PLUGIN, PYTHON]
+    for name in registered() if names is None else names:
+        info = adapter(name).info
+        if not missing(info):
+            found.append(f"{name}=={_version(info)}")
+    if environ.get("DISPLAY") or environ.get("WAYLAND_DISPLAY") or shutil.which("Xvfb"):
+        found.append(DISPLAY)
+    if Path("/proc/driver/nvidia/version").exists():
+        found.append(GPU)
+    if _vulkan():
+        found.append(VULKAN)
+    return dict.fromkeys(found, float(slots))
+
+
+def _version(info: SimulatorInfo) -> str:
+    other = outside(info)
+    try:
+        return (other.version() if other else version(info.distribution)) or "unknown"
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _vulkan() -> bool:
+    command = [sys.executable, "-c", VULKAN_PROBE]
+    try:
+        return subprocess.run(command, capture_output=True, timeout=PROBE_TIMEOUT).returncode == 0
+    except (OSError, subprocess.SubprocessError):
+        return False
+
+
+@dataclass(frozen=True)
+class Node:
+    """A node as the scheduler knows it.
+
+    Attributes:
+        address: of this process of it; one that is started again has another.
+        name: of the node.
+        slots: repetitions at once.
+        offers: names of its resources.
+    """
+
+    address: str
+    name: str
+    slots: int
+    offers: frozenset[str]
+
+    @classmethod
+    def of(cls, address: str, name: object, resources: Mapping[str, float]) -> Node | None:
+        """The node, or None for a worker of Dask's that is none of ours."""
+        if SLOTS not in resources:
+            return None
+        return cls(address, str(name), int(resources[SLOTS]), frozenset(resources))
+
+    def version(self, simulator: str) -> str | None:
+        """Of a simulator there, or None."""
+        for offer in self.offers:
+            name, equals, found = offer.partition("==")
+            if name == simulator and equals:
+                return found
+        return None
+
+    @property
+    def stranger(self) -> str:
+        """Why nothing can be carried out there, in words, or nothing."""
+        if PLUGIN not in self.offers:
+            return f"runs pytest-simbench {self.version(SLOTS)}, and this is {__version__}"
+        if PYTHON not in self.offers:
+            ours = PYTHON.partition("==")[2]
+            return f"runs Python {self.version('python')}, and this is {ours}"
+        return ""
+
+    def has(self, simulator: str, mode: str) -> bool:
+        """Whether it can carry out repetitions of a simulator in a mode."""
+        return (
+            not self.stranger
+            and self.version(simulator) is not None
+            and (mode != "gui" or DISPLAY in self.offers)
+        )
+
+    def __str__(self) -> str:
+        own = (SLOTS, "python")
+        sims = sorted(o for o in self.offers if "==" in o and o.partition("==")[0] not in own)
+        told = [o.replace("==", " ") for o in sims] + [d for d in DEVICES if d in self.offers]
+        return f"{self.name} has {', '.join(told) or 'no simulator'}"
+
+
+def refusal(nodes: Sequence[Node]) -> str:
+    """Why a run cannot begin on these nodes at all, as a sentence, or nothing."""
+    if not nodes:
+        return "it has no node; start one: python -m pytest_simbench.cluster node ADDRESS"
+    strangers = [f"{node.name} {node.stranger}" for node in nodes if node.stranger]
+    if strangers:
+        return f"{'; '.join(strangers)}; install the same version on both sides"
+    return ""
+
+
+def unmet(nodes: Sequence[Node], simulator: str, modes: Iterable[str]) -> str | None:
+    """Why a simulator cannot run in these modes on any node, with what each has; None if it can."""
+    for mode in modes:
+        able = [node for node in nodes if node.has(simulator, mode)]
+        if not able:
+            what = f"{simulator} with a display" if mode == "gui" else simulator
+            return f"no node of the cluster offers {what}: {'; '.join(map(str, nodes))}"
+        versions: dict[str, list[str]] = {}
+        for node in able:
+            versions.setdefault(node.version(simulator) or "", []).append(node.name)
+        if len(versions) > 1:
+            told = ", ".join(f"{v} ({', '.join(names)})" for v, names in sorted(versions.items()))
+            return (
+                f"the nodes of the cluster have several versions of {simulator}: {told}; their "
+                "results do not belong together, so give the run nodes of one version"
+            )
+    return None

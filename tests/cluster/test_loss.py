@@ -1,0 +1,135 @@
+"""Nodes are lost and come, and the records are those of one machine, each of them once."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from textwrap import dedent
+from typing import Any
+
+import pytest
+
+from tests.cluster.machines import Machines
+from tests.plugin.test_same_records import TIMES
+
+TEST = """
+    import errno, os, signal, time
+    from pathlib import Path
+    from tests.tiny import Falling
+
+    class Slow(Falling):
+        def perform(self, world, seed, count):
+            outcome = super().perform(world, seed, count)
+            outcome.details["bodies"] = world.bodies  # every bit of the state at the end
+            if trouble := os.environ.get("TROUBLE"):  # on nodes alone
+                began = Path(trouble, f"{seed}-{os.getpid()}")
+                began.touch()
+                time.sleep(1.0)
+                if seed == 2024 and len(list(Path(trouble).glob("2024-*"))) == 1:
+                    os.kill(os.getpid(), signal.SIGKILL)  # as a simulator may
+                if seed == 2029:
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))  # wherever it runs
+            return outcome
+
+    def test_one(repeat):
+        repeat(Slow())
+"""
+FULL = 2029
+"""The seed at which every node's disk is full."""
+
+
+@pytest.fixture(scope="module")
+def machines(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machines]:
+    """A head, and the nodes a and b."""
+    folder = tmp_path_factory.mktemp("machines")
+    trouble = folder / "trouble"
+    trouble.mkdir()
+    with Machines(folder, lost_after=6.0) as found:
+        found.wait("head")
+        for name in ("a", "b"):
+            found.node(name, "--sim", "mujoco", environment={"TROUBLE": str(trouble)})
+        found.wait()
+        yield found
+
+
+def pytest_in(folder: Path, *arguments: str) -> subprocess.Popen[str]:
+    (folder / "test_it.py").write_text(dedent(TEST))
+    return subprocess.Popen(
+        [sys.executable, "-m", "pytest", "--sim=mujoco", "--reps=8", *arguments],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": os.getcwd()},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+def records(folder: Path) -> dict[int, dict[str, Any]]:
+    """By seed; each is there once."""
+    found = [json.loads(line) for line in (folder / "out" / "records.jsonl").open()]
+    by_seed = {record["seed"]: record for record in found}
+    assert len(by_seed) == len(found)
+    return by_seed
+
+
+def alike(record: dict[str, Any]) -> dict[str, Any]:
+    """What must be the same wherever it ran."""
+    host = {k: v for k, v in record["host"].items() if k != "node"}
+    details = {k: v for k, v in record["details"].items() if k != "lost"}
+    kept = {k: v for k, v in record.items() if k not in TIMES}
+    return {**kept, "host": host, "details": details}
+
+
+def until(condition: Any, seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def test_a_process_killed_a_machine_stopped_and_one_added(
+    machines: Machines, tmp_path: Path
+) -> None:
+    straight, spread = tmp_path / "straight", tmp_path / "spread"
+    straight.mkdir()
+    spread.mkdir()
+    alone = pytest_in(straight, "--sim-output=out")
+    assert alone.wait() == 0, alone.stdout and alone.stdout.read()
+    run = pytest_in(spread, "--sim-output=out", f"--sim-cluster={machines.address}")
+    trouble = machines.folder / "trouble"
+    until(lambda: len(list(trouble.glob("*"))) >= 2)
+    machines.signal("b", signal.SIGSTOP)  # nothing comes from it any more, and nobody says so
+    machines.node("d", "--sim", "mujoco", environment={"TROUBLE": str(trouble)})
+    out, _ = run.communicate(timeout=120)
+    assert run.returncode == 0, out
+    assert "of them failed for it" in out
+    expected, found = records(straight), records(spread)
+    assert found.keys() == expected.keys()
+    lost = found.pop(FULL)
+    assert (lost["status"], lost["error"]["type"]) == ("failed", "NodeLost")
+    assert len(lost["details"]["lost"]) == 2
+    assert "it cannot: No space left on device, then on" in lost["error"]["message"]
+    assert {s: alike(r) for s, r in found.items()} == {s: alike(expected[s]) for s in found}
+    again = {seed: r["details"]["lost"] for seed, r in found.items() if "lost" in r["details"]}
+    assert "its process ended, or its network is gone" in again[2024][0]
+    assert any("b: " in texts[0] for texts in again.values())
+    assert "d" in {r["host"]["node"] for r in found.values()}
+    assert all((spread / "out" / r["details"]["log"]).is_file() for r in found.values())
+    assert len(list((spread / "out" / "traces").iterdir())) == 1
+
+
+def test_what_nobody_offers_is_said_before_anything_runs(
+    machines: Machines, pytester: pytest.Pytester
+) -> None:
+    pytester.makepyfile("def test_it(repeat): pass")
+    result = pytester.runpytest_subprocess("--sim=pybullet", f"--sim-cluster={machines.address}")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    message = "*no node of the cluster offers pybullet: a has mujoco *"
+    result.stderr.fnmatch_lines([message])
+    assert len(result.stderr.lines) < 4
