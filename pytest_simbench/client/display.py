@@ -19,7 +19,8 @@ SCREEN = "1280x960x24"
 
 OPTIONS = ("-screen", "0", SCREEN, "-nolisten", "tcp", "-noreset")
 """Of Xvfb. Without ``-noreset`` it begins anew when its last client leaves, and refuses a client
-that comes meanwhile. A Vulkan driver looks at the display and leaves just before the engine comes."""
+that comes meanwhile. A Vulkan driver looks at the display and leaves just before the engine
+comes."""
 
 START_TIMEOUT = 30.0
 """For Xvfb to tell the number of its display [s]; it takes about 0.1 s."""
