@@ -188,7 +188,7 @@ def steps(place: Place) -> Iterator[Step]:
     shown = (f"{len(suites)} passed", "simulator comparison")
     yield Step((*suites, *smallest), shown, files)
     if not place.plugins:
-        yield Step(("--pyargs", "pytest_simbench.suites", *smallest), ("6 passed", shown[1]))
+        yield Step(("--pyargs", "pytest_simbench.suites", *smallest), ("8 passed", shown[1]))
     if place.plugins in ((), ALL):
         without = ("-p", "no:benchmark", "--strict-markers")
         yield Step((suites[0], *smallest, *without), ("1 passed",), files)
