@@ -10,10 +10,14 @@ import pytest
 from pytest_simbench.measure.intervals import interval
 from pytest_simbench.measure.limits import FAILURES
 from pytest_simbench.measure.verdicts import Verdict, at_least, at_most, confidence, judge
-from pytest_simbench.tasks import Stacking, Throwing
+from pytest_simbench.tasks import Pushing, Stacking, Task, Throwing
 
 ROOT = Path(__file__).resolve().parents[2]
-TASKS = {"stacking": Stacking(), "throwing": Throwing()}
+TASKS: dict[str, Task] = {
+    "stacking": Stacking(),
+    "throwing": Throwing(),
+    "pushing": Pushing(),
+}
 CLAIMS = [
     (task, relation, name, float(value))
     for task in TASKS
@@ -44,6 +48,10 @@ def test_all_claims_were_found() -> None:
     assert [(task, name) for task, _, name, _ in CLAIMS] == [
         *(("stacking", name) for name in ("failures", "placed", "at_end", "untouched_moved")),
         *(("throwing", name) for name in ("failures", "hit", "moved")),
+        *(
+            ("pushing", name)
+            for name in ("failures", "position_error", "heading_error", "path_error", "tipped")
+        ),
     ]
 
 
