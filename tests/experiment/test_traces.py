@@ -90,7 +90,8 @@ def test_a_task_that_samples_itself_keeps_that(case: Case) -> None:
             raise RuntimeError("bad luck")
 
     case = replace(case, trace="first-and-failed")
-    Repetition(Experiment(case, Watched()), 2).run()
+    record, error = Repetition(Experiment(case, Watched()), 2).run()
+    assert str(error) == "bad luck", record.error
     (path,) = (case.folder / FOLDER).iterdir()
     apart = np.diff(Trace.read(path).time)
     assert sorted(set(apart.round(3))) == [0.02, 0.1, 0.119]
