@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import ExitStack
 from typing import Any
 
 import pytest
@@ -37,12 +38,24 @@ HONEST = [
 
 
 @pytest.fixture(scope="module")
-def worlds(request: pytest.FixtureRequest) -> Iterator[Worlds]:
-    with Worlds(ENGINES[request.param][0]) as worlds:
-        yield worlds
+def kept() -> Iterator[dict[str, Worlds]]:
+    """One worker for each engine, whatever the order of the tests: Genesis compiles for 20 s."""
+    with ExitStack() as stack:
+        kept: dict[str, Worlds] = {}
+        yield kept
+        for worlds in kept.values():
+            stack.enter_context(worlds)
 
 
-@pytest.mark.parametrize(("worlds", "profile"), HONEST, indirect=["worlds"], scope="module")
+@pytest.fixture
+def worlds(request: pytest.FixtureRequest, kept: dict[str, Worlds]) -> Worlds:
+    name = request.param
+    if name not in kept:
+        kept[name] = Worlds(ENGINES[name][0])
+    return kept[name]
+
+
+@pytest.mark.parametrize(("worlds", "profile"), HONEST, indirect=["worlds"])
 @pytest.mark.parametrize("task", [Stacking(), Throwing()], ids=lambda task: task.name)
 def test_an_honest_world_passes(worlds: Worlds, task: Any, profile: str) -> None:
     assert worlds.load(task.scene(7, Jitter()), profile).time == 0.0
@@ -52,7 +65,6 @@ def test_an_honest_world_passes(worlds: Worlds, task: Any, profile: str) -> None
     ("worlds", "quantity"),
     [(name, quantity) for name, (_, faults) in ENGINES.items() for quantity in faults],
     indirect=["worlds"],
-    scope="module",  # else pytest makes a worker for every quantity
 )
 def test_fault_is_caught(worlds: Worlds, quantity: str) -> None:
     world, cls = worlds.load(SCENE, parity=False, fault=quantity), worlds.cls
