@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import ClassVar
 
 import numpy as np
@@ -224,6 +225,7 @@ class CurvePushing(Pushing):
     turn: float = 0.785
 
 
+@cache
 def _front(robot: Robot) -> tuple[float, float]:
     """Of the closed hand where it can touch the block."""
     planning = PlanningScene(RobotModel(robot), Scene("front", (), robot))
