@@ -7,11 +7,12 @@ and bytes, and a record is read from it as from a file.
 
 from __future__ import annotations
 
+import copyreg
 import sys
 import threading
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, fields, replace
+from dataclasses import MISSING, dataclass, fields, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -31,6 +32,10 @@ OF_THE_MACHINE = ("folder", "python", "spec", "environment", "display", "robot",
 
 _packing = threading.Lock()
 """What cloudpickle sends by value is set for the whole process."""
+
+copyreg.pickle(type(MISSING), lambda missing: "MISSING")
+"""Fields of a dataclass are told from others by the identity of this object. cloudpickle 3.1 sends
+a copy of it with a class: a class derived from that one gets wrong defaults."""
 
 
 @dataclass(frozen=True)

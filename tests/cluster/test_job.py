@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -38,6 +38,17 @@ def test_a_task_of_the_tests_travels_as_code(case: Case) -> None:
     command = [sys.executable, "-P", "-c", code]
     out = subprocess.run(command, input=packed, capture_output=True, check=True, cwd="/").stdout
     assert out.decode().strip() == "Falling(duration=0.25) ['landed']"
+
+
+def test_a_class_that_travelled_can_be_derived_from(case: Case) -> None:
+    """Its parameters have the defaults that they had, also in who unpacks its own job."""
+    task = Job.unpack(Job.of(Experiment(case, Falling(0.25)), 1).pack()).task
+
+    @dataclass(frozen=True)
+    class Watched(type(task)):  # type: ignore[misc]
+        more: float = 1.0
+
+    assert Watched().parameters() == {"task.duration": 0.6, "task.more": 1.0}
 
 
 def test_a_robot_travels_by_content(
