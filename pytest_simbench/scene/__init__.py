@@ -1,6 +1,6 @@
 """The declarative world: bodies, robot, gravity, friction, gains; frozen, in SI units."""
 
-from pytest_simbench.scene.bodies import Box, penetration
+from pytest_simbench.scene.bodies import Body, Box, penetration
 from pytest_simbench.scene.checks import SceneError
 from pytest_simbench.scene.pose import FloatArray, Pose, Quaternion, Vector3, rotation_matrix
 from pytest_simbench.scene.robot import Gripper, Joint, MotionLimits, Robot
@@ -9,6 +9,7 @@ from pytest_simbench.scene.trajectory import Trajectory
 
 __all__ = [
     "STANDARD_GRAVITY",
+    "Body",
     "Box",
     "FloatArray",
     "Gripper",

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from pytest_simbench.scene import Box, Robot, Scene
+from pytest_simbench.scene import Body, Robot, Scene
 from pytest_simbench.simulator.base import Simulator
 from pytest_simbench.simulator.urdf import PreparedRobot
 
@@ -20,7 +20,7 @@ from pytest_simbench.simulator.urdf import PreparedRobot
 def remembering(simulator: Simulator, scene: Scene) -> Iterator[None]:
     """Have the adapter, and the objects of its own package that it holds, remember `scene`.
 
-    Every `Scene`, `Robot`, `PreparedRobot` and `Box` among their attributes is replaced meanwhile.
+    Every `Scene`, `Robot`, `PreparedRobot` and `Body` among their attributes is replaced meanwhile.
     """
     replaced = list(_memories(simulator, scene))
     for owner, name, _, other in replaced:
@@ -56,7 +56,7 @@ def _counterpart(value: Any, scene: Scene) -> Any:
     robot = scene.robot
     if isinstance(value, Scene):
         return scene
-    if isinstance(value, Box):
+    if isinstance(value, Body):
         return scene.body(value.name)
     if isinstance(value, Robot):
         return robot

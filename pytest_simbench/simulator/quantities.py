@@ -3,7 +3,7 @@
     gravity, timestep, gripper/coupled
     ground/{height, friction, restitution}
     body/NAME/{pose, boxes, meshes, friction, restitution, margin, dynamic, touches}
-        and of a free body {mass, com, inertia, damping, gravity}
+        and of a free body {mass, com, inertia, damping, gravity, velocity}
     link/NAME/{pose, boxes, meshes, friction, restitution, margin, touches}
         and of a link that moves {mass, com, inertia, damping, gravity}
     joint/NAME/{axis, limits, effort_limit, stiffness, damping, friction, armature,
@@ -23,6 +23,7 @@ is the link `base`, whose frame is the world's.
 - damping of a body or link: resistance to its linear and angular motion, (2,) [1/s], 0.
 - gravity of a body or link: the share of the scene's gravity that it feels, 1.
 - dynamic: 1 if forces can move the body, else 0.
+- velocity: of the centre of mass, then angular, in the world frame, (6,) [m/s, rad/s].
 - touches: the shares of ground, bodies and links that it can collide with, (3,). Links do not
   collide with links; what can never meet (fixed things) is left out of count; 0 where
   nothing is left.
@@ -71,6 +72,7 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
         if not body.fixed:
             inertia = np.diag(body.inertia())
             quantities |= _inertial(f"body/{body.name}", body.mass, np.zeros(3), inertia)
+            quantities[f"body/{body.name}/velocity"] = body.velocity
     if prepared is not None:
         quantities |= _robot_quantities(prepared.robot, prepared)
     robots = _links(prepared)

@@ -36,13 +36,26 @@ class Fault:
     plant: Plant
 
 
+TURNED, SPIN = Pose.at(0.5, 0.1, 0.315, yaw=0.4), (0.7, -0.5, 0.4)
+"""Of the true scene's brick: where it is, and its angular velocity [rad/s]."""
+
+
 def true_scene() -> Scene:
-    """The Panda in front of a table with a brick and a cube, odd sizes, tilted gravity."""
+    """The Panda in front of a table with a brick that starts up and a cube: odd sizes and
+    velocities, tilted gravity."""
     return Scene(
         "full",
         (
             Box("table", (0.9, 0.9, 0.3), Pose.at(0.8, 0.0, 0.15), friction=0.7),
-            Box("brick", (0.1, 0.06, 0.03), Pose.at(0.5, 0.1, 0.315, yaw=0.4), 0.23, 0.7),
+            Box(
+                "brick",
+                (0.1, 0.06, 0.03),
+                TURNED,
+                0.23,
+                0.7,
+                linear_velocity=(0.2, -0.1, 0.3),
+                angular_velocity=SPIN,
+            ),
             scenes.cube("cube", Pose.at(0.6, -0.1, 0.325, yaw=-1.0), friction=0.7),
         ),
         robot=replace(scenes.arm(), friction=0.7),
@@ -250,6 +263,16 @@ FAULTS: dict[str, Fault] = {
         "the brick is 2 mm thinner, and its inertia with it",
         "body/brick/inertia",
         of_body("brick", size=(0.1, 0.058, 0.03)),
+    ),
+    "linear_velocity": Fault(
+        "the brick starts 1 cm/s faster",
+        "body/brick/velocity",
+        of_body("brick", linear_velocity=(0.2, -0.1, 0.31)),
+    ),
+    "angular_velocity": Fault(
+        "the brick's spin is in its own frame",
+        "body/brick/velocity",
+        of_body("brick", angular_velocity=tuple(TURNED.rotation().T @ SPIN)),
     ),
     "body_pose": Fault(
         "the cube is 1 mm aside",

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pytest_simbench.client.world import Motion
-from pytest_simbench.scene import FloatArray, rotation_matrix
+from pytest_simbench.scene import FloatArray, Pose, rotation_matrix
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
@@ -90,6 +90,32 @@ def sticks_below_mu(subject: Subject) -> None:
     motion = subject.motion(scenes.incline(0.4, 0.5), 2.2, 0.1)
     away = float(np.linalg.norm(motion.bodies[-1, 0, :2] - motion.bodies[1, 0, :2]))
     require_close("creep on a slope below mu", away, 0.0, 1e-3, "m")
+
+
+@check()
+def thrown_as_the_scene_says(subject: Subject) -> None:
+    """A turned cube starts with the scene's velocities, in the world's axes, and flies on with
+    them: after 0.3 s its centre is where the parabola is, within g dt t; it turned by omega t,
+    within 1 %."""
+    scene = scenes.thrown()
+    body = scene.body("thrown")
+    v, omega = np.array(body.linear_velocity), np.array(body.angular_velocity)
+    with subject.world(scene) as world:
+        start = world.bodies[0]
+        for what, row, law in (("linear", start[7:10], v), ("angular", start[10:], omega)):
+            gap = float(np.abs(row - law).max())
+            require_close(f"{what} velocity's error at the start", gap, 0.0, 1e-5, "")
+        world.wait(0.3)
+        t, row = world.time, world.bodies[0]
+    place = start[:3] + v * t + np.array(scene.gravity) * t * t / 2
+    away = float(np.abs(row[:3] - place).max())
+    require_close("distance from the parabola", away, 0.0, GRAVITY * subject.timestep * t, "m")
+    turn = Pose(quaternion=row[3:7]) * Pose(quaternion=start[3:7]).inverse()
+    vector = np.array(turn.quaternion) * (np.sign(turn.quaternion[0]) or 1.0)
+    sine = float(np.linalg.norm(vector[1:]))
+    turned = 2 * math.atan2(sine, float(vector[0])) * vector[1:] / sine
+    error = float(np.linalg.norm(turned - omega * t))
+    require_close("error of its turn", error, 0.0, 0.01 * float(np.linalg.norm(omega)) * t, "rad")
 
 
 def _flight(motion: Motion) -> FloatArray:

@@ -24,6 +24,12 @@ ROTATION_TOLERANCE = 1e-4
 NORM_TOLERANCE = 1e-3
 """Of a quaternion's length from 1."""
 
+REST_TOLERANCE = 1e-6
+"""Speed of what is at rest at the start [m/s], [rad/s]."""
+
+SPEED_TOLERANCE = 1e-4
+"""Share by which the speed of a body at the start may differ from the scene's: as in parity."""
+
 EXCHANGED = 0.1
 """A joint this far from its set point [rad] may have been taken for another one."""
 
@@ -54,23 +60,29 @@ def checked_state(simulator: Simulator, scene: Scene) -> dict[str, Any]:
 
 
 def check_start(simulator: Simulator, scene: Scene) -> None:
-    """A loaded world: at time 0, at rest, every joint and body where the scene has it.
+    """A loaded world: at time 0, every joint and body where the scene has it and as fast.
 
     Raises:
         StateError: as `checked_state`; or the rows are in another order than the scene's.
-        ParityError: not at time 0 or not at rest, as in a worker that served others before.
+        ParityError: not at time 0 or not as fast as the scene says, as in a worker that served
+            others before.
     """
     name, state = simulator.info.name, checked_state(simulator, scene)
     joints, bodies = state["joints"], state["bodies"]
     for what, values in (("joints", joints), ("bodies", bodies)):
         if not np.isfinite(values).all():
             raise StateError(f"{name}: the state of the {what} is not finite after loading")
-    speeds = [joints[1], bodies[:, 7:]]
-    fastest = max((float(np.abs(values).max()) for values in speeds if values.size), default=0.0)
-    if abs(state["time"]) > 1e-9 or not fastest < 1e-6:
+    asked = np.array([body.velocity for body in scene.free_bodies]).reshape(-1, 6)
+    wrong = [joints[1], bodies[:, 7:] - asked]
+    allowed = [REST_TOLERANCE, REST_TOLERANCE + SPEED_TOLERANCE * np.abs(asked)]
+    fastest = max((float(np.abs(values).max()) for values in wrong if values.size), default=0.0)
+    slow = all((np.abs(v) < most).all() for v, most in zip(wrong, allowed, strict=True))
+    if abs(state["time"]) > 1e-9 or not slow:
+        what = "speeds up to" if not asked.any() else "speeds that differ from the scene's by up to"
+        how = "at rest" if not asked.any() else "with the scene's speeds"
         raise ParityError(
-            f"{name} starts a world at t = {state['time']:g} s with speeds up to "
-            f"{fastest:.3g} (m/s, rad/s); it must start at 0 and at rest"
+            f"{name} starts a world at t = {state['time']:g} s with {what} "
+            f"{fastest:.3g} (m/s, rad/s); it must start at 0 and {how}"
         )
     if scene.robot is not None:
         names = [joint.name for joint in scene.robot.joints]

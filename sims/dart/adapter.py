@@ -187,6 +187,8 @@ class DART(Simulator):
             inertia.setMoment(np.diag(box.inertia()))
             body.setInertia(inertia)
             joint.setPositions(dynamics.FreeJoint.convertToPositions(place))
+            joint.setLinearVelocity(np.array(box.linear_velocity))
+            joint.setAngularVelocity(np.array(box.angular_velocity))
         shape = body.createShapeNode(dynamics.BoxShape(np.array(box.size)))
         shape.createVisualAspect().setColor(list(box.colour))
         _set_surface(shape, box.friction)

@@ -85,6 +85,8 @@ class ReadBack:
         found[f"{prefix}/dynamic"] = float(mobile and joint.getActuatorType() in driven)
         if joint.getNumDofs():
             found |= _inertial(prefix, body)
+            speeds = [body.getCOMLinearVelocity(), body.getAngularVelocity()]
+            found[f"{prefix}/velocity"] = np.concatenate(speeds)
             passive = np.array([joint.getDampingCoefficient(k) for k in range(6)])
             largest = np.array([passive[3:].max(), passive[:3].max()])
             inertia = body.getInertia()

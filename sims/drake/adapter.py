@@ -54,6 +54,7 @@ analysis = lazy_import("pydrake.systems.analysis")
 framework = lazy_import("pydrake.systems.framework")
 geometry = lazy_import("pydrake.geometry")
 math = lazy_import("pydrake.math")
+math_ = lazy_import("pydrake.multibody.math")
 sensors = lazy_import("pydrake.systems.sensors")
 
 
@@ -136,6 +137,8 @@ class Drake(Simulator):
         free = [self.world.bodies[box.name] for box in scene.free_bodies]
         for box, body in zip(scene.free_bodies, free, strict=True):
             self.plant.SetFreeBodyPose(self.context, body, transform(box.pose))
+            velocity = math_.SpatialVelocity(w=box.angular_velocity, v=box.linear_velocity)
+            self.plant.SetFreeBodySpatialVelocity(body=body, V_PB=velocity, context=self.context)
         self._joints_at = np.empty((2, 0), dtype=int)
         if scene.robot is not None:
             self._start_drives(scene.robot)

@@ -57,6 +57,8 @@ class ReadBack:
         found[f"{prefix}/dynamic"] = float(free and not body.is_locked(self.context))
         if free:
             found |= self._inertial(prefix, body)
+            speed = world.plant.EvalBodySpatialVelocityInWorld(self.context, body)
+            found[f"{prefix}/velocity"] = [*speed.translational(), *speed.rotational()]
             joint = world.plant.get_joint(self._floating_joint(body))
             found[f"{prefix}/damping"] = [
                 joint.default_translational_damping() / found[f"{prefix}/mass"],

@@ -140,6 +140,7 @@ class Genesis(Simulator):
         self.solver = world.rigid_solver
         self._set_contacts(scene)
         self._free = [self._boxes[box.name].links[0].idx for box in scene.free_bodies]
+        self._start_bodies(scene)
         self._dofs: list[int] = []
         if scene.robot is not None:
             self._set_drives(scene.robot)
@@ -158,6 +159,15 @@ class Genesis(Simulator):
             if friction < LEAST_FRICTION:
                 for geom in entity.geoms:
                     solver.set_geom_friction(friction, geom.idx)
+
+    def _start_bodies(self, scene: Scene) -> None:
+        """The velocities of free bodies: linear in the world's axes, angular in the body's."""
+        for box in scene.free_bodies:
+            if box.velocity.any():
+                link = self._boxes[box.name].links[0]
+                dofs = list(range(link.dof_start, link.dof_end))
+                spin = box.pose.rotation().T @ box.angular_velocity
+                self.solver.set_dofs_velocity([*box.linear_velocity, *spin], dofs)
 
     def _set_drives(self, robot: Any) -> None:
         entity = self._robot

@@ -65,6 +65,7 @@ class ReadBack:
             if link.n_dofs:
                 reported |= self._inertial(prefix, link)
                 reported[f"{prefix}/damping"] = self._damping(link)
+                reported[f"{prefix}/velocity"] = self._velocity(link)
         if self.prepared is not None:
             reported |= self._robot(self.prepared)
         return reported | touches(self.scene, self.prepared, self._can_touch)
@@ -133,6 +134,10 @@ class ReadBack:
             f"{prefix}/inertia": axes @ tensor @ axes.T,
             f"{prefix}/gravity": 1.0 - self._array("entities", "gravity_compensation")[entity],
         }
+
+    def _velocity(self, link: Any) -> FloatArray:
+        linear = numbers(self.solver.get_links_vel([link.idx], ref="link_com"))
+        return np.ravel(np.concatenate([linear, numbers(self.solver.get_links_ang([link.idx]))]))
 
     def _damping(self, link: Any) -> FloatArray:
         """Of a free body: that of its degrees of freedom, per mass and inertia."""

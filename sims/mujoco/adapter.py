@@ -154,6 +154,9 @@ class MuJoCo(Simulator):
         self._body_q = np.array([j.qposadr[0] + np.arange(7) for j in free], int).reshape(-1, 7)
         self._body_v = np.array([j.dofadr[0] + np.arange(3) for j in free], int).reshape(-1, 3)
         self._rotations = np.array([model.body(b.name).id for b in scene.free_bodies], dtype=int)
+        for at, body in zip(self._body_v, scene.free_bodies, strict=True):
+            data.qvel[at] = body.linear_velocity
+            data.qvel[at + 3] = body.pose.rotation().T @ body.angular_velocity  # in its own frame
         mujoco.mj_forward(model, data)
         self._viewer: Any = None
         self._renderer: Any = None

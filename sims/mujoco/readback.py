@@ -46,9 +46,10 @@ class ReadBack:
         self.model, self.scene, self.prepared, self.at = model, scene, prepared, at
         self.active = np.array(data.eq_active, dtype=bool)
         self.data = mujoco.MjData(model)  # of its own: what is read must not change the world
-        self.data.qpos[:] = data.qpos
+        self.data.qpos[:], self.data.qvel[:] = data.qpos, data.qvel
         mujoco.mj_kinematics(model, self.data)
         mujoco.mj_comPos(model, self.data)
+        mujoco.mj_comVel(model, self.data)
 
     def all(self) -> dict[str, Any]:
         """Every quantity by its name."""
@@ -81,6 +82,7 @@ class ReadBack:
         found[f"{prefix}/dynamic"] = float(free)
         if model.body_dofnum[body]:
             found |= self._inertial(prefix, body, place, turn)
+            found[f"{prefix}/velocity"] = self._velocity(body)
             dof = model.body_dofadr[body] + np.arange(6)
             passive = np.ravel(model.dof_damping[dof])[:6]
             found[f"{prefix}/damping"] += [
@@ -141,6 +143,13 @@ class ReadBack:
             f"{prefix}/damping": np.full(2, medium),
             f"{prefix}/gravity": 1.0 - model.body_gravcomp[body],
         }
+
+    def _velocity(self, body: int) -> FloatArray:
+        """Of a body's centre of mass, then angular, in the world's axes, (6,)."""
+        found = np.empty(6)
+        kind = mujoco.mjtObj.mjOBJ_BODY
+        mujoco.mj_objectVelocity(self.model, self.data, kind, body, found, 0)
+        return np.roll(found, 3)
 
     def _friction(self, geoms: list[int]) -> Any:
         """Sliding friction of geoms, and of pairs with an own one that they are part of."""

@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.scene import FloatArray, Scene, rotation_matrix
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
@@ -134,7 +134,16 @@ class Newton(Simulator):
         """Newton hands its state to MuJoCo only in `step`; it may be looked at before."""
         model, data = self.solver.mj_model, self.solver.mj_data
         data.qpos[model.jnt_qposadr[self._mujoco_joints()]] = self.model.joint_q.numpy()[self._q]
+        numbers = self.solver.mjc_body_to_newton.numpy()[0].tolist()
+        for body in self._free:
+            number, velocity = numbers.index(body), self._states[0].body_qd.numpy()[body]
+            at, turn = model.body_dofadr[number], self._rotation(body)
+            data.qvel[at : at + 3], data.qvel[at + 3 : at + 6] = velocity[:3], velocity[3:] @ turn
         mujoco.mj_forward(model, data)
+
+    def _rotation(self, body: int) -> FloatArray:
+        """Rotation matrix of a body; Newton's quaternions end with w."""
+        return rotation_matrix(np.roll(self._states[0].body_q.numpy()[body, 3:], 1))
 
     def _mujoco_joints(self) -> list[int]:
         """MuJoCo's numbers of the driven joints."""

@@ -108,6 +108,8 @@ def _add_box(builder: Any, box: Box, surface: Any) -> None:
     if not box.fixed:
         surface.density = box.mass / float(np.prod(box.size))
         body, pose = builder.add_body(xform=pose, label=box.name), None
+        start = builder.joint_qd_start[builder.joint_child.index(body)]
+        builder.joint_qd[start : start + 6] = map(float, box.velocity)
     hx, hy, hz = (edge / 2 for edge in box.size)
     builder.add_shape_box(
         body, xform=pose, hx=hx, hy=hy, hz=hz, cfg=surface, color=box.colour[:3], label=box.name

@@ -64,6 +64,9 @@ class ReadBack:
         }
         for name, part in self.bodies.items():
             reported |= self._part(f"body/{name}", part)
+            if part.body is not None:
+                velocity = [*part.body.getLinearVel(), *part.body.getAngularVel()]
+                reported[f"body/{name}/velocity"] = velocity
             free = part.body is not None and not part.body.isKinematic()
             reported[f"body/{name}/dynamic"] = float(free and part.body.getNumJoints() == 0)
         for name, part in self.links.items():

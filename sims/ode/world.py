@@ -43,6 +43,8 @@ def add_box(world: Any, space: Any, box: Box) -> Part:
         place(geom, box.pose)
         return part
     part.surface.body = _body(world, box.mass, np.diag(box.inertia()), box.pose)
+    part.body.setLinearVel(box.linear_velocity)
+    part.body.setAngularVel(box.angular_velocity)
     geom.setBody(part.body)
     return part
 

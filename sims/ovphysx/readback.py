@@ -27,6 +27,8 @@ _ATTRIBUTES = (
     "restitution",
     "restOffset",
     "shapeCount",
+    "linearVelocity",
+    "angularVelocity",
     *_FRICTIONS,
 )
 _Values = Mapping[str, Mapping[str, FloatArray]]
@@ -58,6 +60,8 @@ def read_back(
         reported |= _part(values, path, prefix) | outlines(prefix, shapes, [])
         if not box.fixed:
             reported |= _inertial(values, path, prefix)
+            velocity = [values[name][path] for name in ("linearVelocity", "angularVelocity")]
+            reported[f"{prefix}/velocity"] = np.concatenate(velocity)
     if prepared is not None:
         reported |= _links(session, prepared, places)
         reported |= _joints(session, prepared, units)

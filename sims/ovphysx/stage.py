@@ -123,6 +123,9 @@ class Stage:
             lines.append("bool physics:kinematicEnabled = true")
         else:
             lines += usd.mass_lines(box.mass, np.zeros(3), np.diag(box.inertia()))
+            spin = np.degrees(box.angular_velocity)
+            lines.append(f"vector3f physics:velocity = {usd.numbers(box.linear_velocity)}")
+            lines.append(f"vector3f physics:angularVelocity = {usd.numbers(spin)}")
         return usd.prim("Xform", f"body_{index}", _BODY, lines, [shape])
 
     def _robot(self, prepared: PreparedRobot) -> list[str]:

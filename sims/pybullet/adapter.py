@@ -200,6 +200,10 @@ class PyBullet(Simulator):
             box.mass, shape, picture, box.pose.position, [x, y, z, w], physicsClientId=c
         )
         self._set_surface(body, -1, box.friction)
+        if not box.fixed:
+            pybullet.resetBaseVelocity(
+                body, box.linear_velocity, box.angular_velocity, physicsClientId=c
+            )
         return body
 
     def _set_surface(self, body: int, link: int, friction: float) -> None:

@@ -65,6 +65,8 @@ class ReadBack:
             reported |= self._part(f"body/{name}", body, -1)
             if free:
                 reported |= self._inertial(f"body/{name}", body, -1)
+                velocity = pybullet.getBaseVelocity(body, physicsClientId=self.c)
+                reported[f"body/{name}/velocity"] = np.concatenate(velocity)
             reported[f"body/{name}/dynamic"] = float(free and body not in held)
         if self.prepared is not None:
             reported |= self._robot_quantities(self.prepared.robot)

@@ -207,6 +207,7 @@ class SAPIEN(Simulator):
         entity = builder.build(box.name)
         body = entity.find_component_by_type(physx.PhysxRigidDynamicComponent)
         body.angular_damping = self.settings.angular_damping
+        body.linear_velocity, body.angular_velocity = box.linear_velocity, box.angular_velocity
         return body
 
     def _load_robot(self, prepared: PreparedRobot) -> None:

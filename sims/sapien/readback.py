@@ -58,6 +58,8 @@ class ReadBack:
             reported[f"body/{name}/dynamic"] = float(not static and _free(body))
             if not static:
                 reported |= _inertial(f"body/{name}", body)
+                velocity = np.concatenate([body.linear_velocity, body.angular_velocity])
+                reported[f"body/{name}/velocity"] = velocity
         if self.prepared is not None:
             for name in self.prepared.links:
                 reported |= _part(f"link/{name}", self.links[name])

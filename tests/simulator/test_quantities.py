@@ -58,7 +58,15 @@ ARM = """<robot name="arm">
   </joint>
 </robot>
 """
-FREE = Box("free", (0.1, 0.2, 0.4), Pose.at(0.5, 0.0, 0.2, yaw=0.3), mass=0.3, friction=0.7)
+FREE = Box(
+    "free",
+    (0.1, 0.2, 0.4),
+    Pose.at(0.5, 0.0, 0.2, yaw=0.3),
+    mass=0.3,
+    friction=0.7,
+    linear_velocity=(0.1, 0.0, -0.2),
+    angular_velocity=(0.0, 0.0, 3.0),
+)
 SHELF = Box("shelf", (0.2, 0.2, 0.2), Pose.at(-0.5, 0.0, 0.1), friction=0.6)
 
 
@@ -116,6 +124,7 @@ def expected() -> dict[str, Any]:
             "friction": 0.7,
             "dynamic": 1,
             "touches": [1, 1, 1],
+            "velocity": [0.1, 0, -0.2, 0, 0, 3],
             **SURFACE,
             **inertial(0.3, [0, 0, 0], np.diag([0.005, 0.00425, 0.00125])),
         },

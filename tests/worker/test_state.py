@@ -217,6 +217,14 @@ def test_a_world_starts_at_0_and_at_rest(world: Any, time: float, speed: float) 
     check_start(changed("joints", (1, 3), 9e-7), WORLD)
 
 
+def test_a_body_starts_as_fast_as_the_scene_says() -> None:
+    fast = replace(WORLD.bodies[0], linear_velocity=(0.0, 0.0, 2.0))
+    check_start(changed("bodies", (0, 9), 2.0001), WORLD.with_body(fast))
+    for speed in (0.0, 1.999):
+        with pytest.raises(ParityError, match=f"by up to {2 - speed:.3g} .* the scene's speeds"):
+            check_start(changed("bodies", (0, 9), speed), WORLD.with_body(fast))
+
+
 @pytest.mark.parametrize(("what", "index"), [("joints", (0, 8)), ("bodies", (1, 7))])
 def test_what_is_not_finite_at_the_start(what: str, index: Any) -> None:
     with pytest.raises(StateError) as caught:
