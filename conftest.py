@@ -6,7 +6,7 @@ Nothing of it is installed: the plugin and the suites do without.
 from __future__ import annotations
 
 import re
-from functools import cached_property
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -19,7 +19,7 @@ pytest_plugins = ["pytester"]  # for the tests; pytest wants it named here and n
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling | None:
-    """Under `-n N --dist loadgroup`, one process tests an engine that is slow to start.
+    """Under `-n N --dist loadgroup`, tests that share what is slow to make run in one process.
 
     xdist 3.8 looks for its mark of groups in vain with pytest 9.2 (pytest-xdist issue 1386), so
     the group is found in the test's name.
@@ -28,15 +28,26 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeSch
         return None
     from xdist.scheduler import LoadGroupScheduling
 
-    from pytest_simbench.simulator.registry import adapter, registered
-
     class ByEngine(LoadGroupScheduling):
-        @cached_property
-        def slow(self) -> set[str]:
-            return {name for name in registered() if adapter(name).info.costly_start}
-
         def _split_scope(self, nodeid: str) -> str:
-            words = re.split(r"\W|_", nodeid.rpartition("/")[2])
-            return min(self.slow.intersection(words), default=nodeid)
+            return group(nodeid)
 
     return ByEngine(config, log)
+
+
+@cache
+def engines() -> dict[str, bool]:
+    """The engines by name, and whether each is slow to start."""
+    from pytest_simbench.simulator.registry import adapter, registered
+
+    return {name: adapter(name).info.costly_start for name in registered()}
+
+
+def group(nodeid: str) -> str:
+    """A slow engine's tests, another engine's tests of one file, the tests with a browser."""
+    file, _, test = nodeid.rpartition("/")[2].partition("::")
+    named = sorted(engines().keys() & set(re.split(r"\W|_", f"{file} {test}")))
+    slow = [name for name in named if engines()[name]]
+    if slow or named:
+        return slow[0] if slow else f"{file} {named[0]}"
+    return "browser" if file == "test_browser.py" else nodeid

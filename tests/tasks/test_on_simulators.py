@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable
 from contextlib import closing
 from dataclasses import dataclass, replace
-from typing import Any
 
 import pytest
 
@@ -26,12 +24,7 @@ THROW = Throwing(settle=1.0)
 _thrown: dict[str, tuple[Record, Exception | None]] = {}
 
 
-def on_one_worker(names: Iterable[str]) -> list[Any]:
-    """An engine's tests run on one of xdist's workers, since they share a throw."""
-    return [pytest.param(n, marks=pytest.mark.xdist_group(f"tasks on {n}")) for n in names]
-
-
-@pytest.fixture(params=on_one_worker(ADAPTERS))
+@pytest.fixture(params=ADAPTERS)
 def any_case(request: pytest.FixtureRequest, case: Case) -> Case:
     return case_of(case, request.param)
 
@@ -90,7 +83,7 @@ def test_unreachable_cubes_are_counted_and_the_task_goes_on(case: Case) -> None:
 
 
 @pytest.mark.skipif(shutil.which("Xvfb") is None, reason="no Xvfb: apt-get install xvfb")
-@pytest.mark.parametrize("name", on_one_worker(able_to(Capability.WINDOW)))
+@pytest.mark.parametrize("name", able_to(Capability.WINDOW))
 def test_with_a_window_the_outcome_is_the_same(case: Case, name: str) -> None:
     headless = case_of(case, name)
     displays = Displays()

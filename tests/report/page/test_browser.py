@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 STRANGE = "".join(text for text in (*HOSTILE, *MORE) if len(text) < 1000)
 SIZES = [(400, 800), (1400, 900)]
 
-pytestmark = pytest.mark.xdist_group("browser")
 __all__ = ["browser", "opened"]  # fixtures
 
 

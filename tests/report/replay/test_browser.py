@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 SIZES = [(400, 800), (1400, 900)]
 STRANGE = "".join(text for text in (*HOSTILE, *MORE) if len(text) < 1000)
 
-pytestmark = pytest.mark.xdist_group("browser")
 __all__ = ["browser", "opened"]  # fixtures
 
 
