@@ -25,7 +25,7 @@ import numpy as np
 from pytest_simbench.recordings.figure import relative
 from pytest_simbench.recordings.trace import Trace
 from pytest_simbench.records.text import for_terminal, in_one_line
-from pytest_simbench.scene import Box, FloatArray, Pose
+from pytest_simbench.scene import Body, FloatArray, Pose, Solid
 
 if TYPE_CHECKING:
     from rosbags.rosbag2 import Writer
@@ -151,9 +151,10 @@ class _Bag:
     def _markers(self, start: int) -> Iterator[Any]:
         """A marker for each shape, in the frame of its link or body; it moves with that frame."""
         trace, messages = self._trace, self._messages
-        for k, box in enumerate(trace.boxes):
+        solids = [(box, solid) for box in trace.boxes for solid in box.solids()]
+        for k, (box, solid) in enumerate(solids):
             place = (start, frame_of(box), "bodies", k)
-            yield messages.box(*place, Pose(), box.size, box.colour)
+            yield messages.solid(*place, solid, box.colour)
         for k, part in enumerate(trace.figure.parts if trace.figure else ()):
             assert trace.figure is not None
             place = (start, part.link, "robot", k)
@@ -161,7 +162,7 @@ class _Bag:
                 corners = trace.figure.meshes[part.mesh].triangles.reshape(-1, 3)
                 yield messages.triangles(*place, part.pose, corners, METAL)
             elif part.size is not None:
-                yield messages.box(*place, part.pose, part.size, METAL)
+                yield messages.solid(*place, Solid("box", part.size, part.pose), METAL)
 
     def _topic(self, name: str, kind: str, latched: bool = False) -> Callable[[int, Any], None]:
         """Adds a topic; what writes a message of it at a time [ns]."""
@@ -176,7 +177,7 @@ class _Bag:
         return write
 
 
-def frame_of(box: Box) -> str:
+def frame_of(box: Body) -> str:
     """The frame of a body; no link's name has a slash."""
     return f"bodies/{in_one_line(box.name)}"
 

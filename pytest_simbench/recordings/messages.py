@@ -12,12 +12,15 @@ import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
 from pytest_simbench.records.text import in_one_line
-from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.scene import FloatArray, Pose, Solid
 
 NANOSECONDS = 10**9
 
 INFO = 20
 """Level of a message about what is normal (rcl_interfaces/msg/Log)."""
+
+SOLIDS = {"box": "CUBE", "ball": "SPHERE", "tube": "CYLINDER"}
+"""What visualization_msgs/msg/Marker calls the solids of a body."""
 
 NO_CORNERS = np.zeros((0, 3))
 
@@ -68,14 +71,14 @@ class Messages:
             line=0,
         )
 
-    def box(
-        self, nanoseconds: int, frame: str, namespace: str, number: int, pose: Pose,
-        size: Sequence[float], colour: Sequence[float],
+    def solid(
+        self, nanoseconds: int, frame: str, namespace: str, number: int, solid: Solid,
+        colour: Sequence[float],
     ) -> Any:  # fmt: skip
-        """A marker: a box of edge lengths `size` [m] at a pose in a frame, with which it moves."""
-        kind = self.store.types["visualization_msgs/msg/Marker"].CUBE  # type: ignore[attr-defined]
-        place = (nanoseconds, frame, namespace, number, pose)
-        return self._marker(*place, kind, size, colour, NO_CORNERS)
+        """A marker: a solid at its pose in a frame, with which it moves."""
+        kind = getattr(self.store.types["visualization_msgs/msg/Marker"], SOLIDS[solid.kind])
+        place = (nanoseconds, frame, namespace, number, solid.pose)
+        return self._marker(*place, kind, solid.extents, colour, NO_CORNERS)
 
     def triangles(
         self, nanoseconds: int, frame: str, namespace: str, number: int, pose: Pose,

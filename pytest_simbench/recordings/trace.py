@@ -26,7 +26,7 @@ import numpy as np
 from pytest_simbench.client.world import Motion
 from pytest_simbench.recordings.figure import Figure, Mesh
 from pytest_simbench.records.paths import write_whole
-from pytest_simbench.scene import Box, FloatArray, Scene
+from pytest_simbench.scene import Body, FloatArray, Scene
 from pytest_simbench.simulator.files import FileError, read_arrays, read_json
 
 LARGEST = 512 * 2**20
@@ -47,7 +47,7 @@ class Trace:
     Attributes:
         time, joints, bodies: see the module.
         joint_names, body_names: of the joints and of the free bodies.
-        boxes: all of the scene, the free ones in the order of `body_names`, as they began.
+        boxes: all bodies of the scene, the free ones in the order of `body_names`, as they began.
         figure: the robot; None for a scene without one.
         phases: when each began [s], and its name, in the order of time.
     """
@@ -57,7 +57,7 @@ class Trace:
     bodies: FloatArray
     joint_names: Sequence[str]
     body_names: Sequence[str]
-    boxes: Sequence[Box]
+    boxes: Sequence[Body]
     figure: Figure | None
     phases: Sequence[tuple[float, str]] = ()
 
@@ -88,13 +88,13 @@ class Trace:
         )
 
     @property
-    def free(self) -> Sequence[Box]:
-        """The boxes that move, in the order of the rows of `bodies`."""
+    def free(self) -> Sequence[Body]:
+        """The bodies that move, in the order of the rows of `bodies`."""
         return self.boxes[: len(self.body_names)]
 
     @property
-    def fixed(self) -> Sequence[Box]:
-        """The boxes that do not."""
+    def fixed(self) -> Sequence[Body]:
+        """The bodies that do not."""
         return self.boxes[len(self.body_names) :]
 
     def links(self) -> FloatArray:
@@ -170,7 +170,7 @@ class Trace:
             np.ascontiguousarray(arrays["bodies"], dtype=float),
             [str(name) for name in arrays["joint_names"]],
             [str(name) for name in arrays["body_names"]],
-            [Box.from_wire(box) for box in about["boxes"]],
+            [Body.from_wire(box) for box in about["boxes"]],
             None if figure is None else Figure.from_wire(figure, meshes),
             [(float(time), str(name)) for time, name in about["phases"]],
         )

@@ -105,7 +105,7 @@ class Perturbation:
             return replace(scene, robot=_squeezing(_robot(scene), 1 + self.amount))
         body = scene.body(self.body)
         if self.quantity == "mass":
-            return scene.with_body(replace(body, mass=body.mass * (1 + self.amount)))
+            return scene.with_body(body.changed(mass=body.mass * (1 + self.amount)))
         return scene.with_pose(self.body, _moved(body.pose, self.quantity, self.amount))
 
 
@@ -119,7 +119,7 @@ def _moved(pose: Pose, quantity: str, amount: float) -> Pose:
 
 
 def _with_friction(scene: Scene, factor: float) -> Scene:
-    bodies = tuple(replace(body, friction=body.friction * factor) for body in scene.bodies)
+    bodies = tuple(body.changed(friction=body.friction * factor) for body in scene.bodies)
     robot = scene.robot and replace(scene.robot, friction=scene.robot.friction * factor)
     return replace(
         scene, bodies=bodies, robot=robot, ground_friction=scene.ground_friction * factor

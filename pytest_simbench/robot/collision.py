@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.scene import Box, FloatArray, Pose, Scene
+from pytest_simbench.scene import Body, FloatArray, Pose, Scene
 from pytest_simbench.simulator.robot_files import description_xml
 
 MARGIN = 0.012
@@ -59,7 +59,7 @@ class PlanningScene:
         self._free = {body.name: body for body in scene.free_bodies}
         self._bodies: dict[str, int] = {}
         for body in scene.bodies:
-            shape = coal.Box(*body.size)
+            shape = coal.Box(*body.extents)
             placement = inverse * pin.SE3(body.pose.matrix())
             obstacle = pin.GeometryObject(body.name, 0, placement, shape)
             self._bodies[body.name] = geometry.addGeometryObject(obstacle)
@@ -90,7 +90,7 @@ class PlanningScene:
                 f"held {body.name}",
                 tool.parentJoint,
                 tool.placement,
-                coal.Box(*(edge - 2 * HELD_SLACK for edge in body.size)),
+                coal.Box(*(edge - 2 * HELD_SLACK for edge in body.extents)),
             )
             index = geometry.addGeometryObject(rider)
             self._riding[body.name] = index
@@ -122,7 +122,7 @@ class PlanningScene:
         self._activate()
 
     @property
-    def held_body(self) -> Box | None:
+    def held_body(self) -> Body | None:
         """What is in the hand."""
         return None if self.held is None else self._free[self.held]
 

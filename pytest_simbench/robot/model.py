@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from pytest_simbench.scene import Box, FloatArray, MotionLimits, Pose, Robot, Vector3
+from pytest_simbench.scene import Body, Box, FloatArray, MotionLimits, Pose, Robot, Vector3
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.robot_check import check_robot
 
@@ -45,7 +45,7 @@ class RobotModel:
         self.tool = self.pin.getFrameId(robot.tool_frame)
         self.base = pin.SE3(robot.base.matrix())
         self.pin.armature = robot.column("armature")
-        self._loaded: dict[tuple[float, Vector3], pin.Model] = {}
+        self._loaded: dict[tuple[type[Body], float, Vector3], pin.Model] = {}
         self.effort_limits = robot.column("effort_limit")[: self.arm]
         self._fingers = np.array([joint.initial_position for joint in robot.joints[self.arm :]])
 
@@ -103,7 +103,7 @@ class RobotModel:
         q: FloatArray,
         v: FloatArray,
         a: FloatArray,
-        held: Box | None = None,
+        held: Body | None = None,
     ) -> FloatArray:
         """Joint efforts of a motion, rows of (n, n_joints), rotor inertia included [N m, N].
 
@@ -123,7 +123,7 @@ class RobotModel:
         arm: FloatArray,
         velocity: FloatArray,
         acceleration: FloatArray,
-        held: Box | None = None,
+        held: Body | None = None,
     ) -> FloatArray:
         """What an arm motion asks of the motors, as signed shares of their limits, (n, arm); the
         fingers at rest."""
@@ -133,13 +133,15 @@ class RobotModel:
         efforts = self.inverse_dynamics(gravity, q, v, a, held)
         return np.asarray(efforts[:, : self.arm] / self.effort_limits)
 
-    def _carrying(self, body: Box) -> pin.Model:
+    def _carrying(self, body: Body) -> pin.Model:
         """The model with a body fixed in the hand."""
-        key = body.mass, body.size
+        key = type(body), body.mass, body.extents
         if key not in self._loaded:
             model = self.pin.copy()
             tool = model.frames[self.tool]
-            inertia = pin.Inertia.FromBox(body.mass, *body.size)
+            inertia = pin.Inertia(body.mass, np.zeros(3), np.diag(body.inertia()))
+            if isinstance(body, Box):
+                inertia = pin.Inertia.FromBox(body.mass, *body.size)
             model.appendBodyToJoint(tool.parentJoint, inertia, tool.placement)
             self._loaded[key] = model
         return self._loaded[key]

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.scene import Box, FloatArray
+from pytest_simbench.scene import Body, FloatArray
 
 SPAN = 0.01
 """Accelerations are the change of the joints' velocities over this time [s]: the engines' steps are
@@ -42,7 +42,7 @@ def strain(
     gravity: FloatArray,
     time: FloatArray,
     joints: FloatArray,
-    held: Box | None = None,
+    held: Body | None = None,
     free: int = 0,
 ) -> Strain | None:
     """How hard a motion was on the arm; None when it is shorter than `SPAN`.

@@ -14,7 +14,7 @@ import numpy as np
 from pytest_simbench.robot.errors import PlanningError, RobotError
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.timing import TICK, Timed, line_move, synchronised_move
-from pytest_simbench.scene import Box, FloatArray, Robot
+from pytest_simbench.scene import Body, FloatArray, Robot
 
 EFFORT_SHARE = 0.9
 """Largest planned effort, as a share of each joint's limit: the drives need the rest to correct."""
@@ -81,7 +81,7 @@ def study_swing(model: RobotModel, start: FloatArray, goal: FloatArray) -> tuple
 
 
 def feasible_swing(
-    model: RobotModel, start: FloatArray, goal: FloatArray, gravity: FloatArray, held: Box | None
+    model: RobotModel, start: FloatArray, goal: FloatArray, gravity: FloatArray, held: Body | None
 ) -> tuple[Timed, float]:
     """From rest to rest on the straight line in joint space, with its exact duration [s].
 

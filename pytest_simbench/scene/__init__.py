@@ -1,6 +1,6 @@
 """The declarative world: bodies, robot, gravity, friction, gains; frozen, in SI units."""
 
-from pytest_simbench.scene.bodies import Body, Box, penetration
+from pytest_simbench.scene.bodies import Body, Box, Capsule, Cylinder, Solid, Sphere, penetration
 from pytest_simbench.scene.checks import SceneError
 from pytest_simbench.scene.pose import FloatArray, Pose, Quaternion, Vector3, rotation_matrix
 from pytest_simbench.scene.robot import Gripper, Joint, MotionLimits, Robot
@@ -11,6 +11,8 @@ __all__ = [
     "STANDARD_GRAVITY",
     "Body",
     "Box",
+    "Capsule",
+    "Cylinder",
     "FloatArray",
     "Gripper",
     "Joint",
@@ -20,6 +22,8 @@ __all__ = [
     "Robot",
     "Scene",
     "SceneError",
+    "Solid",
+    "Sphere",
     "Trajectory",
     "Vector3",
     "penetration",

@@ -1,6 +1,10 @@
-"""How deep boxes overlap, many pairs at once: the separating-axis test."""
+"""How deep boxes overlap, many pairs at once: the separating-axis test. How far hulls are apart."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -49,3 +53,73 @@ def overlaps(
     away = np.abs(np.einsum("nki,ni->nk", axes, offset))
     depth: FloatArray = np.where(real, reach - away, np.inf).min(axis=1)
     return depth
+
+
+@dataclass(frozen=True)
+class Hull:
+    """A box of half edges `half` [m], (3,), widened by a disc of radius `disc` [m] about z."""
+
+    half: FloatArray
+    disc: float = 0.0
+
+    def reach(self, directions: FloatArray) -> FloatArray:
+        """How far it reaches from its centre in directions (n, 3) [m], (n,)."""
+        flat = np.hypot(directions[:, 0], directions[:, 1])
+        return np.asarray(np.abs(directions) @ self.half + self.disc * flat)
+
+    def farthest(self, direction: FloatArray) -> FloatArray:
+        """Its point that lies farthest in a direction (3,)."""
+        point = np.where(direction < 0, -self.half, self.half)
+        flat = float(np.hypot(direction[0], direction[1]))
+        if flat > 0:
+            point[:2] += self.disc / flat * direction[:2]
+        return point
+
+
+STEPS, CLOSE = 64, 1e-9
+"""The most of a search for a distance, and where it ends [m]."""
+
+
+def distance(offset: FloatArray, a: Hull, turn_a: FloatArray, b: Hull, turn_b: FloatArray) -> float:
+    """How far two hulls are apart [m], 0 where they overlap: the algorithm of Gilbert, Johnson and
+    Keerthi (1988), which finds the point of their Minkowski difference nearest to the origin.
+
+    Args:
+        offset: from the centre of a to that of b [m].
+        turn_a, turn_b: their rotation matrices.
+    """
+
+    def farthest(direction: FloatArray) -> FloatArray:
+        of_a = turn_a @ a.farthest(direction @ turn_a)
+        return np.asarray(of_a - offset - turn_b @ b.farthest(-direction @ turn_b))
+
+    return _nearest_to_origin(farthest, -offset)
+
+
+def _nearest_to_origin(farthest: Callable[[FloatArray], FloatArray], start: FloatArray) -> float:
+    """Distance from the origin of a convex body that tells its farthest point in a direction."""
+    nearest = farthest(-start)
+    corners = [nearest]
+    for _ in range(STEPS):
+        length = float(np.linalg.norm(nearest))
+        if length < CLOSE:
+            return 0.0
+        found = farthest(-nearest)
+        if nearest @ (nearest - found) <= CLOSE * length:
+            return length
+        nearest, corners = _of_simplex([*corners, found])
+    return float(np.linalg.norm(nearest))
+
+
+def _of_simplex(corners: list[FloatArray]) -> tuple[FloatArray, list[FloatArray]]:
+    """The point of a simplex of up to 4 corners nearest to the origin, and the face it lies in."""
+    best, face = min(((c, [c]) for c in corners), key=lambda pair: float(pair[0] @ pair[0]))
+    for count in range(2, len(corners) + 1):
+        for some in combinations(corners, count):
+            edges = np.array(some[1:]) - some[0]
+            weights = np.linalg.lstsq(edges.T, -some[0], rcond=None)[0]
+            point = some[0] + weights @ edges
+            inside = (weights >= 0).all() and weights.sum() <= 1
+            if inside and point @ point < best @ best - 1e-18:
+                best, face = point, list(some)
+    return best, face[:4]

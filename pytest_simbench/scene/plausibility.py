@@ -13,13 +13,18 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_simbench.scene.bodies import Box, penetration
 from pytest_simbench.scene.overlap import overlaps, rotations
-from pytest_simbench.scene.pose import FloatArray, Vector3
+from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
 from pytest_simbench.scene.scene import Scene
 
 DEEPEST = 1 / 3
 """Share of the thinner body's shortest edge to which two bodies, or a body and the ground, may
 overlap. The softest contacts of any engine's defaults give way by 1 mm of 50."""
+
+THICK = 0.9
+"""Layer in which the overlap of two bodies that are not both boxes is measured, as a share of half
+their shortest edge: the core within it never counts as less than that."""
 
 FASTEST = 30.0
 """No point of a body is faster [m/s]: ten times what the arm can throw, and twice a fall from the
@@ -43,7 +48,7 @@ def implausible(scene: Scene, bodies: FloatArray) -> str | None:
         row = int(np.argmin(np.isfinite(bodies).all(axis=1)))
         return f"the state of {free[row].name!r} is not finite"
     position = bodies[:, :3]
-    half = np.array([body.size for body in free]) / 2
+    half = np.array([body.extents for body in free]) / 2
     for k in np.flatnonzero(~_inside(position, scene.room)):
         at = ", ".join(f"{value:.3g}" for value in position[k])
         x, y, height = scene.room
@@ -74,10 +79,15 @@ def _too_deep(scene: Scene, bodies: FloatArray) -> str | None:
     names = [body.name for body in (*scene.free_bodies, *scene.fixed_bodies)]
     fixed = [body.pose.as_array() for body in scene.fixed_bodies]
     states = np.concatenate([bodies[:, :7], np.reshape(fixed, (-1, 7))])
-    half = np.array([b.size for b in (*scene.free_bodies, *scene.fixed_bodies)]) / 2
+    everything = (*scene.free_bodies, *scene.fixed_bodies)
+    half = np.array([body.extents for body in everything]) / 2
+    boxes = np.array([isinstance(body, Box) for body in everything])
     limit = 2 * half.min(axis=1) * DEEPEST
     position, turn = states[:, :3], rotations(states[:, 3:])
-    depth = np.einsum("ni,ni->n", np.abs(turn[:, 2]), half) - position[:, 2]
+    down = np.einsum("ni,ni->n", np.abs(turn[:, 2]), half)
+    for k in np.flatnonzero(~boxes):
+        down[k] = everything[k].reach(turn[k, 2][None])[0]
+    depth = down - position[:, 2]
     for k in np.flatnonzero(depth[: len(bodies)] > limit[: len(bodies)]):
         return f"{names[k]!r} is {1000 * depth[k]:.0f} mm deep in the ground"
     pairs = [(a, b) for a, b in combinations(range(len(names)), 2) if a < len(bodies)]
@@ -88,6 +98,9 @@ def _too_deep(scene: Scene, bodies: FloatArray) -> str | None:
     near = np.linalg.norm(offset, axis=1) < radius[a] + radius[b]
     a, b, offset = a[near], b[near], offset[near]
     into = overlaps(offset, turn[a], half[a], turn[b], half[b])
+    for k in np.flatnonzero(~(boxes[a] & boxes[b])):  # of these, boxes around them overlap sooner
+        first, second = (everything[n].moved_to(Pose.from_array(states[n])) for n in (a[k], b[k]))
+        into[k] = min(into[k], penetration(first, second, THICK))
     for k in np.flatnonzero(into > np.minimum(limit[a], limit[b])):
         return f"{names[a[k]]!r} and {names[b[k]]!r} overlap by {1000 * into[k]:.0f} mm"
     return None

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
 
-from pytest_simbench.scene.bodies import Box, penetration
+from pytest_simbench.scene.bodies import Body, penetration
 from pytest_simbench.scene.checks import (
     RESERVED,
     SceneError,
@@ -24,7 +24,7 @@ ROOM: Vector3 = (5.0, 5.0, 10.0)
 """[m]. The arm throws at 3 m/s from at most 1.4 m up: that flies 2 m and slides or rolls 1 m."""
 
 OVERLAP_TOLERANCE = 1e-4
-"""Boxes may overlap this deep at the start [m]: resting contacts are given to rounding."""
+"""Bodies may overlap this deep at the start [m]: resting contacts are given to rounding."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class Scene:
 
     Attributes:
         name: for messages and file names.
-        bodies: boxes, fixed and free.
-        robot: the arm, or None for a scene of boxes alone.
+        bodies: fixed and free.
+        robot: the arm, or None for a scene of bodies alone.
         gravity: [m/s^2].
         ground_friction: Coulomb coefficient of the ground plane.
         room: how far it goes from the origin to each side in x and in y, and up [m]. A free body
@@ -46,7 +46,7 @@ class Scene:
     """
 
     name: str
-    bodies: tuple[Box, ...] = ()
+    bodies: tuple[Body, ...] = ()
     robot: Robot | None = None
     gravity: Vector3 = field(default=STANDARD_GRAVITY)
     ground_friction: float = 1.0
@@ -87,15 +87,15 @@ class Scene:
                 )
 
     @property
-    def free_bodies(self) -> tuple[Box, ...]:
+    def free_bodies(self) -> tuple[Body, ...]:
         """The bodies that can move, in scene order: the rows of every body state."""
         return tuple(body for body in self.bodies if not body.fixed)
 
     @property
-    def fixed_bodies(self) -> tuple[Box, ...]:
+    def fixed_bodies(self) -> tuple[Body, ...]:
         return tuple(body for body in self.bodies if body.fixed)
 
-    def body(self, name: str) -> Box:
+    def body(self, name: str) -> Body:
         """The body of that name.
 
         Raises:
@@ -108,7 +108,7 @@ class Scene:
             f"no body {name!r} in scene {self.name!r}; it has {[b.name for b in self.bodies]}"
         )
 
-    def with_body(self, body: Box) -> Scene:
+    def with_body(self, body: Body) -> Scene:
         """The same scene with one body replaced by its namesake."""
         self.body(body.name)
         return replace(self, bodies=tuple(body if b.name == body.name else b for b in self.bodies))
@@ -131,7 +131,7 @@ class Scene:
     def from_wire(cls, data: dict[str, Any]) -> Scene:
         return cls(
             name=data["name"],
-            bodies=tuple(Box.from_wire(body) for body in data["bodies"]),
+            bodies=tuple(Body.from_wire(body) for body in data["bodies"]),
             robot=None if data["robot"] is None else Robot.from_wire(data["robot"]),
             gravity=tuple(data["gravity"]),
             ground_friction=data["ground_friction"],

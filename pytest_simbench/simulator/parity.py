@@ -129,7 +129,7 @@ def _equal(name: str, expected: Any, reported: Any) -> bool:
         b = np.concatenate([b[:3], -b[3:]])  # q and -q are the same rotation
     if kind in ("inertia", "mass"):  # of a tensor, relative to its largest element
         return bool(np.abs(a - b).max() <= RELATIVE_TOLERANCE * np.abs(a).max() + 1e-12)
-    composed = kind in ("boxes", "meshes", "com", "axis") or name.startswith("link/")
+    composed = kind in ("boxes", "rounds", "meshes", "com", "axis") or name.startswith("link/")
     absolute = LENGTH_TOLERANCE if composed else ABSOLUTE_TOLERANCE
     return bool(np.allclose(a, b, rtol=RELATIVE_TOLERANCE, atol=absolute))
 

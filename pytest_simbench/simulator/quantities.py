@@ -2,9 +2,9 @@
 
     gravity, timestep, gripper/coupled
     ground/{height, friction, restitution}
-    body/NAME/{pose, boxes, meshes, friction, restitution, margin, dynamic, touches}
+    body/NAME/{pose, boxes, rounds, meshes, friction, restitution, margin, dynamic, touches}
         and of a free body {mass, com, inertia, damping, gravity, velocity}
-    link/NAME/{pose, boxes, meshes, friction, restitution, margin, touches}
+    link/NAME/{pose, boxes, rounds, meshes, friction, restitution, margin, touches}
         and of a link that moves {mass, com, inertia, damping, gravity}
     joint/NAME/{axis, limits, effort_limit, stiffness, damping, friction, armature,
         initial_position}
@@ -13,7 +13,8 @@ Links are those of the prepared robot (`simulator.urdf`), in which fixed joints 
 is the link `base`, whose frame is the world's.
 
 - pose: position and quaternion w, x, y, z of the body's or link's frame in the world, (7,).
-- boxes, meshes: the reach of each collision shape of that kind in the 26 directions of
+- boxes, rounds, meshes: the reach of each collision shape of that kind (rounds are spheres,
+  cylinders and capsules) in the 26 directions of
   `shapes.DIRECTIONS`, in the body's or link's frame, (n_shapes, 26) [m]; a mesh counts as its
   convex hull.
 - com: centre of mass in that frame (3,) [m]; inertia: tensor about it in axes of that frame,
@@ -42,10 +43,10 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Robot, Scene
+from pytest_simbench.scene import Box, FloatArray, Robot, Scene
 from pytest_simbench.simulator.kinematics import link_poses, motion_subspace
 from pytest_simbench.simulator.settings import Settings
-from pytest_simbench.simulator.shapes import box_corners, outlines, reach, shape_points
+from pytest_simbench.simulator.shapes import DIRECTIONS, outlines, reach, shape_points
 from pytest_simbench.simulator.urdf import PreparedRobot
 
 
@@ -68,7 +69,10 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
             margin=0.0,
             dynamic=float(not body.fixed),
         )
-        quantities |= outlines(f"body/{body.name}", [reach(box_corners(body.size))], [])
+        boxes: list[FloatArray] = []
+        rounds: list[FloatArray] = []
+        (boxes if isinstance(body, Box) else rounds).append(body.reach(DIRECTIONS))
+        quantities |= outlines(f"body/{body.name}", boxes, [], rounds)
         if not body.fixed:
             inertia = np.diag(body.inertia())
             quantities |= _inertial(f"body/{body.name}", body.mass, np.zeros(3), inertia)

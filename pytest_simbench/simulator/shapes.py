@@ -37,19 +37,46 @@ def reach(points: FloatArray) -> FloatArray:
     return np.asarray((np.atleast_2d(points) @ DIRECTIONS.T).max(axis=0))
 
 
+def round_reach(radius: float, length: float = 0.0, pose: Pose | None = None) -> FloatArray:
+    """The `reach` of a sphere, or of a capsule along the z axis of a pose, (26,) [m].
+
+    Args:
+        radius: [m].
+        length: of the capsule's cylindrical part [m].
+        pose: of its centre in the frame; by default the frame itself.
+    """
+    pose = pose or Pose()
+    axis = pose.rotation()[:, 2]
+    along: FloatArray = np.abs(DIRECTIONS @ axis) * length / 2
+    return np.asarray(DIRECTIONS @ np.asarray(pose.position) + along + radius)
+
+
+def cylinder_reach(radius: float, length: float, pose: Pose | None = None) -> FloatArray:
+    """The `reach` of a cylinder along the z axis of a pose; arguments as of `round_reach`."""
+    pose = pose or Pose()
+    along = DIRECTIONS @ pose.rotation()[:, 2]
+    across = np.sqrt(np.maximum(0.0, 1.0 - along**2))
+    reached = np.abs(along) * length / 2 + across * radius
+    return np.asarray(DIRECTIONS @ np.asarray(pose.position) + reached)
+
+
 def outlines(
-    prefix: str, boxes: Iterable[FloatArray], meshes: Iterable[FloatArray]
+    prefix: str,
+    boxes: Iterable[FloatArray],
+    meshes: Iterable[FloatArray],
+    rounds: Iterable[FloatArray] = (),
 ) -> dict[str, FloatArray]:
-    """The quantities `boxes` and `meshes` of a body or link named `prefix`.
+    """The quantities `boxes`, `meshes` and `rounds` of a body or link named `prefix`.
 
     Args:
         prefix: of the quantities' names.
-        boxes, meshes: each shape by its `reach`.
+        boxes, meshes, rounds: each shape by its `reach`.
 
     Returns:
         Of each kind the reaches in an order of their own, (n_shapes, 26) [m].
     """
-    return {f"{prefix}/boxes": _ordered(boxes), f"{prefix}/meshes": _ordered(meshes)}
+    kinds = {"boxes": boxes, "meshes": meshes, "rounds": rounds}
+    return {f"{prefix}/{kind}": _ordered(shapes) for kind, shapes in kinds.items()}
 
 
 def _ordered(reaches: Iterable[FloatArray]) -> FloatArray:

@@ -18,7 +18,7 @@ from pytest_simbench.client.world import Motion
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.strain import strain
 from pytest_simbench.robot.throw import Throw, landing_x
-from pytest_simbench.scene import Box, FloatArray
+from pytest_simbench.scene import Body, FloatArray
 
 BoolArray = NDArray[np.bool_]
 
@@ -111,7 +111,7 @@ class Thrown:
         model: RobotModel,
         motion: Motion,
         cube: int,
-        held: Box,
+        held: Body,
         started: float,
         perfect: Throw,
         gravity: FloatArray,

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import Box, Pose, Robot, Scene
+from pytest_simbench.scene import Box, Capsule, Cylinder, Pose, Robot, Scene, Sphere
 from pytest_simbench.simulator.shapes import mesh_points
 from pytest_simbench.testing import scenes
 
@@ -40,6 +40,12 @@ TURNED, SPIN = Pose.at(0.5, 0.1, 0.315, yaw=0.4), (0.7, -0.5, 0.4)
 """Of the true scene's brick: where it is, and its angular velocity [rad/s]."""
 
 
+LYING = Pose((0.7, -0.1, 0.42), (math.cos(0.3), math.sin(0.3), 0.0, 0.0)) * Pose(
+    quaternion=(math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
+)
+"""Of the true scene's can, which falls: it lies across, and is turned about the x axis."""
+
+
 def true_scene() -> Scene:
     """The Panda in front of a table with a brick that starts up and a cube: odd sizes and
     velocities, tilted gravity."""
@@ -57,6 +63,10 @@ def true_scene() -> Scene:
                 angular_velocity=SPIN,
             ),
             scenes.cube("cube", Pose.at(0.6, -0.1, 0.325, yaw=-1.0), friction=0.7),
+            Sphere("ball", 0.03, Pose.at(0.7, 0.1, 0.33), 0.12, 0.7),
+            Cylinder("can", 0.033, 0.11, LYING, 0.3, 0.7),
+            Capsule("pill", 0.02, 0.06, Pose.at(0.8, -0.2, 0.36, yaw=0.3), 0.08, 0.7),
+            Cylinder("pillar", 0.04, 0.2, Pose.at(0.5, -0.6, 0.1), friction=0.7),
         ),
         robot=replace(scenes.arm(), friction=0.7),
         gravity=(0.3, -0.2, -3.7),
@@ -258,6 +268,25 @@ FAULTS: dict[str, Fault] = {
         "the brick is 2 mm thinner",
         "body/brick/boxes",
         of_body("brick", size=(0.1, 0.058, 0.03)),
+    ),
+    "ball_size": Fault(
+        "the ball is 1 mm smaller", "body/ball/rounds", of_body("ball", radius=0.0295)
+    ),
+    "can_length": Fault("the can is 2 mm shorter", "body/can/rounds", of_body("can", length=0.108)),
+    "can_inertia": Fault(
+        "the can is 1 mm thinner, and its inertia with it",
+        "body/can/inertia",
+        of_body("can", radius=0.0325),
+    ),
+    "pill_length": Fault(
+        "the pill is 2 mm longer", "body/pill/rounds", of_body("pill", length=0.062)
+    ),
+    "round_kind": Fault(
+        "the pillar is a capsule as long as it",
+        "body/pillar/rounds",
+        lambda scene, _: scene.with_body(
+            Capsule("pillar", 0.04, 0.12, scene.body("pillar").pose, friction=0.7)
+        ),
     ),
     "body_inertia": Fault(
         "the brick is 2 mm thinner, and its inertia with it",

@@ -8,11 +8,24 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import STANDARD_GRAVITY, Box, Pose, Robot, Scene, Vector3
+from pytest_simbench.scene import (
+    STANDARD_GRAVITY,
+    Box,
+    Capsule,
+    Cylinder,
+    Pose,
+    Robot,
+    Scene,
+    Sphere,
+    Vector3,
+)
 
 GRAVITY = -STANDARD_GRAVITY[2]
 EDGE, MASS = 0.05, 0.1
 """The cube of the tasks [m], [kg]."""
+
+RADIUS = 0.03
+"""Of round bodies [m]."""
 
 
 def cube(name: str, pose: Pose, mass: float = MASS, friction: float = 1.0) -> Box:
@@ -39,6 +52,28 @@ def thrown() -> Scene:
         cube("thrown", turn), linear_velocity=(1.0, -0.7, 1.5), angular_velocity=(3.0, -2.0, 1.5)
     )
     return Scene("thrown", (body,))
+
+
+def bowling() -> Scene:
+    """A ball and a lying can that start along x on the plane at 1 m/s without turning."""
+    lying = Pose((0.0, 0.5, RADIUS), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0))
+    start: dict[str, Any] = {"mass": MASS, "friction": 0.5, "linear_velocity": (1.0, 0.0, 0.0)}
+    ball = Sphere("ball", RADIUS, Pose.at(0.0, 0.0, RADIUS), **start)
+    can = Cylinder("can", RADIUS, 2 * RADIUS, lying, **start)
+    return Scene("bowling", (ball, can), ground_friction=0.5)
+
+
+def standing() -> Scene:
+    """One of each round body, at rest on the plane: the can on its end, the pill on its side."""
+    lying = Pose((0.6, 0.0, RADIUS), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0))
+    return Scene(
+        "standing",
+        (
+            Sphere("ball", RADIUS, Pose.at(0.0, 0.0, RADIUS), MASS),
+            Cylinder("can", RADIUS, 2 * RADIUS, Pose.at(0.3, 0.0, RADIUS), MASS),
+            Capsule("pill", RADIUS, 2 * RADIUS, lying, MASS),
+        ),
+    )
 
 
 def tower() -> Scene:

@@ -21,11 +21,12 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from pytest_simbench.scene import Box, FloatArray, Scene
+from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Scene, Sphere
 from pytest_simbench.simulator import (
     FOLLOWER,
     Capability,
     Deviation,
+    NotSupportedError,
     PreparedRobot,
     SeedsSeen,
     Settings,
@@ -127,7 +128,7 @@ class DART(Simulator):
         self.world = world = dartpy.simulation.World()
         self._set_options(world, scene)
         self._ground = self._add_ground(scene.ground_friction)
-        self._bodies = {box.name: self._add_box(box) for box in scene.bodies}
+        self._bodies = {box.name: self._add_body(box) for box in scene.bodies}
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
         self._robot: Any = None
         self.prepared = None
@@ -170,7 +171,7 @@ class DART(Simulator):
         self.world.addSkeleton(skeleton)
         return body
 
-    def _add_box(self, box: Box) -> Any:
+    def _add_body(self, box: Body) -> Any:
         dynamics = dartpy.dynamics
         skeleton = dynamics.Skeleton(box.name)
         place = dartpy.math.Isometry3()
@@ -189,7 +190,7 @@ class DART(Simulator):
             joint.setPositions(dynamics.FreeJoint.convertToPositions(place))
             joint.setLinearVelocity(np.array(box.linear_velocity))
             joint.setAngularVelocity(np.array(box.angular_velocity))
-        shape = body.createShapeNode(dynamics.BoxShape(np.array(box.size)))
+        shape = body.createShapeNode(_shape(box))
         shape.createVisualAspect().setColor(list(box.colour))
         _set_surface(shape, box.friction)
         self.world.addSkeleton(skeleton)
@@ -305,6 +306,19 @@ class DART(Simulator):
 
     def close(self) -> None:
         self._viewer = self._node = None
+
+
+def _shape(body: Body) -> Any:
+    match body:
+        case Box():
+            return dartpy.dynamics.BoxShape(np.array(body.size))
+        case Sphere():
+            return dartpy.dynamics.SphereShape(body.radius)
+        case Cylinder():
+            return dartpy.dynamics.CylinderShape(body.radius, body.length)
+        case Capsule():
+            return dartpy.dynamics.CapsuleShape(body.radius, body.length)
+    raise NotSupportedError(f"dart has no {type(body).__name__}")
 
 
 def _set_surface(shape: Any, friction: float) -> None:

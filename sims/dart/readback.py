@@ -11,10 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import PreparedRobot, lazy_import, one_value
 from pytest_simbench.simulator.quantities import touches
-from pytest_simbench.simulator.shapes import DIRECTIONS, box_corners, outlines, reach
+from pytest_simbench.simulator.shapes import (
+    DIRECTIONS,
+    box_corners,
+    cylinder_reach,
+    outlines,
+    reach,
+    round_reach,
+)
 
 dartpy = lazy_import("dartpy")
 
@@ -101,8 +108,10 @@ class ReadBack:
             f"{prefix}/pose": np.concatenate([position, turn]),
         }
         boxes = [self._reach(shape, place) for shape in shapes if _is_box(shape)]
-        meshes = [self._reach(shape, place) for shape in shapes if not _is_box(shape)]
-        found |= outlines(prefix, boxes, meshes)
+        rounds = [_round(shape, place) for shape in shapes if _is_round(shape)]
+        others = (shape for shape in shapes if not (_is_box(shape) or _is_round(shape)))
+        meshes = [self._reach(shape, place) for shape in others]
+        found |= outlines(prefix, boxes, meshes, rounds)
         if shapes:
             surfaces = [shape.getDynamicsAspect() for shape in shapes]
             found[f"{prefix}/friction"] = one_value([s.getFrictionCoeff() for s in surfaces])
@@ -150,6 +159,22 @@ def _colliding(body: Any) -> list[Any]:
 
 def _is_box(shape: Any) -> bool:
     return isinstance(shape.getShape(), dartpy.dynamics.BoxShape)
+
+
+def _is_round(shape: Any) -> bool:
+    kinds = dartpy.dynamics
+    return isinstance(
+        shape.getShape(), kinds.SphereShape | kinds.CylinderShape | kinds.CapsuleShape
+    )
+
+
+def _round(shape: Any, place: Any) -> FloatArray:
+    """The reach of a sphere, cylinder or capsule in the frame at `place`."""
+    own, solid = place.inverse().multiply(shape.getWorldTransform()), shape.getShape()
+    pose = Pose.from_array([*own.translation(), *own.quaternion().wxyz()])
+    length = getattr(solid, "getHeight", float)()
+    pillar = isinstance(solid, dartpy.dynamics.CylinderShape)
+    return (cylinder_reach if pillar else round_reach)(solid.getRadius(), length, pose)
 
 
 def _inertial(prefix: str, body: Any) -> dict[str, Any]:

@@ -54,7 +54,6 @@ analysis = lazy_import("pydrake.systems.analysis")
 framework = lazy_import("pydrake.systems.framework")
 geometry = lazy_import("pydrake.geometry")
 math = lazy_import("pydrake.math")
-math_ = lazy_import("pydrake.multibody.math")
 sensors = lazy_import("pydrake.systems.sensors")
 
 
@@ -137,8 +136,6 @@ class Drake(Simulator):
         free = [self.world.bodies[box.name] for box in scene.free_bodies]
         for box, body in zip(scene.free_bodies, free, strict=True):
             self.plant.SetFreeBodyPose(self.context, body, transform(box.pose))
-            velocity = math_.SpatialVelocity(w=box.angular_velocity, v=box.linear_velocity)
-            self.plant.SetFreeBodySpatialVelocity(body=body, V_PB=velocity, context=self.context)
         self._joints_at = np.empty((2, 0), dtype=int)
         if scene.robot is not None:
             self._start_drives(scene.robot)
@@ -149,6 +146,10 @@ class Drake(Simulator):
         self._bodies_at = np.hstack(
             [q + np.array([4, 5, 6, 0, 1, 2, 3]), nq + v + np.array([3, 4, 5, 0, 1, 2])]
         )
+        state = self.plant.GetPositionsAndVelocities(self.context).copy()
+        for at, box in zip(self._bodies_at, scene.free_bodies, strict=True):
+            state[at[7:]] = box.velocity
+        self.plant.SetPositionsAndVelocities(self.context, state)
         self._steps = 0
         self._has_camera = False
         self.simulator.Initialize()

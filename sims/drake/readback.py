@@ -11,7 +11,14 @@ import numpy as np
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.simulator import PreparedRobot, lazy_import, one_value
 from pytest_simbench.simulator.quantities import touches
-from pytest_simbench.simulator.shapes import DIRECTIONS, box_corners, outlines, placed, reach
+from pytest_simbench.simulator.shapes import (
+    box_corners,
+    cylinder_reach,
+    outlines,
+    placed,
+    reach,
+    round_reach,
+)
 
 from . import releases
 from .world import World
@@ -86,7 +93,10 @@ class ReadBack:
             kind = type(self.inspector.GetShape(made))
             kinds.setdefault(kind, []).append(self._reach(made, frame))
         boxes, spheres = kinds.pop(geometry.Box, []), kinds.pop(geometry.Sphere, [])
-        found |= outlines(prefix, _merged(boxes, spheres), chain(*kinds.values()))
+        rounds = [*kinds.pop(geometry.Cylinder, []), *kinds.pop(geometry.Capsule, [])]
+        if not boxes:
+            rounds, spheres = [*rounds, *spheres], []
+        found |= outlines(prefix, _merged(boxes, spheres), chain(*kinds.values()), rounds)
         if shapes:
             found[f"{prefix}/friction"] = self._friction(owner)
             found[f"{prefix}/margin"] = self._margin(owner)
@@ -98,7 +108,11 @@ class ReadBack:
         place = frame.inverse() @ self.inspector.GetPoseInFrame(made)
         pose = Pose.from_array([*place.translation(), *place.rotation().ToQuaternion().wxyz()])
         if isinstance(shape, geometry.Sphere):
-            return DIRECTIONS @ place.translation() + shape.radius()
+            return round_reach(shape.radius(), 0.0, pose)
+        if isinstance(shape, geometry.Capsule):
+            return round_reach(shape.radius(), shape.length(), pose)
+        if isinstance(shape, geometry.Cylinder):
+            return cylinder_reach(shape.radius(), shape.length(), pose)
         if isinstance(shape, geometry.Box):
             return reach(placed(box_corners(shape.size()), pose))
         hull = self.inspector.GetConvexHull(made)
@@ -137,8 +151,10 @@ class ReadBack:
         return any(found) if a[:4] == b[:4] == "link" else bool(pairs) and all(found)
 
     def _shapes(self, name: str) -> Sequence[Any]:
-        """All but the spheres, which do not collide with each other."""
+        """All but the spheres in corners, which do not collide with each other."""
         made = self.world.shapes.get(name.partition("/")[2] or name, [])
+        if len(made) == 1:
+            return made
         return [m for m in made if not isinstance(self.inspector.GetShape(m), geometry.Sphere)]
 
     def _robot(self, prepared: PreparedRobot) -> dict[str, Any]:

@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pytest_simbench.scene import Box, FloatArray, Pose, Scene
-from pytest_simbench.simulator import PreparedRobot, Settings, lazy_import
+from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Pose, Scene, Sphere
+from pytest_simbench.simulator import NotSupportedError, PreparedRobot, Settings, lazy_import
 from pytest_simbench.simulator.shapes import mesh_points
 from pytest_simbench.simulator.urdf import Link, Shape
 
@@ -92,7 +92,7 @@ class World:
         self._add_shape(world, "ground", "plane", plane, Pose(), scene.ground_friction)
         slab = geometry.Box(10.0, 10.0, 0.02)
         self._add_picture(world, "ground", slab, Pose((0.0, 0.0, -0.01)), GREY)
-        self.bodies = {box.name: self._add_box(box) for box in scene.bodies}
+        self.bodies = {box.name: self._add_body(box) for box in scene.bodies}
         self.links: dict[str, Any] = {}
         self.joints: dict[str, Any] = {}
         self.drives: dict[str, Any] = {}
@@ -149,22 +149,26 @@ class World:
             made = self._add_shape(body, name, f"sphere{k}", sphere, pose, friction)
             self._spheres.append(made)
 
-    def _add_box(self, box: Box) -> Any:
-        s = self.settings
-        if box.fixed:
-            body, pose, gone = self.plant.world_body(), box.pose, 0.0
+    def _add_body(self, part: Body) -> Any:
+        solid, weighted, arguments = _solid(part)
+        if part.fixed:
+            body, pose = self.plant.world_body(), part.pose
         else:
-            inertia = trees.SpatialInertia.SolidBoxWithMass(box.mass, *box.size)
-            body, pose = self.plant.AddRigidBody(box.name, inertia), Pose()
-            gone = s.shrink if s.corner_radius else 0.0
-            if s.corner_radius:
-                radius = fitting_radius(box.size, s.corner_radius)
-                centres = corner_centres(box.size, radius)
-                self._add_spheres(body, box.name, centres, radius, box.friction)
-        core = geometry.Box(*(np.asarray(box.size) - 2 * gone))
-        self._add_shape(body, box.name, "box", core, pose, box.friction)
-        self._add_picture(body, box.name, geometry.Box(*box.size), pose, box.colour)
+            inertia = getattr(trees.SpatialInertia, weighted)(part.mass, *arguments)
+            body, pose = self.plant.AddRigidBody(part.name, inertia), Pose()
+        core = solid
+        if isinstance(part, Box) and not part.fixed and self.settings.corner_radius:
+            core = self._add_corners(body, part)
+        self._add_shape(body, part.name, "box", core, pose, part.friction)
+        self._add_picture(body, part.name, solid, pose, part.colour)
         return body
+
+    def _add_corners(self, body: Any, box: Box) -> Any:
+        """Spheres in the corners of a box; the box that is left within them."""
+        radius = fitting_radius(box.size, self.settings.corner_radius)
+        centres = corner_centres(box.size, radius)
+        self._add_spheres(body, box.name, centres, radius, box.friction)
+        return geometry.Box(*(np.asarray(box.size) - 2 * self.settings.shrink))
 
     def _add_links(self, prepared: PreparedRobot) -> None:
         plant, robot = self.plant, prepared.robot
@@ -213,6 +217,23 @@ class World:
             apart.append(geometry.GeometrySet(self._spheres))
         for group in apart:
             manager.Apply(geometry.CollisionFilterDeclaration().ExcludeWithin(group))
+
+
+def _solid(body: Body) -> tuple[Any, str, tuple[Any, ...]]:
+    """Drake's shape of a body, and what makes its inertia of a mass and which arguments."""
+    upright = np.array([0.0, 0.0, 1.0])
+    match body:
+        case Box():
+            return geometry.Box(*body.size), "SolidBoxWithMass", body.size
+        case Sphere():
+            return geometry.Sphere(body.radius), "SolidSphereWithMass", (body.radius,)
+        case Cylinder():
+            size = body.radius, body.length
+            return geometry.Cylinder(*size), "SolidCylinderWithMass", (*size, upright)
+        case Capsule():
+            size = body.radius, body.length
+            return geometry.Capsule(*size), "SolidCapsuleWithMass", (*size, upright)
+    raise NotSupportedError(f"drake has no {type(body).__name__}")
 
 
 def transform(pose: Pose) -> Any:

@@ -41,7 +41,7 @@ from .readback import ReadBack
 from .world import (
     LEAST_FRICTION,
     GenesisSettings,
-    add_box,
+    add_body,
     add_camera,
     add_robot,
     material,
@@ -134,7 +134,7 @@ class Genesis(Simulator):
         self._ground = world.add_entity(
             genesis.morphs.Plane(), material=material(scene.ground_friction)
         )
-        self._boxes = {box.name: add_box(world, box) for box in scene.bodies}
+        self._boxes = {box.name: add_body(world, box) for box in scene.bodies}
         self._robot: Any = None if self.prepared is None else add_robot(world, self.prepared)
         world.build()
         self.solver = world.rigid_solver

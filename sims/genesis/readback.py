@@ -7,15 +7,24 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Scene, rotation_matrix
+from pytest_simbench.scene import FloatArray, Pose, Scene, rotation_matrix
 from pytest_simbench.simulator import PreparedRobot, lazy_import, one_value
 from pytest_simbench.simulator.quantities import touches
-from pytest_simbench.simulator.shapes import box_corners, outlines, reach
+from pytest_simbench.simulator.shapes import (
+    box_corners,
+    cylinder_reach,
+    outlines,
+    reach,
+    round_reach,
+)
 
 from ..mujoco.readback import bounce
 from .engine import array_of, numbers
 
 genesis = lazy_import("genesis")
+
+
+_ROUND = ("SPHERE", "CYLINDER", "CAPSULE")
 
 
 class ReadBack:
@@ -106,9 +115,10 @@ class ReadBack:
         """Pose, shapes and surface of a body or link."""
         shapes, kinds = self._shapes(link), self._array("geoms", "type")
         boxes = [shape for shape in shapes if kinds[shape] == genesis.GEOM_TYPE.BOX]
-        meshes = [shape for shape in shapes if shape not in boxes]
+        rounds = [shape for shape in shapes if genesis.GEOM_TYPE(kinds[shape]).name in _ROUND]
+        meshes = [shape for shape in shapes if shape not in boxes and shape not in rounds]
         found = {f"{prefix}/pose": pose}
-        found |= outlines(prefix, map(self._reach, boxes), map(self._reach, meshes))
+        found |= outlines(prefix, *(map(self._reach, kind) for kind in (boxes, meshes, rounds)))
         if shapes:
             found[f"{prefix}/friction"] = self._friction(shapes)
             found[f"{prefix}/restitution"] = self._restitution(shapes)
@@ -116,6 +126,12 @@ class ReadBack:
 
     def _reach(self, shape: int) -> FloatArray:
         """The reach of a shape in the frame of its link."""
+        kind = genesis.GEOM_TYPE(self._array("geoms", "type")[shape]).name
+        if kind in _ROUND:
+            place = [*self._array("geoms", "pos")[shape], *self._array("geoms", "quat")[shape]]
+            radius, length = self._array("geoms", "data")[shape, :2].astype(float)
+            reached = cylinder_reach if kind == "CYLINDER" else round_reach
+            return reached(radius, length * (kind != "SPHERE"), Pose.from_array(place))
         if self._array("geoms", "type")[shape] == genesis.GEOM_TYPE.BOX:
             corners = box_corners(self._array("geoms", "data")[shape, :3].astype(float))
         else:

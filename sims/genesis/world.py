@@ -7,10 +7,8 @@ from dataclasses import dataclass
 from math import degrees
 from typing import Any, Literal
 
-import numpy as np
-
-from pytest_simbench.scene import Box, Scene
-from pytest_simbench.simulator import PreparedRobot, Settings, lazy_import
+from pytest_simbench.scene import Body, Box, Capsule, Cylinder, Scene, Sphere
+from pytest_simbench.simulator import NotSupportedError, PreparedRobot, Settings, lazy_import
 from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
 
 genesis = lazy_import("genesis")
@@ -92,14 +90,37 @@ def material(friction: float, density: float | None = None) -> Any:
     return genesis.materials.Rigid(rho=density, friction=max(friction, LEAST_FRICTION))
 
 
-def add_box(world: Any, box: Box) -> Any:
-    """The entity of a box, fixed or free."""
-    morph = genesis.morphs.Box(
-        size=box.size, pos=box.pose.position, quat=box.pose.quaternion, fixed=box.fixed
+def add_body(world: Any, body: Body) -> Any:
+    """The entity of a body, fixed or free."""
+    density = None if body.fixed else body.mass / body.volume
+    surface = genesis.surfaces.Default(color=body.colour)
+    return world.add_entity(
+        _morph(body), material=material(body.friction, density), surface=surface
     )
-    density = None if box.fixed else box.mass / float(np.prod(box.size))
-    surface = genesis.surfaces.Default(color=box.colour)
-    return world.add_entity(morph, material=material(box.friction, density), surface=surface)
+
+
+def _morph(body: Body) -> Any:
+    """The shape of a body. Genesis makes a capsule of MuJoCo's description alone."""
+    morphs = genesis.morphs
+    place = {"pos": body.pose.position, "quat": body.pose.quaternion}
+    match body:
+        case Box():
+            return morphs.Box(size=body.size, **place, fixed=body.fixed)
+        case Sphere():
+            return morphs.Sphere(radius=body.radius, **place, fixed=body.fixed)
+        case Cylinder():
+            return morphs.Cylinder(
+                radius=body.radius, height=body.length, **place, fixed=body.fixed
+            )
+        case Capsule():
+            joint = "" if body.fixed else "<freejoint/>"
+            size = f'size="{body.radius!r} {body.length / 2!r}" mass="{body.mass or 1.0!r}"'
+            return morphs.MJCF(
+                file=f"<mujoco><worldbody><body>{joint}<geom type='capsule' {size}/></body>"
+                "</worldbody></mujoco>",
+                **place,
+            )
+    raise NotSupportedError(f"genesis has no {type(body).__name__}")
 
 
 def add_robot(world: Any, prepared: PreparedRobot) -> Any:

@@ -16,10 +16,11 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.scene import Box, FloatArray, Scene
+from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Scene, Sphere
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
+    NotSupportedError,
     PreparedRobot,
     SeedsSeen,
     Settings,
@@ -133,8 +134,8 @@ class MuJoCo(Simulator):
             rgba=GROUND_COLOUR,
         )
         self._set_surface(ground, scene.ground_friction, WORLD, WORLD | ROBOT)
-        for box in scene.bodies:
-            self._add_box(spec, box)
+        for part in scene.bodies:
+            self._add_body(spec, part)
         spec.worldbody.add_light(pos=[0.5, 0, 3], dir=[0, 0, -1])
         self.model = model = spec.compile()
         model.vis.global_.offwidth, model.vis.global_.offheight = 1920, 1080
@@ -181,20 +182,23 @@ class MuJoCo(Simulator):
         geom.solimp[:3] = self.settings.solimp
         geom.contype, geom.conaffinity = group, touches
 
-    def _add_box(self, spec: Any, box: Box) -> None:
+    def _add_body(self, spec: Any, part: Body) -> None:
         body = spec.worldbody.add_body(
-            name=box.name, pos=box.pose.position, quat=box.pose.quaternion
+            name=part.name, pos=part.pose.position, quat=part.pose.quaternion
         )
+        kind, size = _geom(part)
         geom = body.add_geom(
-            name=box.name,
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            size=np.asarray(box.size) / 2,
-            rgba=box.colour,
+            name=part.name,
+            type=getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"),
+            size=[*size, 0.0, 0.0][:3],
+            rgba=part.colour,
         )
-        self._set_surface(geom, box.friction, WORLD, WORLD | ROBOT)
-        if not box.fixed:
-            geom.mass = box.mass
-            body.add_freejoint(name=f"{box.name}/free")
+        self._set_surface(geom, part.friction, WORLD, WORLD | ROBOT)
+        if not isinstance(part, Box):  # their contacts neither roll nor spin with friction
+            geom.condim, geom.priority = 3, 1
+        if not part.fixed:
+            geom.mass = part.mass
+            body.add_freejoint(name=f"{part.name}/free")
 
     def read_back(self) -> dict[str, Any]:
         model, prepared = self.model, self.prepared
@@ -280,6 +284,20 @@ _INTEGRATORS = {
     "implicit": "mjINT_IMPLICIT",
     "implicitfast": "mjINT_IMPLICITFAST",
 }
+
+
+def _geom(body: Body) -> tuple[str, list[float]]:
+    """MuJoCo's kind of a body's shape, and its size: half edges, or radius and half length."""
+    match body:
+        case Box():
+            return "BOX", [edge / 2 for edge in body.size]
+        case Sphere():
+            return "SPHERE", [body.radius]
+        case Cylinder():
+            return "CYLINDER", [body.radius, body.length / 2]
+        case Capsule():
+            return "CAPSULE", [body.radius, body.length / 2]
+    raise NotSupportedError(f"mujoco has no {type(body).__name__}")
 
 
 def _mujoco_urdf(prepared: PreparedRobot) -> str:

@@ -9,10 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import PreparedRobot, lazy_import, one_value
 from pytest_simbench.simulator.quantities import touches
-from pytest_simbench.simulator.shapes import box_corners, outlines, reach
+from pytest_simbench.simulator.shapes import (
+    box_corners,
+    cylinder_reach,
+    outlines,
+    reach,
+    round_reach,
+)
 
 mujoco = lazy_import("mujoco")
 
@@ -106,16 +112,31 @@ class ReadBack:
         model, quaternion = self.model, np.empty(4)
         mujoco.mju_mat2Quat(quaternion, turn.ravel())
         found: dict[str, Any] = {f"{prefix}/pose": np.concatenate([place, quaternion])}
-        kinds: tuple[list[FloatArray], list[FloatArray]] = ([], [])
+        kinds: tuple[list[FloatArray], ...] = ([], [], [])
         for geom in geoms:
-            mesh = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH
-            kinds[int(mesh)].append(reach((self._corners(geom) - place) @ turn))
+            kind = mujoco.mjtGeom(model.geom_type[geom])
+            if kind.name[len("mjGEOM_") :] in _ROUND:
+                kinds[2].append(self._round(geom, place, turn))
+            else:
+                mesh = kind == mujoco.mjtGeom.mjGEOM_MESH
+                kinds[int(mesh)].append(reach((self._corners(geom) - place) @ turn))
         found |= outlines(prefix, *kinds)
         if geoms:
             found[f"{prefix}/friction"] = self._friction(geoms)
             found[f"{prefix}/restitution"] = self._restitution(geoms)
             found[f"{prefix}/margin"] = one_value(model.geom_margin[geoms])
         return found
+
+    def _round(self, geom: int, place: FloatArray, turn: FloatArray) -> FloatArray:
+        """The reach of a sphere, cylinder or capsule in the frame at place and turn."""
+        model, quaternion = self.model, np.empty(4)
+        mujoco.mju_mat2Quat(quaternion, (turn.T @ self.data.geom_xmat[geom].reshape(3, 3)).ravel())
+        centre = turn.T @ (self.data.geom_xpos[geom] - place)
+        pose, (radius, half, _) = Pose.from_array([*centre, *quaternion]), model.geom_size[geom]
+        kind = model.geom_type[geom]
+        if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+            return cylinder_reach(radius, 2 * half, pose)
+        return round_reach(radius, 2 * half * (kind == mujoco.mjtGeom.mjGEOM_CAPSULE), pose)
 
     def _corners(self, geom: int) -> FloatArray:
         """Corners of a box or a mesh in the world, (n, 3)."""
@@ -239,6 +260,9 @@ class ReadBack:
                 strict=True,
             )
         )
+
+
+_ROUND = ("SPHERE", "CYLINDER", "CAPSULE")
 
 
 def bounce(first: float, second: float) -> float:

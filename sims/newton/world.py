@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import numpy as np
-
-from pytest_simbench.scene import Box, Joint, Pose, Scene
+from pytest_simbench.scene import Body, Box, Capsule, Cylinder, Joint, Pose, Scene, Sphere
 from pytest_simbench.simulator import PreparedRobot, Settings, lazy_import
 
 newton = lazy_import("newton")
@@ -50,11 +48,16 @@ def build_model(scene: Scene, prepared: PreparedRobot | None, settings: NewtonSe
     if prepared is not None:
         _add_robot(builder, prepared, _surface(prepared.robot.friction, settings))
     builder.add_ground_plane(cfg=_surface(scene.ground_friction, settings), label="ground")
-    for box in scene.bodies:
-        _add_box(builder, box, _surface(box.friction, settings))
+    for body in scene.bodies:
+        _add_body(builder, body, _surface(body.friction, settings))
     model = builder.finalize(device="cpu")
-    # What MuJoCo needs of a contact beyond Newton's own parameters, the same everywhere.
+    # What MuJoCo needs of a contact beyond Newton's own parameters.
     model.mujoco.condim.fill_(settings.condim)
+    for body in scene.bodies:
+        if not isinstance(body, Box):  # their contacts neither roll nor spin with friction
+            shape = model.shape_label.index(body.name)
+            model.mujoco.condim.numpy()[shape] = 3
+            model.mujoco.geom_priority.numpy()[shape] = 1
     model.mujoco.geom_solimp.numpy()[:] = (*settings.solimp, 0.5, 2.0)
     return model
 
@@ -103,17 +106,28 @@ def _add_robot(builder: Any, prepared: PreparedRobot, surface: Any) -> None:
         builder.set_joint_mimic(joints.index(second), joints.index(first))
 
 
-def _add_box(builder: Any, box: Box, surface: Any) -> None:
-    pose, body = _transform(box.pose), -1
-    if not box.fixed:
-        surface.density = box.mass / float(np.prod(box.size))
-        body, pose = builder.add_body(xform=pose, label=box.name), None
+def _add_body(builder: Any, part: Body, surface: Any) -> None:
+    pose, body = _transform(part.pose), -1
+    if not part.fixed:
+        surface.density = part.mass / part.volume
+        body, pose = builder.add_body(xform=pose, label=part.name), None
         start = builder.joint_qd_start[builder.joint_child.index(body)]
-        builder.joint_qd[start : start + 6] = map(float, box.velocity)
-    hx, hy, hz = (edge / 2 for edge in box.size)
-    builder.add_shape_box(
-        body, xform=pose, hx=hx, hy=hy, hz=hz, cfg=surface, color=box.colour[:3], label=box.name
-    )
+        builder.joint_qd[start : start + 6] = map(float, part.velocity)
+    given = {"xform": pose, "cfg": surface, "color": part.colour[:3], "label": part.name}
+    match part:
+        case Box():
+            hx, hy, hz = (edge / 2 for edge in part.size)
+            builder.add_shape_box(body, hx=hx, hy=hy, hz=hz, **given)
+        case Sphere():
+            builder.add_shape_sphere(body, radius=part.radius, **given)
+        case Cylinder():
+            builder.add_shape_cylinder(
+                body, radius=part.radius, half_height=part.length / 2, **given
+            )
+        case Capsule():
+            builder.add_shape_capsule(
+                body, radius=part.radius, half_height=part.length / 2, **given
+            )
 
 
 def _transform(pose: Pose) -> Any:

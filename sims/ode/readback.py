@@ -13,7 +13,15 @@ import numpy as np
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import PreparedRobot, lazy_import
 from pytest_simbench.simulator.quantities import touches
-from pytest_simbench.simulator.shapes import DIRECTIONS, box_corners, outlines, placed, reach
+from pytest_simbench.simulator.shapes import (
+    DIRECTIONS,
+    box_corners,
+    cylinder_reach,
+    outlines,
+    placed,
+    reach,
+    round_reach,
+)
 
 from .axes import Axis
 from .contacts import Part
@@ -86,9 +94,11 @@ class ReadBack:
         boxes = [
             reach(placed(box_corners(geom.getLengths()), frame.inverse() * pose_of(geom)))
             for geom in part.geoms
-            if not isinstance(geom, Mesh)
+            if isinstance(geom, ode.GeomBox)
         ]
-        found |= outlines(prefix, boxes, meshes)
+        others = (geom for geom in part.geoms if not isinstance(geom, Mesh | ode.GeomBox))
+        rounds = [_round(geom, frame.inverse() * pose_of(geom)) for geom in others]
+        found |= outlines(prefix, boxes, meshes, rounds)
         if part.geoms:
             found[f"{prefix}/friction"] = part.surface.friction
             found[f"{prefix}/restitution"] = part.surface.bounce
@@ -170,6 +180,15 @@ def _collide(x: int, y: int) -> bool:
     wanted = tell.dGeomGetCategoryBits(x) & tell.dGeomGetCollideBits(y)
     wanted |= tell.dGeomGetCategoryBits(y) & tell.dGeomGetCollideBits(x)
     return bool(wanted and tell.dGeomIsEnabled(x) and tell.dGeomIsEnabled(y))
+
+
+def _round(geom: Any, pose: Pose) -> FloatArray:
+    """The reach of a sphere, cylinder or capsule at a pose."""
+    if isinstance(geom, ode.GeomSphere):
+        return round_reach(geom.getRadius(), 0.0, pose)
+    radius, length = geom.getParams()
+    pillar = isinstance(geom, ode.GeomCylinder)
+    return (cylinder_reach if pillar else round_reach)(radius, length, pose)
 
 
 def _pose(body: Any) -> Pose:

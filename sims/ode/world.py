@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import Box, FloatArray, Pose
-from pytest_simbench.simulator import PreparedRobot, lazy_import
+from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Pose, Sphere
+from pytest_simbench.simulator import NotSupportedError, PreparedRobot, lazy_import
 from pytest_simbench.simulator.kinematics import link_poses, motion_subspace
 from pytest_simbench.simulator.mesh_check import TRIANGLE
 from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
@@ -34,9 +34,9 @@ def add_ground(space: Any, friction: float) -> Part:
     return ground
 
 
-def add_box(world: Any, space: Any, box: Box) -> Part:
-    """A box, fixed or free."""
-    geom = ode.GeomBox(space, box.size)
+def add_body(world: Any, space: Any, box: Body) -> Part:
+    """A body, fixed or free."""
+    geom = _solid(space, box)
     part = Part(Surface(None, box.friction))
     part.add(geom, FIXED if box.fixed else FREE)
     if box.fixed:
@@ -47,6 +47,20 @@ def add_box(world: Any, space: Any, box: Box) -> Part:
     part.body.setAngularVel(box.angular_velocity)
     geom.setBody(part.body)
     return part
+
+
+def _solid(space: Any, body: Body) -> Any:
+    """The geom of a body; those of ODE are along z."""
+    match body:
+        case Box():
+            return ode.GeomBox(space, body.size)
+        case Sphere():
+            return ode.GeomSphere(space, body.radius)
+        case Cylinder():
+            return ode.GeomCylinder(space, body.radius, body.length)
+        case Capsule():
+            return ode.GeomCapsule(space, body.radius, body.length)
+    raise NotSupportedError(f"ode has no {type(body).__name__}")
 
 
 def add_links(world: Any, space: Any, prepared: PreparedRobot) -> dict[str, Part]:

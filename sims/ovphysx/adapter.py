@@ -122,6 +122,11 @@ class OvPhysX(Simulator):
                 within=4e-3,
             ),
             Deviation(
+                "body/*/rounds",
+                "measured by sweeping a box, which PhysX rounds; the cylinders differ",
+                within=3e-4,
+            ),
+            Deviation(
                 "link/*/boxes",
                 "measured by sweeping a box, which PhysX rounds",
                 within=1e-4,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose, Scene
+from pytest_simbench.scene import Box, FloatArray, Pose, Scene
 from pytest_simbench.simulator import PreparedRobot, one_value
 from pytest_simbench.simulator.shapes import box_corners, outlines, reach
 
@@ -56,8 +56,12 @@ def read_back(
     for index, box in enumerate(scene.bodies):
         path, prefix = usd.body_path(index), f"body/{box.name}"
         pose = _pose(values, path)
-        shapes = [reach(box_corners(session.size(f"{path}/shape", pose)))]
-        reported |= _part(values, path, prefix) | outlines(prefix, shapes, [])
+        shape = f"{path}/shape"
+        if isinstance(box, Box):  # rays tell the size of a box more exactly
+            outline = outlines(prefix, [reach(box_corners(session.size(shape, pose)))], [])
+        else:
+            outline = outlines(prefix, [], [], [session.reach(shape, pose, Pose())])
+        reported |= _part(values, path, prefix) | outline
         if not box.fixed:
             reported |= _inertial(values, path, prefix)
             velocity = [values[name][path] for name in ("linearVelocity", "angularVelocity")]

@@ -14,8 +14,18 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import Box, FloatArray, Joint, Pose, Scene
-from pytest_simbench.simulator import PreparedRobot
+from pytest_simbench.scene import (
+    Body,
+    Box,
+    Capsule,
+    Cylinder,
+    FloatArray,
+    Joint,
+    Pose,
+    Scene,
+    Sphere,
+)
+from pytest_simbench.simulator import NotSupportedError, PreparedRobot
 from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
 
 from . import usd_text as usd
@@ -66,7 +76,7 @@ class Stage:
     def text(self) -> str:
         """The stage as `.usda` text."""
         prims = [self._physics(), *self._materials(), self._ground()]
-        prims += [self._box(i, box) for i, box in enumerate(self.scene.bodies)]
+        prims += [self._body(i, box) for i, box in enumerate(self.scene.bodies)]
         if self.prepared is not None:
             prims += self._robot(self.prepared)
         units = "metersPerUnit = 1\n kilogramsPerUnit = 1"
@@ -113,11 +123,10 @@ class Stage:
         lines = ['uniform token axis = "Z"', *self._surface(self.scene.ground_friction)]
         return usd.prim("Plane", "ground", _COLLIDER, lines)
 
-    def _box(self, index: int, box: Box) -> str:
+    def _body(self, index: int, box: Body) -> str:
         """A rigid body; kinematic where it is fixed, since PhysX reports nothing of static ones."""
-        shape = usd.prim(
-            "Cube", "shape", _COLLIDER, [*usd.cube(box.size), *self._surface(box.friction)]
-        )
+        kind, size = _solid(box)
+        shape = usd.prim(kind, "shape", _COLLIDER, [*size, *self._surface(box.friction)])
         lines = [*usd.placed(box.pose), *self._lines["physxRigidBody"]]
         if box.fixed:
             lines.append("bool physics:kinematicEnabled = true")
@@ -174,6 +183,20 @@ class Stage:
             f"int[] faceVertexIndices = [{', '.join(str(i) for i in faces.ravel())}]",
         ]
         return usd.prim("Mesh", name, (*_COLLIDER, "PhysicsMeshCollisionAPI"), [*lines, *surface])
+
+
+def _solid(body: Body) -> tuple[str, list[str]]:
+    """USD's kind of a body's shape, and the lines of its size; along z where it has an axis."""
+    match body:
+        case Box():
+            return "Cube", usd.cube(body.size)
+        case Sphere():
+            return "Sphere", [f"double radius = {float(body.radius)!r}"]
+        case Cylinder() | Capsule():
+            radius, length = float(body.radius), float(body.length)
+            lines = [f"double radius = {radius!r}", f"double height = {length!r}"]
+            return type(body).__name__, [*lines, 'uniform token axis = "Z"']
+    raise NotSupportedError(f"ovphysx has no {type(body).__name__}")
 
 
 def _material(friction: float) -> str:

@@ -19,10 +19,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.scene import Box, FloatArray, Scene
+from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Scene, Sphere
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
+    NotSupportedError,
     PreparedRobot,
     SeedsSeen,
     Settings,
@@ -175,7 +176,7 @@ class PyBullet(Simulator):
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=c)
         self._ground = pybullet.createMultiBody(0, plane, physicsClientId=c)
         self._set_surface(self._ground, -1, scene.ground_friction)
-        self._bodies = {box.name: self._add_box(box) for box in scene.bodies}
+        self._bodies = {box.name: self._add_body(box) for box in scene.bodies}
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
         self.prepared = None
         self._robot = -1
@@ -186,20 +187,24 @@ class PyBullet(Simulator):
             self.prepared = PreparedRobot(scene.robot)
             self._load_robot(self.prepared)
 
-    def _add_box(self, box: Box) -> int:
+    def _add_body(self, box: Body) -> int:
         c = self.client
-        half = [edge / 2 for edge in box.size]
-        shape = pybullet.createCollisionShape(
-            pybullet.GEOM_BOX, halfExtents=half, physicsClientId=c
-        )
+        kind, size, length = _shape(box)
+        lengths = {} if length is None else {"height": length}
+        shape = pybullet.createCollisionShape(kind, **size, **lengths, physicsClientId=c)
+        lengths = {} if length is None else {"length": length}
         picture = pybullet.createVisualShape(
-            pybullet.GEOM_BOX, halfExtents=half, rgbaColor=box.colour, physicsClientId=c
+            kind, **size, **lengths, rgbaColor=box.colour, physicsClientId=c
         )
         w, x, y, z = box.pose.quaternion
         body: int = pybullet.createMultiBody(
             box.mass, shape, picture, box.pose.position, [x, y, z, w], physicsClientId=c
         )
         self._set_surface(body, -1, box.friction)
+        if not isinstance(box, Box):  # Bullet takes a capsule for the box around it
+            pybullet.changeDynamics(
+                body, -1, localInertiaDiagonal=list(box.inertia()), physicsClientId=c
+            )
         if not box.fixed:
             pybullet.resetBaseVelocity(
                 body, box.linear_velocity, box.angular_velocity, physicsClientId=c
@@ -365,3 +370,17 @@ class PyBullet(Simulator):
         client = getattr(self, "client", None)  # none, when loading failed before
         if client is not None and pybullet.isConnected(client):
             pybullet.disconnect(client)
+
+
+def _shape(body: Body) -> tuple[int, dict[str, Any], float | None]:
+    """Bullet's kind of a body's shape, its size, and its length [m]; None where it has none."""
+    match body:
+        case Box():
+            return pybullet.GEOM_BOX, {"halfExtents": [edge / 2 for edge in body.size]}, None
+        case Sphere():
+            return pybullet.GEOM_SPHERE, {"radius": body.radius}, None
+        case Cylinder():
+            return pybullet.GEOM_CYLINDER, {"radius": body.radius}, body.length
+        case Capsule():
+            return pybullet.GEOM_CAPSULE, {"radius": body.radius}, body.length
+    raise NotSupportedError(f"pybullet has no {type(body).__name__}")

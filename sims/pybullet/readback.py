@@ -13,7 +13,14 @@ import numpy as np
 
 from pytest_simbench.scene import FloatArray, Pose, Robot
 from pytest_simbench.simulator import PreparedRobot, lazy_import
-from pytest_simbench.simulator.shapes import box_corners, outlines, placed, reach
+from pytest_simbench.simulator.shapes import (
+    box_corners,
+    cylinder_reach,
+    outlines,
+    placed,
+    reach,
+    round_reach,
+)
 
 pybullet = lazy_import("pybullet")
 
@@ -90,16 +97,17 @@ class ReadBack:
     def _part(self, prefix: str, body: int, link: int) -> dict[str, Any]:
         """Pose, shapes and surface of a body or link."""
         dynamics, inertial = self._dynamics(body, link), self._inertial_frame(body, link)
-        boxes, meshes = self._shapes(body, link)
+        boxes, meshes, rounds = self._shapes(body, link)
         found: dict[str, Any] = {
             f"{prefix}/pose": (self._centre(body, link) * inertial.inverse()).as_array(),
         }
-        kinds = ([reach(placed(points, inertial)) for points in kind] for kind in (boxes, meshes))
-        found |= outlines(prefix, *kinds)
-        if boxes or meshes:
+        corners = ([reach(placed(points, inertial)) for points in kind] for kind in (boxes, meshes))
+        outline = [*corners, rounds]
+        found |= outlines(prefix, *outline)
+        if boxes or meshes or rounds:
             found[f"{prefix}/friction"] = dynamics[1] ** 2
             found[f"{prefix}/restitution"] = dynamics[5]
-            found[f"{prefix}/margin"] = dynamics[11]
+            found[f"{prefix}/margin"] = dynamics[11] - self._thickness(body, link)
         return found
 
     def _inertial(self, prefix: str, body: int, link: int) -> dict[str, Any]:
@@ -111,20 +119,37 @@ class ReadBack:
             f"{prefix}/inertia": axes @ np.diag(dynamics[2]) @ axes.T,
         }
 
-    def _shapes(self, body: int, link: int) -> tuple[list[FloatArray], list[FloatArray]]:
-        """Corners (n, 3) of each box and of each mesh, in the inertial frame."""
+    def _shapes(self, body: int, link: int) -> tuple[list[FloatArray], ...]:
+        """Corners (n, 3) of each box and of each mesh, in the inertial frame; and the reach of each
+        sphere, cylinder and capsule, which only bodies have."""
+        rounds: list[FloatArray] = []
         boxes: list[FloatArray] = []
         meshes: list[FloatArray] = []
         data = pybullet.getCollisionShapeData(body, link, physicsClientId=self.c)
         for k, (_, _, kind, size, _, place, turn) in enumerate(data):
             if kind == pybullet.GEOM_BOX:
                 boxes.append(placed(box_corners(size), _pose(place, turn)))
+            elif kind == pybullet.GEOM_SPHERE:
+                rounds.append(round_reach(size[0], 0.0, _pose(place, turn)))
+            elif kind == pybullet.GEOM_CAPSULE:
+                rounds.append(round_reach(size[1], size[0], _pose(place, turn)))
+            elif kind == pybullet.GEOM_CYLINDER:
+                rounds.append(cylinder_reach(size[1], size[0], _pose(place, turn)))
             else:  # Bullet's own corners, already in the inertial frame
                 mesh = pybullet.getMeshData(
                     body, link, collisionShapeIndex=k, physicsClientId=self.c
                 )
                 meshes.append(np.reshape(mesh[1], (-1, 3)) if mesh[0] else np.full((1, 3), np.nan))
-        return boxes, meshes
+        return boxes, meshes, rounds
+
+    def _thickness(self, body: int, link: int) -> float:
+        """Radius of a sphere or capsule, which are a point and a line to Bullet, their margin the
+        rest [m]; else 0."""
+        data = pybullet.getCollisionShapeData(body, link, physicsClientId=self.c)
+        kind, size = data[0][2:4]
+        if kind == pybullet.GEOM_SPHERE:
+            return float(size[0])
+        return float(size[1]) if kind == pybullet.GEOM_CAPSULE else 0.0
 
     def _axis(self, joint: int) -> FloatArray:
         """Motion subspace of a joint, from Bullet's Jacobian at the present state.

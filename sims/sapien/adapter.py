@@ -19,7 +19,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.scene import Box, FloatArray, Scene
+from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Scene, Sphere
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
@@ -31,7 +31,7 @@ from pytest_simbench.simulator import (
     lazy_import,
 )
 
-from .drawing import Drawing, facing_up
+from .drawing import UPRIGHT, Drawing, facing_up, to_sapien
 from .readback import ReadBack
 
 sapien = lazy_import("sapien")
@@ -161,7 +161,7 @@ class SAPIEN(Simulator):
         self._system.timestep = self.settings.timestep
         self._world = sapien.Scene([self._system])
         self._ground = self._add_ground(scene.ground_friction)
-        self._bodies = {box.name: self._add_box(box) for box in scene.bodies}
+        self._bodies = {box.name: self._add_body(box) for box in scene.bodies}
         packed = self._system.rigid_dynamic_components
         self._rows = [packed.index(self._bodies[box.name]) for box in scene.free_bodies]
         self._robot: Any = None
@@ -193,11 +193,10 @@ class SAPIEN(Simulator):
         entity = builder.build_static("ground")
         return entity.find_component_by_type(physx.PhysxRigidStaticComponent)
 
-    def _add_box(self, box: Box) -> Any:
+    def _add_body(self, box: Body) -> Any:
         builder = self._world.create_actor_builder()
         material = physx.PhysxMaterial(box.friction, box.friction, 0.0)
-        half = [edge / 2 for edge in box.size]
-        builder.add_box_collision(half_size=half, material=material)
+        _add_shape(builder, box, material)
         builder.collision_groups = [WORLD, WORLD | ROBOT, 0, 0]
         builder.initial_pose = sapien.Pose(box.pose.position, box.pose.quaternion)
         if box.fixed:
@@ -337,6 +336,22 @@ class SAPIEN(Simulator):
         for name in list(vars(self)):
             if name.startswith("_"):
                 delattr(self, name)
+
+
+def _add_shape(builder: Any, body: Body, material: Any) -> None:
+    """The collision shape of a body. Cylinders and capsules of SAPIEN lie along x."""
+    match body:
+        case Box():
+            half = [edge / 2 for edge in body.size]
+            builder.add_box_collision(half_size=half, material=material)
+        case Sphere():
+            builder.add_sphere_collision(radius=body.radius, material=material)
+        case Cylinder():
+            upright = to_sapien(UPRIGHT)
+            builder.add_cylinder_collision(upright, body.radius, body.length / 2, material)
+        case Capsule():
+            upright = to_sapien(UPRIGHT)
+            builder.add_capsule_collision(upright, body.radius, body.length / 2, material)
 
 
 def _drop_visuals(path: Path) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.scene import Pose, Scene, Vector3
+from pytest_simbench.scene import Pose, Scene, Solid
 from pytest_simbench.simulator import PreparedRobot, UnavailableError, lazy_import
 from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
 
@@ -26,6 +26,9 @@ NEAR, FAR = 0.1, 100.0
 """What the camera sees [m]."""
 
 LINK_COLOUR, GROUND_COLOUR = (0.9, 0.9, 0.9, 1.0), (0.4, 0.45, 0.5, 1.0)
+
+UPRIGHT = Pose(quaternion=(math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0))
+"""Turns the x axis, along which SAPIEN's cylinders and capsules lie, to the z axis."""
 
 NO_VULKAN = (
     "SAPIEN draws with Vulkan and finds no device for it ({error}); it takes a graphics card's "
@@ -56,11 +59,11 @@ class Drawing:
         self._entities: dict[str, Any] = {}
         self._add_ground()
         for box in scene.bodies:
-            shape = self._box(box.size, Pose(), box.colour)
-            self._add(box.name, [shape]).set_pose(_pose(box.pose))
+            solids = [self._solid(solid, box.colour) for solid in box.solids()]
+            self._add(box.name, solids).set_pose(to_sapien(box.pose))
         for link in () if prepared is None else prepared.links.values():
             shapes = [
-                self._box(shape.size, shape.pose, LINK_COLOUR)
+                self._solid(Solid("box", shape.size, shape.pose), LINK_COLOUR)
                 if shape.size is not None
                 else self._mesh(str(shape.mesh), shape.pose)
                 for shape in link.shapes
@@ -85,14 +88,21 @@ class Drawing:
         shape = rendering.RenderShapePlane(size, _material(GROUND_COLOUR))
         self._add("ground", [shape]).set_pose(facing_up())
 
-    def _box(self, size: Vector3, pose: Pose, colour: tuple[float, ...]) -> Any:
-        shape = rendering.RenderShapeBox(np.array(size) / 2, _material(colour))
-        shape.local_pose = _pose(pose)
+    def _solid(self, solid: Solid, colour: tuple[float, ...]) -> Any:
+        x, _, z = half = np.array(solid.extents) / 2
+        material, pose = _material(colour), solid.pose
+        if solid.kind == "box":
+            shape = rendering.RenderShapeBox(half, material)
+        elif solid.kind == "ball":
+            shape = rendering.RenderShapeSphere(x, material)
+        else:
+            shape, pose = rendering.RenderShapeCylinder(x, z, material), pose * UPRIGHT
+        shape.local_pose = to_sapien(pose)
         return shape
 
     def _mesh(self, path: str, pose: Pose) -> Any:
         shape = rendering.RenderShapeTriangleMesh(path, np.ones(3), _material(LINK_COLOUR))
-        shape.local_pose = _pose(pose)
+        shape.local_pose = to_sapien(pose)
         return shape
 
     def follow(self, poses: Mapping[str, Any]) -> None:
@@ -148,7 +158,8 @@ def _material(colour: tuple[float, ...]) -> Any:
     return material
 
 
-def _pose(pose: Pose) -> Any:
+def to_sapien(pose: Pose) -> Any:
+    """A pose of SAPIEN."""
     return sapien.Pose(pose.position, pose.quaternion)
 
 

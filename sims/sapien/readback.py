@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -10,9 +11,20 @@ import numpy as np
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import PreparedRobot, lazy_import, one_value
 from pytest_simbench.simulator.quantities import touches
-from pytest_simbench.simulator.shapes import box_corners, outlines, placed, reach
+from pytest_simbench.simulator.shapes import (
+    box_corners,
+    cylinder_reach,
+    outlines,
+    placed,
+    reach,
+    round_reach,
+)
 
 physx = lazy_import("sapien.physx")
+
+
+LYING = Pose(quaternion=(math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0))
+"""Turns the z axis to the x axis, along which SAPIEN's cylinders and capsules lie."""
 
 
 class ReadBack:
@@ -97,8 +109,9 @@ def _part(prefix: str, component: Any) -> dict[str, Any]:
         f"{prefix}/pose": np.concatenate([component.entity.pose.p, component.entity.pose.q]),
     }
     boxes = [s for s in shapes if isinstance(s, physx.PhysxCollisionShapeBox)]
-    meshes = [s for s in shapes if not isinstance(s, physx.PhysxCollisionShapeBox)]
-    found |= outlines(prefix, map(_reach, boxes), map(_reach, meshes))
+    rounds = [s for s in shapes if hasattr(s, "radius")]
+    meshes = [s for s in shapes if s not in boxes and s not in rounds]
+    found |= outlines(prefix, *(map(_reach, kind) for kind in (boxes, meshes, rounds)))
     if shapes:
         found[f"{prefix}/friction"] = _friction(component)
         found[f"{prefix}/restitution"] = _restitution(component)
@@ -108,6 +121,11 @@ def _part(prefix: str, component: Any) -> dict[str, Any]:
 
 def _reach(shape: Any) -> FloatArray:
     """The reach of a shape in the frame of its body."""
+    if hasattr(shape, "radius"):
+        lying = _pose(shape.local_pose) * LYING
+        length = 2 * getattr(shape, "half_length", 0.0)
+        pillar = isinstance(shape, physx.PhysxCollisionShapeCylinder)
+        return (cylinder_reach if pillar else round_reach)(shape.radius, length, lying)
     if isinstance(shape, physx.PhysxCollisionShapeBox):
         corners = box_corners(2 * shape.half_size)
     elif isinstance(shape, physx.PhysxCollisionShapeConvexMesh):

@@ -136,6 +136,10 @@ def test_every_shape_has_a_marker_in_a_frame_that_there_is(tmp_path: Path) -> No
     assert sum(len(m.points) for m in triangles) == 3 * sum(
         len(m.faces) for m in kept.figure.meshes
     )
+    pill = [m for m in markers if m.header.frame_id == "bodies/pill"]
+    assert [m.type for m in pill] == [pill[0].CYLINDER, pill[0].SPHERE, pill[0].SPHERE]
+    assert [m.scale.z for m in pill] == [0.06, 0.04, 0.04]
+    assert [m.pose.position.z for m in pill] == [0.0, -0.03, 0.03]
     red = next(m for m in markers if m.header.frame_id == "bodies/red")
     assert (red.scale.x, red.color.r, red.color.b) == pytest.approx((0.05, 0.9, 0.1))
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pytest_simbench.robot.panda import panda
-from pytest_simbench.scene import Box, FloatArray, Gripper, Joint, Pose, Robot, Scene
+from pytest_simbench.scene import Box, Capsule, FloatArray, Gripper, Joint, Pose, Robot, Scene
 from pytest_simbench.simulator import PreparedRobot
 from pytest_simbench.simulator.quantities import expected_quantities, touches
 from pytest_simbench.simulator.settings import Settings
@@ -67,6 +67,7 @@ FREE = Box(
     linear_velocity=(0.1, 0.0, -0.2),
     angular_velocity=(0.0, 0.0, 3.0),
 )
+PILL = Capsule("pill", 0.1, 0.4, Pose.at(-1.0, 0.0, 0.5))
 SHELF = Box("shelf", (0.2, 0.2, 0.2), Pose.at(-0.5, 0.0, 0.1), friction=0.6)
 
 
@@ -121,6 +122,7 @@ def expected() -> dict[str, Any]:
             "pose": FREE.pose.as_array(),
             "boxes": [box_reach((0, 0, 0), (0.1, 0.2, 0.4))],
             "meshes": NONE,
+            "rounds": NONE,
             "friction": 0.7,
             "dynamic": 1,
             "touches": [1, 1, 1],
@@ -132,7 +134,18 @@ def expected() -> dict[str, Any]:
             "pose": [-0.5, 0, 0.1, 1, 0, 0, 0],
             "boxes": [box_reach((0, 0, 0), (0.2, 0.2, 0.2))],
             "meshes": NONE,
+            "rounds": NONE,
             "friction": 0.6,
+            "dynamic": 0,
+            "touches": [0, 1, 1],
+            **SURFACE,
+        },
+        "body/pill": {
+            "pose": [-1, 0, 0.5, 1, 0, 0, 0],
+            "boxes": NONE,
+            "meshes": NONE,
+            "rounds": [0.1 + 0.2 * np.abs(DIRECTIONS[:, 2])],
+            "friction": 1,
             "dynamic": 0,
             "touches": [0, 1, 1],
             **SURFACE,
@@ -141,6 +154,7 @@ def expected() -> dict[str, Any]:
             "pose": [0, 0, 0, 1, 0, 0, 0],
             "boxes": [box_reach((0.1, 0.2, 0.3), (0.1, 0.2, 0.1))],
             "meshes": NONE,
+            "rounds": NONE,
             "friction": 0.9,
             "touches": [0, 1, 0],
             **SURFACE,
@@ -149,6 +163,7 @@ def expected() -> dict[str, Any]:
             "pose": [0.1, 0.2, 0.5, 0, 0, 0, 1],
             "boxes": [box_reach((0, 0, 0.1), (0.1, 0.1, 0.2))],
             "meshes": [corner_reach(0.0)],
+            "rounds": NONE,
             "friction": 0.9,
             "touches": [1, 1, 0],
             **SURFACE,
@@ -158,6 +173,7 @@ def expected() -> dict[str, Any]:
             "pose": [0.1, 0.15, 0.5, 0, 0, 0, 1],
             "boxes": NONE,
             "meshes": [corner_reach(0.03)],
+            "rounds": NONE,
             "friction": 0.9,
             "touches": [1, 1, 0],
             **SURFACE,
@@ -167,6 +183,7 @@ def expected() -> dict[str, Any]:
             "pose": [0.1, 0.15, 0.5, 0, 0, 0, 1],
             "boxes": NONE,
             "meshes": NONE,
+            "rounds": NONE,
             **inertial(0.2, [0, 0, 0], 0.01 * np.eye(3)),
         },
         "joint/shoulder": {
@@ -196,15 +213,16 @@ def assert_quantities(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> No
 
 
 def test_every_quantity_of_a_world(arm: Robot) -> None:
-    scene = Scene("s", (FREE, SHELF), arm, gravity=(0.1, 0.2, -9.0), ground_friction=0.8)
+    scene = Scene("s", (FREE, SHELF, PILL), arm, gravity=(0.1, 0.2, -9.0), ground_friction=0.8)
     assert_quantities(expected_quantities(scene, Settings(0.004)), expected())
 
 
 def test_a_world_without_a_robot() -> None:
-    scene = Scene("s", (FREE, SHELF), None, gravity=(0.1, 0.2, -9.0), ground_friction=0.8)
+    scene = Scene("s", (FREE, SHELF, PILL), None, gravity=(0.1, 0.2, -9.0), ground_friction=0.8)
     alone = ("body/", "ground/", "gravity", "timestep")
     wanted = {name: v for name, v in expected().items() if name.startswith(alone)}
-    wanted |= {"body/free/touches": [1, 1, 0], "body/shelf/touches": [0, 1, 0]}
+    wanted |= {f"body/{name}/touches": [0, 1, 0] for name in ("shelf", "pill")}
+    wanted["body/free/touches"] = [1, 1, 0]
     assert_quantities(expected_quantities(scene, Settings(0.004)), wanted)
 
 
@@ -214,7 +232,7 @@ class Damped(Settings):
 
 
 def test_settings_change_what_they_name_and_add_nothing(arm: Robot) -> None:
-    scene = Scene("s", (FREE, SHELF), arm, gravity=(0.1, 0.2, -9.0), ground_friction=0.8)
+    scene = Scene("s", (FREE, SHELF, PILL), arm, gravity=(0.1, 0.2, -9.0), ground_friction=0.8)
     wanted = {**expected(), "body/free/damping": [0.1, 0.2], "joint/slide/friction": 0.3}
     assert_quantities(expected_quantities(scene, Damped(0.004)), wanted)
 

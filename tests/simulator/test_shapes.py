@@ -12,10 +12,12 @@ from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.shapes import (
     DIRECTIONS,
     box_corners,
+    cylinder_reach,
     mesh_points,
     outlines,
     placed,
     reach,
+    round_reach,
     shape_points,
 )
 from pytest_simbench.simulator.urdf import Shape
@@ -94,12 +96,24 @@ def test_shapes_of_a_link_in_its_frame(tmp_path: Path) -> None:
     np.testing.assert_array_equal(box, box_corners((2, 4, 6)) + up)
 
 
+def test_reach_of_what_is_round() -> None:
+    """A sphere, and a tilted and moved cylinder and capsule by points on their rims."""
+    np.testing.assert_allclose(round_reach(0.3), np.full(26, 0.3))
+    pose = Pose((0.1, -0.2, 0.3), (0.5, 0.5, -0.1, 0.7))
+    angles = np.linspace(0, 2 * np.pi, 20000)
+    rim = np.stack([0.3 * np.cos(angles), 0.3 * np.sin(angles), 0.4 + 0 * angles], axis=1)
+    rims = placed(np.vstack([rim, rim * (1, 1, -1)]), pose)
+    np.testing.assert_allclose(cylinder_reach(0.3, 0.8, pose), reach(rims), atol=1e-6)
+    ends = placed(np.array([[0, 0, 0.4], [0, 0, -0.4]]), pose)
+    np.testing.assert_allclose(round_reach(0.3, 0.8, pose), reach(ends) + 0.3)
+
+
 def test_order_is_by_what_tells_symmetric_shapes_apart() -> None:
     """All orders of six boxes that mirror each other give the same rows."""
     places = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
     rows = [reach(placed(box_corners((1, 1, 1)), Pose.at(*place))) for place in places]
     wanted = outlines("a", rows, rows[:2])
-    assert set(wanted) == {"a/boxes", "a/meshes"}
+    assert set(wanted) == {"a/boxes", "a/meshes", "a/rounds"}
     assert {row.tobytes() for row in wanted["a/boxes"]} == {row.tobytes() for row in rows}
     for seed in range(10):
         order = np.random.default_rng(seed).permutation(6)

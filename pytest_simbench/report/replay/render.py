@@ -22,7 +22,7 @@ from pytest_simbench.recordings.trace import Trace, TraceError
 from pytest_simbench.records.text import in_one_line
 from pytest_simbench.report.replay.groups import Group
 from pytest_simbench.report.replay.motion import SCALE, packed
-from pytest_simbench.scene import Box, Pose
+from pytest_simbench.scene import Body, Box, Pose
 
 INSTALL = "no replay in 3-D: pip install 'pytest-simbench[replay]'"
 
@@ -69,7 +69,7 @@ def replay_of(shown: Sequence[Group]) -> tuple[str, int, list[str]]:
                     "samples": len(trace.time),
                     "phases": [[time, in_one_line(name)] for time, name in trace.phases],
                     "joints": list(trace.joint_names),
-                    "boxes": [_box(box) for box in trace.boxes],
+                    "boxes": [_body(body) for body in trace.boxes],
                     "free": len(trace.free),
                     "figure": meshes.figure(trace.figure),
                 }
@@ -123,14 +123,22 @@ class _Meshes:
         return self._found[key]
 
     def viewer(self) -> str:
-        """trimesh's page: a cube `box` of edge length 1, and the meshes `mesh_0`, `mesh_1`, ..."""
+        """trimesh's page: `box`, `ball` and `tube` of edge length or diameter 1, and the meshes
+        `mesh_0`, `mesh_1`, ..."""
         try:
             import trimesh
             from trimesh.viewer.notebook import scene_to_html
         except ImportError:
             raise ReplayUnavailable(INSTALL) from None
         scene = trimesh.Scene()
-        scene.add_geometry(trimesh.creation.box(), node_name="box", geom_name="box")
+        make = trimesh.creation
+        solids = {
+            "box": make.box(),
+            "ball": make.icosphere(3, 0.5),
+            "tube": make.cylinder(0.5, 1.0),
+        }
+        for name, solid in solids.items():
+            scene.add_geometry(solid, node_name=name, geom_name=name)
         for k, mesh in enumerate(self._meshes):
             triangles = trimesh.Trimesh(
                 np.asarray(mesh.vertices, dtype=float), mesh.faces, process=False
@@ -139,8 +147,16 @@ class _Meshes:
         return str(scene_to_html(scene))
 
 
-def _box(box: Box) -> dict[str, Any]:
-    return {"size": box.size, "colour": box.colour, "pose": list(_array(box.pose))}
+def _body(body: Body) -> dict[str, Any]:
+    """What the player needs of a body: the size of a box, or the solids of another."""
+    told = {"colour": body.colour, "pose": list(_array(body.pose))}
+    if isinstance(body, Box):
+        return {"size": body.size, **told}
+    solids = [
+        {"kind": solid.kind, "size": solid.extents, "pose": _array(solid.pose)}
+        for solid in body.solids()
+    ]
+    return {"solids": solids, **told}
 
 
 def _array(pose: Pose) -> list[float]:

@@ -38,9 +38,16 @@
     return object;
   }
   function shaped(part, material) {
-    const mesh = new THREE.Mesh(geometry(part.size ? "box" : `mesh_${part.mesh}`), material);
+    const name = part.kind || (part.size ? "box" : `mesh_${part.mesh}`);
+    const mesh = new THREE.Mesh(geometry(name), material);
     if (part.size) mesh.scale.set(...part.size);
     return placed(mesh, part.pose);
+  }
+  function built(box, material) {
+    if (!box.solids) return shaped(box, material);
+    const group = placed(new THREE.Group(), box.pose);
+    for (const solid of box.solids) group.add(shaped(solid, material));
+    return group;
   }
   function painted([r, g, b, a], ghost) {
     const opacity = ghost ? GHOST : a;
@@ -71,7 +78,7 @@
     const root = new THREE.Group();
     root.name = ghost ? "ghost" : "tile";
     const free = tile.boxes.map((box, k) => {
-      const mesh = shaped(box, painted(box.colour, ghost));
+      const mesh = built(box, painted(box.colour, ghost));
       mesh.name = `body ${k}`;
       if (!ghost || k < tile.free) root.add(mesh);
       return mesh;
