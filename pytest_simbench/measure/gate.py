@@ -260,12 +260,12 @@ def _change(
 
 def _of_machines(old: ResultSet, new: ResultSet, name: str) -> bool:
     """Whether a cost tells of two machines rather than of two versions."""
-    if name not in POWER or name in new.metrics or without_speed(name, old, new) is not None:
+    if name not in POWER or name in new.metrics:
         return False
     first, second = (
         {(r.host.get("cpu"), r.host.get("cores")) for r in side.ok} for side in (old, new)
     )
-    return first != second
+    return first != second and without_speed(name, old, new) is None
 
 
 def _failed(result: ResultSet) -> dict[int, float]:

@@ -142,10 +142,11 @@ def betting(values: Sequence[float], confidence: float = CONFIDENCE) -> Interval
 def _least_mean(sample: NDArray[np.float64], rich: float) -> float:
     """The smallest m at which bets on values above m do not make rich; the capital falls with m."""
     low, high = 0.0, float(sample.mean())
+    different, counts = np.unique(sample, return_counts=True)  # shares of 15 cubes are 16 values
     while high - low > 1e-6:
         m = (low + high) / 2
         with np.errstate(divide="ignore"):  # a lost whole stake: log 0
-            growth = np.log1p(_STAKES[:, None] * (sample / m - 1)).sum(axis=1)
+            growth = np.log1p(_STAKES[:, None] * (different / m - 1)) @ counts
         if math.log(rich) <= float(np.logaddexp.reduce(np.log(_CAPITAL) + growth)):
             low = m
         else:

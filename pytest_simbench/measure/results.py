@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property
 from math import isfinite
 
 from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval, proportion
@@ -68,7 +69,7 @@ class ResultSet:
         first = self.records[0]
         return f"{first.task} on {first.label}"
 
-    @property
+    @cached_property
     def ok(self) -> tuple[Record, ...]:
         """The repetitions that ended as they should."""
         return tuple(record for record in self.records if record.ok)
@@ -116,13 +117,16 @@ class ResultSet:
 
     def values(self, name: str) -> list[float]:
         """A metric's values, one for each ok repetition that has it, in their order."""
-        found = (self.value(record, name) for record in self.ok)
-        return [value for value in found if value is not None]
+        return [value for _, value in self._found(name)]
 
     def by_seed(self, name: str) -> dict[int, float]:
         """A metric's values by seed, for pairing with another set; ok repetitions only."""
-        found = {record.seed: self.value(record, name) for record in self.ok}
-        return {seed: value for seed, value in found.items() if value is not None}
+        return {record.seed: value for record, value in self._found(name)}
+
+    def _found(self, name: str) -> list[tuple[Record, float]]:
+        own = self.metric(name).name in self.metrics
+        found = ((r, r.metrics.get(name) if own else r.cost(name)) for r in self.ok)
+        return [(record, float(value)) for record, value in found if value is not None]
 
     def interval(self, name: str, confidence: float = CONFIDENCE) -> Interval:
         """The interval of a metric's mean; without values its mean is nan and n is 0."""

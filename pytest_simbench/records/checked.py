@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Mapping
+from math import isfinite
 from typing import Any
 
 DEEPEST = 32
@@ -25,7 +26,7 @@ class CheckError(ValueError):
     """A value that cannot be used; the message says where in the data it stands."""
 
 
-def plain(value: Any, where: str = "", depth: int = 0) -> Any:
+def plain(value: Any) -> Any:
     """`value` as it can be used: lists, dicts with texts as keys, texts, finite numbers, None.
 
     Lone surrogates, which no file takes as UTF-8, become "?".
@@ -33,24 +34,41 @@ def plain(value: Any, where: str = "", depth: int = 0) -> Any:
     Raises:
         CheckError: nested too deeply, or a number that is infinite, none, or too large.
     """
+    return _plain(value, (), 0)
+
+
+def _plain(value: Any, where: tuple[Any, ...], depth: int) -> Any:
+    """`where` is the key, and before it those of what holds it."""
+    kind = type(value)
+    if kind is str:
+        return value if value.isascii() else writable(value)
+    if kind is float:
+        if isfinite(value):
+            return value
+        raise CheckError(f"{_place(where)!r} must be a finite number, not {value}")
     if depth > DEEPEST:
-        raise CheckError(f"{where[:60]!r} is nested more than {DEEPEST} levels deep")
+        raise CheckError(f"{_place(where)[:60]!r} is nested more than {DEEPEST} levels deep")
     if isinstance(value, dict):
-        return {
-            sys.intern(writable(key)): plain(
-                item, f"{where}.{key}" if where else str(key), depth + 1
-            )
-            for key, item in value.items()
-        }
+        found = {}
+        for key, item in value.items():
+            key = sys.intern(key if key.isascii() else writable(key))
+            kind = type(item)  # most are such: a call for each would take as long as the rest
+            fine = isfinite(item) if kind is float else kind is str and item.isascii()
+            found[key] = item if fine else _plain(item, (where, key), depth + 1)
+        return found
     if isinstance(value, list):
-        return [plain(item, where, depth + 1) for item in value]
-    if isinstance(value, str):
-        return writable(value)
-    if isinstance(value, float) and not math.isfinite(value):
-        raise CheckError(f"{where!r} must be a finite number, not {value}")
+        return [_plain(item, where, depth + 1) for item in value]
     if isinstance(value, int) and abs(value) > LARGEST_INTEGER:
-        raise CheckError(f"{where!r} is larger than any number of ours")
+        raise CheckError(f"{_place(where)!r} is larger than any number of ours")
     return value
+
+
+def _place(where: tuple[Any, ...]) -> str:
+    keys = []
+    while where:
+        where, key = where
+        keys.append(key)
+    return ".".join(reversed(keys))
 
 
 def writable(text: str) -> str:

@@ -142,7 +142,15 @@ _MOST_FOUND = 1000
 
 
 def _known(record: Record, use: Use) -> Known:
-    """Of records that were read together, most share these fields, so it is found out once."""
+    """Of records that were read together, most share these fields, so it is found out once; and
+    each record keeps it."""
+    kept: dict[str, Known] = vars(record).setdefault("_known", {})
+    if use not in kept:
+        kept[use] = _shared(record, use)
+    return kept[use]
+
+
+def _shared(record: Record, use: Use) -> Known:
     parts = tuple(getattr(record, name) for name in equal_to(use))
     same = (repr(p) if isinstance(p, str | int | float | None) else id(p) for p in parts)
     unknown = partial(record)
@@ -207,7 +215,7 @@ class Told(NamedTuple):
     def agrees(self, other: Told) -> bool:
         """Whether nothing known contradicts that both are of one configuration."""
         a, b = self.values, other.values
-        return all(
+        return a is b or all(
             a[key] == b[key]
             if key in a and key in b
             else field_of(key) in (other.unknown if key in a else self.unknown)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal, get_args
 
@@ -97,19 +97,7 @@ class Record:
 
     def cost(self, name: str) -> float | None:
         """One of `metrics.COSTS` by name, or None where the record does not hold it."""
-        resources, stepping = self.resources, self.stepping
-        cpu, rss = resources.get("cpu_percent") or {}, resources.get("rss_mb") or {}
-        found: dict[str, float | None] = {
-            "rtf": _ratio(stepping.get("simulated"), stepping.get("wall")),
-            "cpu_cost": _ratio(stepping.get("cpu"), stepping.get("simulated")),
-            "cpu": cpu.get("mean"),
-            "ram": rss.get("mean"),
-            "ram_peak": rss.get("peak"),
-            "start": self.timeline.get("start"),
-            "end": self.timeline.get("end"),
-            "total": self.seconds.get("total"),
-        }
-        return found[name]
+        return _COSTS[name](self)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data in a fixed order of keys; numbers that JSON does not have become None."""
@@ -272,6 +260,23 @@ _TYPES: dict[str, tuple[type, ...]] = {
 
 def _ratio(over: float | None, under: float | None) -> float | None:
     return over / under if over is not None and under is not None and under > 0 else None
+
+
+def _resource(record: Record, name: str, what: str) -> float | None:
+    found: float | None = (record.resources.get(name) or {}).get(what)
+    return found
+
+
+_COSTS: dict[str, Callable[[Record], float | None]] = {
+    "rtf": lambda r: _ratio(r.stepping.get("simulated"), r.stepping.get("wall")),
+    "cpu_cost": lambda r: _ratio(r.stepping.get("cpu"), r.stepping.get("simulated")),
+    "cpu": lambda r: _resource(r, "cpu_percent", "mean"),
+    "ram": lambda r: _resource(r, "rss_mb", "mean"),
+    "ram_peak": lambda r: _resource(r, "rss_mb", "peak"),
+    "start": lambda r: r.timeline.get("start"),
+    "end": lambda r: r.timeline.get("end"),
+    "total": lambda r: r.seconds.get("total"),
+}
 
 
 def plain(value: Any) -> Any:

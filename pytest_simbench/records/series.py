@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 from pytest_simbench.records.configuration import (
@@ -83,10 +84,7 @@ class RowKey(NamedTuple):
 
     @classmethod
     def of(cls, record: Record) -> RowKey:
-        function, _, parameters = record.test.partition("[")
-        inside = "-" + parameters.removesuffix("]") + "-"
-        inside = inside.replace(f"-{record.simulator}-{record.mode}-", "-", 1).strip("-")
-        return cls(record.simulator, record.mode, record.profile, function, inside)
+        return _row_key(record.simulator, record.mode, record.profile, record.test)
 
     @property
     def order(self) -> tuple[object, ...]:
@@ -94,6 +92,14 @@ class RowKey(NamedTuple):
         name = VersionedName.of(self.simulator)
         version = (name.base, name.kind, release_numbers(name.which), self.simulator)
         return (version, self.mode == "gui", *self[1:])
+
+
+@lru_cache(maxsize=1000)
+def _row_key(simulator: str, mode: str, profile: str, test: str) -> RowKey:
+    function, _, parameters = test.partition("[")
+    inside = "-" + parameters.removesuffix("]") + "-"
+    inside = inside.replace(f"-{simulator}-{mode}-", "-", 1).strip("-")
+    return RowKey(simulator, mode, profile, function, inside)
 
 
 class Series(NamedTuple):
@@ -113,9 +119,10 @@ class Series(NamedTuple):
 def series(records: Iterable[Record]) -> list[Series]:
     """The records of one task as rows, sorted: a row is one test and one configuration."""
     by_subject: dict[RowKey, list[Record]] = {}
-    for record in sorted(records, key=lambda r: (RowKey.of(r).order, r.repetition)):
+    for record in sorted(records, key=lambda r: r.repetition):
         by_subject.setdefault(RowKey.of(record), []).append(record)
-    rows = [(s, group) for s, found in by_subject.items() for group in configurations(found)]
+    ordered = sorted(by_subject.items(), key=lambda item: item[0].order)
+    rows = [(s, group) for s, found in ordered for group in configurations(found)]
     return [
         Series(key, group, _label(key, group, [r for r in rows if r[0][:3] == key[:3]]))
         for key, group in rows

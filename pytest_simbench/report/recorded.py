@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from pytest_simbench.experiment.identity import file_stem_of
@@ -29,13 +29,23 @@ def trace_of(run: Path, record: Record) -> Path | None:
     return path if path.is_file() else None
 
 
-def video_of(run: Path, record: Record) -> str:
-    """The address of a repetition's video in the run folder; empty where there is none."""
-    address = f"{film.FOLDER}/{file_stem_of(record)}.mp4"
+def videos(run: Path) -> Callable[[Record], str]:
+    """Gives the address of a repetition's video in the run folder; empty where there is none."""
     try:
-        return address if inside(run, address).is_file() else ""
-    except FolderError:
-        return ""
+        there = {path.name for path in inside(run, film.FOLDER).iterdir()}
+    except (OSError, FolderError):
+        there = set()
+
+    def address(record: Record) -> str:
+        if not there or (name := f"{file_stem_of(record)}.mp4") not in there:
+            return ""
+        found = f"{film.FOLDER}/{name}"
+        try:
+            return found if inside(run, found).is_file() else ""
+        except FolderError:
+            return ""
+
+    return address
 
 
 def write_bags(

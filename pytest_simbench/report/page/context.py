@@ -21,7 +21,7 @@ from pytest_simbench.report.page import setup
 from pytest_simbench.report.page.cells import Of, Table, from_columns, labelled, of, study
 from pytest_simbench.report.page.pictures import Picture, pictures
 from pytest_simbench.report.page.strips import Strip, strips
-from pytest_simbench.report.recorded import video_of
+from pytest_simbench.report.recorded import videos
 from pytest_simbench.report.replay.groups import Group, links
 from pytest_simbench.report.summary import TaskSummary
 
@@ -104,7 +104,7 @@ def page(
     sheets: Mapping[str, bytes] | None = None,
 ) -> Page:
     """The page of a run, see `page_of`."""
-    replay = links(replays)
+    replay, video = links(replays), videos(folder)
     numbers: dict[int, int] = {}
     repetitions: list[dict[str, Any]] = []
 
@@ -112,7 +112,7 @@ def page(
         """Its place among the page's repetitions, where it is put when first asked for."""
         if id(record) not in numbers:
             numbers[id(record)] = len(repetitions)
-            links_of = replay.get(id(record), ""), video_of(folder, record)
+            links_of = replay.get(id(record), ""), video(record)
             repetitions.append(_repetition(record, *links_of))
         return numbers[id(record)]
 
@@ -129,7 +129,7 @@ def page(
                 study(summary),
                 strips(summary, rows, number),
                 _tables(summary),
-                _causes(summary, rows, lambda r: (replay.get(id(r), ""), video_of(folder, r))),
+                _causes(summary, rows, lambda r: (replay.get(id(r), ""), video(r))),
                 drawn,
                 columns.notes(summary),
                 [
@@ -141,7 +141,7 @@ def page(
                     (f"{record.label}, seed {record.seed}", address)
                     for row in rows
                     for record in row
-                    if (address := video_of(folder, record))
+                    if (address := video(record))
                 ],
                 b64encode((sheets or {}).get(summary.task, b"")).decode("ascii"),
             )

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.text import for_figure
@@ -38,6 +39,10 @@ NEAR = 1.2
 LOGARITHMIC = 20
 """Costs that differ by more than this factor are drawn on a logarithmic scale."""
 
+MOST = 200
+"""Dots of a line; of more repetitions some are drawn: the ends, and others at equal steps. Ten
+thousand would make a page of 17 MB, and nobody can press one of them."""
+
 SHOWN_COSTS = ("cpu_cost", "rtf", "ram", "start", "end")
 
 
@@ -61,7 +66,8 @@ class Dot:
 
 @dataclass(frozen=True)
 class StripLine:
-    """One row: its repetitions with a value, those without, mean and interval [% of the width]."""
+    """One row: its repetitions with a value, those without, mean and interval [% of the width],
+    which are of all repetitions; and what is not drawn, if anything is not, in words."""
 
     label: str
     of: Of
@@ -70,6 +76,7 @@ class StripLine:
     mean: float | None
     low: float | None
     high: float | None
+    left_out: str = ""
 
 
 @dataclass(frozen=True)
@@ -139,20 +146,28 @@ def _strip(
     scale = _Scale(low, high, log)
     lines = []
     for row, records, label in zip(summary.rows, rows, short_labels(summary.rows), strict=True):
-        found = [(r, _finite(r, value)) for r in records]
-        dots = [(number(r), scale(v), _text(v, metric)) for r, v in found if v is not None]
-        lost = [number(r) for r, v in found if v is None]
+        found = [(r, v) for r in records if (v := _finite(r, value)) is not None]
+        drawn = _some(found, by=lambda item: item[1])
+        lost = _some([r for r in records if _finite(r, value) is None])
+        dots = [(number(r), scale(v), _text(v, metric)) for r, v in drawn]
         pooled = None if cost else row.metrics.get(metric.name)
-        there = [v for _, v in found if v is not None]
+        there = [v for _, v in found]
+        count = len(drawn) + len(lost)
         mean = sum(there) / len(there) if there else None
-        ends = (pooled.low, pooled.high) if pooled else (None, None)
+        ends = (mean, pooled.low, pooled.high) if pooled else (mean, None, None)
+        bar, low_end, high_end = (None if v is None else scale(v) for v in ends)
         lines.append(
             StripLine(
                 for_figure(label),
                 of(row),
                 _swarm(dots),
-                _swarm([(k, LOST, "") for k in lost]),
-                *(None if v is None else scale(v) for v in (mean, *ends)),
+                _swarm([(number(r), LOST, "") for r in lost]),
+                bar,
+                low_end,
+                high_end,
+                left_out=(
+                    f"{count} of {len(records)} repetitions drawn" if count < len(records) else ""
+                ),
             )
         )
     return Strip(
@@ -164,6 +179,19 @@ def _strip(
         metric.study and not cost,
         log,
     )
+
+
+T = TypeVar("T")
+
+
+def _some(found: Sequence[T], by: Callable[[T], float] = lambda item: 0.0) -> Sequence[T]:
+    """At most `MOST` of them: those at both ends, and others at equal steps, in their order."""
+    if len(found) <= MOST:
+        return found
+    places = {k * len(found) // (MOST - 2) for k in range(MOST - 2)}
+    values = [by(item) for item in found]
+    places |= {values.index(min(values)), values.index(max(values))}
+    return [found[k] for k in sorted(places)]
 
 
 class _Scale:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import series
-from pytest_simbench.report.page.strips import HEIGHT, LEFT, LOST, RIGHT, Strip, strips
+from pytest_simbench.report.page.strips import HEIGHT, LEFT, LOST, MOST, RIGHT, Strip, strips
 from pytest_simbench.report.summary import summarise
 from tests.report.samples import METRICS, REFERENCES, record, stacking_run, throwing_run
 
@@ -72,6 +72,20 @@ def test_costs_that_differ_widely_are_logarithmic() -> None:
 
 def test_a_metric_that_nothing_has_is_left_out() -> None:
     assert "placed %" not in plots([record(metrics={"at_end": 1.0})])
+
+
+def test_of_very_many_some_are_drawn_and_all_counted() -> None:
+    """The ends are among them, mean and interval are of all, and the line says so."""
+    records = [record(repetition=k, metrics={"placed": k % 15 / 15}) for k in range(1, 1000)]
+    records[500] = record(repetition=501, metrics={"placed": 1.0})
+    (line,) = plots(records)["placed %"].lines
+    assert MOST - 2 <= len(line.dots) <= MOST
+    assert line.left_out == f"{len(line.dots)} of 999 repetitions drawn"
+    assert 501 in {dot.number for dot in line.dots}
+    (few,) = plots(records[:MOST])["placed %"].lines
+    assert (len(few.dots), few.left_out) == (MOST, "")
+    shares = [r.metrics["placed"] or 0.0 for r in records]
+    assert line.mean == pytest.approx(LEFT + (RIGHT - LEFT) * sum(shares) / 999, abs=0.01)
 
 
 @given(st.lists(st.sampled_from([0.0, 0.2, 0.2001, 0.5, 1.0]), min_size=1, max_size=40))
