@@ -66,6 +66,10 @@ class Body(_Placed):
         colour: red, green, blue, alpha in 0..1.
         linear_velocity: of a free body's centre at the start, in the world frame [m/s].
         angular_velocity: of a free body at the start, in the world frame [rad/s].
+        restitution: Newton's coefficient e: what an impact leaves of the normal velocity. All
+            surfaces of a scene that bounce have the same one, as with friction.
+        linear_damping: c of dv/dt = -c v of a free body [1/s].
+        angular_damping: the same of its angular velocity [1/s].
 
     Raises:
         SceneError: a body that cannot exist; the message names body and value.
@@ -73,6 +77,9 @@ class Body(_Placed):
 
     linear_velocity: Vector3 = STILL
     angular_velocity: Vector3 = STILL
+    restitution: float = 0.0
+    linear_damping: float = 0.0
+    angular_damping: float = 0.0
 
     def __post_init__(self) -> None:
         check_name(self.name, "a body")
@@ -82,6 +89,9 @@ class Body(_Placed):
         check_numbers(self.colour, 4, f"the colour of {self.name!r}", 0.0)
         check_numbers(self.linear_velocity, 3, f"the linear velocity [m/s] of {self.name!r}")
         check_numbers(self.angular_velocity, 3, f"the angular velocity [rad/s] of {self.name!r}")
+        check_number(self.restitution, f"the restitution of {self.name!r}", 0.0, 1.0)
+        for kind, value in zip(("linear", "angular"), self.damping.tolist(), strict=True):
+            check_number(value, f"the {kind} damping [1/s] of {self.name!r}", 0.0)
         if self.fixed and any((*self.linear_velocity, *self.angular_velocity)):
             raise SceneError(
                 f"{self.name!r} has a velocity and no mass, so it is fixed; give it a mass"
@@ -95,6 +105,11 @@ class Body(_Placed):
     def velocity(self) -> FloatArray:
         """Linear, then angular velocity at the start, as in body states, (6,) [m/s, rad/s]."""
         return np.array([*self.linear_velocity, *self.angular_velocity])
+
+    @property
+    def damping(self) -> FloatArray:
+        """Linear and angular, (2,) [1/s]."""
+        return np.array([self.linear_damping, self.angular_damping])
 
     @property
     @abstractmethod
@@ -149,6 +164,9 @@ class Body(_Placed):
             data["linear_velocity"] = list(self.linear_velocity)
         if self.angular_velocity != STILL:
             data["angular_velocity"] = list(self.angular_velocity)
+        for name in ("restitution", "linear_damping", "angular_damping"):
+            if getattr(self, name):
+                data[name] = getattr(self, name)
         return data
 
     @classmethod

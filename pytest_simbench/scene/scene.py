@@ -39,6 +39,7 @@ class Scene:
         ground_friction: Coulomb coefficient of the ground plane.
         room: how far it goes from the origin to each side in x and in y, and up [m]. A free body
             that leaves it has diverged (`plausibility`); 1e6 for a side without a wall.
+        ground_restitution: Newton's coefficient of the ground plane, as `Body.restitution`.
 
     Raises:
         SceneError: two bodies share a name or overlap, one has the name of what is in every
@@ -51,12 +52,15 @@ class Scene:
     gravity: Vector3 = field(default=STANDARD_GRAVITY)
     ground_friction: float = 1.0
     room: Vector3 = field(default=ROOM)
+    ground_restitution: float = 0.0
 
     def __post_init__(self) -> None:
         check_name(self.name, "a scene")
         check_numbers(self.gravity, 3, f"the gravity [m/s^2] of scene {self.name!r}")
         check_number(self.ground_friction, f"the ground's friction in scene {self.name!r}", 0.0)
         check_numbers(self.room, 3, f"the room [m] of scene {self.name!r}", 0.0, above=True)
+        what = f"the ground's restitution in scene {self.name!r}"
+        check_number(self.ground_restitution, what, 0.0, 1.0)
         names = [body.name for body in self.bodies]
         for name in names:
             if name.lower() in RESERVED:
@@ -95,6 +99,16 @@ class Scene:
     def fixed_bodies(self) -> tuple[Body, ...]:
         return tuple(body for body in self.bodies if body.fixed)
 
+    @property
+    def words(self) -> frozenset[str]:
+        """What is in it: `box`, `sphere`, `cylinder`, `capsule`, `restitution`, `damping`."""
+        kinds = {type(body).__name__.lower() for body in self.bodies}
+        bouncing = any((self.ground_restitution, *(body.restitution for body in self.bodies)))
+        damped = any(body.damping.any() for body in self.bodies)
+        return frozenset(
+            kinds | ({"restitution"} if bouncing else set()) | ({"damping"} if damped else set())
+        )
+
     def body(self, name: str) -> Body:
         """The body of that name.
 
@@ -117,7 +131,9 @@ class Scene:
         return self.with_body(self.body(name).moved_to(pose))
 
     def to_wire(self) -> dict[str, Any]:
-        """The scene as nested dicts, lists, strings and numbers."""
+        """The scene as nested dicts, lists, strings and numbers; a ground that does not bounce is
+        not named, as in scenes written before one could."""
+        bouncing = {"ground_restitution": self.ground_restitution}
         return {
             "name": self.name,
             "bodies": [body.to_wire() for body in self.bodies],
@@ -125,6 +141,7 @@ class Scene:
             "gravity": list(self.gravity),
             "ground_friction": self.ground_friction,
             "room": list(self.room),
+            **(bouncing if self.ground_restitution else {}),
         }
 
     @classmethod
@@ -136,4 +153,5 @@ class Scene:
             gravity=tuple(data["gravity"]),
             ground_friction=data["ground_friction"],
             room=tuple(data.get("room", ROOM)),  # examples written before there was one
+            ground_restitution=data.get("ground_restitution", 0.0),
         )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from fnmatch import fnmatchcase
 
-from pytest_simbench.scene import Robot
+from pytest_simbench.scene import Robot, Scene
 from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.versions import BUILD, VersionedName, release_numbers
 
@@ -44,12 +44,19 @@ class Deviation:
             and that the engine does not tell the quantity.
         elsewhere: the same with another robot than `MEASURED_ON`, whose links may be larger; None
             where it makes no difference.
+        only: what a scene must have for it to count, one of `Scene.words` ("cylinder",
+            "restitution"); empty when it counts in every scene.
     """
 
     quantity: str
     reason: str
     within: float | None = None
     elsewhere: float | None = None
+    only: str = ""
+
+    def concerns(self, scene: Scene) -> bool:
+        """Whether it counts in this scene."""
+        return not self.only or self.only in scene.words
 
     def with_robot(self, robot: Robot | None) -> Deviation:
         """The same in a world with this robot. `FOLLOWER` in its patterns is then each finger that

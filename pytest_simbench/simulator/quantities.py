@@ -19,9 +19,10 @@ is the link `base`, whose frame is the world's.
   convex hull.
 - com: centre of mass in that frame (3,) [m]; inertia: tensor about it in axes of that frame,
   (3, 3) [kg m^2].
-- friction: Coulomb's coefficient; restitution: 0, nothing bounces; margin: the distance from its
+- friction: Coulomb's coefficient; restitution: Newton's, 0 of links; margin: the distance from its
   shape at which it rests on others, 0 [m].
-- damping of a body or link: resistance to its linear and angular motion, (2,) [1/s], 0.
+- damping of a body or link: resistance to its linear and angular motion, (2,) [1/s], 0 of links.
+  A body's own replaces that of the settings.
 - gravity of a body or link: the share of the scene's gravity that it feels, 1.
 - dynamic: 1 if forces can move the body, else 0.
 - velocity: of the centre of mass, then angular, in the world frame, (6,) [m/s, rad/s].
@@ -58,14 +59,14 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
         "timestep": settings.timestep,
         "ground/height": 0.0,
         "ground/friction": scene.ground_friction,
-        "ground/restitution": 0.0,
+        "ground/restitution": scene.ground_restitution,
     }
     for body in scene.bodies:
         quantities |= _named(
             f"body/{body.name}",
             pose=body.pose.as_array(),
             friction=body.friction,
-            restitution=0.0,
+            restitution=body.restitution,
             margin=0.0,
             dynamic=float(not body.fixed),
         )
@@ -77,12 +78,15 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
             inertia = np.diag(body.inertia())
             quantities |= _inertial(f"body/{body.name}", body.mass, np.zeros(3), inertia)
             quantities[f"body/{body.name}/velocity"] = body.velocity
+            quantities[f"body/{body.name}/damping"] = body.damping
     if prepared is not None:
         quantities |= _robot_quantities(prepared.robot, prepared)
     robots = _links(prepared)
     quantities |= touches(scene, prepared, lambda a, b: not (a in robots and b in robots))
+    own = {f"body/{body.name}/damping" for body in scene.free_bodies if body.damping.any()}
     for pattern, value in settings.quantities().items():
-        quantities |= {name: value for name in quantities if fnmatchcase(name, pattern)}
+        named = {name for name in quantities if fnmatchcase(name, pattern)}
+        quantities |= dict.fromkeys(named - own, value)
     return quantities
 
 

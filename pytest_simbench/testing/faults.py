@@ -63,7 +63,16 @@ def true_scene() -> Scene:
                 angular_velocity=SPIN,
             ),
             scenes.cube("cube", Pose.at(0.6, -0.1, 0.325, yaw=-1.0), friction=0.7),
-            Sphere("ball", 0.03, Pose.at(0.7, 0.1, 0.33), 0.12, 0.7),
+            Sphere(
+                "ball",
+                0.03,
+                Pose.at(0.7, 0.1, 0.33),
+                0.12,
+                0.7,
+                restitution=0.6,
+                linear_damping=0.3,
+                angular_damping=0.2,
+            ),
             Cylinder("can", 0.033, 0.11, LYING, 0.3, 0.7),
             Capsule("pill", 0.02, 0.06, Pose.at(0.8, -0.2, 0.36, yaw=0.3), 0.08, 0.7),
             Cylinder("pillar", 0.04, 0.2, Pose.at(0.5, -0.6, 0.1), friction=0.7),
@@ -71,6 +80,7 @@ def true_scene() -> Scene:
         robot=replace(scenes.arm(), friction=0.7),
         gravity=(0.3, -0.2, -3.7),
         ground_friction=0.7,
+        ground_restitution=0.6,
     )
 
 
@@ -280,6 +290,15 @@ FAULTS: dict[str, Fault] = {
     ),
     "pill_length": Fault(
         "the pill is 2 mm longer", "body/pill/rounds", of_body("pill", length=0.062)
+    ),
+    "restitution": Fault(
+        "the ball bounces less", "body/ball/restitution", of_body("ball", restitution=0.55)
+    ),
+    "ground_restitution": Fault(
+        "the ground bounces less", "ground/restitution", of_scene(ground_restitution=0.55)
+    ),
+    "body_damping": Fault(
+        "the ball turns on undamped", "body/ball/damping", of_body("ball", angular_damping=0.0)
     ),
     "round_kind": Fault(
         "the pillar is a capsule as long as it",

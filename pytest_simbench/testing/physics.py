@@ -152,6 +152,30 @@ def rounds_rest(subject: Subject) -> None:
         require_close(f"drift of the {body.name}", float(away), 0.0, 1e-3, "m")
 
 
+@check()
+def bounces_as_restitution_says(subject: Subject) -> None:
+    """A ball that strikes the plane at 3.2 m/s leaves it with 0.6 of that, within 5 %."""
+    rows = subject.motion(scenes.bouncing(), 0.15, subject.timestep).bodies[:, 0]
+    struck, left = float(rows[:, 9].min()), float(rows[:, 9].max())
+    require_close("speed after the bounce", left, -0.6 * struck, -0.03 * struck, "m/s")
+
+
+@check()
+def damps_as_the_scene_says(subject: Subject) -> None:
+    """After 1 s a ball with linear damping 0.8/s and angular damping 0.5/s has exp(-0.8) of its
+    speed and exp(-0.5) of its spin, within 1 %."""
+    scene = scenes.damped()
+    ball = scene.body("ball")
+    with subject.world(scene) as world:
+        world.wait(1.0)
+        t, row = world.time, world.bodies[0]
+    law = ball.velocity * np.exp(-np.repeat(ball.damping, 3) * t)
+    for what, part in (("linear", slice(0, 3)), ("angular", slice(3, 6))):
+        speed = float(np.linalg.norm(law[part]))
+        gap = float(np.linalg.norm(row[7:][part] - law[part]))
+        require_close(f"error of the {what} velocity", gap, 0.0, 0.01 * speed, "")
+
+
 def _flight(motion: Motion) -> FloatArray:
     rows = motion.bodies[motion.bodies[:, 0, 2] < 4.8, 0]  # below the ledge, in the air
     require(len(rows) >= 5, "the box did not leave the ledge")

@@ -63,6 +63,34 @@ def bowling() -> Scene:
     return Scene("bowling", (ball, can), ground_friction=0.5)
 
 
+def bouncing() -> Scene:
+    """A ball that falls on the plane at 3 m/s, and leaves with 0.6 of it."""
+    ball = Sphere(
+        "ball",
+        RADIUS,
+        Pose.at(0.0, 0.0, RADIUS + 0.05),
+        MASS,
+        linear_velocity=(0.0, 0.0, -3.0),
+        restitution=0.6,
+    )
+    return Scene("bouncing", (ball,), ground_restitution=0.6)
+
+
+def damped() -> Scene:
+    """A ball that flies and turns, braked in both, far from everything and without weight."""
+    ball = Sphere(
+        "ball",
+        RADIUS,
+        Pose.at(0.0, 0.0, 3.0),
+        MASS,
+        linear_velocity=(1.0, 0.0, 0.5),
+        angular_velocity=(2.0, -1.0, 4.0),
+        linear_damping=0.8,
+        angular_damping=0.5,
+    )
+    return Scene("damped", (ball,), gravity=(0.0, 0.0, 0.0))
+
+
 def standing() -> Scene:
     """One of each round body, at rest on the plane: the can on its end, the pill on its side."""
     lying = Pose((0.6, 0.0, RADIUS), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0))

@@ -136,7 +136,8 @@ class Server:
         if parity:
             expected = expected_quantities(world, simulator.settings)
             info = simulator.info
-            declared = [deviation.with_robot(world.robot) for deviation in info.deviations]
+            counting = (deviation for deviation in info.deviations if deviation.concerns(world))
+            declared = [deviation.with_robot(world.robot) for deviation in counting]
             excused = check(expected, simulator.read_back(), declared, info.name)
         if simulator.gui:
             simulator.refresh_window()

@@ -12,6 +12,7 @@ What was learnt stands in docs/engines/dart.md.
 
 from __future__ import annotations
 
+import math
 import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
@@ -127,7 +128,7 @@ class DART(Simulator):
         self.scene = scene
         self.world = world = dartpy.simulation.World()
         self._set_options(world, scene)
-        self._ground = self._add_ground(scene.ground_friction)
+        self._ground = self._add_ground(scene.ground_friction, scene.ground_restitution)
         self._bodies = {box.name: self._add_body(box) for box in scene.bodies}
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
         self._robot: Any = None
@@ -162,11 +163,11 @@ class DART(Simulator):
             options.maxSweeps, options.tolerance = s.sweeps, s.tolerance
             solver.setBoxedLcpSolver(constraint.NsgsFrictionSolver(options))
 
-    def _add_ground(self, friction: float) -> Any:
+    def _add_ground(self, friction: float, restitution: float) -> Any:
         skeleton = dartpy.dynamics.Skeleton("ground")
         _, body = skeleton.createWeldJointAndBodyNodePair()
         shape = body.createShapeNode(dartpy.dynamics.PlaneShape([0.0, 0.0, 1.0], 0.0))
-        _set_surface(shape, friction)
+        _set_surface(shape, friction, restitution)
         skeleton.setMobile(False)
         self.world.addSkeleton(skeleton)
         return body
@@ -188,11 +189,14 @@ class DART(Simulator):
             inertia.setMoment(np.diag(box.inertia()))
             body.setInertia(inertia)
             joint.setPositions(dynamics.FreeJoint.convertToPositions(place))
+            damping = [*(box.angular_damping * box.inertia()), *[box.linear_damping * box.mass] * 3]
+            for k, value in enumerate(damping):
+                joint.setDampingCoefficient(k, value)
             joint.setLinearVelocity(np.array(box.linear_velocity))
             joint.setAngularVelocity(np.array(box.angular_velocity))
         shape = body.createShapeNode(_shape(box))
         shape.createVisualAspect().setColor(list(box.colour))
-        _set_surface(shape, box.friction)
+        _set_surface(shape, box.friction, box.restitution)
         self.world.addSkeleton(skeleton)
         return body
 
@@ -321,13 +325,15 @@ def _shape(body: Body) -> Any:
     raise NotSupportedError(f"dart has no {type(body).__name__}")
 
 
-def _set_surface(shape: Any, friction: float) -> None:
-    """Friction of a shape; of a pair, DART takes the smaller one."""
+def _set_surface(shape: Any, friction: float, restitution: float = 0.0) -> None:
+    """Friction and restitution of a shape; of a pair, DART takes the smaller friction, and the
+    product of both restitutions."""
     if not shape.hasCollisionAspect():
         shape.createCollisionAspect()
     if not shape.hasDynamicsAspect():
         shape.createDynamicsAspect()
     shape.getDynamicsAspect().setFrictionCoeff(friction)
+    shape.getDynamicsAspect().setRestitutionCoeff(math.sqrt(restitution))
 
 
 def _with_mimic(prepared: PreparedRobot) -> str:

@@ -64,7 +64,7 @@ class ReadBack:
             "gravity": self.world.getGravity(),
             "timestep": self.world.getTimeStep(),
             "ground/friction": surface.getFrictionCoeff(),
-            "ground/restitution": surface.getRestitutionCoeff(),
+            "ground/restitution": surface.getRestitutionCoeff() ** 2,
             "ground/height": height,
         }
         for name, body in self.bodies.items():
@@ -115,7 +115,9 @@ class ReadBack:
         if shapes:
             surfaces = [shape.getDynamicsAspect() for shape in shapes]
             found[f"{prefix}/friction"] = one_value([s.getFrictionCoeff() for s in surfaces])
-            found[f"{prefix}/restitution"] = one_value([s.getRestitutionCoeff() for s in surfaces])
+            found[f"{prefix}/restitution"] = one_value(
+                [s.getRestitutionCoeff() ** 2 for s in surfaces]
+            )
         return found
 
     def _reach(self, shape: Any, place: Any) -> FloatArray:

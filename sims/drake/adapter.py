@@ -86,6 +86,12 @@ class Drake(Simulator):
                 "*/restitution",
                 "Drake has no restitution; its contacts dissipate",
             ),
+            Deviation(
+                "",
+                "a body's angular damping is one torque for all its axes: right about that of its "
+                "largest moment of inertia, too strong about the others",
+                only="damping",
+            ),
             Deviation("joint/*/friction", "Drake's joints have no friction"),
             Deviation("link/*/damping", "Drake has no damping of links"),
             Deviation(
@@ -140,8 +146,9 @@ class Drake(Simulator):
         if scene.robot is not None:
             self._start_drives(scene.robot)
         nq = self.plant.num_positions()
-        q = np.array([body.floating_positions_start() for body in free], int).reshape(-1, 1)
-        v = np.array([body.floating_velocities_start_in_v() for body in free], int).reshape(-1, 1)
+        joints = [self.world.floating_joint(body) for body in free]
+        q = np.array([joint.position_start() for joint in joints], int).reshape(-1, 1)
+        v = np.array([joint.velocity_start() for joint in joints], int).reshape(-1, 1)
         # Drake has rotation before translation; the contract has it after.
         self._bodies_at = np.hstack(
             [q + np.array([4, 5, 6, 0, 1, 2, 3]), nq + v + np.array([3, 4, 5, 0, 1, 2])]

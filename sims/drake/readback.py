@@ -20,7 +20,6 @@ from pytest_simbench.simulator.shapes import (
     round_reach,
 )
 
-from . import releases
 from .world import World
 
 geometry = lazy_import("pydrake.geometry")
@@ -56,7 +55,7 @@ class ReadBack:
     def _box(self, name: str, body: Any) -> dict[str, Any]:
         """A box; a fixed one is a shape of the world, whose frame is the shape's own."""
         world, prefix = self.world, f"body/{name}"
-        free = releases.is_floating(body)
+        free = body.index() != world.plant.world_body().index()
         frame = math.RigidTransform()
         if not free:
             frame = self.inspector.GetPoseInFrame(world.shapes[name][0])
@@ -66,20 +65,12 @@ class ReadBack:
             found |= self._inertial(prefix, body)
             speed = world.plant.EvalBodySpatialVelocityInWorld(self.context, body)
             found[f"{prefix}/velocity"] = [*speed.translational(), *speed.rotational()]
-            joint = world.plant.get_joint(self._floating_joint(body))
+            joint = world.floating_joint(body)
             found[f"{prefix}/damping"] = [
                 joint.default_translational_damping() / found[f"{prefix}/mass"],
                 joint.default_angular_damping() / np.max(found[f"{prefix}/inertia"]),
             ]
         return found
-
-    def _floating_joint(self, body: Any) -> Any:
-        plant = self.world.plant
-        return next(
-            index
-            for index in plant.GetJointIndices()
-            if plant.get_joint(index).child_body().index() == body.index()
-        )
 
     def _part(self, prefix: str, owner: str, pose: Any, frame: Any) -> dict[str, Any]:
         """Pose, shapes and surface of what is in `frame` of a body at `pose` in the world."""

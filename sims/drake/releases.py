@@ -14,10 +14,3 @@ def without_sampled_ports(config: Any) -> dict[str, bool]:
     and only cost time here."""
     name = "use_sampled_output_ports"
     return {name: False} if hasattr(config(), name) else {}
-
-
-def is_floating(body: Any) -> bool:
-    """Whether a body floats freely; `is_floating` in older releases, which newer ones deprecate."""
-    if hasattr(body, "is_floating_base_body"):
-        return bool(body.is_floating_base_body())
-    return bool(body.is_floating())

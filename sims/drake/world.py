@@ -102,6 +102,15 @@ class World:
         self.plant.Finalize()
         self._filter_collisions()
 
+    def floating_joint(self, body: Any) -> Any:
+        """The joint of a free body to the world."""
+        plant = self.plant
+        return next(
+            plant.get_joint(index)
+            for index in plant.GetJointIndices()
+            if plant.get_joint(index).child_body().index() == body.index()
+        )
+
     def _options(self) -> Any:
         s = self.settings
         return plants.MultibodyPlantConfig(
@@ -156,12 +165,28 @@ class World:
         else:
             inertia = getattr(trees.SpatialInertia, weighted)(part.mass, *arguments)
             body, pose = self.plant.AddRigidBody(part.name, inertia), Pose()
+            if part.damping.any():
+                self._damp(body, part)
         core = solid
         if isinstance(part, Box) and not part.fixed and self.settings.corner_radius:
             core = self._add_corners(body, part)
         self._add_shape(body, part.name, "box", core, pose, part.friction)
         self._add_picture(body, part.name, solid, pose, part.colour)
         return body
+
+    def _damp(self, body: Any, part: Body) -> None:
+        """The damping of a floating joint, whose torque is the same about all axes."""
+        world = self.plant.world_frame()
+        turning = part.angular_damping * float(part.inertia().max())
+        self.plant.AddJoint(
+            trees.QuaternionFloatingJoint(
+                f"{part.name}/free",
+                world,
+                body.body_frame(),
+                turning,
+                part.linear_damping * part.mass,
+            )
+        )
 
     def _add_corners(self, body: Any, box: Box) -> Any:
         """Spheres in the corners of a box; the box that is left within them."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import dataclasses
 import gc
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
@@ -29,7 +30,9 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
+from pytest_simbench.simulator.bounces import direct
 
+from ..mujoco.adapter import BOUNCES
 from .engine import (
     array_of,
     forget_worlds,
@@ -49,6 +52,9 @@ from .world import (
 )
 
 genesis = lazy_import("genesis")
+
+MOST_BOUNCE = 0.9999
+"""The largest restitution: Genesis divides by the damping ratio."""
 
 
 class Genesis(Simulator):
@@ -76,6 +82,7 @@ class Genesis(Simulator):
         deviations=(
             Deviation("link/*/damping", "Genesis has no damping of links"),
             Deviation("body/*/margin link/*/margin", "Genesis' shapes have no margin"),
+            Deviation("", BOUNCES, only="restitution"),
             Deviation("", f"no contact has a friction coefficient below {LEAST_FRICTION}"),
         ),
         costly_start=True,
@@ -153,6 +160,17 @@ class Genesis(Simulator):
             parameters[:, 2:4] = self.settings.impedance
             for geom, values in zip(geoms, parameters, strict=True):
                 geom.set_sol_params(values)
+        bouncing = {self._boxes[body.name]: body.restitution for body in scene.bodies}
+        bouncing[self._ground] = scene.ground_restitution
+        substep = self.settings.timestep / self.settings.substeps
+        for entity, restitution in bouncing.items():
+            if restitution:
+                stiffness, damping = direct(min(restitution, MOST_BOUNCE), substep)
+                ratio = -damping / (2 * math.sqrt(-stiffness))
+                for geom in entity.geoms:
+                    values = geom.sol_params.cpu().numpy().copy()
+                    values[:2] = -2 / damping, ratio  # time constant, damping ratio
+                    geom.set_sol_params(values)
         frictions = {self._boxes[box.name]: box.friction for box in scene.bodies}
         frictions[self._ground] = scene.ground_friction
         for entity, friction in frictions.items():
@@ -161,8 +179,14 @@ class Genesis(Simulator):
                     solver.set_geom_friction(friction, geom.idx)
 
     def _start_bodies(self, scene: Scene) -> None:
-        """The velocities of free bodies: linear in the world's axes, angular in the body's."""
+        """Velocities and damping of free bodies: linear in the world's axes, angular in the
+        body's."""
         for box in scene.free_bodies:
+            if box.damping.any():
+                link = self._boxes[box.name].links[0]
+                spins = box.angular_damping * box.inertia()
+                damping = [*[box.linear_damping * box.mass] * 3, *spins]
+                self.solver.set_dofs_damping(damping, list(range(link.dof_start, link.dof_end)))
             if box.velocity.any():
                 link = self._boxes[box.name].links[0]
                 dofs = list(range(link.dof_start, link.dof_end))

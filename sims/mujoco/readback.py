@@ -11,6 +11,7 @@ import numpy as np
 
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import PreparedRobot, lazy_import, one_value
+from pytest_simbench.simulator.bounces import restitution_of
 from pytest_simbench.simulator.quantities import touches
 from pytest_simbench.simulator.shapes import (
     box_corners,
@@ -268,8 +269,7 @@ _ROUND = ("SPHERE", "CYLINDER", "CAPSULE")
 def bounce(first: float, second: float) -> float:
     """Restitution of a contact's linear spring and damper, from MuJoCo's `solref`.
 
-    That is (time constant, damping ratio z), or minus stiffness and damping per mass. An
-    oscillator with z < 1 leaves after half a period with exp(-pi z / sqrt(1 - z^2)) of its speed.
+    That is (time constant, damping ratio), or minus stiffness and damping per mass.
     """
     ratio = second if first > 0 else -second / (2 * math.sqrt(-first)) if first < 0 else 0.0
-    return math.exp(-math.pi * ratio / math.sqrt(1 - ratio**2)) if ratio < 1 else 0.0
+    return restitution_of(ratio)

@@ -29,7 +29,9 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
+from pytest_simbench.simulator.bounces import direct
 
+from ..mujoco.adapter import BOUNCES
 from ..mujoco.pictures import DISABLED, camera, renderer
 from ..mujoco.readback import Numbers, ReadBack
 from .world import NewtonSettings, build_model, make_solver, names
@@ -64,6 +66,7 @@ class Newton(Simulator):
         ),
         deviations=(
             Deviation("", "contacts are soft by design: cubes sink in and creep a little"),
+            Deviation("", BOUNCES, only="restitution"),
             Deviation("", "the state is kept in single precision between steps"),
         ),
         costly_start=True,
@@ -119,6 +122,7 @@ class Newton(Simulator):
         self.model = build_model(scene, self.prepared, self.settings)
         self._number(scene)
         self.solver = make_solver(self.model, self.settings)
+        self._set_mujoco(scene)
         self._states = [self.model.state(), self.model.state()]
         self._control = self.model.control()
         ctrl = self._control.mujoco.ctrl if scene.robot is not None else None
@@ -129,6 +133,20 @@ class Newton(Simulator):
         self._show_mujoco_the_start()
         if self.gui:
             self._open_window()
+
+    def _set_mujoco(self, scene: Scene) -> None:
+        """Restitution and damping of bodies, which only MuJoCo's own model holds."""
+        model = self.solver.mj_model
+        surfaces = {body.name: body.restitution for body in scene.bodies}
+        surfaces["ground"] = scene.ground_restitution
+        for name, restitution in surfaces.items():
+            if restitution:
+                model.geom_solref[self._geom(name)] = direct(restitution, self.settings.timestep)
+        for body in scene.free_bodies:
+            if body.damping.any():
+                at = model.body_dofadr[model.geom_bodyid[self._geom(body.name)]]
+                model.dof_damping[at : at + 3] = body.linear_damping * body.mass
+                model.dof_damping[at + 3 : at + 6] = body.angular_damping * body.inertia()
 
     def _show_mujoco_the_start(self) -> None:
         """Newton hands its state to MuJoCo only in `step`; it may be looked at before."""

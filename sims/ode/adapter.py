@@ -163,8 +163,10 @@ class ODE(Simulator):
         self.contacts = Contacts(world, s.contact_erp, s.contact_cfm, s.contacts)
         space = self.contacts.space
         self._advance = world.step if s.solver == "step" else world.quickStep
-        self._ground = build.add_ground(space, scene.ground_friction)
-        self._bodies = {box.name: build.add_body(world, space, box) for box in scene.bodies}
+        self._ground = build.add_ground(space, scene.ground_friction, scene.ground_restitution)
+        self._bodies = {
+            box.name: build.add_body(world, space, box, s.timestep) for box in scene.bodies
+        }
         self._free = [self._bodies[box.name].body for box in scene.free_bodies]
         self._links: dict[str, Part] = {}
         self._axes: dict[str, Axis] = {}

@@ -58,6 +58,9 @@ _FUNCTIONS: dict[str, tuple[Any, Sequence[Any]]] = {
     "dBodyGetRotation": (_ID, [_ID]),
     "dBodyGetLinearDamping": (_REAL, [_ID]),
     "dBodyGetAngularDamping": (_REAL, [_ID]),
+    "dBodySetDamping": (None, [_ID, _REAL, _REAL]),
+    "dBodySetLinearDampingThreshold": (None, [_ID, _REAL]),
+    "dBodySetAngularDampingThreshold": (None, [_ID, _REAL]),
 }
 """Result and arguments of each (include/ode/*.h of ODE 0.16)."""
 
@@ -172,3 +175,12 @@ def damping(body: Any) -> FloatArray:
     """Shares of its linear and angular velocity that a body loses in a step, (2,)."""
     tell, name = library(), body_id(body)
     return np.array([tell.dBodyGetLinearDamping(name), tell.dBodyGetAngularDamping(name)])
+
+
+def set_damping(body: Any, shares: FloatArray) -> None:
+    """Have a body lose these shares of its linear and angular velocity in a step, at any speed."""
+    if shares.any():
+        tell, name = library(), body_id(body)
+        tell.dBodySetDamping(name, *shares.tolist())
+        tell.dBodySetLinearDampingThreshold(name, 0.0)
+        tell.dBodySetAngularDampingThreshold(name, 0.0)

@@ -22,27 +22,28 @@ from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
 
 from .axes import Axis
 from .contacts import BASE, FIXED, FREE, GROUND, LINK, Part, Surface
-from .library import HI_STOP, LO_STOP, Mesh, place
+from .library import HI_STOP, LO_STOP, Mesh, place, set_damping
 
 ode = lazy_import("ode")
 
 
-def add_ground(space: Any, friction: float) -> Part:
+def add_ground(space: Any, friction: float, restitution: float) -> Part:
     """The plane z = 0."""
-    ground = Part(Surface(None, friction))
+    ground = Part(Surface(None, friction, restitution))
     ground.add(ode.GeomPlane(space, (0.0, 0.0, 1.0), 0.0), GROUND)
     return ground
 
 
-def add_body(world: Any, space: Any, box: Body) -> Part:
-    """A body, fixed or free."""
+def add_body(world: Any, space: Any, box: Body, timestep: float) -> Part:
+    """A body, fixed or free, in a world with this time step [s]."""
     geom = _solid(space, box)
-    part = Part(Surface(None, box.friction))
+    part = Part(Surface(None, box.friction, box.restitution))
     part.add(geom, FIXED if box.fixed else FREE)
     if box.fixed:
         place(geom, box.pose)
         return part
     part.surface.body = _body(world, box.mass, np.diag(box.inertia()), box.pose)
+    set_damping(part.body, box.damping * timestep)
     part.body.setLinearVel(box.linear_velocity)
     part.body.setAngularVel(box.angular_velocity)
     geom.setBody(part.body)

@@ -117,6 +117,12 @@ class OvPhysX(Simulator):
             Deviation("body/*/dynamic", "PhysX does not report which bodies are kinematic"),
             Deviation("body/*/touches link/*/touches", "PhysX does not report collision groups"),
             Deviation(
+                "",
+                "PhysX brakes a body before it touches and bounces what is left: with tuned "
+                "settings 0.27 of the speed instead of 0.6",
+                only="restitution",
+            ),
+            Deviation(
                 "link/*/meshes",
                 "a convex hull that PhysX makes of a mesh has at most 64 corners",
                 within=4e-3,

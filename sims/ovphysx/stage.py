@@ -94,40 +94,47 @@ class Stage:
         return usd.prim("PhysicsScene", "physics", ("PhysxSceneAPI",), lines)
 
     def _materials(self) -> list[str]:
-        """One material a coefficient, static and dynamic friction alike, no restitution.
+        """One material a pair of coefficients, static and dynamic friction alike.
 
         PhysX combines two by their average, which is the scene's value for equal surfaces.
         """
-        frictions = {self.scene.ground_friction, *(box.friction for box in self.scene.bodies)}
+        surfaces = {(body.friction, body.restitution) for body in self.scene.bodies}
+        surfaces.add((self.scene.ground_friction, self.scene.ground_restitution))
         if self.scene.robot is not None:
-            frictions.add(self.scene.robot.friction)
+            surfaces.add((self.scene.robot.friction, 0.0))
         return [
             usd.prim(
                 "Material",
-                _material(friction),
+                _material(friction, restitution),
                 ("PhysicsMaterialAPI",),
                 [
                     f"float physics:staticFriction = {float(friction)!r}",
                     f"float physics:dynamicFriction = {float(friction)!r}",
-                    "float physics:restitution = 0",
+                    f"float physics:restitution = {float(restitution)!r}",
                 ],
             )
-            for friction in sorted(frictions)
+            for friction, restitution in sorted(surfaces)
         ]
 
-    def _surface(self, friction: float) -> list[str]:
-        bound = f"rel material:binding:physics = </World/{_material(friction)}>"
+    def _surface(self, friction: float, restitution: float = 0.0) -> list[str]:
+        material = _material(friction, restitution)
+        bound = f"rel material:binding:physics = </World/{material}>"
         return [bound, *self._lines["physxCollision"]]
 
     def _ground(self) -> str:
-        lines = ['uniform token axis = "Z"', *self._surface(self.scene.ground_friction)]
+        lines = [
+            'uniform token axis = "Z"',
+            *self._surface(self.scene.ground_friction, self.scene.ground_restitution),
+        ]
         return usd.prim("Plane", "ground", _COLLIDER, lines)
 
     def _body(self, index: int, box: Body) -> str:
         """A rigid body; kinematic where it is fixed, since PhysX reports nothing of static ones."""
         kind, size = _solid(box)
-        shape = usd.prim(kind, "shape", _COLLIDER, [*size, *self._surface(box.friction)])
-        lines = [*usd.placed(box.pose), *self._lines["physxRigidBody"]]
+        shape = usd.prim(
+            kind, "shape", _COLLIDER, [*size, *self._surface(box.friction, box.restitution)]
+        )
+        lines = [*usd.placed(box.pose), *self._rigid(box)]
         if box.fixed:
             lines.append("bool physics:kinematicEnabled = true")
         else:
@@ -136,6 +143,15 @@ class Stage:
             lines.append(f"vector3f physics:velocity = {usd.numbers(box.linear_velocity)}")
             lines.append(f"vector3f physics:angularVelocity = {usd.numbers(spin)}")
         return usd.prim("Xform", f"body_{index}", _BODY, lines, [shape])
+
+    def _rigid(self, body: Body) -> list[str]:
+        """The engine's settings of a body, and its own damping where it has one."""
+        lines = self._lines["physxRigidBody"]
+        if not body.damping.any():
+            return lines
+        own = dict(zip(("linearDamping", "angularDamping"), body.damping.tolist(), strict=True))
+        kept = [line for line in lines if not any(name in line for name in own)]
+        return [*kept, *usd.attributes("physxRigidBody", own)]
 
     def _robot(self, prepared: PreparedRobot) -> list[str]:
         robot, names = prepared.robot, list(prepared.links)
@@ -199,8 +215,11 @@ def _solid(body: Body) -> tuple[str, list[str]]:
     raise NotSupportedError(f"ovphysx has no {type(body).__name__}")
 
 
-def _material(friction: float) -> str:
-    return "friction_" + repr(float(friction)).translate(str.maketrans(".-+", "pmp"))
+def _material(friction: float, restitution: float) -> str:
+    name = f"friction_{float(friction)!r}"
+    if restitution:
+        name += f"_bouncing_{float(restitution)!r}"
+    return name.translate(str.maketrans(".-+", "pmp"))
 
 
 def _joint(

@@ -64,7 +64,7 @@ class ReadBack:
             "timestep": engine["fixedTimeStep"],
             "ground/height": place[2],
             "ground/friction": ground[1] ** 2,
-            "ground/restitution": ground[5],
+            "ground/restitution": ground[5] ** 2,
         }
         held = self._held()
         for name, body in self.bodies.items():
@@ -106,7 +106,7 @@ class ReadBack:
         found |= outlines(prefix, *outline)
         if boxes or meshes or rounds:
             found[f"{prefix}/friction"] = dynamics[1] ** 2
-            found[f"{prefix}/restitution"] = dynamics[5]
+            found[f"{prefix}/restitution"] = dynamics[5] ** 2
             found[f"{prefix}/margin"] = dynamics[11] - self._thickness(body, link)
         return found
 

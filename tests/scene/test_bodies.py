@@ -65,6 +65,17 @@ def test_a_moving_body_crosses() -> None:
     assert thrown.velocity.tolist() == [1, 2, 3, 0, 0, -1]
 
 
+def test_a_body_that_bounces_and_is_braked_crosses() -> None:
+    given = {"restitution": 0.5, "linear_damping": 0.1, "angular_damping": 0.2}
+    ball = Sphere("ball", 0.1, Pose(), 1.0).changed(**given)
+    wire = ball.to_wire()
+    assert {name: wire[name] for name in given} == given
+    assert Body.from_wire(wire) == ball
+    for name, wrong in (("restitution", 1.1), ("linear_damping", -0.1), ("angular_damping", -1.0)):
+        with pytest.raises(SceneError, match=f"the {name.replace('_', ' ')}.* of 'ball' is"):
+            ball.changed(**{name: wrong})
+
+
 def test_a_fixed_body_does_not_start_to_move() -> None:
     with pytest.raises(SceneError, match="'post' has a velocity and no mass"):
         Box("post", (1.0, 1.0, 1.0), Pose(), angular_velocity=(0.0, 0.0, 1.0))

@@ -40,3 +40,11 @@ def test_free_and_fixed_bodies_keep_their_order() -> None:
     scene = Scene("s", (box("b", 0.0), Box("t", (1, 1, 0.1), Pose.at(0, 0, -0.05)), box("a", 1.0)))
     assert [body.name for body in scene.free_bodies] == ["b", "a"]
     assert [body.name for body in scene.fixed_bodies] == ["t"]
+
+
+def test_a_ground_that_bounces_crosses_and_another_is_not_named() -> None:
+    bouncing = Scene("s", ground_restitution=0.5)
+    assert Scene.from_wire(bouncing.to_wire()) == bouncing
+    assert "ground_restitution" not in Scene("s").to_wire()
+    with pytest.raises(SceneError, match="the ground's restitution in scene 's' is 2"):
+        Scene("s", ground_restitution=2.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pytest_simbench.robot.panda import panda
-from pytest_simbench.scene import Gripper
+from pytest_simbench.scene import Cylinder, Gripper, Pose, Scene
 from pytest_simbench.simulator import FOLLOWER, Deviation, ParityError, one_value
 from pytest_simbench.simulator.parity import check, compare
 
@@ -209,3 +209,14 @@ def test_sizes_hold_for_the_robot_they_were_measured_on() -> None:
     assert replace(hull, elsewhere=None).with_robot(ur5).within == 5e-4
     assert finger.with_robot(ur5).excuses("joint/panda_joint2/effort_limit")
     assert not finger.with_robot(ur5).excuses("joint/panda_joint1/effort_limit")
+
+
+def test_some_deviations_count_only_where_a_scene_has_their_word() -> None:
+    bouncing = Deviation("", "it does not bounce", only="restitution")
+    rolling = Deviation("", "it does not roll", only="cylinder")
+    can = Cylinder("can", 0.1, 0.1, Pose.at(0.0, 0.0, 0.05), 1.0)
+    scenes = [Scene("s"), Scene("s", (can,)), Scene("s", (can.changed(restitution=0.5),))]
+    assert [bouncing.concerns(scene) for scene in scenes] == [False, False, True]
+    assert [rolling.concerns(scene) for scene in scenes] == [False, True, True]
+    assert all(Deviation("", "always").concerns(scene) for scene in scenes)
+    assert Scene("s", (can.changed(linear_damping=0.1),)).words == {"cylinder", "damping"}

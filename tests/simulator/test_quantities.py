@@ -67,7 +67,7 @@ FREE = Box(
     linear_velocity=(0.1, 0.0, -0.2),
     angular_velocity=(0.0, 0.0, 3.0),
 )
-PILL = Capsule("pill", 0.1, 0.4, Pose.at(-1.0, 0.0, 0.5))
+PILL = Capsule("pill", 0.1, 0.4, Pose.at(-1.0, 0.0, 0.5), restitution=0.4)
 SHELF = Box("shelf", (0.2, 0.2, 0.2), Pose.at(-0.5, 0.0, 0.1), friction=0.6)
 
 
@@ -149,6 +149,7 @@ def expected() -> dict[str, Any]:
             "dynamic": 0,
             "touches": [0, 1, 1],
             **SURFACE,
+            "restitution": 0.4,
         },
         "link/base": {
             "pose": [0, 0, 0, 1, 0, 0, 0],
@@ -235,6 +236,12 @@ def test_settings_change_what_they_name_and_add_nothing(arm: Robot) -> None:
     scene = Scene("s", (FREE, SHELF, PILL), arm, gravity=(0.1, 0.2, -9.0), ground_friction=0.8)
     wanted = {**expected(), "body/free/damping": [0.1, 0.2], "joint/slide/friction": 0.3}
     assert_quantities(expected_quantities(scene, Damped(0.004)), wanted)
+
+
+def test_a_bodys_own_damping_replaces_that_of_the_settings() -> None:
+    braked = FREE.changed(linear_damping=0.7)
+    found = expected_quantities(Scene("s", (braked,)), Damped(0.004))
+    assert found["body/free/damping"].tolist() == [0.7, 0]
 
 
 def test_shares_of_what_can_be_touched(arm: Robot) -> None:
