@@ -92,6 +92,7 @@ class LocalExecutor(Executor):
     def __init__(self, jobs: int = 1) -> None:
         self._jobs = jobs
         self._idle = IdleWorkers()
+        self._shared = False
 
     @property
     def jobs(self) -> int:
@@ -106,6 +107,7 @@ class LocalExecutor(Executor):
     ) -> Repetition:
         hooks = hooks or Hooks()
         hooks.begin("")
+        self._shared = experiment.task.shares_worker
         return Repetition(
             experiment.in_case(contended=True) if self.jobs > 1 else experiment,
             number,
@@ -119,4 +121,8 @@ class LocalExecutor(Executor):
         return Repetition(experiment, 0).probe()
 
     def end_test(self) -> None:
+        if not self._shared:
+            self._idle.close()
+
+    def close(self) -> None:
         self._idle.close()

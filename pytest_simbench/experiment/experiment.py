@@ -69,6 +69,11 @@ class Experiment:
         return self.task.scene(seed, self.jitter)
 
     @property
+    def reuses_worker(self) -> bool:
+        """Whether one worker serves several repetitions."""
+        return self.case.reuses_worker or (self.task.shares_worker and not self.case.fresh)
+
+    @property
     def metrics(self) -> tuple[Metric, ...]:
         """What the task measures."""
         return self.task.metrics

@@ -72,7 +72,7 @@ class Repetition:
         self.where = Where(case.simulator, case.mode, number, self.seed)
         self.stopwatch = Stopwatch()
         self._camera = camera or self._filming()
-        self._idle = idle if idle is not None and case.reuses_worker else None
+        self._idle = idle if idle is not None and experiment.reuses_worker else None
         self._reused = False
         self._on_phase = on_phase
         self._on_count = on_count
@@ -170,17 +170,17 @@ class Repetition:
         return process
 
     def _worker(self, deadline: float) -> WorkerProcess:
-        process = self._idle.take() if self._idle is not None else None
+        try:
+            launch = self.case.launch(file_stem(self.experiment, self.number))
+        except DisplayError as error:
+            raise DisplayLost(str(error), self.where) from None
+        process = self._idle.take(launch) if self._idle is not None else None
         if process is not None:
             self._reused = True
             process.where = self.where
             process.deadline = deadline
             self._made(process)
             return process
-        try:
-            launch = self.case.launch(file_stem(self.experiment, self.number))
-        except DisplayError as error:
-            raise DisplayLost(str(error), self.where) from None
         return WorkerProcess(launch, self.where, deadline=deadline, made=self._made)
 
     def _made(self, process: WorkerProcess) -> None:

@@ -1,11 +1,14 @@
-"""Workers that wait for the next repetition, for engines whose start is costly."""
+"""Workers that wait for the next repetition: of engines whose start is costly, and of tasks that
+take less time than a start."""
 
 from __future__ import annotations
 
 import threading
 from contextlib import suppress
+from dataclasses import replace
 
 from pytest_simbench.client.errors import WorkerError
+from pytest_simbench.client.launch import Launch
 from pytest_simbench.client.process import WorkerProcess
 
 
@@ -16,12 +19,13 @@ class IdleWorkers:
         self._idle: list[WorkerProcess] = []
         self._lock = threading.Lock()
 
-    def take(self) -> WorkerProcess | None:
-        """A living worker, which belongs to the caller now; None when there is none."""
+    def take(self, launch: Launch) -> WorkerProcess | None:
+        """A living worker that was started like that, but for its log; it belongs to the caller
+        now. None when there is none. Others are ended: whoever asks needs no more of them."""
         with self._lock:
             while self._idle:
                 process = self._idle.pop()
-                if process.alive:
+                if process.alive and replace(process.launch, log=launch.log) == launch:
                     return process
                 process.kill()
         return None

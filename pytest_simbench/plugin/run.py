@@ -311,5 +311,7 @@ class Run:
 
     def close(self) -> None:
         """End what the run started."""
+        if "executor" in vars(self):
+            self.executor.close()
         self.displays.close()
         self.folder.close()

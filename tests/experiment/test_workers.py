@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import pytest
 
@@ -12,6 +13,7 @@ from pytest_simbench.client.errors import Where
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.experiment.workers import IdleWorkers
@@ -108,4 +110,30 @@ def test_closing_ends_them(case: Case) -> None:
     run(costly(case), idle)
     assert workers() - before
     idle.close()
+    assert not workers() - before
+
+
+@dataclass(frozen=True)
+class Sharing(Falling):
+    """Shorter than the start of a worker."""
+
+    shares_worker: ClassVar[bool] = True
+
+
+def test_tests_of_short_tasks_share_a_worker_of_any_engine(case: Case) -> None:
+    executor = LocalExecutor()
+
+    def reused(case: Case, task: Falling) -> bool:
+        record, error = executor.repetition(Experiment(case, task), 1).run()
+        executor.end_test()
+        assert (record.status, error) == ("ok", None)
+        return record.reused_worker
+
+    before = workers()
+    assert [reused(case, Sharing()) for _ in range(3)] == [False, True, True]
+    assert not reused(replace(case, fresh=True), Sharing())
+    assert not reused(replace(case, environment={"OTHER": "1"}), Sharing())
+    assert not reused(case, Falling())
+    assert not reused(case, Sharing())
+    executor.close()
     assert not workers() - before
