@@ -1,0 +1,90 @@
+"""Laws: cases whose right answer is known, by which a simulator can be wrong all by itself."""
+
+from pytest_simbench.laws.base import LAW, Law, Reading
+from pytest_simbench.laws.contact import (
+    CollisionMomentum,
+    DeadCollision,
+    DeadLanding,
+    HeavyOnTop,
+    LandingTime,
+    Overhang,
+    Pivot,
+    RestDepth,
+    TippingEdge,
+    TippingSlope,
+    Tower,
+)
+from pytest_simbench.laws.free import (
+    FallSpeed,
+    FreeFall,
+    FreeTop,
+    ObliqueGravity,
+    Projectile,
+    Spin,
+    TumbleEnergy,
+    TumbleMomentum,
+)
+from pytest_simbench.laws.friction import (
+    Belt,
+    Carried,
+    Creep,
+    Glide,
+    SlideDiagonal,
+    SlideStraight,
+    SlideX,
+    SlideY,
+    StickAngle,
+    StickAngleAcross,
+    StickAngleDiagonal,
+    StoppingDistance,
+    StoppingDistanceDiagonal,
+)
+from pytest_simbench.laws.hands import (
+    GripHolds,
+    GripSlips,
+    GripSlipsDiagonally,
+    PushForce,
+    PushStraight,
+    PushTips,
+)
+from pytest_simbench.laws.joints import (
+    CompoundPendulum,
+    DoublePendulum,
+    DoublePendulumEnergy,
+    EffortLimit,
+    FeedForward,
+    PendulumEnergy,
+    PendulumPeriod,
+    Sag,
+    SphericalPendulum,
+    SpringAndDamper,
+    StepResponse,
+    SwingingSlider,
+    Tracking,
+)
+from pytest_simbench.laws.rolling import (
+    FreeCylinder,
+    RollingCylinder,
+    RollingSphere,
+    SlipToRoll,
+    SpinToRoll,
+)
+
+LAWS: tuple[Law, ...] = (
+    FreeFall(), FallSpeed(), ObliqueGravity(), Projectile(), Spin(), FreeTop(), FreeCylinder(),
+    TumbleEnergy(), TumbleMomentum(),
+    LandingTime(), DeadLanding(), DeadCollision(), CollisionMomentum(),
+    StickAngle(), StickAngleAcross(), StickAngleDiagonal(), Creep(), Carried(),
+    SlideX(), SlideY(), SlideDiagonal(), SlideStraight(), StoppingDistance(),
+    StoppingDistanceDiagonal(), Glide(), Belt(),
+    Pivot(), RollingSphere(), RollingCylinder(), SlipToRoll(), SpinToRoll(),
+    RestDepth(), Tower(), HeavyOnTop(), Overhang(), TippingEdge(), TippingSlope(),
+    GripHolds(), GripSlips(), GripSlipsDiagonally(),
+    PendulumPeriod(), CompoundPendulum(), PendulumEnergy(), DoublePendulum(),
+    DoublePendulumEnergy(), SwingingSlider(), SphericalPendulum(), StepResponse(),
+    SpringAndDamper(), EffortLimit(), Tracking(), Sag(), FeedForward(),
+    PushForce(), PushStraight(), PushTips(),
+)  # fmt: skip
+"""All of them, by phenomenon."""
+
+__all__ = ["LAW", "LAWS", "Law", "Reading"]

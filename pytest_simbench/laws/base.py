@@ -1,0 +1,195 @@
+"""What a law is: a case whose right answer is known in closed form, and how far off an engine may
+be.
+
+The tolerance of a law never looks at what an engine does. It is what an integrator of the first
+order may do at the step that was used, and the single rule is: *late by one step*. A quantity may
+be off by as much as it changes within a step; one that is integrated from a rate, by what the rate
+is off, over the time that it is off (Hairer, Norsett, Wanner, Solving Ordinary Differential
+Equations I, II.3: the global error of a method of order 1 is the step times what the solution's
+second derivative sums up to). An equilibrium is kept exactly by every consistent method; what is
+allowed is what gravity moves a body by within one step, g dt^2 (`stillness`). To all of it rounding
+is added, as single precision may collect it (`rounding`). How each law applies that stands in its
+docstring."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pytest_simbench.client.world import Motion, World
+from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task
+from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.tasks.phenomena import PHENOMENON
+
+GRAVITY = 9.80665
+"""[m/s^2] (ISO 80000-3)."""
+
+LAW = "law"
+"""Key of a record's details that holds what was read, see `Law.perform`."""
+
+
+def rounding(scale: float, steps: int) -> float:
+    """What single precision may add up to in so many steps on a number of that size: half of the
+    last digit, 2^-24 (IEEE 754), in each of the eight operations that a step is taken to have."""
+    return scale * steps * 8 * 2.0**-24
+
+
+def stillness(dt: float, scale: float, contacts: int = 1) -> float:
+    """By what a body in equilibrium may be off its place [m]: what gravity moves it by in one step,
+    for each contact that it rests on, and the rounding of one step. Of more steps it does not add
+    up: an equilibrium is restored.
+
+    Args:
+        dt: the time step [s].
+        scale: of its coordinates [m].
+        contacts: that it rests on.
+    """
+    return contacts * GRAVITY * dt**2 + rounding(scale, 1)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What an engine did, and what is right, in the law's unit.
+
+    Attributes:
+        value: measured.
+        exact: by the law.
+        tolerance: by the step; above 0.
+
+    Raises:
+        ValueError: a number that is none, or a tolerance of 0.
+    """
+
+    value: float
+    exact: float
+    tolerance: float
+
+    def __post_init__(self) -> None:
+        if not all(map(math.isfinite, (self.value, self.exact))) or not self.tolerance > 0:
+            raise ValueError(f"nothing can be read from {self}")
+
+    @property
+    def error(self) -> float:
+        return abs(self.value - self.exact)
+
+    @property
+    def ratio(self) -> float:
+        """Error over tolerance; at most 1 where the law is kept."""
+        return self.error / self.tolerance
+
+
+class Law(Task):
+    """One law. Subclasses are frozen dataclasses; formula, source and tolerance in the docstring.
+
+    A law draws nothing: seed and jitter do not matter, and one repetition is enough of an engine
+    that is deterministic.
+
+    Attributes:
+        phenomenon: one of `tasks.phenomena.PHENOMENA`.
+        quantity: what is measured, for instance "height fallen".
+        unit: of it.
+    """
+
+    study_timeout: ClassVar[float] = 300.0
+    references: ClassVar[Mapping[str, float]] = {"error": 0.0, "ratio": 0.0}
+    shares_worker: ClassVar[bool] = True
+
+    phenomenon: ClassVar[str]
+    quantity: ClassVar[str]
+    unit: ClassVar[str]
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]:
+        return (
+            Metric("error", "error", self.unit, "lower", least=0.0, resolution=0.0,
+                   doc=f"of the {self.quantity}, from what the law says"),
+            Metric("ratio", "error/tolerance", "", "lower", least=0.0,
+                   doc="above 1 the error is more than the time step explains"),
+        )  # fmt: skip
+
+    @abstractmethod
+    def build(self) -> Scene:
+        """The scene."""
+
+    @abstractmethod
+    def measure(self, world: World) -> Reading:
+        """Let time pass in a freshly loaded world, and read."""
+
+    def parameters(self) -> dict[str, Any]:
+        """With the phenomenon, so that a repetition that failed says of which one it was."""
+        return {**super().parameters(), PHENOMENON: self.phenomenon}
+
+    def scene(self, seed: int, jitter: Jitter) -> Scene:
+        return self.build()
+
+    def perform(self, world: World, seed: int, count: Count) -> Outcome:
+        world.mark("start")
+        with world.phase("measure"):
+            found = self.measure(world)
+        world.mark("end")
+        told: dict[str, Any] = {
+            "phenomenon": self.phenomenon,
+            "quantity": self.quantity,
+            "unit": self.unit,
+            **vars(found),
+        }
+        return Outcome({"error": found.error, "ratio": found.ratio}, {LAW: told})
+
+
+@dataclass(frozen=True)
+class Watched:
+    """A motion sampled at every step since the world was loaded.
+
+    Attributes:
+        dt: the time step [s].
+        t: of each sample [s], from dt on, (n,).
+        joints: positions and velocities, (n, 2, n_joints).
+        bodies: rows as `World.bodies`, (n, n_free, 13).
+    """
+
+    dt: float
+    t: FloatArray
+    joints: FloatArray
+    bodies: FloatArray
+
+    @property
+    def steps(self) -> int:
+        return len(self.t)
+
+    def at(self, time: float, values: FloatArray) -> Any:
+        """One of the columns at a time [s], linear between samples."""
+        flat = values.reshape(len(self.t), -1)
+        found = np.array([np.interp(time, self.t, column) for column in flat.T])
+        return found[0] if values.ndim == 1 else found.reshape(values.shape[1:])
+
+    def crossings(self, values: FloatArray, level: float = 0.0) -> FloatArray:
+        """The times at which (n,) values cross a level upwards, linear between samples [s]."""
+        below = values - level
+        k = np.flatnonzero((below[:-1] < 0) & (below[1:] >= 0))
+        share = -below[k] / (below[k + 1] - below[k])
+        return np.asarray(self.t[k] + share * (self.t[k + 1] - self.t[k]))
+
+
+def watch(world: World, duration: float) -> Watched:
+    """Let `duration` [s] pass in a world that was just loaded, and see every step of it.
+
+    Raises:
+        ValueError: the engine told no step.
+    """
+    motion = world.wait(duration, log_period=0.0)
+    if motion is None or not len(motion):
+        raise ValueError("a motion was asked for step by step, and none came back")
+    return watched(motion)
+
+
+def watched(motion: Motion) -> Watched:
+    """The same of a motion that was logged at every step."""
+    first = float(motion.time[0])
+    dt = float(motion.time[1]) - first if len(motion) > 1 else first
+    return Watched(dt, motion.time, motion.joints, motion.bodies)

@@ -1,0 +1,296 @@
+"""Laws of bodies that rest on each other, and of impacts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from pytest_simbench.client.world import World
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, stillness, watch
+from pytest_simbench.laws.friction import BETWEEN, SHARES, WEDGE, boundary, slope_pose
+from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Vector3, rotation_matrix
+
+EDGE = 0.1
+CUBE: Vector3 = (EDGE,) * 3
+
+
+class _Stack(Law):
+    """Cubes upon each other; how far the top one is from its place."""
+
+    phenomenon = "stacking"
+    quantity: ClassVar[str] = "way of the top cube"
+    unit: ClassVar[str] = "m"
+
+    masses: ClassVar[tuple[float, ...]]
+    overhangs: ClassVar[tuple[float, ...]] = ()
+    seconds: float = 1.0
+
+    def build(self) -> Scene:
+        aside = (0.0, *self.overhangs, *(0.0,) * len(self.masses))
+        bodies = [
+            Box(f"cube {k}", CUBE, Pose.at(sum(aside[: k + 1]), 0.0, EDGE * (k + 0.5)), mass)
+            for k, mass in enumerate(self.masses)
+        ]
+        return Scene(self.name, tuple(bodies))
+
+    def measure(self, world: World) -> Reading:
+        start = world.bodies[-1, :3].copy()
+        seen = watch(world, self.seconds)
+        off = float(np.linalg.norm(seen.bodies[-1, -1, :3] - start))
+        n = len(self.masses)
+        return Reading(off, 0.0, stillness(seen.dt, n * EDGE, n))
+
+
+@dataclass(frozen=True)
+class RestDepth(_Stack):
+    """A cube put on the ground stays there: it neither sinks nor moves aside. Tolerance: an
+    equilibrium, g dt^2."""
+
+    name = "rest_depth"
+    masses: ClassVar[tuple[float, ...]] = (1.0,)
+
+    seconds: float = 1.0
+
+
+@dataclass(frozen=True)
+class Tower(_Stack):
+    """A tower of five equal cubes stands. Tolerance: g dt^2 for each contact."""
+
+    name = "tower"
+    masses: ClassVar[tuple[float, ...]] = (1.0,) * 5
+
+    seconds: float = 1.0
+
+
+@dataclass(frozen=True)
+class HeavyOnTop(_Stack):
+    """Three cubes of 1 kg carry one of 100 kg: masses do not matter to statics. Tolerance as of
+    `Tower`. Solvers that iterate converge the slower, the larger the ratio of masses."""
+
+    name = "heavy_on_top"
+    masses: ClassVar[tuple[float, ...]] = (1.0, 1.0, 1.0, 100.0)
+
+    seconds: float = 1.0
+
+
+@dataclass(frozen=True)
+class Overhang(_Stack):
+    """Four cubes, each shifted on the one below by 0.9 of what statics allows, L / 2 (1, 1/2, 1/3)
+    from the top (Coffin 1923; Paterson, Zwick, Overhang, 2009): the stack stands. Tolerance as of
+    `Tower`."""
+
+    name = "overhang"
+    masses: ClassVar[tuple[float, ...]] = (1.0,) * 4
+    overhangs: ClassVar[tuple[float, ...]] = tuple(0.9 * EDGE / 2 / k for k in (3, 2, 1))
+
+    seconds: float = 1.0
+
+
+@dataclass(frozen=True)
+class TippingEdge(Law):
+    """A cube that lies over an edge tips when its centre is beyond it: six cubes, whose overhang is
+    0.92 to 1.08 of half their length. One has tipped that is turned by 0.05 rad. Tolerance: half of
+    the gap between those on either side, 0.02 of it; no step."""
+
+    name = "tipping_edge"
+    phenomenon = "stacking"
+    quantity: ClassVar[str] = "largest overhang that stands"
+    unit: ClassVar[str] = "m"
+
+    seconds: float = 0.8
+
+    def build(self) -> Scene:
+        bodies = []
+        for k, share in enumerate(SHARES):
+            y = 0.5 * (k - 2.5)
+            bodies.append(Box(f"table {k}", (0.3, 0.3, 0.5), Pose.at(0.0, y, 0.25)))
+            place = Pose.at(0.15 + (share - 1) * EDGE / 2, y, 0.5 + EDGE / 2)
+            bodies.append(Box(f"cube {k}", CUBE, place, 1.0))
+        return Scene(self.name, tuple(bodies))
+
+    def measure(self, world: World) -> Reading:
+        world.wait(self.seconds)
+        turned = [tilt(row) > 0.05 for row in world.bodies]
+        found = boundary([share * EDGE / 2 for share in SHARES], turned)
+        return Reading(found, EDGE / 2, BETWEEN * EDGE / 2)
+
+
+@dataclass(frozen=True)
+class TippingSlope(Law):
+    """A tall block on a slope tips, and does not slide, when the slope's tangent is above its width
+    over its height, and mu is more than that: six slopes. Turned by 0.05 rad it has tipped.
+    Tolerance: half of the gap between the slopes on either side; no step."""
+
+    name = "tipping_slope"
+    phenomenon = "stacking"
+    quantity: ClassVar[str] = "tangent of the steepest slope that holds"
+    unit: ClassVar[str] = ""
+
+    size: Vector3 = (0.1, 0.1, 0.25)
+    seconds: float = 0.8
+
+    def build(self) -> Scene:
+        critical, bodies = self.size[0] / self.size[2], []
+        for k, share in enumerate(SHARES):
+            turn = slope_pose(share * critical, 0.0)
+            place = Pose((0.0, 0.5 * (k - 2.5), 1.0), turn.quaternion)
+            on_top = place * Pose.at(0.0, 0.0, (WEDGE[2] + self.size[2]) / 2)
+            bodies.append(Box(f"slope {k}", WEDGE, place))
+            bodies.append(Box(f"block {k}", self.size, on_top, 1.0))
+        return Scene(self.name, tuple(bodies))
+
+    def measure(self, world: World) -> Reading:
+        critical = self.size[0] / self.size[2]
+        before = [rotation_matrix(row[3:7]) for row in world.bodies]
+        world.wait(self.seconds)
+        turned = []
+        for start, row in zip(before, world.bodies, strict=True):
+            up = float(start[:, 2] @ rotation_matrix(row[3:7])[:, 2])
+            turned.append(math.acos(min(1.0, up)) > 0.05)
+        found = boundary([share * critical for share in SHARES], turned)
+        return Reading(found, critical, BETWEEN * critical)
+
+
+@dataclass(frozen=True)
+class Pivot(Law):
+    """A plank that stands on an edge, leaning, turns about that edge: (I + m r^2) x'' = m g r cos
+    x, with x the angle of its centre above the edge; friction 1 holds the edge. Against DOP853.
+    Tolerance: late by one step and a rate late by one step all the time: |v| dt + |a| t dt."""
+
+    name = "pivot"
+    phenomenon = "rolling"
+    quantity: ClassVar[str] = "angle turned"
+    unit: ClassVar[str] = "rad"
+
+    size: Vector3 = (0.4, 0.2, 0.1)
+    lean: float = math.radians(60.0)
+    seconds: float = 0.3
+
+    def build(self) -> Scene:
+        half = self.lean / 2
+        turn = Pose(quaternion=(math.cos(half), 0.0, -math.sin(half), 0.0))  # the far end up
+        corner = turn.rotation() @ [-self.size[0] / 2, 0.0, -self.size[2] / 2]
+        place = Pose((0.0, 0.0, float(-corner[2])), turn.quaternion)
+        return Scene(self.name, (Box("plank", self.size, place, 1.0),))
+
+    def exact(self, seconds: float) -> tuple[float, float, float]:
+        """Angle turned [rad], the largest rate [rad/s] and acceleration [rad/s^2]."""
+        length, _, height = self.size
+        radius = math.hypot(length, height) / 2
+        inertia = (length**2 + height**2) / 12 + radius**2
+        start = self.lean + math.atan2(height, length)
+
+        def fall(_: float, state: FloatArray) -> FloatArray:
+            return np.array([state[1], -GRAVITY * radius * math.cos(state[0]) / inertia])
+
+        begin = np.array([start, 0.0])
+        end = solve_ivp(fall, (0.0, seconds), begin, "DOP853", rtol=1e-10, atol=1e-12).y
+        return start - float(end[0, -1]), abs(float(end[1, -1])), GRAVITY * radius / inertia
+
+    def measure(self, world: World) -> Reading:
+        before = rotation_matrix(world.bodies[0, 3:7])
+        seen = watch(world, self.seconds)
+        t = float(seen.t[-1])
+        along = before[:, 0] @ rotation_matrix(seen.bodies[-1, 0, 3:7])[:, 0]
+        exact, rate, change = self.exact(t)
+        allowed = (rate + change * t) * seen.dt + rounding(1.0, seen.steps)
+        return Reading(math.acos(min(1.0, float(along))), exact, allowed)
+
+
+@dataclass(frozen=True)
+class LandingTime(Law):
+    """A cube let go at the height h lands after sqrt(2 h / g): its speed is the largest then.
+    Tolerance: late by one step, and read to one step."""
+
+    name = "landing_time"
+    phenomenon = "impact"
+    quantity: ClassVar[str] = "time of the landing"
+    unit: ClassVar[str] = "s"
+
+    height: float = 0.5
+
+    def build(self) -> Scene:
+        cube = Box("cube", CUBE, Pose.at(0.0, 0.0, EDGE / 2 + self.height), 1.0)
+        return Scene(self.name, (cube,))
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, 1.5 * math.sqrt(2 * self.height / GRAVITY))
+        found = float(seen.t[int(np.argmin(seen.bodies[:, 0, 9]))])
+        return Reading(found, math.sqrt(2 * self.height / GRAVITY), 2 * seen.dt)
+
+
+@dataclass(frozen=True)
+class DeadLanding(LandingTime):
+    """It does not rise again: e = 0 (Newton). Tolerance: the impact is late by one step, so that
+    it is pushed out of the ground by v dt."""
+
+    name = "dead_landing"
+    quantity: ClassVar[str] = "rise after the landing"
+    unit: ClassVar[str] = "m"
+
+    def measure(self, world: World) -> Reading:
+        fall = math.sqrt(2 * self.height / GRAVITY)
+        seen = watch(world, 2 * fall)
+        landed = seen.bodies[seen.t > 1.1 * fall, 0, 2] - EDGE / 2
+        rise = max(0.0, float(landed.max()))
+        return Reading(rise, 0.0, GRAVITY * fall * seen.dt + rounding(1.0, seen.steps))
+
+
+class _Collision(Law):
+    """A cube hits another one that is at rest, face on face, on ground without friction."""
+
+    phenomenon = "impact"
+    unit: ClassVar[str] = "m/s"
+
+    speed: float
+    masses: ClassVar[tuple[float, float]] = (1.0, 2.0)
+
+    def build(self) -> Scene:
+        at = Pose.at(0.0, 0.0, EDGE / 2)
+        velocity = (self.speed, 0.0, 0.0)
+        one = Box("one", CUBE, at, self.masses[0], 0.0, linear_velocity=velocity)
+        two = Box("two", CUBE, at.translated(EDGE + 0.1), self.masses[1], 0.0)
+        return Scene(self.name, (one, two), ground_friction=0.0)
+
+
+@dataclass(frozen=True)
+class DeadCollision(_Collision):
+    """With e = 0 both go on with the common speed m1 v / (m1 + m2). Tolerance: what gravity changes
+    within one step, g dt: an impact is solved at once, whatever the step."""
+
+    name = "dead_collision"
+    quantity: ClassVar[str] = "speed of the cube that was hit"
+
+    speed: float = 1.0
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, 0.3)
+        exact = self.speed * self.masses[0] / sum(self.masses)
+        allowed = GRAVITY * seen.dt + rounding(1.0, seen.steps)
+        return Reading(float(seen.bodies[-1, 1, 7]), exact, allowed)
+
+
+@dataclass(frozen=True)
+class CollisionMomentum(_Collision):
+    """Whatever else happens, momentum stays: (m1 v1 + m2 v2) / (m1 + m2) is what it was. Tolerance
+    as of `DeadCollision`."""
+
+    name = "collision_momentum"
+    quantity: ClassVar[str] = "speed of the common centre of mass"
+
+    speed: float = 1.0
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, 0.3)
+        exact = self.speed * self.masses[0] / sum(self.masses)
+        found = float(seen.bodies[-1, :, 7] @ self.masses) / sum(self.masses)
+        return Reading(found, exact, rounding(2.0, seen.steps))
+
+
+def tilt(row: FloatArray) -> float:
+    """Of a body's upper face from the horizontal [rad]."""
+    return math.acos(min(1.0, max(-1.0, float(rotation_matrix(row[3:7])[2, 2]))))

@@ -1,0 +1,244 @@
+"""Laws of grasping, with the Panda's hand, and of pushing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from pytest_simbench.client.world import World
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, stillness
+from pytest_simbench.laws.contact import tilt
+from pytest_simbench.laws.friction import BETWEEN, SHARES, boundary
+from pytest_simbench.laws.joints import STRONG, follow
+from pytest_simbench.laws.mechanisms import Part, mechanism
+from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.robot.panda import panda
+from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene, Trajectory, Vector3
+
+HELD = 0.05
+"""Edge of what is held [m]."""
+
+GAP = 2e-4
+"""Between it and each finger at the start [m]."""
+
+SQUEEZE = 5.0
+"""Of each finger [N]."""
+
+
+class _Grip(Law):
+    """The Panda holds a cube between its fingers, whose friction is 1; what of it two fingers can
+    carry, 2 mu F, is `1 / load` of its weight."""
+
+    phenomenon = "grasping"
+
+    load: float
+    aside: ClassVar[float] = 0.0
+    seconds: ClassVar[float] = 0.3
+
+    def robot(self) -> Robot:
+        found = panda()
+        joints = tuple(
+            replace(j, effort_limit=SQUEEZE, initial_position=HELD / 2 + GAP)
+            if j.name in found.gripper.joints
+            else j
+            for j in found.joints
+        )
+        hand = replace(found.gripper, squeeze=SQUEEZE)
+        return replace(found, joints=joints, gripper=hand)
+
+    def pull(self) -> Vector3:
+        """Gravity [m/s^2]: down, turned by `aside` [rad] within the plane of the fingers."""
+        tool = RobotModel(self.robot()).tool_pose(self.robot().column("initial_position"))
+        x, _, z = tool.rotation().T
+        a, b, c = (math.cos(self.aside) * z + math.sin(self.aside) * x) * GRAVITY
+        return (float(a), float(b), float(c))
+
+    def build(self) -> Scene:
+        robot = self.robot()
+        tool = RobotModel(robot).tool_pose(robot.column("initial_position"))
+        mass = self.load * 2 * robot.friction * SQUEEZE / GRAVITY
+        cube = Box("cube", (HELD,) * 3, tool, mass)
+        return Scene(self.name, (cube,), robot, gravity=self.pull())
+
+    def close(self) -> Trajectory:
+        """Told all the time: the arm holds its place, its weight compensated, the fingers close."""
+        robot = self.robot()
+        goal = robot.column("initial_position")
+        still = np.zeros((1, len(goal)))
+        effort = RobotModel(robot).inverse_dynamics(
+            np.array(self.pull()), goal[None], still, still
+        )[0]
+        goal[robot.finger_indices] = robot.gripper.closed
+        effort[robot.finger_indices] = 0.0
+        return Trajectory.holding(self.seconds, goal, effort)
+
+
+@dataclass(frozen=True)
+class GripSlips(_Grip):
+    """Two fingers that press with F carry 2 mu F and no more (Coulomb): a cube of 1.15 times that
+    weight slips down with a = g - 2 mu F / m. Tolerance: its speed is late by one step at either
+    end of the time T over which it is taken: 2 g dt / T."""
+
+    name = "grip_slips"
+    quantity: ClassVar[str] = "acceleration"
+    unit: ClassVar[str] = "m/s^2"
+
+    load: float = 1.15
+
+    def measure(self, world: World) -> Reading:
+        seen = follow(world, self.close())
+        along = seen.bodies[:, 0, 7:10] @ np.array(self.pull()) / GRAVITY
+        used = (seen.t > 0.06) & (seen.t < 0.22)
+        found = float(np.polyfit(seen.t[used], along[used], 1)[0])
+        allowed = 2 * GRAVITY * seen.dt / 0.16 + rounding(1.0, seen.steps)
+        return Reading(found, GRAVITY * (1 - 1 / self.load), allowed)
+
+
+@dataclass(frozen=True)
+class GripSlipsDiagonally(GripSlips):
+    """The same when the load pulls at 45 degrees, within the plane of the fingers: a friction
+    pyramid holds up to sqrt(2) times as much there."""
+
+    name = "grip_slips_diagonally"
+    aside: ClassVar[float] = math.pi / 4
+
+
+@dataclass(frozen=True)
+class GripHolds(_Grip):
+    """A cube of 0.8 times what the fingers carry stays where it is in the hand, from 0.15 s on.
+    Tolerance: an equilibrium, g dt^2."""
+
+    name = "grip_holds"
+    quantity: ClassVar[str] = "way in the hand in 0.35 s"
+    unit: ClassVar[str] = "m"
+    seconds: ClassVar[float] = 0.5
+
+    load: float = 0.8
+
+    def measure(self, world: World) -> Reading:
+        seen = follow(world, self.close())
+        model = RobotModel(self.robot())
+
+        def in_hand(k: int) -> FloatArray:
+            tool = model.tool_pose(seen.joints[k, 0, : model.arm])
+            place = Pose.from_array(seen.bodies[k, 0, :7])
+            return np.array((tool.inverse() * place).position)
+
+        way = float(np.linalg.norm(in_hand(-1) - in_hand(int(np.argmax(seen.t > 0.15)))))
+        return Reading(way, 0.0, stillness(seen.dt, 0.5))
+
+
+BLOCK: Vector3 = (0.1, 0.1, 0.1)
+BAR: Vector3 = (0.05, 0.3, 0.05)
+
+
+class _Push(Law):
+    """A bar on a slide pushes a block over the ground."""
+
+    phenomenon = "pushing"
+    unit: ClassVar[str] = "m"
+
+    friction: ClassVar[float] = 0.4
+    speed: ClassVar[float] = 0.05
+    stiffness: ClassVar[float] = 500.0
+    seconds: float
+
+    def build(self) -> Scene:
+        bar = Part(
+            "bar", (1.0, 0.0, 0.0), mass=1.0, inertia=(0.01,) * 3, slides=True, shape=BAR,
+            stiffness=self.stiffness, damping=2 * math.sqrt(2 * self.stiffness), effort=STRONG,
+        )  # fmt: skip
+        at = Pose.at(0.0, 0.0, BLOCK[2] / 2)
+        robot = mechanism("pusher", bar, base=at, friction=self.friction)
+        block = Box("block", BLOCK, at.translated((BAR[0] + BLOCK[0]) / 2), 1.0, self.friction)
+        return Scene(self.name, (block,), robot, ground_friction=self.friction)
+
+    def push(self) -> Trajectory:
+        time = np.array([0.0, self.seconds])
+        speed = np.full((2, 1), self.speed)
+        return Trajectory(self.seconds, self.speed * time[:, None], speed, 0 * speed)
+
+
+@dataclass(frozen=True)
+class PushForce(_Push):
+    """The bar hangs on a spring that pulls it on: it lags behind by mu m g / k while it pushes a
+    block steadily (Coulomb, Hooke). Tolerance: what gravity moves within one step, g dt^2, and the
+    bar late by two steps, as of `Tracking`: 2 v dt."""
+
+    name = "push_force"
+    quantity: ClassVar[str] = "lag of the bar"
+
+    seconds: float = 1.0
+
+    def measure(self, world: World) -> Reading:
+        seen = follow(world, self.push())
+        lag = self.speed * float(seen.t[-1]) - float(seen.joints[-1, 0, 0])
+        exact = self.friction * GRAVITY / self.stiffness
+        allowed = 2 * self.speed * seen.dt + stillness(seen.dt, 0.1)
+        return Reading(lag, exact, allowed)
+
+
+@dataclass(frozen=True)
+class PushStraight(_Push):
+    """A block that is pushed in its middle stays at the bar: it neither runs ahead, nor turns, nor
+    is it entered. Tolerance as of `PushForce`."""
+
+    name = "push_straight"
+    quantity: ClassVar[str] = "distance from its place at the bar"
+
+    seconds: float = 1.0
+
+    def measure(self, world: World) -> Reading:
+        seen = follow(world, self.push())
+        place = np.array([float(seen.joints[-1, 0, 0]) + (BAR[0] + BLOCK[0]) / 2, 0.0])
+        off = float(np.linalg.norm(seen.bodies[-1, 0, :2] - place))
+        allowed = 2 * self.speed * seen.dt + stillness(seen.dt, 0.1)
+        return Reading(off, 0.0, allowed)
+
+
+@dataclass(frozen=True)
+class PushTips(Law):
+    """A block that is pushed at the height h slides when its depth is more than 2 mu h / (1 + mu^2)
+    and tips when it is less, all friction alike: the ground pulls with F = mu N, the bar holds its
+    back down with mu F, and torques are taken about its front edge. Six depths, pushed by one bar.
+    Turned by 0.05 rad it has tipped. Tolerance: half of the gap between the depths on either side;
+    no step."""
+
+    name = "push_tips"
+    phenomenon = "pushing"
+    quantity: ClassVar[str] = "depth at which it tips"
+    unit: ClassVar[str] = "m"
+
+    friction: float = 0.5
+    height: float = 0.2
+    seconds: float = 0.6
+
+    @property
+    def critical(self) -> float:
+        """Depth [m]."""
+        return 2 * self.friction * self.height / (1 + self.friction**2)
+
+    def build(self) -> Scene:
+        bar = Part(
+            "bar", (1.0, 0.0, 0.0), mass=20.0, inertia=(5.0,) * 3, slides=True,
+            shape=(0.05, 1.2, 0.004), stiffness=1e5, damping=4e3, effort=STRONG,
+        )  # fmt: skip
+        at = Pose.at(0.0, 0.0, self.height)
+        robot = mechanism("ram", bar, base=at, friction=self.friction)
+        blocks = []
+        for k, share in enumerate(SHARES):
+            depth = share * self.critical
+            place = Pose.at(0.025 + depth / 2, 0.2 * (k - 2.5), 0.15)
+            blocks.append(Box(f"block {k}", (depth, 0.1, 0.3), place, 0.5, self.friction))
+        return Scene(self.name, tuple(blocks), robot, ground_friction=self.friction)
+
+    def measure(self, world: World) -> Reading:
+        time = np.array([[0.0], [self.seconds]])
+        speed = np.full((2, 1), 0.1)
+        follow(world, Trajectory(self.seconds, 0.1 * time, speed, 0 * speed))
+        stands = [tilt(row) < 0.05 for row in world.bodies]
+        found = boundary([share * self.critical for share in SHARES], stands)
+        return Reading(found, self.critical, BETWEEN * self.critical)

@@ -1,0 +1,433 @@
+"""Laws of joints that move freely, and of drives."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from scipy.special import ellipk
+
+from pytest_simbench.client.world import World
+from pytest_simbench.laws.base import (
+    GRAVITY,
+    Law,
+    Reading,
+    Watched,
+    rounding,
+    stillness,
+    watch,
+    watched,
+)
+from pytest_simbench.laws.mechanisms import INERTIA_OF_A_POINT, Part, mechanism
+from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Scene, Trajectory, Vector3
+
+Y: Vector3 = (0.0, 1.0, 0.0)
+STRONG = 1e4
+"""Effort limit of a drive that is to obey its law [N m]."""
+
+
+def follow(world: World, rows: Trajectory) -> Watched:
+    """Have the drives follow, and see every step.
+
+    Raises:
+        ValueError: the engine told no step.
+    """
+    motion = world.follow(rows, log_period=0.0)
+    if motion is None or not len(motion):
+        raise ValueError("a motion was asked for step by step, and none came back")
+    return watched(motion)
+
+
+def held(position: float, seconds: float, velocity: float = 0.0, effort: float = 0.0) -> Trajectory:
+    """One joint told to be at `position` [rad or m] at the end, moving there at `velocity`."""
+    ends = np.array([[position - velocity * seconds], [position]])
+    return Trajectory(seconds, ends, np.full((2, 1), velocity), np.full((2, 1), effort))
+
+
+class _Passive(Law):
+    """A mechanism without drives that falls under gravity."""
+
+    phenomenon = "joints"
+    gravity: ClassVar[Vector3] = STANDARD_GRAVITY
+
+    seconds: float
+
+    def parts(self) -> tuple[Part, ...]:
+        raise NotImplementedError
+
+    def build(self) -> Scene:
+        return Scene(self.name, robot=mechanism(self.name, *self.parts()), gravity=self.gravity)
+
+    def exact(self, seconds: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Joint positions, velocities and accelerations of the equations of motion M(q) q'' +
+        h(q, q') = 0, by Pinocchio's articulated-body algorithm and DOP853 with a relative
+        tolerance of 1e-10, (n, n_joints) each."""
+        import pinocchio as pin
+
+        robot = self.build().robot
+        assert robot is not None
+        model, n = _model(robot, self.gravity), len(robot.joints)
+        data, no_effort = model.createData(), np.zeros(n)
+
+        def change(_: float, state: FloatArray) -> FloatArray:
+            q, v = state[:n], state[n:]
+            return np.concatenate([v, pin.aba(model, data, q, v, no_effort)])
+
+        start = np.concatenate([robot.column("initial_position"), np.zeros(n)])
+        times = np.linspace(0.0, seconds, 200)
+        found = solve_ivp(
+            change, (0.0, seconds), start, "DOP853", times, rtol=1e-10, atol=1e-12
+        ).y.T
+        bent = np.array([change(0.0, state)[n:] for state in found])
+        return found[:, :n], found[:, n:], bent
+
+    def energy(self, seen: Watched) -> tuple[FloatArray, FloatArray]:
+        """Kinetic and potential energy at each sample [J], (n,) each."""
+        import pinocchio as pin
+
+        robot = self.build().robot
+        assert robot is not None
+        model = _model(robot, self.gravity)
+        data = model.createData()
+        kinetic = [pin.computeKineticEnergy(model, data, q, v) for q, v in seen.joints]
+        potential = [pin.computePotentialEnergy(model, data, q) for q, _ in seen.joints]
+        return np.array(kinetic), np.array(potential)
+
+
+def _model(robot: Robot, gravity: Vector3):  # type: ignore[no-untyped-def]  # Pinocchio has no types
+    from pytest_simbench.robot.model import RobotModel
+
+    model = RobotModel(robot).pin
+    model.gravity.linear = np.array(gravity)
+    return model
+
+
+class _Motion(_Passive):
+    """Where the joints are after a time, by the equations of motion."""
+
+    quantity: ClassVar[str] = "largest distance of a joint from its place"
+    unit: ClassVar[str] = "rad or m"
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        t = float(seen.t[-1])
+        q, v, a = self.exact(t)
+        off = float(np.abs(seen.joints[-1, 0] - q[-1]).max())
+        late = float(np.abs(v).max()) + float(np.abs(a).max(axis=1).mean()) * t
+        return Reading(off, 0.0, late * seen.dt + rounding(float(np.abs(q).max()), seen.steps))
+
+
+class _Energy(_Passive):
+    """The energy stays what it was."""
+
+    quantity: ClassVar[str] = "largest change of the energy"
+    unit: ClassVar[str] = "J"
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        kinetic, potential = self.energy(seen)
+        robot = self.build().robot
+        assert robot is not None
+        start = robot.column("initial_position")[None, None]
+        rest = np.concatenate([start, np.zeros_like(start)], axis=1)
+        _, before = self.energy(Watched(seen.dt, seen.t[:1], rest, seen.bodies[:1]))
+        off = float(np.abs(kinetic + potential - before[0]).max())
+        scale = float(np.ptp(potential))
+        late = self.late(np.gradient(potential, seen.dt))
+        return Reading(off, 0.0, late * seen.dt + rounding(scale, seen.steps))
+
+    def late(self, power: FloatArray) -> float:
+        """By what the energy may be off for each second of a step [W], from the power of gravity at
+        each sample, (n,)."""
+        return float(np.abs(power).max())
+
+
+@dataclass(frozen=True)
+class PendulumPeriod(_Passive):
+    """A pendulum that is let go at the angle a swings with the period T = 4 sqrt(I / m g l)
+    K(sin^2(a / 2)), K the complete elliptic integral of the first kind (Landau, Lifshitz,
+    Mechanics, section 11). Tolerance: late by one step, at each end of the period."""
+
+    name = "pendulum_period"
+    quantity: ClassVar[str] = "period"
+    unit: ClassVar[str] = "s"
+
+    length: float = 0.5
+    angle: float = 2.0
+    seconds: float = 3.5
+
+    def parts(self) -> tuple[Part, ...]:
+        return (Part("swing", Y, centre=(0.0, 0.0, -self.length), start=self.angle),)
+
+    @property
+    def period(self) -> float:
+        inertia = self.length**2 + INERTIA_OF_A_POINT
+        slow = math.sqrt(inertia / (GRAVITY * self.length))
+        return 4 * slow * float(ellipk(math.sin(self.angle / 2) ** 2))
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        found = seen.crossings(seen.joints[:, 0, 0])
+        period = float(found[1] - found[0]) if len(found) > 1 else self.seconds
+        return Reading(period, self.period, 2 * seen.dt)
+
+
+@dataclass(frozen=True)
+class CompoundPendulum(PendulumPeriod):
+    """A heavy body on a hinge: its moment of inertia about its centre counts (Huygens, Steiner):
+    I = m l^2 + I_c. Tolerance as of `PendulumPeriod`."""
+
+    name = "compound_pendulum"
+
+    length: float = 0.2
+    angle: float = 0.5
+    seconds: float = 3.2
+    inertia: float = 0.05
+
+    def parts(self) -> tuple[Part, ...]:
+        moments = (self.inertia,) * 3
+        (part,) = super().parts()
+        return (Part("swing", Y, centre=part.centre, start=self.angle, inertia=moments),)
+
+    @property
+    def period(self) -> float:
+        slow = math.sqrt((self.length**2 + self.inertia) / (GRAVITY * self.length))
+        return 4 * slow * float(ellipk(math.sin(self.angle / 2) ** 2))
+
+
+@dataclass(frozen=True)
+class PendulumEnergy(_Energy):
+    """The energy of a pendulum that swings by 1.5 rad stays what it was. Tolerance: the potential
+    energy is late by one step against the kinetic one, P dt with P the largest power; a symplectic
+    method of the first order is off by half of that, and does not drift (Hairer, Lubich, Wanner,
+    Geometric Numerical Integration, IX.8)."""
+
+    name = "pendulum_energy"
+
+    seconds: float = 6.0
+
+    def parts(self) -> tuple[Part, ...]:
+        return (Part("swing", Y, centre=(0.0, 0.0, -0.1), start=1.5),)
+
+
+@dataclass(frozen=True)
+class DoublePendulum(_Motion):
+    """Two pendulums, one hung on the other (Lagrange), against the equations of motion. Tolerance:
+    late by one step, and a velocity that is late by one step all the time: |v| dt + |a| t dt."""
+
+    name = "double_pendulum"
+
+    seconds: float = 1.0
+
+    def parts(self) -> tuple[Part, ...]:
+        one = Part("one", Y, centre=(0.0, 0.0, -0.5), start=1.0)
+        two = Part("two", Y, (0.0, 0.0, -0.5), centre=(0.0, 0.0, -0.5), start=0.5)
+        return one, two
+
+
+@dataclass(frozen=True)
+class DoublePendulumEnergy(_Energy):
+    """The energy of a double pendulum stays what it was. Tolerance: the power is late by one step
+    all the time, the step times the sum of its changes. Its mass matrix changes with its position,
+    so that semi-implicit Euler is not symplectic, and the bound of `PendulumEnergy` does not
+    hold."""
+
+    name = "double_pendulum_energy"
+
+    seconds: float = 2.0
+
+    def parts(self) -> tuple[Part, ...]:
+        return DoublePendulum().parts()
+
+    def late(self, power: FloatArray) -> float:
+        return float(np.abs(np.diff(power)).sum())
+
+
+@dataclass(frozen=True)
+class SwingingSlider(_Motion):
+    """A mass slides without friction along a rod that swings: Coriolis force, centrifugal force and
+    gravity, r'' = r q'^2 + g cos q, (I + m r^2) q'' = -m g r sin q - 2 m r r' q'. Tolerance as of
+    `DoublePendulum`."""
+
+    name = "swinging_slider"
+
+    seconds: float = 0.6
+
+    def parts(self) -> tuple[Part, ...]:
+        rod = Part("rod", Y, inertia=(0.2, 0.2, 0.2), start=1.2)
+        return rod, Part("bead", (0.0, 0.0, -1.0), start=0.3, slides=True)
+
+
+@dataclass(frozen=True)
+class SphericalPendulum(_Motion):
+    """A bob on two crossed hinges that moves out of their planes: gyroscopic terms of three
+    dimensions, against the equations of motion. Tolerance as of `DoublePendulum`."""
+
+    name = "spherical_pendulum"
+    gravity: ClassVar[Vector3] = (3.0, 4.0, -8.0)
+
+    seconds: float = 1.0
+
+    def parts(self) -> tuple[Part, ...]:
+        bob = Part("across", Y, centre=(0.0, 0.1, -0.5), start=0.3, inertia=(0.02, 0.04, 0.03))
+        return Part("along", (1.0, 0.0, 0.0), start=0.8), bob
+
+
+class _Driven(Law):
+    """A wheel of 0.5 kg m^2 on a vertical axis, and its drive."""
+
+    phenomenon = "joints"
+    quantity: ClassVar[str] = "angle"
+    unit: ClassVar[str] = "rad"
+
+    inertia: ClassVar[float] = 0.5
+    seconds: float
+
+    def wheel(
+        self, stiffness: float, damping: float, start: float = 0.0, effort: float = STRONG
+    ) -> Scene:
+        """Its drive's stiffness [N m/rad], damping [N m s/rad] and effort limit [N m]."""
+        part = Part(
+            "wheel", (0.0, 0.0, 1.0), inertia=(self.inertia,) * 3, start=start,
+            stiffness=stiffness, damping=damping, effort=effort,
+        )  # fmt: skip
+        return Scene(self.name, robot=mechanism(self.name, part))
+
+
+@dataclass(frozen=True)
+class StepResponse(_Driven):
+    """A critically damped drive that is told to go from x0 to 0 is at x0 (1 + w t) exp(-w t), with
+    w^2 = k / I. Tolerance: |v| dt + |a| t dt at the largest, x0 w / e and x0 w^2."""
+
+    name = "step_response"
+
+    rate: float = 10.0
+    start: float = 0.5
+    seconds: float = 0.1
+
+    def build(self) -> Scene:
+        k, d = self.inertia * self.rate**2, 2 * self.inertia * self.rate
+        return self.wheel(k, d, self.start)
+
+    def measure(self, world: World) -> Reading:
+        seen = follow(world, held(0.0, self.seconds))
+        t = float(seen.t[-1])
+        x = self.rate * t
+        exact = self.start * (1 + x) * math.exp(-x)
+        late = self.start * self.rate * (1 / math.e + x)
+        allowed = late * seen.dt + rounding(self.start, seen.steps)
+        return Reading(float(seen.joints[-1, 0, 0]), exact, allowed)
+
+
+@dataclass(frozen=True)
+class SpringAndDamper(_Driven):
+    """A weakly damped one swings: x0 exp(-z w t) (cos(u t) + z w / u sin(u t)), u = w sqrt(1 -
+    z^2). Tolerance as of `StepResponse`, with |v| up to x0 w."""
+
+    name = "spring_damper"
+
+    rate: float = 10.0
+    damping: float = 0.1
+    start: float = 0.5
+    seconds: float = 0.6
+
+    def build(self) -> Scene:
+        d = 2 * self.damping * self.inertia * self.rate
+        return self.wheel(self.inertia * self.rate**2, d, self.start)
+
+    def measure(self, world: World) -> Reading:
+        seen = follow(world, held(0.0, self.seconds))
+        t, w, z = float(seen.t[-1]), self.rate, self.damping
+        u = w * math.sqrt(1 - z * z)
+        exact = self.start * math.exp(-z * w * t)
+        exact *= math.cos(u * t) + z * w / u * math.sin(u * t)
+        allowed = self.start * w * (1 + w * t) * seen.dt + rounding(self.start, seen.steps)
+        return Reading(float(seen.joints[-1, 0, 0]), exact, allowed)
+
+
+@dataclass(frozen=True)
+class EffortLimit(_Driven):
+    """A drive told to go far away pushes with its limit and no more: x = (F / I) t^2 / 2.
+    Tolerance: (F / I) t dt."""
+
+    name = "effort_limit"
+
+    effort: float = 2.0
+    seconds: float = 0.5
+
+    def build(self) -> Scene:
+        return self.wheel(2000.0, 20.0, effort=self.effort)
+
+    def measure(self, world: World) -> Reading:
+        seen = follow(world, held(5.0, self.seconds))
+        t, pull = float(seen.t[-1]), self.effort / self.inertia
+        allowed = pull * t * seen.dt + rounding(1.0, seen.steps)
+        return Reading(float(seen.joints[-1, 0, 0]), pull * t * t / 2, allowed)
+
+
+@dataclass(frozen=True)
+class Tracking(_Driven):
+    """A drive that is told position and velocity of a steady turn follows it: x = v t (1 - exp(-w
+    t)) from rest, critically damped. Tolerance: late by one step, and a set point of the end of
+    each step holds from its beginning on: 2 v dt."""
+
+    name = "tracking"
+
+    speed: float = 1.0
+    rate: float = 10.0
+    seconds: float = 1.0
+
+    def build(self) -> Scene:
+        return self.wheel(self.inertia * self.rate**2, 2 * self.inertia * self.rate)
+
+    def measure(self, world: World) -> Reading:
+        seen = follow(world, held(self.speed * self.seconds, self.seconds, self.speed))
+        t = float(seen.t[-1])
+        exact = self.speed * t * (1 - math.exp(-self.rate * t))
+        allowed = 2 * self.speed * seen.dt + rounding(1.0, seen.steps)
+        return Reading(float(seen.joints[-1, 0, 0]), exact, allowed)
+
+
+@dataclass(frozen=True)
+class Sag(Law):
+    """A level rod on a spring sags until k x = m g l cos x. Tolerance: what gravity turns it by
+    within one step, (g / l) dt^2, and rounding."""
+
+    name = "sag"
+    phenomenon = "joints"
+    quantity: ClassVar[str] = "angle"
+    unit: ClassVar[str] = "rad"
+
+    stiffness: float = 50.0
+    seconds: float = 2.0
+
+    def build(self) -> Scene:
+        part = Part(
+            "rod", Y, centre=(1.0, 0.0, 0.0), stiffness=self.stiffness,
+            damping=2 * math.sqrt(self.stiffness), effort=STRONG,
+        )  # fmt: skip
+        return Scene(self.name, robot=mechanism(self.name, part))
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        exact = brentq(lambda x: self.stiffness * x - GRAVITY * math.cos(x), 0.0, 1.5)
+        allowed = stillness(seen.dt, 1.0)
+        return Reading(float(seen.joints[-1, 0, 0]), float(exact), allowed)
+
+
+@dataclass(frozen=True)
+class FeedForward(Sag):
+    """The same rod is told the torque that gravity asks for, m g l: it stays level. Tolerance as
+    of `Sag`."""
+
+    name = "feed_forward"
+
+    seconds: float = 1.0
+
+    def measure(self, world: World) -> Reading:
+        seen = follow(world, held(0.0, self.seconds, effort=-GRAVITY))
+        return Reading(float(seen.joints[-1, 0, 0]), 0.0, stillness(seen.dt, 1.0))

@@ -1,0 +1,106 @@
+"""Small mechanisms of rods and sliders, as robots without a hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pytest_simbench.scene import Gripper, Joint, Pose, Robot, Vector3
+from pytest_simbench.simulator.robot_files import keep
+
+WIDEST = 6.0
+"""Limits of a hinge [rad]: less than a turn to each side, which every engine can hold."""
+
+FARTHEST = 10.0
+"""Limits of a slider [m]."""
+
+FREE = 1e-6
+"""Stiffness [N m/rad, N/m] and largest effort [N m, N] of a drive that leaves its joint free: less
+than a millionth of all that acts here. Of 0, engines that divide by a stiffness make no number, and
+others no drive; one whose drives are no springs needs the small effort."""
+
+INERTIA_OF_A_POINT = 1e-4
+"""Principal moments of a bob [kg m^2], m r^2 = 1 kg (1 cm)^2: engines refuse a point, which has
+none. The laws take it into account."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A link and the joint it hangs on.
+
+    Attributes:
+        name: of the joint; the link is `NAME link`.
+        axis: of the joint, in the frame of the part before it.
+        offset: of the joint, there [m].
+        centre: of mass, from the joint [m].
+        mass: [kg].
+        inertia: principal moments about the centre [kg m^2].
+        start: of the joint [rad or m].
+        slides: a prismatic joint; else a hinge.
+        stiffness, damping: of its drive, see `scene.Joint`; 0: the joint is free.
+        effort: of its drive, at most [N m or N].
+        shape: edges of a box about the centre of mass that collides [m]; None: nothing does.
+    """
+
+    name: str
+    axis: Vector3
+    offset: Vector3 = (0.0, 0.0, 0.0)
+    centre: Vector3 = (0.0, 0.0, 0.0)
+    mass: float = 1.0
+    inertia: Vector3 = (INERTIA_OF_A_POINT,) * 3
+    start: float = 0.0
+    slides: bool = False
+    stiffness: float = FREE
+    damping: float = 0.0
+    effort: float = FREE
+    shape: Vector3 | None = None
+
+    @property
+    def drive(self) -> Joint:
+        return Joint(self.name, self.stiffness, self.damping, self.effort, 0.0, self.start)
+
+
+def mechanism(name: str, *parts: Part, base: Pose | None = None, friction: float = 1.0) -> Robot:
+    """A chain of parts that hangs on a link fixed in the world, at `base`."""
+    links = ['<link name="mount"/>']
+    joints = []
+    above = "mount"
+    for part in parts:
+        x, y, z = part.inertia
+        kind, far = ("prismatic", FARTHEST) if part.slides else ("revolute", WIDEST)
+        links.append(
+            f'<link name="{part.name} link"><inertial><origin xyz="{_spaced(part.centre)}"/>'
+            f'<mass value="{part.mass!r}"/><inertia ixx="{x!r}" iyy="{y!r}" izz="{z!r}" '
+            f'ixy="0" ixz="0" iyz="0"/></inertial>{_collision(part)}</link>'
+        )
+        joints.append(
+            f'<joint name="{part.name}" type="{kind}"><parent link="{above}"/>'
+            f'<child link="{part.name} link"/><origin xyz="{_spaced(part.offset)}"/>'
+            f'<axis xyz="{_spaced(part.axis)}"/><limit lower="{-far!r}" upper="{far!r}" '
+            f'effort="{part.effort!r}" velocity="1000"/></joint>'
+        )
+        above = f"{part.name} link"
+    text = f'<robot name="{name}">\n' + "\n".join([*links, *joints]) + "\n</robot>\n"
+    return Robot(
+        name=name,
+        urdf=str(keep(text, {})),
+        packages={},
+        srdf="",
+        joints=tuple(part.drive for part in parts),
+        gripper=Gripper((), 0.0, 0.0, 0.0),
+        tool_frame=above,
+        base=base or Pose.at(0.0, 0.0, 2.0),
+        friction=friction,
+    )
+
+
+def _collision(part: Part) -> str:
+    if part.shape is None:
+        return ""
+    return (
+        f'<collision><origin xyz="{_spaced(part.centre)}"/><geometry>'
+        f'<box size="{_spaced(part.shape)}"/></geometry></collision>'
+    )
+
+
+def _spaced(values: Vector3) -> str:
+    return " ".join(repr(float(value)) for value in values)

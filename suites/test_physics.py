@@ -1,0 +1,29 @@
+"""Every simulator against laws whose right answer is known (docs/truth.md).
+
+    pytest suites/test_physics.py --sim=all
+    pytest suites/test_physics.py --sim=all -k "slide or stick"
+
+A law that a simulator breaks is a finding, with its size, and no failure: it is in the tables. A
+test fails when its repetition fails or its world diverges. `--sim-threshold ratio=1` makes each law
+that is broken fail, `ratio=10` each that is missed by ten tolerances. A law draws nothing, so one
+repetition is enough of a simulator that is deterministic.
+"""
+
+import pytest
+
+from pytest_simbench.laws import LAWS
+
+pytestmark = pytest.mark.reps(1)
+
+ANY = 1e12
+"""No law is missed by so many tolerances: nothing fails for it."""
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+def test_law(repeat, threshold, law):
+    limit = threshold("ratio", ANY)
+    result = repeat(law)
+
+    result.assert_no_failures()
+    worst = max(result.values("ratio"))
+    assert worst <= limit, f"{result.label}: off by {worst:.3g} tolerances"

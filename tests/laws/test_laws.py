@@ -1,0 +1,77 @@
+"""Every law can be kept, and a planted fault breaks it; on a real engine."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import fields
+
+import pytest
+
+from pytest_simbench.laws import LAW, LAWS, Law, Reading
+from pytest_simbench.measure.phenomena import BROKEN, KEPT
+from pytest_simbench.scene import Scene
+from pytest_simbench.simulator.registry import adapter
+from pytest_simbench.tasks.base import Jitter, Outcome
+from pytest_simbench.tasks.phenomena import PHENOMENA, PHENOMENON
+from pytest_simbench.testing.subject import Subject
+
+from .faults import FAULTS
+
+ELSEWHERE = {
+    **dict.fromkeys(
+        (
+            "carried", "slide_x", "slide_y", "slide_diagonal", "slide_straight", "belt",
+            "push_tips",
+        ),
+        "pybullet",
+    ),
+    **dict.fromkeys(("dead_collision", "push_force"), "ode"),
+    **dict.fromkeys(("grip_holds", "heavy_on_top"), "ode"),
+}  # fmt: skip
+"""Laws that tuned MuJoCo does not keep, and who does."""
+
+BY_NAME = {law.name: law for law in LAWS}
+
+
+def outcome(law: Law, scene: Scene) -> Outcome:
+    subject = Subject(adapter(ELSEWHERE.get(law.name, "mujoco")))
+    with subject.world(scene) as world:
+        return law.perform(world, 0, lambda done, total: None)
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_a_law_is_kept_and_a_planted_fault_breaks_it(name: str) -> None:
+    law = BY_NAME[name]
+    kept = outcome(law, law.build())
+    broken = outcome(law, FAULTS[name](law.build()))
+    assert kept.metrics["ratio"] <= KEPT, kept.details[LAW]
+    assert broken.metrics["ratio"] > BROKEN, broken.details[LAW]
+
+
+def test_there_are_enough_and_each_phenomenon_has_one() -> None:
+    assert len(LAWS) >= 30
+    assert len(BY_NAME) == len(LAWS)
+    assert {law.phenomenon for law in LAWS} == set(PHENOMENA)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+def test_a_law_says_where_it_comes_from_and_what_it_allows(law: Law) -> None:
+    told = type(law).__doc__ or ""
+    assert "Tolerance" in told or re.search(r"The same", told)
+    assert law.scene(1, Jitter()) == law.scene(2, Jitter(0.0, 0.0))
+    assert law.parameters()[PHENOMENON] == law.phenomenon
+    assert {f"task.{item.name}" for item in fields(law)} < law.parameters().keys()  # type: ignore[arg-type]
+
+
+def test_a_reading_is_an_error_and_its_ratio_to_the_tolerance() -> None:
+    reading = Reading(value=1.2, exact=1.0, tolerance=0.1)
+    assert reading.error == pytest.approx(0.2)
+    assert reading.ratio == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    "numbers", [(float("nan"), 0.0, 1.0), (0.0, float("inf"), 1.0), (0.0, 0.0, 0.0)]
+)
+def test_what_cannot_be_read_is_an_error(numbers: tuple[float, float, float]) -> None:
+    with pytest.raises(ValueError, match="nothing can be read"):
+        Reading(*numbers)
