@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pytest_simbench.records.text import for_terminal, in_one_line
-from pytest_simbench.report import cells, columns
+from pytest_simbench.report import cells, columns, truth
 from pytest_simbench.report.answer import short_labels
 from pytest_simbench.report.grid import GAP, Column, fill, render
 from pytest_simbench.report.headline import OUTCOMES, cost_of, headline
@@ -33,11 +33,13 @@ def render_brief(summaries: Sequence[TaskSummary], width: int = 80) -> str:
     if not summaries:
         return ""
     width = max(width, NARROWEST)
-    parts = ["\n".join(fill(sentence, width, "  ") for sentence in headline(summaries))]
-    for summary in summaries:
+    tasks = truth.others(summaries)
+    parts = [truth.brief(summaries, width)]
+    parts.append("\n".join(fill(sentence, width, "  ") for sentence in headline(tasks)))
+    for summary in tasks:
         title = fill(in_one_line(columns.title(summary)), width)
         parts.append(f"{title}\n{render(table(summary, width), width)}")
-    text = "\n\n".join(parts)
+    text = "\n\n".join(filter(None, parts))
     room = max(LEAST_ROOM, MOST_LINES - len(text.splitlines()) - 1)
     return for_terminal("\n\n".join(filter(None, [text, _warned(summaries, width, room)])))
 

@@ -27,6 +27,7 @@ from pytest_simbench.report.replay.groups import Group, groups
 from pytest_simbench.report.sheet import sheet_name
 from pytest_simbench.report.sheet import sheets as sheets_of
 from pytest_simbench.report.summary import PHASES, TaskSummary, summarise
+from pytest_simbench.report.truth import others
 from pytest_simbench.tasks.metrics import COSTS
 
 MARKDOWN_NAME = "report.md"
@@ -118,7 +119,9 @@ def write_files(
         return Written((f"no report: {_unwritable(folder, error)}",), False)
     if figures:
         try:
-            pictures = write_figures(folder, summaries) + history.write_pictures(folder, histories)
+            pictures = write_figures(folder, others(summaries)) + history.write_pictures(
+                folder, histories
+            )
         except FiguresUnavailable as error:
             problems.append(str(error))
         except OSError as error:

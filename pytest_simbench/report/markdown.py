@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from pytest_simbench.records.text import for_markdown
-from pytest_simbench.report import columns
+from pytest_simbench.report import columns, truth
 from pytest_simbench.report.answer import sentences
 from pytest_simbench.report.grid import Column
 from pytest_simbench.report.summary import TaskSummary
@@ -25,7 +25,8 @@ def render_run(
     """
     if not summaries:
         return "No repetition was recorded.\n"
-    parts = [render_task(summary) for summary in summaries]
+    parts = [_truth(summaries)] if truth.laws(summaries) else []
+    parts += [render_task(summary) for summary in truth.others(summaries)]
     for title, found in (histories or {}).items():
         items = "\n".join(f"- {for_markdown(text)}" for text in found)
         parts.append(f"## {for_markdown(f'History: {title}')}\n\n{items}")
@@ -37,6 +38,17 @@ def render_run(
     if pictures:
         parts.append("\n".join(["## Pictures", "", *(f"![{name}]({name})" for name in pictures)]))
     return "\n\n".join(parts) + "\n"
+
+
+def _truth(summaries: Sequence[TaskSummary]) -> str:
+    """What simulators make of laws."""
+    parts = [f"## {truth.TITLE[0].upper()}{truth.TITLE[1:]}"]
+    if told := truth.sentences(summaries):
+        parts.append("\n".join(f"- {for_markdown(text)}" for text in told))
+    parts += [table(truth.table(summaries)), for_markdown(truth.LEGEND)]
+    for name, found in truth.details(summaries):
+        parts.append(f"### {for_markdown(name[0].upper() + name[1:])}\n\n{table(found)}")
+    return "\n\n".join(parts)
 
 
 def render_task(summary: TaskSummary, level: int = 2) -> str:

@@ -26,6 +26,7 @@ from pytest_simbench.report.pooling import (
 )
 from pytest_simbench.simulator.choices import published_again
 from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.tasks.phenomena import PHENOMENON
 
 PHASES = ("launch", "compile", "load", "plan", "step", "other")
 """Where the wall time of a repetition goes, in order."""
@@ -112,6 +113,7 @@ class TaskSummary:
         wins: which row beats which at what, by the rows' places; from `matrix.with_wins`.
         modes: whether headless and GUI agree, in sentences; from there too.
         described: whether the run says what the metrics mean; else they are plain numbers.
+        phenomenon: that the task is a law of; empty of one that is none.
     """
 
     task: str
@@ -122,6 +124,7 @@ class TaskSummary:
     wins: tuple[Win, ...] = ()
     modes: tuple[str, ...] = ()
     described: bool = True
+    phenomenon: str = ""
 
     @property
     def study(self) -> tuple[Metric, ...]:
@@ -159,7 +162,15 @@ def summarise(
         protocols = ", ".join(sorted({record.protocol for record in found}))
         known = dict((references or {}).get(task, {}))
         summaries.append(
-            TaskSummary(task, declared, rows, known, protocols, described=task in metrics)
+            TaskSummary(
+                task,
+                declared,
+                rows,
+                known,
+                protocols,
+                described=task in metrics,
+                phenomenon=str(found[0].settings.get(PHENOMENON) or ""),
+            )
         )
     return summaries
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pytest_simbench.records.text import for_terminal, in_one_line
-from pytest_simbench.report import columns
+from pytest_simbench.report import columns, truth
 from pytest_simbench.report.answer import sentences
 from pytest_simbench.report.grid import fill, render
 from pytest_simbench.report.headline import headline
@@ -27,8 +27,11 @@ def render_run(summaries: Sequence[TaskSummary], width: int = 80) -> str:
     if not summaries:
         return ""
     width = max(width, NARROWEST)
-    parts = ["\n".join(fill(sentence, width, "  ") for sentence in headline(summaries))]
-    parts += [render_task(summary, width) for summary in summaries]
+    tasks = truth.others(summaries)
+    parts = [truth.whole(summaries, width)] if len(tasks) < len(summaries) else []
+    if tasks:
+        parts.append("\n".join(fill(sentence, width, "  ") for sentence in headline(tasks)))
+    parts += [render_task(summary, width) for summary in tasks]
     parts.append(fill(columns.LEGEND, width))
     deviations = [f"{name}: {text}" for name, text in columns.deviations(summaries)]
     if deviations:

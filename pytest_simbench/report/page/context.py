@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import series
 from pytest_simbench.records.text import for_terminal
-from pytest_simbench.report import columns, repeatability
+from pytest_simbench.report import columns, repeatability, truth
 from pytest_simbench.report.answer import sentences
 from pytest_simbench.report.changes import DIFFERENT
 from pytest_simbench.report.changes import columns as change_columns
@@ -80,6 +80,7 @@ class Page:
     """Everything. `filters` holds the choices by what they choose; of one there is none.
 
     Attributes:
+        truth: of laws, the table of phenomena first; empty where none ran.
         repetitions: of all tasks, as plain data, in the order of the dots' numbers.
         problems: what could not be shown, as sentences.
     """
@@ -87,6 +88,7 @@ class Page:
     title: str
     answer: Sequence[str]
     filters: Mapping[str, Sequence[str]]
+    truth: Sequence[Table]
     tasks: Sequence[TaskPart]
     repeatability: Sequence[Table]
     comparison: Compared | None
@@ -118,7 +120,7 @@ def page(
 
     problems: dict[str, None] = {}
     tasks = []
-    for summary in summaries:
+    for summary in truth.others(summaries):
         drawn, problem = pictures(summary)
         rows = [row.records for row in series(r for r in records if r.task == summary.task)]
         problems |= dict.fromkeys(filter(None, [problem]))
@@ -153,9 +155,10 @@ def page(
         name: list(dict.fromkeys(getattr(row, name) for row in rows_of)) for name in Of._fields
     }
     return Page(
-        " and ".join(summary.task for summary in summaries) or "repeatability",
-        headline(summaries),
+        " and ".join(_subjects(summaries)) or "repeatability",
+        [*truth.sentences(summaries), *headline(truth.others(summaries))],
         {name: found for name, found in choices.items() if len(found) > 1},
+        _truth(summaries),
         tasks,
         again,
         None if comparison is None else _compared(*comparison),
@@ -163,6 +166,23 @@ def page(
         repetitions,
         list(problems),
     )
+
+
+def _subjects(summaries: Sequence[TaskSummary]) -> list[str]:
+    found = truth.laws(summaries)
+    laws = [f"{len(found)} law{'s' * (len(found) > 1)}"] if found else []
+    return [*laws, *(summary.task for summary in truth.others(summaries))]
+
+
+def _truth(summaries: Sequence[TaskSummary]) -> list[Table]:
+    if not truth.laws(summaries):
+        return []
+    title = truth.TITLE[0].upper() + truth.TITLE[1:]
+    found = [from_columns(title, truth.table(summaries), truth.LEGEND)]
+    return found + [
+        from_columns(name[0].upper() + name[1:], columns)
+        for name, columns in truth.details(summaries)
+    ]
 
 
 def _tables(summary: TaskSummary) -> list[Table]:

@@ -1,0 +1,202 @@
+"""What simulators make of laws: the table of phenomena, a sentence for each, and every law's
+error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from statistics import fmean
+
+from pytest_simbench.measure.phenomena import KEPT, Ratios, Verdict, verdict, worst
+from pytest_simbench.report import cells
+from pytest_simbench.report.answer import NAMED, short_labels
+from pytest_simbench.report.grid import Column, fill, render
+from pytest_simbench.report.summary import Row, TaskSummary
+from pytest_simbench.tasks.metrics import significant
+from pytest_simbench.tasks.phenomena import PHENOMENA
+
+TITLE = "which simulator is right about what"
+
+CHEAPER = 0.5
+"""Who costs at most so much of the next one is called the cheapest: times are of one run on a
+machine that may be busy."""
+
+LEGEND = (
+    "7/8 12x: 7 of 8 laws are kept, and the worst is missed by 12 times its tolerance, which is "
+    "what a time step may cost an integrator of the first order; fails: a repetition failed or its "
+    "world diverged"
+)
+
+
+def laws(summaries: Sequence[TaskSummary]) -> list[TaskSummary]:
+    """Those of laws."""
+    return [summary for summary in summaries if summary.phenomenon]
+
+
+def others(summaries: Sequence[TaskSummary]) -> list[TaskSummary]:
+    """Those of everything else."""
+    return [summary for summary in summaries if not summary.phenomenon]
+
+
+def sentences(summaries: Sequence[TaskSummary]) -> list[str]:
+    """A verdict on each phenomenon and settings profile, in words; none of a single simulator."""
+    profiles = list(dict.fromkeys(row.profile for row in _rows(summaries).values()))
+    found = []
+    for phenomenon in _phenomena(summaries):
+        for profile in profiles:
+            rows = _rows(summaries, profile)
+            ratios = {name: _ratios(summaries, phenomenon, row) for name, row in rows.items()}
+            ratios = {name: known for name, known in ratios.items() if known}
+            if len(ratios) > 1:
+                costs = {name: _cost(summaries, rows[name], phenomenon) for name in ratios}
+                where = f" ({profile})" if len(profiles) > 1 else ""
+                found.append(f"for {phenomenon}{where}: {_told(verdict(ratios), costs)}")
+    return found
+
+
+def table(summaries: Sequence[TaskSummary]) -> list[Column]:
+    """Simulators by phenomena, and what a simulated second costs."""
+    rows = _rows(summaries)
+    columns = [Column("simulator", [[name] for name in rows], left=True)]
+    for phenomenon in _phenomena(summaries):
+        found = [_ratios(summaries, phenomenon, row) for row in rows.values()]
+        columns.append(Column(phenomenon, [[_cell(ratios)] for ratios in found]))
+    costs = [_cost(summaries, row) for row in rows.values()]
+    shown = [[cells.MISSING if cost is None else cells.number(cost, 2)] for cost in costs]
+    return [*columns, Column("CPU s/sim s", shown)]
+
+
+def details(summaries: Sequence[TaskSummary]) -> list[tuple[str, list[Column]]]:
+    """For each phenomenon its laws by simulators: the error in the law's unit, with its ratio to
+    the tolerance where the law is not kept."""
+    rows = _rows(summaries)
+    found = []
+    for phenomenon in _phenomena(summaries):
+        asked = [summary for summary in laws(summaries) if summary.phenomenon == phenomenon]
+        columns = [
+            Column("law", [[summary.task] for summary in asked], left=True),
+            Column("error in", [[_unit(summary)] for summary in asked], left=True),
+        ]
+        for name, of in rows.items():
+            columns.append(Column(name, [[_error(summary, of)] for summary in asked]))
+        found.append((f"laws of {phenomenon}", columns))
+    return found
+
+
+def brief(summaries: Sequence[TaskSummary], width: int) -> str:
+    """Sentences and table, as plain lines; empty without laws."""
+    if not laws(summaries):
+        return ""
+    told = [fill(text, width, "  ") for text in sentences(summaries)]
+    parts = ["\n".join(told), render(table(summaries), width), fill(LEGEND, width)]
+    return "\n\n".join(part for part in parts if part)
+
+
+def whole(summaries: Sequence[TaskSummary], width: int) -> str:
+    """The same, and every law."""
+    parts = [f"{name}\n{render(found, width)}" for name, found in details(summaries)]
+    return "\n\n".join([brief(summaries, width), *parts])
+
+
+def _rows(summaries: Sequence[TaskSummary], profile: str | None = None) -> dict[str, Row]:
+    """One row of each contender, of one settings profile or of all, by its short name."""
+    found: dict[str, Row] = {}
+    for summary in laws(summaries):
+        for row in summary.rows:
+            if profile in (None, row.profile):
+                found.setdefault(row.label, row)
+    rows = sorted(found.values(), key=lambda row: row.profile)
+    return dict(zip(short_labels(rows), rows, strict=True))
+
+
+def _row(summary: TaskSummary, like: Row) -> Row | None:
+    return next((row for row in summary.rows if row.label == like.label), None)
+
+
+def _phenomena(summaries: Sequence[TaskSummary]) -> list[str]:
+    """Those that there are, in their order; one that is not known here comes last."""
+    there = dict.fromkeys(summary.phenomenon for summary in laws(summaries))
+    known = [name for name in PHENOMENA if name in there]
+    return [*known, *(name for name in there if name not in known)]
+
+
+def _ratio(row: Row) -> float | None:
+    if row.failed:
+        return math.inf
+    found = row.metrics.get("ratio")
+    return None if found is None else found.max
+
+
+def _ratios(summaries: Sequence[TaskSummary], phenomenon: str, like: Row) -> Ratios:
+    found = {}
+    for summary in laws(summaries):
+        row = _row(summary, like)
+        ratio = _ratio(row) if row else None
+        if summary.phenomenon == phenomenon and ratio is not None:
+            found[summary.task] = ratio
+    return found
+
+
+def _cost(
+    summaries: Sequence[TaskSummary], like: Row, phenomenon: str | None = None
+) -> float | None:
+    """CPU seconds for a simulated second, the mean of the laws."""
+    found = [
+        row.cpu_cost.mean
+        for summary in laws(summaries)
+        if phenomenon in (None, summary.phenomenon)
+        and (row := _row(summary, like)) is not None
+        and row.cpu_cost is not None
+    ]
+    return fmean(found) if found else None
+
+
+def _cell(ratios: Ratios) -> str:
+    if not ratios:
+        return cells.MISSING
+    kept = sum(ratio <= KEPT for ratio in ratios.values())
+    return f"{kept}/{len(ratios)} {_times(worst(ratios))}"
+
+
+def _times(ratio: float) -> str:
+    return "fails" if math.isinf(ratio) else f"{significant(ratio, 2)}x"
+
+
+def _error(summary: TaskSummary, like: Row) -> str:
+    row = _row(summary, like)
+    if row is None or (ratio := _ratio(row)) is None:
+        return cells.MISSING
+    error = row.metrics.get("error")
+    if math.isinf(ratio) or error is None:
+        return "fails"
+    return f"{error.max:.2g}" + (f" ({_times(ratio)})" if ratio > KEPT else "")
+
+
+def _unit(summary: TaskSummary) -> str:
+    return next((metric.unit for metric in summary.metrics if metric.name == "error"), "")
+
+
+def _told(found: Verdict, costs: dict[str, float | None]) -> str:
+    if found.best is not None:
+        text = f"{found.best}, which keeps {found.kept[found.best]} of {found.laws} laws"
+    else:
+        some = [f"{who} {found.kept[who]}" for who in found.unbeaten[:NAMED]]
+        more = len(found.unbeaten) - len(some)
+        some += [f"{more} more"] * (more > 0)
+        text = f"no clear best; laws kept of {found.laws} by those that nobody beats: "
+        text += _listed(some) if some else "nobody"
+        text += _cheapest({who: costs[who] for who in found.unbeaten})
+    left = f"; not compared: {_listed(list(found.incomplete))}" if found.incomplete else ""
+    return f"{text}{left}."
+
+
+def _cheapest(costs: dict[str, float | None]) -> str:
+    known = sorted((cost, who) for who, cost in costs.items() if cost is not None)
+    if len(known) < 2 or known[0][0] > CHEAPER * known[1][0]:
+        return ""
+    return f"; the cheapest of them: {known[0][1]}"
+
+
+def _listed(texts: list[str]) -> str:
+    join: Callable[[list[str]], str] = ", ".join
+    return " and ".join([join(texts[:-1]), texts[-1]]) if len(texts) > 1 else texts[0]

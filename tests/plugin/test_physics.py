@@ -1,0 +1,41 @@
+"""The suite of laws as users run it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+SUITE = Path(__file__).resolve().parents[2] / "suites" / "test_physics.py"
+
+
+def test_a_broken_law_is_a_finding_and_no_failure_unless_asked_for(
+    pytester: pytest.Pytester,
+) -> None:
+    """PyBullet's motors are no springs: a rod on one does not sag."""
+    pytester.makepyfile(test_physics=SUITE.read_text("utf-8"))
+    asked = ("--sim=mujoco,pybullet", "-k", "free_fall or sag", "--sim-output=out")
+    result = pytester.runpytest_subprocess(*asked, "--sim-threshold=ratio=2")
+    result.assert_outcomes(passed=3, failed=1)
+    result.stdout.fnmatch_lines(
+        [
+            "*off by * tolerances*",
+            "for free motion: no clear best*",
+            "for joints: mujoco, which keeps 1 of 1 laws.",
+            "pybullet *1/1 *x *0/1 *x *",
+        ]
+    )
+    lines = (pytester.path / "out" / "records.jsonl").read_text().splitlines()
+    records = [json.loads(line) for line in lines]
+    assert [(r["simulator"], r["task"], r["repetition"], r["status"]) for r in records] == [
+        (simulator, law, 1, "ok") for simulator in ("mujoco", "pybullet")
+        for law in ("free_fall", "sag")
+    ]  # fmt: skip
+    assert [r["reused_worker"] for r in records] == [False, True, False, True]
+    law = records[-1]["details"]["law"]
+    assert law["exact"] == pytest.approx(0.1925, abs=1e-4)
+    assert records[-1]["metrics"]["ratio"] == pytest.approx(law["exact"] / law["tolerance"], 0.01)
+    again = pytester.runpytest_subprocess("--sim-report", "out")
+    assert again.ret == 0
+    again.stdout.fnmatch_lines(["for joints: mujoco, which keeps 1 of 1 laws."])
