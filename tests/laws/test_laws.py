@@ -7,6 +7,7 @@ from dataclasses import fields
 
 import pytest
 
+from pytest_simbench.client.environments import missing
 from pytest_simbench.laws import LAW, LAWS, Law, Reading
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
 from pytest_simbench.scene import Scene
@@ -34,7 +35,10 @@ BY_NAME = {law.name: law for law in LAWS}
 
 
 def outcome(law: Law, scene: Scene) -> Outcome:
-    subject = Subject(adapter(ELSEWHERE.get(law.name, "mujoco")))
+    engine = adapter(ELSEWHERE.get(law.name, "mujoco"))
+    if absent := missing(engine.info):
+        pytest.skip(absent)
+    subject = Subject(engine)
     with subject.world(scene) as world:
         return law.perform(world, 0, lambda done, total: None)
 

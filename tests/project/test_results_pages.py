@@ -19,6 +19,7 @@ sys.path.append(str(DOCS))  # for the scripts, which are no package
 
 import make_pushing  # noqa: E402
 import make_results  # noqa: E402
+import make_truth  # noqa: E402
 import published_runs  # noqa: E402
 
 
@@ -36,6 +37,11 @@ def test_the_tables_of_pushing_are_up_to_date() -> None:
     told = "run `python docs/make_pushing.py`"
     assert make_pushing.PAGE.read_text("utf-8") == make_pushing.page(), told
     assert make_pushing.page().count("| ODE |") == 4  # tuned, default, UR5, xArm 7
+
+
+def test_the_tables_of_laws_are_up_to_date() -> None:
+    assert make_truth.PAGE.read_text("utf-8") == make_truth.page(), "run `docs/make_truth.py`"
+    assert make_truth.page().count("\n| genesis | ") == 2  # tuned and default
 
 
 def test_no_profile_was_chosen_on_a_published_seed() -> None:
