@@ -215,7 +215,7 @@ class PyBullet(Simulator):
             pybullet.changeDynamics(
                 body, -1, localInertiaDiagonal=list(box.inertia()), physicsClientId=c
             )
-        if not box.fixed:
+        if box.velocity.any():  # setting none changes the last bits of what follows
             pybullet.resetBaseVelocity(
                 body, box.linear_velocity, box.angular_velocity, physicsClientId=c
             )
