@@ -21,7 +21,7 @@ from pathlib import Path
 from pytest_simbench.client import installing, package_index
 from pytest_simbench.client.system import SystemPython
 from pytest_simbench.simulator.errors import SimulatorError
-from pytest_simbench.simulator.info import SimulatorInfo
+from pytest_simbench.simulator.info import SimulatorInfo, alternatives, no_module
 from pytest_simbench.simulator.versions import RELEASE, VersionedName
 
 MARKER = "simbench.json"
@@ -172,7 +172,8 @@ def missing(info: SimulatorInfo) -> str | None:
     if other is not None and (absent or VersionedName.of(info.name).kind):
         return other.problem
     if absent:
-        return f"{info.name} is not installed (no module {absent[0]}); install it: {info.install}"
+        module = no_module(absent[:1])
+        return f"{info.name} is not installed (no module {module}); install it: {info.install}"
     return None
 
 
@@ -196,7 +197,7 @@ def interpreter(info: SimulatorInfo) -> str | None:
 
 def _absent(info: SimulatorInfo) -> list[str]:
     """The engine's modules that cannot be imported here."""
-    return [module for module in info.modules if not _importable(module)]
+    return [names for names in info.modules if not any(map(_importable, alternatives(names)))]
 
 
 def _importable(module: str) -> bool:

@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
 
-from pytest_simbench.simulator.info import SimulatorInfo
+from pytest_simbench.simulator.info import SimulatorInfo, no_module
 
 OLDEST = (3, 11)
 """Of Python, for the rooms that a worker runs: `requires-python` in pyproject.toml."""
@@ -30,7 +30,12 @@ try:
     version = importlib.metadata.version(distribution)
 except importlib.metadata.PackageNotFoundError:
     version = None
-absent = [name for name in modules if importlib.util.find_spec(name) is None]
+def there(name):
+    try:
+        return importlib.util.find_spec(name) is not None
+    except ImportError:  # of a package that is not there
+        return False
+absent = [names for names in modules if not any(map(there, names.split("|")))]
 print(json.dumps({"python": sys.version_info[:3], "version": version, "absent": absent}))
 """
 """What an interpreter is asked. It imports no engine."""
@@ -66,10 +71,9 @@ class SystemPython:
                 f"older than {'.'.join(map(str, OLDEST))}{other}"
             )
         if found["absent"]:
-            modules = " and no module ".join(found["absent"])
             return (
                 f"{info.name} comes with packages of the system, and {self.python} has no module "
-                f"{modules}; on Debian and Ubuntu: {info.install}{other}"
+                f"{no_module(found['absent'])}; on Debian and Ubuntu: {info.install}{other}"
             )
         return None
 

@@ -86,6 +86,7 @@ def _version(base: str, python: str, where: str) -> str:
     """The version of a simulator's engine in an interpreter that has all that a worker needs;
     empty where the interpreter does not tell it."""
     from pytest_simbench.client.system import OLDEST, look_into
+    from pytest_simbench.simulator.info import no_module
     from pytest_simbench.simulator.registry import adapter
 
     info = adapter(base).info
@@ -98,9 +99,7 @@ def _version(base: str, python: str, where: str) -> str:
             f"{'.'.join(map(str, OLDEST))}"
         )
     if found["absent"]:
-        raise pytest.UsageError(
-            f"{where}: {python} has no module {' and no module '.join(found['absent'])}"
-        )
+        raise pytest.UsageError(f"{where}: {python} has no module {no_module(found['absent'])}")
     return found["version"] or ""
 
 

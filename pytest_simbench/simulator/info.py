@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from fnmatch import fnmatchcase
@@ -72,6 +72,16 @@ class Deviation:
         return any(fnmatchcase(quantity, pattern) for pattern in self.quantity.split())
 
 
+def alternatives(modules: str) -> list[str]:
+    """The modules that an entry of `SimulatorInfo.modules` names, one of which is enough."""
+    return modules.split("|")
+
+
+def no_module(absent: Iterable[str]) -> str:
+    """What follows the words "no module" when such entries are absent."""
+    return " and no module ".join(" or ".join(alternatives(names)) for names in absent)
+
+
 @dataclass(frozen=True)
 class SimulatorInfo:
     """The facts that `--sims` lists.
@@ -80,7 +90,8 @@ class SimulatorInfo:
         name: short and stable; part of test ids and records.
         title: engine and company as a user knows them.
         distribution: PyPI distribution whose version is the engine's.
-        modules: modules that must be importable for the simulator to be here.
+        modules: modules that must be importable for the simulator to be here; of several joined by
+            `|`, one of them (`engine8|engine9`: modules that carry their version).
         install: what to type when it is missing.
         licence: of the engine.
         engine: physics engine inside.

@@ -22,6 +22,7 @@ from typing import Any
 from pytest_simbench import __version__
 from pytest_simbench.scene import Scene, Trajectory
 from pytest_simbench.simulator import Simulator, SimulatorError, SimulatorInfo
+from pytest_simbench.simulator.info import alternatives
 from pytest_simbench.simulator.memory import remembering
 from pytest_simbench.simulator.parity import check
 from pytest_simbench.simulator.quantities import expected_quantities
@@ -243,14 +244,24 @@ def _exit_call(error: SystemExit) -> str:
 
 
 def _import_engine(info: SimulatorInfo) -> None:
-    for module in info.modules:
+    for modules in info.modules:
+        *others, last = alternatives(modules)
+        if any(map(_imports, others)):
+            continue
         try:
-            importlib.import_module(module)
+            importlib.import_module(last)
         except ImportError as error:
             raise SimulatorError(
                 f"{info.title} does not import ({error}); it is missing or half installed in "
                 f"{sys.executable}: {info.install}"
             ) from error
+
+
+def _imports(module: str) -> bool:
+    with suppress(ImportError):
+        importlib.import_module(module)
+        return True
+    return False
 
 
 def serve(receive: Callable[[], Any], send: Callable[[Any], None]) -> None:

@@ -1,0 +1,1 @@
+"""Gazebo (gz-sim), the simulator of ROS users."""

@@ -1,0 +1,179 @@
+"""Gazebo (gz-sim 8 to 10), in process and in lock-step, through its own Python bindings.
+
+Gazebo takes its physics engine as a plugin: DART (`dartsim`, its default) or Bullet's multibodies
+(`bullet-featherstone`). Drives are its velocity commands of joints, see `drives`.
+
+What was learnt stands in docs/engines/gazebo.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.simulator import (
+    FOLLOWER,
+    Deviation,
+    PreparedRobot,
+    Settings,
+    Simulator,
+    SimulatorInfo,
+)
+
+from .bindings import MODULES, bindings, library_version
+from .drives import Drives
+from .readback import ReadBack
+from .sdf import Physics, robot_model, world_text
+from .server import Server, new_name
+
+PACKAGES = ("python3-numpy", "gz-harmonic")
+"""The second is of the Open Source Robotics Foundation's own package archive."""
+
+ARCHIVE = "https://gazebosim.org/docs/harmonic/install_ubuntu"
+"""Says how that archive is made known to apt."""
+
+
+@dataclass(frozen=True)
+class GazeboSettings(Settings):
+    """Gazebo's options; defaults are its own.
+
+    Attributes:
+        timestep: [s]; SDF's default.
+        engine: physics engine, a plugin of Gazebo's.
+        detector: collision detector of dartsim; Gazebo's default is `ode`.
+        solver: of dartsim: `dantzig` (pivoting) or `pgs` (projected Gauss-Seidel, 30 passes).
+        position_gain: share of the position error that the drives correct in a step; the default
+            is that of gz_ros2_control, Gazebo has none.
+    """
+
+    timestep: float = 0.001
+    engine: Literal["dartsim", "bullet-featherstone"] = "dartsim"
+    detector: Literal["ode", "fcl", "bullet", "dart"] = "ode"
+    solver: Literal["dantzig", "pgs"] = "dantzig"
+    position_gain: float = 0.1
+
+
+class Gazebo(Simulator):
+    """Adapter of Gazebo."""
+
+    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+        name="gazebo",
+        title="Gazebo",
+        distribution="gz-sim",
+        modules=MODULES,
+        install=f"apt-get install {' '.join(PACKAGES)} (from Gazebo's archive: {ARCHIVE})",
+        system_packages=PACKAGES,
+        licence="Apache-2.0",
+        engine="DART, Bullet",
+        language="C++",
+        tested_version="8.14.0",
+        capabilities=frozenset(),
+        deviations=(
+            Deviation("joint/*/armature", "Gazebo has no rotor inertia"),
+            Deviation(
+                "joint/*/stiffness joint/*/damping",
+                "velocity commands are constraints of the engine, neither springs nor dampers",
+            ),
+            Deviation("body/*/damping link/*/damping", "Gazebo tells no damping of links"),
+            Deviation("body/*/margin link/*/margin", "Gazebo's shapes have no margin"),
+            Deviation(
+                f"joint/*finger_joint2/effort_limit joint/{FOLLOWER}/effort_limit",
+                "with dartsim the second finger is led by the first, by up to both their limits",
+            ),
+            Deviation(
+                "",
+                "shapes, friction and joints are read from the world that Gazebo's server writes; "
+                "its physics engine tells nobody what it has",
+            ),
+            Deviation(
+                "",
+                "a body's pose and velocity are refreshed when it has moved by 1e-6 m: what comes "
+                "to rest keeps its last velocity, up to a mm/s",
+            ),
+        ),
+        environment={"GZ_IP": "127.0.0.1"},
+        install_size_mb=1500,
+    )
+    profiles: ClassVar[Mapping[str, Settings]] = {
+        "default": GazeboSettings(),
+        "tuned": GazeboSettings(position_gain=0.5),
+    }
+    settings: GazeboSettings
+
+    def load(self, scene: Scene) -> None:
+        s = self.settings
+        self.scene, self._steps = scene, 0
+        self._physics = Physics(s.engine, s.timestep, s.detector, s.solver)
+        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
+        name = new_name()
+        text = world_text(scene, self.prepared, self._physics, name)
+        self.server = server = Server(text, name)
+        server.reset()
+        sim, ecm = bindings().sim, server.ecm
+        self._free = [
+            sim.Link(self._model(body.name).link_by_name(ecm, "link")) for body in scene.free_bodies
+        ]
+        for link in self._free:
+            link.enable_velocity_checks(ecm)
+        self._drives: Drives | None = None
+        if self.prepared is not None:
+            self._drives = Drives(
+                server,
+                self._model(robot_model(scene)),
+                self.prepared.robot,
+                s.timestep,
+                s.position_gain,
+                self._physics.coupled,
+            )
+
+    def _model(self, name: str) -> Any:
+        ecm = self.server.ecm
+        return bindings().sim.Model(self.server.world.model_by_name(ecm, name))
+
+    def read_back(self) -> dict[str, Any]:
+        return ReadBack(
+            self.server,
+            self._physics,
+            robot_model(self.scene),
+            self._drives,
+            self.scene,
+            self.prepared,
+        ).all()
+
+    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        # A velocity command finds the effort itself, so there is nothing to feed forward.
+        if self._drives is not None:
+            self._drives.command(position, velocity)
+
+    def step(self) -> None:
+        if self._drives is not None:
+            self._drives.act()
+        self.server.step()
+        self._steps += 1
+
+    @property
+    def time(self) -> float:
+        return self._steps * self.settings.timestep
+
+    def body_state(self) -> FloatArray:
+        state, ecm = np.zeros((len(self._free), 13)), self.server.ecm
+        for row, link in zip(state, self._free, strict=True):
+            place = link.world_pose(ecm)
+            at, turn = place.pos(), place.rot()
+            row[:7] = at.x(), at.y(), at.z(), turn.w(), turn.x(), turn.y(), turn.z()
+            linear, angular = link.world_linear_velocity(ecm), link.world_angular_velocity(ecm)
+            if linear is not None and angular is not None:
+                row[7:10] = linear.x(), linear.y(), linear.z()
+                row[10:] = angular.x(), angular.y(), angular.z()
+        return state
+
+    def joint_state(self) -> FloatArray:
+        return np.empty((2, 0)) if self._drives is None else self._drives.state()
+
+    def versions(self) -> dict[str, str]:
+        bindings()
+        return {self.info.distribution: library_version()}

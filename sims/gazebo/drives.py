@@ -1,0 +1,104 @@
+"""Drives: Gazebo's velocity commands of joints.
+
+A velocity command is a constraint of the engine, solved together with the contacts, the joint's
+effort limit the largest force. It holds for one step. So each step tells each joint
+v* + gain (q* - h v* - q) / h, as Gazebo's ros2_control does it (its gain is 0.1).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Robot
+
+from .bindings import bindings
+from .server import Server
+
+
+class Drives:
+    """The drives of a robot.
+
+    Args:
+        server: runs the world.
+        model: of the robot, an entity of the bindings.
+        robot: whose drives they are.
+        timestep: [s].
+        gain: share of the position error that a step corrects.
+        coupled: whether the engine couples the fingers; else the others are led by the first.
+
+    Attributes:
+        joints: Gazebo's, in the robot's order.
+        zeros: the robot's positions where Gazebo's are 0 [rad or m], (n_joints,).
+    """
+
+    def __init__(
+        self, server: Server, model: Any, robot: Robot, timestep: float, gain: float, coupled: bool
+    ) -> None:
+        self.ecm, self._names = server.ecm, robot.joint_names
+        self.joints = [
+            bindings().sim.Joint(model.joint_by_name(self.ecm, name)) for name in robot.joint_names
+        ]
+        self.zeros = robot.column("initial_position")
+        for joint in self.joints:
+            joint.enable_position_check(self.ecm)
+            joint.enable_velocity_check(self.ecm)
+        index = robot.joint_names.index
+        fingers = [index(name) for name in robot.gripper.joints]
+        self._first = fingers[0] if fingers else -1
+        self._led = [] if coupled else fingers[1:]
+        self._gain, self._share = gain / timestep, 1 - gain
+        self._told = [
+            (joint.position, joint.set_velocity)
+            for number, joint in enumerate(self.joints)
+            if number not in self._led
+        ]
+        self._driven = [n for n in range(len(self.joints)) if n not in self._led]
+        self._state = np.stack([self.zeros, 0 * self.zeros])
+        self.command(self.zeros, 0 * self.zeros)
+
+    def command(self, position: FloatArray, velocity: FloatArray) -> None:
+        """Set points of all joints [rad or m, rad/s or m/s]."""
+        asked = self._gain * (position - self.zeros) + self._share * velocity
+        self._asked = asked[self._driven].tolist()
+
+    def act(self) -> None:
+        """Before a step: tell the joints what they are asked for."""
+        ecm, gain = self.ecm, self._gain
+        for (position, tell), asked in zip(self._told, self._asked, strict=True):
+            found = position(ecm)
+            tell(ecm, [asked - gain * (found[0] if found else 0.0)])
+        if self._led:
+            self._lead()
+
+    def _lead(self) -> None:
+        """Move the other fingers as the first one does.
+
+        One that is led is a step late: while the first one opens, the others are asked for what
+        it is asked for.
+        """
+        ecm, first = self.ecm, self.joints[self._first]
+        place = (first.position(ecm) or [0.0])[0]
+        speed = (first.velocity(ecm) or [0.0])[0]
+        asked = self._asked[self._driven.index(self._first)] - self._gain * place
+        if asked > 0:
+            speed = max(speed, asked)
+        for number in self._led:
+            joint = self.joints[number]
+            behind = place - (joint.position(ecm) or [0.0])[0]
+            joint.set_velocity(ecm, [speed + self._gain * behind])
+
+    def leads(self, first: str, other: str) -> bool:
+        """Whether one joint is led by another."""
+        names = self._names
+        return names.index(first) == self._first and names.index(other) in self._led
+
+    def state(self) -> FloatArray:
+        """Positions and velocities, (2, n_joints); before the first step those of the file."""
+        rows = [[joint.position(self.ecm), joint.velocity(self.ecm)] for joint in self.joints]
+        if any(value is None or not value for row in rows for value in row):
+            return self._state.copy()
+        state = np.array([[p[0], v[0]] for p, v in rows]).T
+        state[0] += self.zeros
+        return np.asarray(state)

@@ -1,0 +1,220 @@
+"""The scene as an SDF world.
+
+Every link stands where it does at the robot's initial position, and that is the zero of every
+joint: Gazebo's reset puts joints to zero. So the limits are moved, and `drives` adds the offset.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from pytest_simbench.scene import Box, FloatArray, Pose, Scene
+from pytest_simbench.simulator import PreparedRobot
+from pytest_simbench.simulator.kinematics import link_poses
+from pytest_simbench.simulator.urdf import MovingJoint, Shape
+
+VERSION = "1.11"
+"""Of SDF; gz-sim 8 reads none newer."""
+
+FEATHERSTONE = "bullet-featherstone"
+
+
+@dataclass(frozen=True)
+class Physics:
+    """What a world says of its engine.
+
+    Attributes:
+        engine: `dartsim` or `bullet-featherstone`.
+        timestep: [s].
+        detector: collision detector of dartsim.
+        solver: of dartsim.
+    """
+
+    engine: str
+    timestep: float
+    detector: str
+    solver: str
+
+    @property
+    def coupled(self) -> bool:
+        """Whether it has `<mimic>`."""
+        return self.engine == FEATHERSTONE
+
+    def friction(self, coefficient: float) -> float:
+        """What to write so that a pair of such surfaces has this coefficient.
+
+        bullet-featherstone counts each surface's friction twice, and Bullet multiplies those of a
+        pair: the fourth root. dartsim takes the smaller one.
+        """
+        return coefficient**0.25 if self.engine == FEATHERSTONE else coefficient
+
+    def friction_of(self, written: float) -> float:
+        """The coefficient that `friction` has written."""
+        return written**4 if self.engine == FEATHERSTONE else written
+
+    @property
+    def friction_names(self) -> tuple[str, str]:
+        """Elements of <friction> that the engine reads."""
+        if self.engine == FEATHERSTONE:
+            return "bullet/friction", "bullet/friction2"
+        return "ode/mu", "ode/mu2"
+
+
+def world_text(scene: Scene, prepared: PreparedRobot | None, physics: Physics, name: str) -> str:
+    """The world as SDF text, called `name`."""
+    root = ET.Element("sdf", version=VERSION)
+    world = ET.SubElement(root, "world", name=name)
+    _add_physics(world, physics)
+    _text(world, "gravity", _spaced(scene.gravity))
+    _add_ground(world, scene.ground_friction, physics)
+    for box in scene.bodies:
+        _add_box(world, box, physics)
+    if prepared is not None:
+        _add_robot(world, scene, prepared, physics)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode")
+
+
+def robot_model(scene: Scene) -> str:
+    """Name of the robot's model: no body of the scene has it."""
+    names, name = {body.name for body in scene.bodies}, "robot"
+    while name in names:
+        name += "_"
+    return name
+
+
+def _add_physics(world: ET.Element, physics: Physics) -> None:
+    element = ET.SubElement(world, "physics", name="physics", type="ignored")
+    _text(element, "max_step_size", repr(physics.timestep))
+    _text(element, "real_time_factor", "0")  # do not wait for the clock
+    dart = ET.SubElement(element, "dart")
+    _text(dart, "collision_detector", physics.detector)
+    _text(ET.SubElement(dart, "solver"), "solver_type", physics.solver)
+    system = ET.SubElement(
+        world, "plugin", filename="gz-sim-physics-system", name="gz::sim::systems::Physics"
+    )
+    _text(ET.SubElement(system, "engine"), "filename", f"gz-physics-{physics.engine}-plugin")
+
+
+def _add_ground(world: ET.Element, friction: float, physics: Physics) -> None:
+    link = _add_static(world, "ground", Pose())
+    collision = ET.SubElement(link, "collision", name="0")
+    _text(ET.SubElement(ET.SubElement(collision, "geometry"), "plane"), "normal", "0 0 1")
+    _add_surface(collision, friction, physics)
+
+
+def _add_box(world: ET.Element, box: Box, physics: Physics) -> None:
+    if box.fixed:
+        link = _add_static(world, box.name, box.pose)
+    else:
+        model = ET.SubElement(world, "model", name=box.name)
+        _add_pose(model, box.pose)
+        link = ET.SubElement(model, "link", name="link")
+        i, j, k = box.inertia()
+        _add_inertial(link, box.mass, Pose(), [i, 0.0, 0.0, j, 0.0, k])
+    shape = Shape(Pose(), size=box.size)
+    _add_shapes(link, [shape], box.friction, physics)
+
+
+def _add_static(world: ET.Element, name: str, pose: Pose) -> ET.Element:
+    model = ET.SubElement(world, "model", name=name)
+    _add_pose(model, pose)
+    _text(model, "static", "true")
+    return ET.SubElement(model, "link", name="link")
+
+
+def _add_robot(world: ET.Element, scene: Scene, prepared: PreparedRobot, physics: Physics) -> None:
+    robot = prepared.robot
+    model = ET.SubElement(world, "model", name=robot_model(scene))
+    _text(model, "self_collide", "false")
+    fixed = ET.SubElement(model, "joint", name="fixed_in_the_world", type="fixed")
+    _text(fixed, "parent", "world")
+    _text(fixed, "child", prepared.root)
+    poses = link_poses(prepared, {joint.name: joint.initial_position for joint in robot.joints})
+    for link in prepared.links.values():
+        element = ET.SubElement(model, "link", name=link.name)
+        _add_pose(element, poses[link.name])
+        if link.mass > 0:
+            x, y, z = (float(value) for value in link.centre)
+            tensor = link.inertia[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
+            _add_inertial(element, link.mass, Pose.at(x, y, z), tensor)
+        _add_shapes(element, link.shapes, robot.friction, physics)
+    couplings = {other: first for first, other in robot.gripper.couplings}
+    for joint in prepared.joints:
+        _add_joint(model, joint, prepared, physics, couplings.get(joint.name))
+
+
+def _add_joint(
+    model: ET.Element,
+    joint: MovingJoint,
+    prepared: PreparedRobot,
+    physics: Physics,
+    leader: str | None,
+) -> None:
+    drive = prepared.robot.joints[prepared.robot.joint_names.index(joint.name)]
+    element = ET.SubElement(model, "joint", name=joint.name, type=joint.kind)
+    _text(element, "parent", joint.parent)
+    _text(element, "child", joint.child)
+    axis = ET.SubElement(element, "axis")
+    _text(axis, "xyz", _spaced(joint.axis))
+    limit = ET.SubElement(axis, "limit")
+    lower, upper = prepared.limits[joint.name] - drive.initial_position
+    _text(limit, "lower", repr(float(lower)))
+    _text(limit, "upper", repr(float(upper)))
+    effort = drive.effort_limit
+    if leader is not None and physics.coupled:
+        mimic = ET.SubElement(axis, "mimic", joint=leader)
+        _text(mimic, "multiplier", "1")
+        _text(mimic, "offset", "0")
+        _text(mimic, "reference", "0")
+    elif leader is not None:
+        effort *= 2  # it has to hold against the first finger's drive and against its own load
+    _text(limit, "effort", repr(effort))
+
+
+def _add_shapes(
+    link: ET.Element, shapes: Iterable[Shape], friction: float, physics: Physics
+) -> None:
+    for number, shape in enumerate(shapes):
+        for tag in ("visual", "collision"):
+            element = ET.SubElement(link, tag, name=str(number))
+            _add_pose(element, shape.pose)
+            geometry = ET.SubElement(element, "geometry")
+            if shape.size is not None:
+                _text(ET.SubElement(geometry, "box"), "size", _spaced(shape.size))
+            else:
+                _text(ET.SubElement(geometry, "mesh"), "uri", shape.mesh or "")
+        _add_surface(element, friction, physics)
+
+
+def _add_surface(collision: ET.Element, friction: float, physics: Physics) -> None:
+    element = ET.SubElement(ET.SubElement(collision, "surface"), "friction")
+    mu = repr(physics.friction(friction))
+    own = ET.SubElement(element, physics.friction_names[0].partition("/")[0])
+    for name in physics.friction_names:
+        _text(own, name.partition("/")[2], mu)
+
+
+def _add_inertial(link: ET.Element, mass: float, pose: Pose, tensor: Iterable[float]) -> None:
+    element = ET.SubElement(link, "inertial")
+    _add_pose(element, pose)
+    _text(element, "mass", repr(float(mass)))
+    inertia = ET.SubElement(element, "inertia")
+    for name, value in zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), tensor, strict=True):
+        _text(inertia, name, repr(float(value)))
+
+
+def _add_pose(element: ET.Element, pose: Pose) -> None:
+    w, x, y, z = pose.quaternion
+    found = ET.SubElement(element, "pose", rotation_format="quat_xyzw")
+    found.text = _spaced([*pose.position, x, y, z, w])
+
+
+def _text(parent: ET.Element, tag: str, text: str) -> None:
+    ET.SubElement(parent, tag).text = text
+
+
+def _spaced(values: Iterable[float] | FloatArray) -> str:
+    return " ".join(repr(float(value)) for value in values)

@@ -1,0 +1,144 @@
+"""Gazebo's server in this process, stepped in lock-step.
+
+A world of SDF goes in through a file. `TestFixture` is the one class of the bindings that gives the
+entities and their components (the "ecm"): they come with the first step, and stay valid.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import tempfile
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+from pytest_simbench.simulator import SimulatorError
+
+from .bindings import bindings
+from .messages import BOOLEAN, reset_request, text_of
+
+HANDLED = (signal.SIGINT, signal.SIGTERM)
+"""Signals that a server takes over from Python."""
+
+PATIENCE = 10_000
+"""For an answer of the server, which is in this process [ms]."""
+
+
+class Server:
+    """A world that runs.
+
+    Args:
+        text: the world, of SDF.
+        name: its name in it.
+
+    Attributes:
+        ecm: the world's entities and components, as the bindings take them.
+        world: the entity.
+        timestep: that the last step advanced by [s].
+
+    Raises:
+        SimulatorError: Gazebo refused the world; the message has its own words.
+    """
+
+    def __init__(self, text: str, name: str) -> None:
+        _own_partition()
+        self.name = name
+        self.timestep = 0.0
+        self._ecm: Any = None
+        self._steps = 0
+        with tempfile.TemporaryDirectory(prefix="simbench-gazebo-") as folder, _told() as told:
+            path = Path(folder) / "world.sdf"
+            path.write_text(text, "utf-8")
+            with _signals_kept():
+                self._fixture = bindings().sim.TestFixture(str(path))
+            self._fixture.on_pre_update(self._seen)
+            self._fixture.finalize()
+            self._server = self._fixture.server()
+            self._server.run(True, 1, False)
+        if self._ecm is None:
+            words = " ".join(told[0].split()) or "it said nothing"
+            raise SimulatorError(f"Gazebo refused the world: {words}")
+        self.ecm: Any = self._ecm
+        self.world: Any = bindings().sim.World(bindings().sim.world_entity(self.ecm))
+
+    def _seen(self, info: Any, ecm: Any) -> None:
+        """Called by Gazebo in each step, before it acts."""
+        self._ecm, self._steps = ecm, info.iterations
+        self.timestep = info.dt.total_seconds()
+
+    def reset(self) -> None:
+        """Go back to the state that the file describes.
+
+        That takes a step: a reset takes effect at the end of one.
+        """
+        if not self._request("control", reset_request(), "gz.msgs.WorldControl", BOOLEAN):
+            raise SimulatorError("Gazebo did not answer the request to reset the world")
+        self._server.run(True, 1, False)
+
+    def step(self) -> None:
+        """Advance by one step, and return when it is done."""
+        self._server.run(True, 1, False)
+
+    def sdf(self) -> ET.Element:
+        """The world as Gazebo holds it at present, the element <world>."""
+        answer = self._request(
+            "generate_world_sdf", b"", "gz.msgs.SdfGeneratorConfig", "gz.msgs.StringMsg"
+        )
+        world = ET.fromstring(text_of(answer)).find("world")
+        assert world is not None
+        return world
+
+    def _request(self, service: str, request: bytes, asked: str, answered: str) -> bytes:
+        node = bindings().transport.Node()
+        ok, answer = node.request_raw(
+            f"/world/{self.name}/{service}", request, asked, answered, PATIENCE
+        )
+        if not ok:
+            raise SimulatorError(f"Gazebo did not answer its service {service}")
+        return bytes(answer)
+
+
+def new_name() -> str:
+    """Of a world that no other run on this machine has."""
+    return f"simbench_{uuid4().hex[:12]}"
+
+
+def _own_partition() -> None:
+    """Messages of this process and of no other: servers of one partition hear each other."""
+    os.environ["GZ_PARTITION"] = f"simbench-{os.getpid()}-{uuid4().hex[:12]}"
+    os.environ.setdefault("GZ_IP", "127.0.0.1")
+
+
+@contextmanager
+def _signals_kept() -> Iterator[None]:
+    """Python's handlers of signals, which a server replaces by its own."""
+    kept = {number: signal.getsignal(number) for number in HANDLED}
+    try:
+        yield
+    finally:
+        for number, handler in kept.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def _told() -> Iterator[list[str]]:
+    """What Gazebo writes on the error stream meanwhile; it goes there all the same."""
+    told: list[str] = []
+    sys.stderr.flush()
+    kept = os.dup(2)
+    with tempfile.TemporaryFile() as file:
+        os.dup2(file.fileno(), 2)
+        try:
+            yield told
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+            file.seek(0)
+            data = file.read()
+            told.append(data.decode("utf-8", "replace"))
+            os.write(2, data)
