@@ -17,6 +17,7 @@ import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict
+from importlib.util import find_spec
 from typing import Any
 
 from pytest_simbench import __version__
@@ -245,11 +246,9 @@ def _exit_call(error: SystemExit) -> str:
 
 def _import_engine(info: SimulatorInfo) -> None:
     for modules in info.modules:
-        *others, last = alternatives(modules)
-        if any(map(_imports, others)):
-            continue
+        names = alternatives(modules)
         try:
-            importlib.import_module(last)
+            importlib.import_module(next(filter(_there, names), names[0]))
         except ImportError as error:
             raise SimulatorError(
                 f"{info.title} does not import ({error}); it is missing or half installed in "
@@ -257,11 +256,11 @@ def _import_engine(info: SimulatorInfo) -> None:
             ) from error
 
 
-def _imports(module: str) -> bool:
-    with suppress(ImportError):
-        importlib.import_module(module)
-        return True
-    return False
+def _there(module: str) -> bool:
+    try:
+        return find_spec(module) is not None
+    except (ImportError, ValueError):
+        return False
 
 
 def serve(receive: Callable[[], Any], send: Callable[[Any], None]) -> None:

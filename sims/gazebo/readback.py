@@ -138,7 +138,7 @@ class ReadBack:
         return {
             f"{prefix}/axis": _motion(joint, axis),
             f"{prefix}/limits": limits,
-            f"{prefix}/effort_limit": effort if effort >= 0 else math.inf,
+            f"{prefix}/effort_limit": self.physics.effort_of(effort) if effort >= 0 else math.inf,
             f"{prefix}/friction": sum(passive),
             f"{prefix}/initial_position": drives.state()[0, index],
         }

@@ -42,6 +42,18 @@ class Physics:
         """Whether it has `<mimic>`."""
         return self.engine == FEATHERSTONE
 
+    def effort(self, limit: float) -> float:
+        """What to write so that a drive has this limit.
+
+        bullet-featherstone makes the motor, and computes its largest impulse, before the world has
+        told it the step: it takes one of 1 ms (`JointFeatures.cc`, `maxEffort * world->stepSize`).
+        """
+        return limit * self.timestep / 1e-3 if self.engine == FEATHERSTONE else limit
+
+    def effort_of(self, written: float) -> float:
+        """The limit for which `effort` wrote this."""
+        return written * 1e-3 / self.timestep if self.engine == FEATHERSTONE else written
+
     def friction(self, coefficient: float) -> float:
         """What to write so that a pair of such surfaces has this coefficient.
 
@@ -171,7 +183,7 @@ def _add_joint(
         _text(mimic, "reference", "0")
     elif leader is not None:
         effort *= 2  # it has to hold against the first finger's drive and against its own load
-    _text(limit, "effort", repr(effort))
+    _text(limit, "effort", repr(physics.effort(effort)))
 
 
 def _add_shapes(

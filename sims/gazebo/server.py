@@ -11,7 +11,7 @@ import signal
 import sys
 import tempfile
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -35,6 +35,7 @@ class Server:
     Args:
         text: the world, of SDF.
         name: its name in it.
+        still: joints by their model, that are held until the reset.
 
     Attributes:
         ecm: the world's entities and components, as the bindings take them.
@@ -45,9 +46,9 @@ class Server:
         SimulatorError: Gazebo refused the world; the message has its own words.
     """
 
-    def __init__(self, text: str, name: str) -> None:
+    def __init__(self, text: str, name: str, still: Mapping[str, Sequence[str]]) -> None:
         _own_partition()
-        self.name = name
+        self.name, self._still = name, still
         self.timestep = 0.0
         self._ecm: Any = None
         self._steps = 0
@@ -70,6 +71,17 @@ class Server:
         """Called by Gazebo in each step, before it acts."""
         self._ecm, self._steps = ecm, info.iterations
         self.timestep = info.dt.total_seconds()
+        if self._still:
+            self._hold(ecm)
+
+    def _hold(self, ecm: Any) -> None:
+        """Let no joint move in a step: a reset puts the joints back, but tells no link's pose."""
+        sim = bindings().sim
+        world = sim.World(sim.world_entity(ecm))
+        for name, joints in self._still.items():
+            model = sim.Model(world.model_by_name(ecm, name))
+            for joint in joints:
+                sim.Joint(model.joint_by_name(ecm, joint)).set_velocity(ecm, [0.0])
 
     def reset(self) -> None:
         """Go back to the state that the file describes.
@@ -79,6 +91,7 @@ class Server:
         if not self._request("control", reset_request(), "gz.msgs.WorldControl", BOOLEAN):
             raise SimulatorError("Gazebo did not answer the request to reset the world")
         self._server.run(True, 1, False)
+        self._still = {}
 
     def step(self) -> None:
         """Advance by one step, and return when it is done."""

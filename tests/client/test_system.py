@@ -52,6 +52,17 @@ def test_absent_engine(info: SimulatorInfo, monkeypatch: pytest.MonkeyPatch) -> 
     assert interpreter(info) is None
 
 
+def test_one_module_of_several_is_enough(
+    info: SimulatorInfo, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A package that is not there has no modules; asking for one is an error in Python."""
+    home(monkeypatch, sys.executable)
+    versions = f"{ABSENT}.eight|{ABSENT}.nine"
+    assert SystemPython(replace(info, modules=(f"{versions}|json.decoder",))).problem is None
+    told = str(missing(replace(info, modules=(versions,))))
+    assert f"has no module {ABSENT}.eight or {ABSENT}.nine; on Debian" in told
+
+
 def test_engine_in_the_systems_python(
     info: SimulatorInfo, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

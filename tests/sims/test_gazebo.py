@@ -1,0 +1,135 @@
+"""What only Gazebo's adapter has to show: its modules, its messages, a server that is refused a world,
+runs beside each other, and what a worker tells when the server ends.
+
+Gazebo comes from no registry that CI reaches: where it is not installed, what needs it is skipped.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pytest_simbench.sims.gazebo import bindings, messages
+from pytest_simbench.sims.gazebo.adapter import Gazebo
+from pytest_simbench.sims.gazebo.sdf import Physics, robot_model, world_text
+
+from pytest_simbench.client.errors import EngineFailed, WorkerExited
+from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.simulator import PreparedRobot, UnavailableError
+from pytest_simbench.simulator.parity import compare
+from pytest_simbench.simulator.quantities import expected_quantities
+from pytest_simbench.tasks import Jitter, Stacking
+
+from .coverage import uncovered
+from .gazebo_faults import FAULTS, FaultyGazebo
+from .worlds import Worlds
+
+CUBE = Box("cube", (0.05, 0.05, 0.05), Pose.at(0.0, 0.0, 0.025), mass=0.1)
+"""Stands on the ground."""
+
+SCENE = Stacking().scene(1, Jitter())
+
+
+@pytest.fixture(scope="module")
+def worlds() -> Iterator[Worlds]:
+    with Worlds(FaultyGazebo) as worlds:
+        yield worlds
+
+
+def test_messages_have_protobufs_form() -> None:
+    """As the protobuf compiler's own classes write and read them."""
+    assert messages.reset_request() == b"*\x02\x10\x01"
+    header = b"\n\x04\n\x02\x08\x07"  # a field that is not asked for
+    assert messages.text_of(header + b"\x12\x05<sdf>") == "<sdf>"
+    assert messages.text_of(b"\x12\xac\x02" + b"x" * 300) == 300 * "x"
+    assert messages.text_of(b"") == ""
+    for broken in (b"\x12", b"\x12\x05<sd", b"\x0b"):
+        with pytest.raises(ValueError, match="the message ends too early|no wire type"):
+            messages.text_of(broken)
+
+
+def test_no_release_is_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bindings, "RELEASES", {"7": ("json", "gz.no_such_module")})
+    with pytest.raises(UnavailableError, match="no release of gz-sim .*: 7: json, gz.no_such_"):
+        bindings.bindings.__wrapped__()
+
+
+def test_the_world_is_that_of_the_engine() -> None:
+    """Joints are 0 where the scene has them start; a name is a body's or the robot's."""
+    assert SCENE.robot is not None
+    scene = replace(SCENE, bodies=(replace(CUBE, name="robot", pose=Pose.at(1.0, 1.0, 0.025)),))
+    prepared = PreparedRobot(SCENE.robot)
+    for engine, elements in (("dartsim", "ode/mu"), ("bullet-featherstone", "bullet/friction")):
+        physics = Physics(engine, 0.001, "ode", "dantzig")
+        world = ET.fromstring(world_text(scene, prepared, physics, "w")).find("world")
+        assert world is not None
+        assert world.findtext("plugin/engine/filename") == f"gz-physics-{engine}-plugin"
+        assert world.find(f"model/link/collision/surface/friction/{elements}") is not None
+        model = world.find(f"model[@name='{robot_model(scene)}']")
+        assert model is not None
+        assert len(world.findall("model[@name='robot']")) == 1
+        for joint in SCENE.robot.joints:
+            limit = model.find(f"joint[@name='{joint.name}']/axis/limit")
+            assert limit is not None
+            found = [float(limit.findtext(what, "")) for what in ("lower", "upper")]
+            expected = prepared.limits[joint.name] - joint.initial_position
+            np.testing.assert_allclose(found, expected)
+
+
+@pytest.mark.parametrize("profile", ["default", "tuned"])
+def test_an_honest_world_passes(worlds: Worlds, profile: str) -> None:
+    assert worlds.load(SCENE, profile).time == 0.0
+
+
+@pytest.mark.parametrize("quantity", FAULTS)
+def test_fault_is_caught(worlds: Worlds, quantity: str) -> None:
+    world = worlds.load(SCENE, "default", parity=False, fault=quantity)
+    expected = expected_quantities(SCENE, Gazebo.profiles["default"])
+    reported = world.process.request("read_back")
+    wrong = compare(expected, reported, Gazebo.info.deviations, "gazebo").wrong
+    assert wrong[quantity].startswith("scene ")
+
+
+def test_nothing_is_left_out(worlds: Worlds) -> None:
+    reported = worlds.load(SCENE).process.request("read_back")
+    assert uncovered(reported, FAULTS, impossible={"gripper/coupled"}) == set()
+
+
+def test_it_starts_where_the_scene_does(worlds: Worlds) -> None:
+    """The server has made a step by then, and was reset."""
+    world = worlds.load(Scene("falling", (CUBE.moved_to(Pose.at(0.0, 0.0, 1.0)),)))
+    np.testing.assert_array_equal(world.bodies[0, :3], (0.0, 0.0, 1.0))
+    np.testing.assert_array_equal(world.bodies[0, 7:], np.zeros(6))
+    world.wait(0.1)
+    assert world.bodies[0, 9] == pytest.approx(-0.980665, rel=1e-6)
+
+
+def test_what_gazebo_refuses_is_told_in_its_own_words(worlds: Worlds) -> None:
+    with pytest.raises(EngineFailed, match="Gazebo refused the world: .*[Cc]ollision"):
+        worlds.load(SCENE, fault="refused")
+
+
+def test_two_runs_do_not_meet(worlds: Worlds) -> None:
+    """Both in a partition that the user named: each makes one of its own."""
+    with Worlds(FaultyGazebo) as others:
+        first, second = (each.load(Scene("one", (CUBE,))) for each in (worlds, others))
+        for world in (first, second):
+            world.wait(0.02)
+        assert first.time == second.time == 0.02
+
+
+@pytest.mark.parametrize(
+    ("number", "told"), [(signal.SIGKILL, "SIGKILL"), (signal.SIGTERM, "SIGTERM")]
+)
+def test_a_server_that_is_ended(number: signal.Signals, told: str) -> None:
+    """The server is in the worker: its end is the worker's, and no handler of Gazebo's hides it."""
+    with Worlds(FaultyGazebo) as worlds:
+        world = worlds.load(Scene("one", (CUBE,)))
+        os.kill(worlds.worker.pid, number)
+        with pytest.raises(WorkerExited, match=told):
+            world.wait(5.0)
