@@ -111,8 +111,7 @@ class Gazebo(Simulator):
         self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         name = new_name()
         text = world_text(scene, self.prepared, self._physics, name)
-        still = {} if scene.robot is None else {robot_model(scene): scene.robot.joint_names}
-        self.server = server = Server(text, name, still)
+        self.server = server = Server(text, name)
         server.reset()
         sim, ecm = bindings().sim, server.ecm
         self._free = [

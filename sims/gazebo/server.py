@@ -11,7 +11,7 @@ import signal
 import sys
 import tempfile
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -35,7 +35,6 @@ class Server:
     Args:
         text: the world, of SDF.
         name: its name in it.
-        still: joints by their model, that are held until the reset.
 
     Attributes:
         ecm: the world's entities and components, as the bindings take them.
@@ -46,9 +45,9 @@ class Server:
         SimulatorError: Gazebo refused the world; the message has its own words.
     """
 
-    def __init__(self, text: str, name: str, still: Mapping[str, Sequence[str]]) -> None:
+    def __init__(self, text: str, name: str) -> None:
         _own_partition()
-        self.name, self._still = name, still
+        self.name = name
         self.timestep = 0.0
         self._ecm: Any = None
         self._steps = 0
@@ -71,27 +70,16 @@ class Server:
         """Called by Gazebo in each step, before it acts."""
         self._ecm, self._steps = ecm, info.iterations
         self.timestep = info.dt.total_seconds()
-        if self._still:
-            self._hold(ecm)
-
-    def _hold(self, ecm: Any) -> None:
-        """Let no joint move in a step: a reset puts the joints back, but tells no link's pose."""
-        sim = bindings().sim
-        world = sim.World(sim.world_entity(ecm))
-        for name, joints in self._still.items():
-            model = sim.Model(world.model_by_name(ecm, name))
-            for joint in joints:
-                sim.Joint(model.joint_by_name(ecm, joint)).set_velocity(ecm, [0.0])
 
     def reset(self) -> None:
         """Go back to the state that the file describes.
 
-        That takes a step: a reset takes effect at the end of one.
+        The server reads the request at the end of a step. In the next one it makes the world anew
+        instead of advancing it.
         """
         if not self._request("control", reset_request(), "gz.msgs.WorldControl", BOOLEAN):
             raise SimulatorError("Gazebo did not answer the request to reset the world")
-        self._server.run(True, 1, False)
-        self._still = {}
+        self._server.run(True, 2, False)
 
     def step(self) -> None:
         """Advance by one step, and return when it is done."""
