@@ -19,6 +19,7 @@ from pytest_simbench.simulator import (
     FOLLOWER,
     Deviation,
     PreparedRobot,
+    SeedsSeen,
     Settings,
     Simulator,
     SimulatorInfo,
@@ -100,7 +101,10 @@ class Gazebo(Simulator):
     )
     profiles: ClassVar[Mapping[str, Settings]] = {
         "default": GazeboSettings(),
-        "tuned": GazeboSettings(position_gain=0.5),
+        "tuned": GazeboSettings(engine="bullet-featherstone", position_gain=0.5),
+    }
+    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+        "tuned": (SeedsSeen("throwing", 2022, 2023), SeedsSeen("stacking", 2022, 2022)),
     }
     settings: GazeboSettings
 
