@@ -82,6 +82,10 @@ class Gazebo(Simulator):
             Deviation("body/*/damping link/*/damping", "Gazebo tells no damping of links"),
             Deviation("body/*/margin link/*/margin", "Gazebo's shapes have no margin"),
             Deviation(
+                "body/*/velocity",
+                "Gazebo tells no velocity before the first step, in which a force gives it",
+            ),
+            Deviation(
                 f"joint/*finger_joint2/effort_limit joint/{FOLLOWER}/effort_limit",
                 "with dartsim the second finger is led by the first, by up to both their limits",
             ),
@@ -123,6 +127,7 @@ class Gazebo(Simulator):
         ]
         for link in self._free:
             link.enable_velocity_checks(ecm)
+        self._throw()
         self._drives: Drives | None = None
         if self.prepared is not None:
             self._drives = Drives(
@@ -133,6 +138,22 @@ class Gazebo(Simulator):
                 s.position_gain,
                 self._physics.coupled,
             )
+
+    def _throw(self) -> None:
+        """Give bodies their velocity by a force and a torque in the first step.
+
+        Without gravity a step of duration h under the force m v / h ends at the velocity v, and so
+        does one that begins with v. Gazebo's velocity commands would hold on in all further steps.
+        """
+        vector3, h = bindings().math.Vector3d, self.settings.timestep
+        for body, link in zip(self.scene.free_bodies, self._free, strict=True):
+            if not body.velocity.any():
+                continue
+            turn = body.pose.rotation()
+            inertia = turn @ np.diag(body.inertia()) @ turn.T
+            force = body.mass / h * body.velocity[:3]
+            torque = inertia @ body.velocity[3:] / h
+            link.add_world_wrench(self.server.ecm, vector3(*force), vector3(*torque))
 
     def _model(self, name: str) -> Any:
         ecm = self.server.ecm
@@ -165,7 +186,8 @@ class Gazebo(Simulator):
 
     def body_state(self) -> FloatArray:
         state, ecm = np.zeros((len(self._free), 13)), self.server.ecm
-        for row, link in zip(state, self._free, strict=True):
+        bodies = self.scene.free_bodies
+        for row, link, body in zip(state, self._free, bodies, strict=True):
             place = link.world_pose(ecm)
             at, turn = place.pos(), place.rot()
             row[:7] = at.x(), at.y(), at.z(), turn.w(), turn.x(), turn.y(), turn.z()
@@ -173,6 +195,8 @@ class Gazebo(Simulator):
             if linear is not None and angular is not None:
                 row[7:10] = linear.x(), linear.y(), linear.z()
                 row[10:] = angular.x(), angular.y(), angular.z()
+            elif not self._steps:
+                row[7:] = body.velocity
         return state
 
     def joint_state(self) -> FloatArray:

@@ -18,7 +18,15 @@ import numpy as np
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import PreparedRobot, one_value
 from pytest_simbench.simulator.quantities import touches
-from pytest_simbench.simulator.shapes import box_corners, mesh_points, outlines, placed, reach
+from pytest_simbench.simulator.shapes import (
+    box_corners,
+    cylinder_reach,
+    mesh_points,
+    outlines,
+    placed,
+    reach,
+    round_reach,
+)
 
 from .bindings import bindings
 from .drives import Drives
@@ -89,16 +97,14 @@ class ReadBack:
         element, ecm = self._element(prefix), self.server.ecm
         link = self._entity(prefix)
         frame = pose(link.world_pose(ecm))
-        boxes, meshes = [], []
+        shapes: dict[str, list[FloatArray]] = {"box": [], "mesh": [], "round": []}
         for collision in element.findall("collision"):
-            box, mesh = collision.find("geometry/box/size"), collision.find("geometry/mesh")
-            at = pose_in(collision)
-            if box is not None:
-                boxes.append(reach(placed(box_corners(numbers(box)), at)))
-            if mesh is not None:
-                meshes.append(reach(placed(_points(mesh), at)))
+            solid = collision.find("geometry/*")
+            assert solid is not None
+            kind = solid.tag if solid.tag in shapes else "round"
+            shapes[kind].append(_reach(solid, pose_in(collision)))
         found: dict[str, Any] = {f"{prefix}/pose": frame.as_array()}
-        found |= outlines(prefix, boxes, meshes)
+        found |= outlines(prefix, shapes["box"], shapes["mesh"], shapes["round"])
         surfaces = self._surfaces(element)
         found |= {f"{prefix}/{name}": value for name, value in surfaces.items()}
         if moves:
@@ -203,6 +209,18 @@ class ReadBack:
     def _entity(self, name: str) -> Any:
         model, link = self._place(name)
         return bindings().sim.Link(self._model(model).link_by_name(self.server.ecm, link))
+
+
+def _reach(solid: ET.Element, at: Pose) -> FloatArray:
+    """The reach of a shape of SDF at a pose."""
+    if solid.tag == "box":
+        size = solid.find("size")
+        assert size is not None
+        return reach(placed(box_corners(numbers(size)), at))
+    if solid.tag == "mesh":
+        return reach(placed(_points(solid), at))
+    radius, length = (number(solid, what, 0.0) for what in ("radius", "length"))
+    return (cylinder_reach if solid.tag == "cylinder" else round_reach)(radius, length, at)
 
 
 def _points(mesh: ET.Element) -> FloatArray:

@@ -10,8 +10,17 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from pytest_simbench.scene import Box, FloatArray, Pose, Scene
-from pytest_simbench.simulator import PreparedRobot
+from pytest_simbench.scene import (
+    Body,
+    Box,
+    Capsule,
+    Cylinder,
+    FloatArray,
+    Pose,
+    Scene,
+    Sphere,
+)
+from pytest_simbench.simulator import NotSupportedError, PreparedRobot
 from pytest_simbench.simulator.kinematics import link_poses
 from pytest_simbench.simulator.urdf import MovingJoint, Shape
 
@@ -81,8 +90,8 @@ def world_text(scene: Scene, prepared: PreparedRobot | None, physics: Physics, n
     _add_physics(world, physics)
     _text(world, "gravity", _spaced(scene.gravity))
     _add_ground(world, scene.ground_friction, physics)
-    for box in scene.bodies:
-        _add_box(world, box, physics)
+    for body in scene.bodies:
+        _add_body(world, body, physics)
     if prepared is not None:
         _add_robot(world, scene, prepared, physics)
     ET.indent(root)
@@ -117,17 +126,33 @@ def _add_ground(world: ET.Element, friction: float, physics: Physics) -> None:
     _add_surface(collision, friction, physics)
 
 
-def _add_box(world: ET.Element, box: Box, physics: Physics) -> None:
-    if box.fixed:
-        link = _add_static(world, box.name, box.pose)
+def _add_body(world: ET.Element, body: Body, physics: Physics) -> None:
+    if body.fixed:
+        link = _add_static(world, body.name, body.pose)
     else:
-        model = ET.SubElement(world, "model", name=box.name)
-        _add_pose(model, box.pose)
+        model = ET.SubElement(world, "model", name=body.name)
+        _add_pose(model, body.pose)
         link = ET.SubElement(model, "link", name="link")
-        i, j, k = box.inertia()
-        _add_inertial(link, box.mass, Pose(), [i, 0.0, 0.0, j, 0.0, k])
-    shape = Shape(Pose(), size=box.size)
-    _add_shapes(link, [shape], box.friction, physics)
+        i, j, k = body.inertia()
+        _add_inertial(link, body.mass, Pose(), [i, 0.0, 0.0, j, 0.0, k])
+    collision = ET.SubElement(link, "collision", name="0")
+    _add_solid(ET.SubElement(collision, "geometry"), body)
+    _add_surface(collision, body.friction, physics)
+
+
+def _add_solid(geometry: ET.Element, body: Body) -> None:
+    """The shape of a body; those of SDF are along z."""
+    match body:
+        case Box():
+            _text(ET.SubElement(geometry, "box"), "size", _spaced(body.size))
+        case Sphere():
+            _text(ET.SubElement(geometry, "sphere"), "radius", repr(float(body.radius)))
+        case Cylinder() | Capsule():
+            element = ET.SubElement(geometry, type(body).__name__.lower())
+            _text(element, "radius", repr(float(body.radius)))
+            _text(element, "length", repr(float(body.length)))
+        case _:
+            raise NotSupportedError(f"gazebo has no {type(body).__name__}")
 
 
 def _add_static(world: ET.Element, name: str, pose: Pose) -> ET.Element:
@@ -190,14 +215,13 @@ def _add_shapes(
     link: ET.Element, shapes: Iterable[Shape], friction: float, physics: Physics
 ) -> None:
     for number, shape in enumerate(shapes):
-        for tag in ("visual", "collision"):
-            element = ET.SubElement(link, tag, name=str(number))
-            _add_pose(element, shape.pose)
-            geometry = ET.SubElement(element, "geometry")
-            if shape.size is not None:
-                _text(ET.SubElement(geometry, "box"), "size", _spaced(shape.size))
-            else:
-                _text(ET.SubElement(geometry, "mesh"), "uri", shape.mesh or "")
+        element = ET.SubElement(link, "collision", name=str(number))
+        _add_pose(element, shape.pose)
+        geometry = ET.SubElement(element, "geometry")
+        if shape.size is not None:
+            _text(ET.SubElement(geometry, "box"), "size", _spaced(shape.size))
+        else:
+            _text(ET.SubElement(geometry, "mesh"), "uri", shape.mesh or "")
         _add_surface(element, friction, physics)
 
 
