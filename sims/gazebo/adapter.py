@@ -146,13 +146,18 @@ class Gazebo(Simulator):
         does one that begins with v. Gazebo's velocity commands would hold on in all further steps.
         """
         vector3, h = bindings().math.Vector3d, self.settings.timestep
-        for body, link in zip(self.scene.free_bodies, self._free, strict=True):
+        self._thrown = np.zeros((len(self._free), 6))
+        bodies = self.scene.free_bodies
+        for row, body, link in zip(self._thrown, bodies, self._free, strict=True):
             if not body.velocity.any():
                 continue
+            row[:] = body.velocity
             turn = body.pose.rotation()
             inertia = turn @ np.diag(body.inertia()) @ turn.T
             force = body.mass / h * body.velocity[:3]
             torque = inertia @ body.velocity[3:] / h
+            if self._physics.turns_torques:
+                torque = turn.T @ torque
             link.add_world_wrench(self.server.ecm, vector3(*force), vector3(*torque))
 
     def _model(self, name: str) -> Any:
@@ -186,17 +191,17 @@ class Gazebo(Simulator):
 
     def body_state(self) -> FloatArray:
         state, ecm = np.zeros((len(self._free), 13)), self.server.ecm
-        bodies = self.scene.free_bodies
-        for row, link, body in zip(state, self._free, bodies, strict=True):
+        if not self._steps:  # Gazebo tells no velocity before it has made a step
+            state[:, 7:] = self._thrown
+        for row, link in zip(state, self._free, strict=True):
             place = link.world_pose(ecm)
             at, turn = place.pos(), place.rot()
             row[:7] = at.x(), at.y(), at.z(), turn.w(), turn.x(), turn.y(), turn.z()
-            linear, angular = link.world_linear_velocity(ecm), link.world_angular_velocity(ecm)
-            if linear is not None and angular is not None:
+            if self._steps:
+                linear = link.world_linear_velocity(ecm)
+                angular = link.world_angular_velocity(ecm)
                 row[7:10] = linear.x(), linear.y(), linear.z()
                 row[10:] = angular.x(), angular.y(), angular.z()
-            elif not self._steps:
-                row[7:] = body.velocity
         return state
 
     def joint_state(self) -> FloatArray:

@@ -51,6 +51,12 @@ class Physics:
         """Whether it has `<mimic>`."""
         return self.engine == FEATHERSTONE
 
+    @property
+    def turns_torques(self) -> bool:
+        """Whether it takes a torque on a body in the body's axes, not in the world's as it should
+        (seen with 8.14.0: a turned cube under a torque about x turned about another axis)."""
+        return self.engine == FEATHERSTONE
+
     def effort(self, limit: float) -> float:
         """What to write so that a drive has this limit.
 

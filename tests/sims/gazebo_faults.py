@@ -27,7 +27,7 @@ GROUND = "model[@name='ground']/link/collision"
 
 @dataclass(frozen=True)
 class FaultySettings(GazeboSettings):
-    """Adds `fault`, a key of `FAULTS` or "" for none."""
+    """Adds `fault`, a key of `PLANTS` or "" for none."""
 
     fault: str = ""
 
@@ -45,7 +45,7 @@ class FaultyGazebo(Gazebo):
             root = ET.fromstring(honest(*args))
             world = root.find("world")
             assert world is not None
-            FAULTS[self.settings.fault](world)
+            PLANTS[self.settings.fault](world)
             return ET.tostring(root, encoding="unicode")
 
         if self.settings.fault:
@@ -113,7 +113,7 @@ FAULTS: dict[str, Fault] = {
     "ground/height": moved("model[@name='ground']/pose", 2, 0.01),
     "ground/friction": rough(GROUND),
     "ground/restitution": bouncing(GROUND),
-    "body/cube_05/pose": moved(f"{CUBE}/pose", 0, 0.01),
+    "body/table/pose": moved("model[@name='table']/pose", 2, -0.012),
     "body/cube_05/friction": rough(BOX),
     "body/cube_05/restitution": bouncing(BOX),
     "body/cube_05/mass": scaled(f"{CUBE}/link/inertial/mass", 2.0),
@@ -137,3 +137,14 @@ FAULTS: dict[str, Fault] = {
     "joint/panda_joint4/friction": added(JOINT, "dynamics/damping", "1.0"),
 }
 """By quantity; `gripper/coupled` is dartsim's own to break, see `test_gazebo`."""
+
+
+def childless(world: ET.Element) -> None:
+    """A joint of a link that is not there."""
+    child = world.find("model[@name='robot']/joint[@name='panda_joint4']/child")
+    assert child is not None
+    child.text = "no_such_link"
+
+
+PLANTS: dict[str, Fault] = {**FAULTS, "refused": childless}
+"""What can be planted: a fault, or what Gazebo refuses."""
