@@ -114,13 +114,17 @@ def test_what_gazebo_refuses_is_told_in_its_own_words(worlds: Worlds) -> None:
         worlds.load(SCENE, fault="refused")
 
 
-def test_two_runs_do_not_meet(worlds: Worlds) -> None:
-    """Both in a partition that the user named: each makes one of its own."""
-    with Worlds(FaultyGazebo) as others:
-        first, second = (each.load(Scene("one", (CUBE,))) for each in (worlds, others))
+def test_two_runs_do_not_meet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a partition that the user named: a world that is loaded is reset, and no other one is."""
+    monkeypatch.setenv("GZ_PARTITION", "shared")
+    scene = Scene("falling", (CUBE.moved_to(Pose.at(0.0, 0.0, 1.0)),))
+    with Worlds(FaultyGazebo) as some, Worlds(FaultyGazebo) as others:
+        first = some.load(scene)
+        first.wait(0.1)
+        second = others.load(scene)
         for world in (first, second):
-            world.wait(0.02)
-        assert first.time == second.time == 0.02
+            world.wait(0.1)
+        assert first.bodies[0, 9] == pytest.approx(2 * second.bodies[0, 9], rel=1e-6)
 
 
 @pytest.mark.parametrize(
