@@ -122,7 +122,7 @@ class ReadBack:
         for collision in element.findall("collision"):
             for name in self.physics.friction_names:
                 frictions.append(number(collision, f"surface/friction/{name}", 1.0))
-            bounces.append(number(collision, "surface/bounce/restitution_coefficient", 0.0))
+            bounces.append(number(collision, "surface/bounce/restitution_coefficient", 0.0) ** 2)
         if not frictions:
             return {}
         friction = np.array([self.physics.friction_of(value) for value in frictions])

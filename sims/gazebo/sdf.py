@@ -6,6 +6,7 @@ joint: Gazebo's reset puts joints to zero. So the limits are moved, and `drives`
 
 from __future__ import annotations
 
+import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -95,7 +96,7 @@ def world_text(scene: Scene, prepared: PreparedRobot | None, physics: Physics, n
     world = ET.SubElement(root, "world", name=name)
     _add_physics(world, physics)
     _text(world, "gravity", _spaced(scene.gravity))
-    _add_ground(world, scene.ground_friction, physics)
+    _add_ground(world, scene, physics)
     for body in scene.bodies:
         _add_body(world, body, physics)
     if prepared is not None:
@@ -125,11 +126,11 @@ def _add_physics(world: ET.Element, physics: Physics) -> None:
     _text(ET.SubElement(system, "engine"), "filename", f"gz-physics-{physics.engine}-plugin")
 
 
-def _add_ground(world: ET.Element, friction: float, physics: Physics) -> None:
+def _add_ground(world: ET.Element, scene: Scene, physics: Physics) -> None:
     link = _add_static(world, "ground", Pose())
     collision = ET.SubElement(link, "collision", name="0")
     _text(ET.SubElement(ET.SubElement(collision, "geometry"), "plane"), "normal", "0 0 1")
-    _add_surface(collision, friction, physics)
+    _add_surface(collision, scene.ground_friction, physics, scene.ground_restitution)
 
 
 def _add_body(world: ET.Element, body: Body, physics: Physics) -> None:
@@ -143,7 +144,7 @@ def _add_body(world: ET.Element, body: Body, physics: Physics) -> None:
         _add_inertial(link, body.mass, Pose(), [i, 0.0, 0.0, j, 0.0, k])
     collision = ET.SubElement(link, "collision", name="0")
     _add_solid(ET.SubElement(collision, "geometry"), body)
-    _add_surface(collision, body.friction, physics)
+    _add_surface(collision, body.friction, physics, body.restitution)
 
 
 def _add_solid(geometry: ET.Element, body: Body) -> None:
@@ -231,8 +232,14 @@ def _add_shapes(
         _add_surface(element, friction, physics)
 
 
-def _add_surface(collision: ET.Element, friction: float, physics: Physics) -> None:
-    element = ET.SubElement(ET.SubElement(collision, "surface"), "friction")
+def _add_surface(
+    collision: ET.Element, friction: float, physics: Physics, restitution: float = 0.0
+) -> None:
+    """Friction and restitution; of a pair both engines take the product of the restitutions."""
+    surface = ET.SubElement(collision, "surface")
+    bounce = ET.SubElement(surface, "bounce")
+    _text(bounce, "restitution_coefficient", repr(math.sqrt(restitution)))
+    element = ET.SubElement(surface, "friction")
     mu = repr(physics.friction(friction))
     own = ET.SubElement(element, physics.friction_names[0].partition("/")[0])
     for name in physics.friction_names:
