@@ -231,8 +231,10 @@ class Repetition:
         seconds["other"] = max(0.0, total - sum(seconds.values()))
         seconds["total"] = total
         details = {**outcome.details, "log": self._log_name()}
+        if sample := self.experiment.task.sample(self.seed):
+            details["data"] = list(sample)
         if seen := seeds_seen(case.adapter, case.profile):
-            details["chosen_on"] = [seeds.to_wire() for seeds in seen]
+            details["chosen_on"] = [what.to_wire() for what in seen]
         if self._constructed.untested:
             details["untested"] = self._constructed.untested
         if self._closing:

@@ -26,13 +26,15 @@ def run_command(config: pytest.Config) -> int:
         pytest.UsageError: what is wrong with the input; one sentence.
     """
     from pytest_simbench.plugin.bisect import bisect
+    from pytest_simbench.plugin.data import download
     from pytest_simbench.plugin.environments import install, list_environments, uninstall
     from pytest_simbench.plugin.merge import merge_runs, report_runs
 
     options.values(config)
     recording.check(config)
     actions = (
-        install, uninstall, list_environments, bisect, merge_runs, report_runs, _list, _robots,
+        install, uninstall, list_environments, download, bisect, merge_runs, report_runs, _list,
+        _robots,
     )  # fmt: skip
     commands = dict(zip(options.COMMANDS, actions, strict=True))
     return next(do(config) for name, do in commands.items() if options.given(config, name))

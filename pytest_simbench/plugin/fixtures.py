@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench.plugin import arguments, benchmark, cluster, options, recording
+from pytest_simbench.plugin import arguments, benchmark, cluster, data, options, recording
 from pytest_simbench.plugin.session import session_of
 from pytest_simbench.plugin.spellings import is_conftest
 
@@ -239,6 +239,15 @@ def threshold(request: pytest.FixtureRequest) -> Callable[[str, float], float]:
         return value
 
     return choose
+
+
+@pytest.fixture(scope="session")
+def data_set(request: pytest.FixtureRequest) -> Callable[[str], Any]:
+    """A measured data set by name: `Tossing(data_set("cube_tosses"))`.
+
+    The test is skipped where the set is not on this machine, with the command that brings it.
+    """
+    return lambda name: data.read_or_skip(request.config, name)
 
 
 @pytest.fixture(scope="session")

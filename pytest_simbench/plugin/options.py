@@ -145,6 +145,8 @@ OPTIONS = (
            "file", metavar="FILE"),
     Option("--sim-threshold", Assignments("METRIC=NUMBER", numbers=True), "change a threshold of "
            "the suites: placed=0.9", {}, metavar="METRIC=VALUE"),
+    Option("--sim-data", File(), "folder of measured data sets (default: $SIMBENCH_DATA, else a "
+           "cache of the user's)", metavar="DIR"),
     Option("--sim-strict", Flag(), "claims that the repetitions do not decide fail, also those "
            "that are not judged because there are too few", False),
     Option("--sim-baseline", File(), "run to compare with: a run folder, its records.jsonl, or a "
@@ -174,14 +176,16 @@ OPTIONS = (
            "own, or of a release (NAME==VERSION), and exit", metavar="NAME", ini=False),
     Option("--sim-uninstall", Words(), "remove such environments and exit", metavar="NAME",
            ini=False),
+    Option("--sim-download", Words(), "bring a measured data set from its public source into the "
+           "folder of --sim-data, and exit", metavar="NAME", ini=False),
     Option("--sim-environments", Flag(), "list the environments that are there, with their sizes, "
            "and exit", False, ini=False),
 )  # fmt: skip
 """All options. Only their tests know them besides this table; docs/options.md is made of it."""
 
 COMMANDS = (
-    "sim_install", "sim_uninstall", "sim_environments", "sim_bisect", "sim_merge", "sim_report",
-    "sim_list", "sim_robots",
+    "sim_install", "sim_uninstall", "sim_environments", "sim_download", "sim_bisect", "sim_merge",
+    "sim_report", "sim_list", "sim_robots",
 )  # fmt: skip
 """Options that do their work and exit, see `plugin.commands`."""
 

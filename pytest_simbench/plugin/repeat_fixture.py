@@ -64,8 +64,10 @@ class RepeatFixture:
             first = up_to(plan.looks[0])
             result: ResultSet = SequentialResultSet(first, experiment.metrics, plan, up_to)
         else:
-            number = wanted or number_mark(self.node, "reps") or self.case.protocol.repetitions
-            result = ResultSet(up_to(int(number)), experiment.metrics)
+            number = wanted or number_mark(self.node, "reps") or experiment.task.repetitions
+            result = ResultSet(
+                up_to(int(number or self.case.protocol.repetitions)), experiment.metrics
+            )
         recording.photograph(self.node.config, experiment, result.records, self.run.tell)
         result.strict = options.value(self.node.config, "sim_strict")
         self.results.append(result)

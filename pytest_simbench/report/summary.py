@@ -184,7 +184,9 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str, ends: 
     first = records[0]
     done = [record for record in records if record.status == "ok"]
     notes = list(dict.fromkeys(r.details["untested"] for r in records if "untested" in r.details))
-    again = published_again((r.task, r.seed, r.details.get("chosen_on", ())) for r in done)
+    again = published_again(
+        (r.task, r.seed, r.details.get("data"), r.details.get("chosen_on", ())) for r in done
+    )
     notes += [again] * bool(again)
     if any(record.contended for record in done):
         notes.append("repetitions ran in parallel: its times and CPU are contended")

@@ -1,7 +1,7 @@
 """What an adapter implements, its settings, capabilities and report of the world it built."""
 
 from pytest_simbench.simulator.base import Simulator
-from pytest_simbench.simulator.choices import SeedsSeen
+from pytest_simbench.simulator.choices import DataSeen, SeedsSeen, Seen
 from pytest_simbench.simulator.errors import (
     DescriptionError,
     DivergedError,
@@ -22,6 +22,7 @@ from pytest_simbench.simulator.urdf import PreparedRobot
 __all__ = [
     "FOLLOWER",
     "Capability",
+    "DataSeen",
     "DescriptionError",
     "Deviation",
     "DivergedError",
@@ -30,6 +31,7 @@ __all__ = [
     "ParityError",
     "PreparedRobot",
     "SeedsSeen",
+    "Seen",
     "Settings",
     "SettingsError",
     "Simulator",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_simbench.scene import FloatArray, Scene
-from pytest_simbench.simulator.choices import SeedsSeen
+from pytest_simbench.simulator.choices import Seen
 from pytest_simbench.simulator.errors import NotSupportedError
 from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.settings import Settings
@@ -33,15 +33,15 @@ class Simulator(ABC):
     Attributes:
         info: facts about the engine, its capabilities and its deviations.
         profiles: settings by profile name; `default` and `tuned` at least.
-        chosen_on: by profile, the seeds by whose results its settings were chosen, or others
-            rejected; a report on the same seeds says so.
+        chosen_on: by profile, the seeds or measured motions by whose results its settings were
+            chosen, or others rejected; a report on the same says so.
         settings: those of this instance.
         gui: whether a window is to be opened in `load`.
     """
 
     info: ClassVar[SimulatorInfo]
     profiles: ClassVar[Mapping[str, Settings]]
-    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {}
+    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {}
 
     def __init__(self, settings: Settings, *, gui: bool = False) -> None:
         self.settings = settings

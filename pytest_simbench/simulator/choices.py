@@ -1,4 +1,4 @@
-"""On which seeds the settings of a profile were chosen, so that nobody publishes on the same."""
+"""On what the settings of a profile were chosen, so that nobody publishes on the same."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import importlib
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
+
+DeclaredSample = tuple[str, int] | None
+"""Data set and number of the measured motion that a repetition was held against, if it was."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +24,7 @@ class SeedsSeen:
     first: int
     last: int
 
-    def holds(self, task: str, seed: int) -> bool:
+    def holds(self, task: str, seed: int, sample: DeclaredSample = None) -> bool:
         """Whether a repetition of that task and seed was seen."""
         return task == self.task and self.first <= seed <= self.last
 
@@ -32,7 +35,43 @@ class SeedsSeen:
         return asdict(self)
 
 
-def seeds_seen(adapter: str, profile: str) -> tuple[SeedsSeen, ...]:
+@dataclass(frozen=True)
+class DataSeen:
+    """Measured motions by whose simulation settings were chosen, or others rejected.
+
+    Attributes:
+        data: name of the data set.
+        first, last: numbers in the set, both included.
+        step: from one number to the next.
+    """
+
+    data: str
+    first: int
+    last: int
+    step: int = 1
+
+    def holds(self, task: str, seed: int, sample: DeclaredSample = None) -> bool:
+        """Whether a repetition that was held against that motion was seen."""
+        if sample is None or sample[0] != self.data:
+            return False
+        return sample[1] in range(self.first, self.last + 1, self.step)
+
+    def __str__(self) -> str:
+        every = "" if self.step == 1 else f" in steps of {self.step}"
+        return f"{self.first} to {self.last}{every}"
+
+    def to_wire(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+Seen = SeedsSeen | DataSeen
+
+
+def _seen(data: Mapping[str, Any]) -> Seen:
+    return DataSeen(**data) if "data" in data else SeedsSeen(**data)
+
+
+def seeds_seen(adapter: str, profile: str) -> tuple[Seen, ...]:
     """What the adapter `module:Class` says of a profile; nothing where it says nothing."""
     module, _, name = adapter.partition(":")
     try:
@@ -43,25 +82,33 @@ def seeds_seen(adapter: str, profile: str) -> tuple[SeedsSeen, ...]:
 
 
 def published_again(
-    repetitions: Iterable[tuple[str, int, Iterable[Mapping[str, Any]]]],
+    repetitions: Iterable[tuple[str, int, DeclaredSample, Iterable[Mapping[str, Any]]]],
 ) -> str:
-    """A sentence when repetitions have seeds on which their settings were chosen; else nothing.
+    """A sentence when repetitions are of what their settings were chosen on; else nothing.
 
     Args:
-        repetitions: task, seed, and what the record says of the profile (`to_wire` of each).
+        repetitions: task, seed, what it was held against, and what the record says of the profile
+            (`to_wire` of each).
     """
-    seen: dict[SeedsSeen, None] = {}
+    seen: dict[Seen, None] = {}
     hit = total = 0
-    for task, seed, declared in repetitions:
-        holding = [s for s in (SeedsSeen(**data) for data in declared) if s.holds(task, seed)]
+    for task, seed, sample, declared in repetitions:
+        holding = [s for s in map(_seen, declared) if s.holds(task, seed, sample)]
         seen |= dict.fromkeys(holding)
         hit += bool(holding)
         total += 1
     if not hit:
         return ""
+    data = [what for what in seen if isinstance(what, DataSeen)]
+    if data:
+        sets = " and ".join(f"{what} of {what.data}" for what in data)
+        return (
+            f"its settings were chosen on numbers {sets}, and {hit} of these {total} repetitions "
+            "are held against them: publish others"
+        )
     seeds = " and ".join(map(str, seen))
-    word = "seed" if len(seen) == 1 and next(iter(seen)).first == next(iter(seen)).last else "seeds"
+    one = len(seen) == 1 and " " not in seeds
     return (
-        f"its settings were chosen on {word} {seeds} of this task, and {hit} of these {total} "
-        "repetitions are of them: publish others (--sim-seed)"
+        f"its settings were chosen on {'seed' if one else 'seeds'} {seeds} of this task, and {hit} "
+        f"of these {total} repetitions are of them: publish others (--sim-seed)"
     )

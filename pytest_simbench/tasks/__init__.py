@@ -5,6 +5,7 @@ from pytest_simbench.tasks.moments import Moment
 from pytest_simbench.tasks.pushing import CurvePushing, Pushing
 from pytest_simbench.tasks.stacking import Stacking
 from pytest_simbench.tasks.throwing import Throwing
+from pytest_simbench.tasks.tossing import Tossing
 from pytest_simbench.tasks.towers import LeaningTowers
 
 __all__ = [
@@ -17,4 +18,5 @@ __all__ = [
     "Stacking",
     "Task",
     "Throwing",
+    "Tossing",
 ]

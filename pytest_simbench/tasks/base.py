@@ -79,6 +79,8 @@ class Task(ABC):
         moments: where replays save and restore, and until which a disturbance is followed.
         shares_worker: it takes less time than the start of a worker, so one serves several tests.
         pictured: phases within which the task notes moments (`World.note`); pictures show them.
+        brief: a repetition is so short that starting a worker for each would cost more than it; one
+            worker serves several.
     """
 
     name: ClassVar[str]
@@ -88,11 +90,22 @@ class Task(ABC):
     moments: ClassVar[tuple[Moment, ...]] = ()
     shares_worker: ClassVar[bool] = False
     pictured: ClassVar[tuple[str, ...]] = ()
+    brief: ClassVar[bool] = False
 
     @property
     @abstractmethod
     def metrics(self) -> tuple[Metric, ...]:
         """What it measures, the study's metrics first."""
+
+    @property
+    def repetitions(self) -> int | None:
+        """How many there are to be where nobody says; None: as many as the protocol has."""
+        return None
+
+    def sample(self, seed: int) -> tuple[str, int] | None:
+        """The data set and the number in it of the measured motion that the repetition of a seed is
+        held against, if it is."""
+        return None
 
     def smoke(self) -> Task:
         """The smallest version of the task that still exercises every part of it."""

@@ -29,7 +29,7 @@ PATHS = BAD.keys() - {"empty", "blank", "long", "long list", "NUL", "half a word
 FINE = {
     "sim_jitter": {"zero"}, "sim_seed": {"zero"},
     "sim_output": PATHS, "sim_baseline": PATHS, "sim_resume": PATHS, "sim_merge": PATHS,
-    "sim_report": PATHS, "sim_badge": PATHS,
+    "sim_report": PATHS, "sim_badge": PATHS, "sim_data": PATHS,
     "sim_gui": {"zero"}, "sim_headless": {"zero"}, "sim_fresh": {"zero"}, "sim_pictures": {"zero"},
     "sim_install_missing": {"zero"},
     "sim_bisect": {"minus inf"},  # where a second value is missing then, for argparse
@@ -37,7 +37,7 @@ FINE = {
 }  # fmt: skip
 """Values that an option may have after all."""
 
-LATER = {"sim_install", "sim_profile", "sim_uninstall"}
+LATER = {"sim_download", "sim_install", "sim_profile", "sim_uninstall"}
 """Options of names that are looked up when they are used: any word will do for a start."""
 
 Configure = Callable[..., pytest.Config]

@@ -1,0 +1,7 @@
+"""Measured motions that simulations are held against, by name; none of it is in the package."""
+
+from pytest_simbench.data.errors import DataError, DataMissing
+from pytest_simbench.data.sets import read
+from pytest_simbench.data.tosses import Half, Toss, Tosses
+
+__all__ = ["DataError", "DataMissing", "Half", "Toss", "Tosses", "read"]

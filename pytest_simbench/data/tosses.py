@@ -1,0 +1,207 @@
+"""Real tosses of one acrylic cube onto a table, motion-captured (Pfrommer, Halm, Posa, 2020)."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from pytest_simbench.data.errors import DataError
+from pytest_simbench.data.torch_file import read_tensor
+from pytest_simbench.scene import FloatArray, Pose, Vector3
+from pytest_simbench.simulator.files import FileError, read_arrays
+
+NAME = "cube_tosses"
+
+RATE = 148.0
+"""Samples a second (the source)."""
+
+EDGE = 0.1048
+"""Of the cube [m]. The source divides lengths by half of it."""
+
+MASS = 0.37
+"""[kg] (the source)."""
+
+INERTIA = 8.1e-4
+"""About each axis through the centre [kg m^2] (the source). A homogeneous cube would have 6.8e-4.
+Two other values are in print: 6.167e-4 is that of a cube of 0.10 m, 8.1e-3 a misprint."""
+
+FRICTION = 0.18
+"""Coulomb coefficient of acrylic on that table, and below Newton's coefficient of restitution: the
+values that were fitted to these tosses (Pfrommer, Halm, Posa 2020; Acosta, Yang, Posa 2022)."""
+
+RESTITUTION = 0.125
+
+COLUMNS = 13
+"""Of a state: position 3, quaternion 4, linear velocity 3, angular velocity 3."""
+
+LARGEST = 256 * 2**20
+"""Of a file [bytes]; the public set has 7 MB."""
+
+FASTEST = 100.0
+"""[m], [m/s], [rad/s]. Whatever is larger is no toss of a hand."""
+
+PATTERN = "contactnets_cube_tosses*.npz"
+
+Half = Literal["held_out", "chosen_on", "all"]
+"""Of the tosses: those with an odd number, those with an even one, all. Settings are chosen on the
+even ones and published on the odd ones."""
+
+
+@dataclass(frozen=True, eq=False)
+class Toss:
+    """One toss.
+
+    Attributes:
+        index: its number in the source.
+        state: rows of 1/148 s, (n, 13): position [m], quaternion w, x, y, z (body to world), linear
+            velocity [m/s] (world), angular velocity [rad/s] (body).
+    """
+
+    index: int
+    state: FloatArray
+
+    @property
+    def start(self) -> Pose:
+        """Of the cube's centre, in row 0."""
+        return Pose.from_array(self.state[0])
+
+    @property
+    def linear_velocity(self) -> Vector3:
+        """In row 0 [m/s], in the world."""
+        x, y, z = map(float, self.state[0, 7:10])
+        return x, y, z
+
+    @property
+    def angular_velocity(self) -> Vector3:
+        """In row 0 [rad/s], in the world; the source has it in the body's axes."""
+        x, y, z = map(float, self.start.rotation() @ self.state[0, 10:13])
+        return x, y, z
+
+    @property
+    def time(self) -> FloatArray:
+        """Of the rows [s], (n,)."""
+        return np.arange(len(self.state)) / RATE
+
+    @property
+    def duration(self) -> float:
+        """From the first row to the last [s]."""
+        return (len(self.state) - 1) / RATE
+
+
+@dataclass(frozen=True, eq=False)
+class Tosses:
+    """Tosses in the order of their numbers. Two sets are equal when their numbers and states are.
+
+    Attributes:
+        items: the tosses.
+    """
+
+    items: tuple[Toss, ...] = field(repr=False)
+
+    def half(self, which: Half) -> tuple[Toss, ...]:
+        """The tosses that settings were chosen on, or those that were held out, or all."""
+        if which == "all":
+            return self.items
+        return tuple(toss for toss in self.items if toss.index % 2 == (which == "held_out"))
+
+    @cached_property
+    def digest(self) -> str:
+        """Of numbers and states: short, for records."""
+        content = hashlib.sha256()
+        for toss in self.items:
+            content.update(str((toss.index, toss.state.shape)).encode())
+            content.update(np.ascontiguousarray(toss.state, "<f8").tobytes())
+        return content.hexdigest()[:12]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Tosses) and self.digest == other.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+
+def read(folder: Path) -> Tosses | None:
+    """The tosses in a folder, of all of its files together; None where it has no such file.
+
+    Raises:
+        DataError: a file that is broken, cut off, or something else.
+    """
+    found: dict[int, Toss] = {}
+    for path in sorted(folder.glob(PATTERN)):
+        try:
+            arrays = read_arrays(path, LARGEST)
+            found |= {toss.index: toss for toss in _tosses(arrays)}
+        except FileError as error:
+            raise DataError(str(error)) from None
+        except ValueError as error:
+            raise DataError(f"{path} holds no tosses: {error}") from None
+    return Tosses(tuple(found[index] for index in sorted(found))) if found else None
+
+
+def _tosses(arrays: Mapping[str, FloatArray]) -> list[Toss]:
+    """
+    Raises:
+        ValueError: what is wrong with the arrays.
+    """
+    try:
+        index, length, state = (arrays[name] for name in ("toss_index", "length", "state"))
+    except KeyError as error:
+        raise ValueError(f"the array {error} is missing") from None
+    numbers = [a.ndim == 1 and a.dtype.kind in "iu" and len(a) for a in (index, length)]
+    if not all(numbers) or len(index) != len(length):
+        raise ValueError("toss_index and length must be as many whole numbers")
+    if index.min() < 0 or len(set(index.tolist())) < len(index) or length.min() < 2:
+        raise ValueError("toss_index has a number twice or below 0, or a toss has under 2 rows")
+    if state.dtype.kind != "f" or state.shape != (length.sum(), COLUMNS):
+        raise ValueError(
+            f"state has the shape {state.shape}, and the lengths ask for {length.sum()} rows of "
+            f"{COLUMNS} numbers"
+        )
+    norms = np.linalg.norm(state[:, 3:7], axis=1)
+    if not (np.abs(state).max(initial=0.0) < FASTEST and np.abs(norms - 1).max() < 1e-3):
+        raise ValueError("state has values that are no numbers, too large, or no rotation")
+    ends = np.cumsum(length)
+    rows = np.split(np.asarray(state, float), ends[:-1])
+    return [Toss(int(k), part) for k, part in zip(index, rows, strict=True)]
+
+
+def convert(files: Mapping[str, bytes], folder: Path) -> None:
+    """Write the arrays of the source's files (`NUMBER.pt`) into a folder.
+
+    Each holds a tensor (1, rows, 19): position 3 and velocity 3 in halves of the edge, quaternion
+    4, then angular velocity 3, and 6 zeros; in the order of `COLUMNS`.
+
+    Raises:
+        DataError: a file that holds something else.
+        OSError: the folder cannot be written to.
+    """
+    numbered = {int(Path(name).stem): content for name, content in files.items()}
+    states = [_state(read_tensor(numbered[k], f"{k}.pt"), k) for k in sorted(numbered)]
+    write(folder / PATTERN.replace("*", ""), sorted(numbered), states)
+
+
+def write(path: Path, indices: Sequence[int], states: Sequence[FloatArray]) -> None:
+    """Write tosses, whole or not at all."""
+    partial = path.with_suffix(".partial")
+    with partial.open("wb") as file:
+        np.savez_compressed(
+            file,
+            toss_index=np.array(indices, np.int64),
+            length=np.array([len(state) for state in states], np.int64),
+            state=np.concatenate(states),
+        )
+    partial.replace(path)
+
+
+def _state(tensor: FloatArray, number: int) -> FloatArray:
+    if tensor.ndim != 3 or tensor.shape[0] != 1 or tensor.shape[2] < COLUMNS:
+        raise DataError(f"{number}.pt has the shape {tensor.shape}, not (1, rows, 19)")
+    state = tensor[0, :, :COLUMNS].copy()
+    state[:, [0, 1, 2, 7, 8, 9]] *= EDGE / 2
+    return state

@@ -1,0 +1,47 @@
+"""`--sim-data`, `--sim-download` and the fixture `data_set`: measured data sets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_simbench.plugin import options
+from pytest_simbench.records.text import for_terminal
+
+
+def folder(config: pytest.Config) -> Path:
+    """Where data sets are looked for and brought to."""
+    from pytest_simbench.data.sets import default_folder
+
+    given = options.value(config, "sim_data")
+    return Path(given) if given else default_folder()
+
+
+def read_or_skip(config: pytest.Config, name: str) -> Any:
+    """A data set; without it the test is skipped, with a broken one or a wrong name it fails."""
+    from pytest_simbench.data import DataError, DataMissing, read
+
+    problem, missing = "", False  # told outside of `except`, else pytest shows both exceptions
+    try:
+        return read(name, folder(config))
+    except DataError as error:
+        problem, missing = str(error), isinstance(error, DataMissing)
+    if missing:
+        pytest.skip(problem)
+    pytest.fail(problem, pytrace=False)
+
+
+def download(config: pytest.Config) -> int:
+    """`--sim-download`: bring data sets from their public sources."""
+    from pytest_simbench.data.download import download as bring
+    from pytest_simbench.data.errors import DataError
+    from pytest_simbench.data.sets import data_set
+
+    try:
+        for wanted in [data_set(name) for name in options.value(config, "sim_download")]:
+            bring(wanted, folder(config), lambda text: print(for_terminal(text)))
+    except DataError as error:
+        raise pytest.UsageError(for_terminal(str(error))) from None
+    return 0

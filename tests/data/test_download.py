@@ -1,0 +1,84 @@
+"""What is downloaded is what was asked for, to the byte, and reads like what is shared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pytest_simbench.data import DataError, DataMissing, read, tosses
+from pytest_simbench.data.download import digest, download
+from pytest_simbench.data.sets import SETS, DataSet, data_set
+from tests.data.samples import archive, falling, source_file
+
+FILES = {f"data/tosses_processed/{k}.pt": source_file(falling(10 + k)) for k in (0, 1, 10)}
+
+
+@dataclass(frozen=True)
+class Local(DataSet):
+    """One whose source is a file."""
+
+    path: str = ""
+
+    @property
+    def url(self) -> str:
+        return Path(self.path).as_uri()
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Local:
+    packed = archive({"README.md": b"?", **FILES}, tmp_path / "set.tar.gz")
+    return Local(**{**vars(SETS["cube_tosses"]), "sha256": digest(FILES), "path": str(packed)})
+
+
+def test_a_set_is_brought_checked_and_read(source: Local, tmp_path: Path) -> None:
+    told: list[str] = []
+    download(source, tmp_path / "new" / "data", told.append)
+    found = tosses.read(tmp_path / "new" / "data")
+    assert found is not None
+    assert [toss.index for toss in found.items] == [0, 1, 10]
+    for toss in found.items:
+        assert np.allclose(toss.state, falling(10 + toss.index), rtol=0, atol=1e-15)
+    assert "BSD-3-Clause" in told[0]
+
+
+def test_other_content_is_refused_and_not_kept(source: Local, tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="is not cube_tosses: the SHA-256 of its 3 files"):
+        download(replace(source, sha256="0" * 64), tmp_path / "data")
+    assert not (tmp_path / "data").exists()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5])
+def test_an_archive_that_is_cut_off_is_one_sentence(
+    source: Local, tmp_path: Path, share: float
+) -> None:
+    path = Path(source.path)
+    content = path.read_bytes()
+    path.write_bytes(content[: int(share * len(content))])
+    with pytest.raises(DataError, match="cube_tosses cannot be downloaded from"):
+        download(source, tmp_path / "data")
+
+
+def test_a_server_that_is_not_there_is_one_sentence(source: Local, tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="cannot be downloaded from .*No such file"):
+        download(replace(source, path=str(tmp_path / "none")), tmp_path / "data")
+
+
+def test_a_set_that_is_not_there_says_what_brings_it(tmp_path: Path) -> None:
+    with pytest.raises(DataMissing, match="pytest --sim-download cube_tosses, or --sim-data DIR$"):
+        read("cube_tosses", tmp_path)
+
+
+def test_an_unknown_set_lists_those_there_are() -> None:
+    with pytest.raises(DataError, match="no data set 'nosuch'; choose from cube_tosses"):
+        data_set("nosuch")
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_a_set_is_pinned(name: str) -> None:
+    pinned = SETS[name]
+    assert len(bytes.fromhex(pinned.commit)) == 20
+    assert len(bytes.fromhex(pinned.sha256)) == 32
+    assert pinned.commit in pinned.url

@@ -1,0 +1,89 @@
+"""The tosses: what is read is what was measured, in world axes; broken files are one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pytest_simbench.data import DataError, Toss, Tosses, tosses
+from tests.data.samples import falling
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    tosses.write(tmp_path / "contactnets_cube_tosses_a.npz", [0, 3], [falling(), falling(30)])
+    tosses.write(tmp_path / "contactnets_cube_tosses_b.npz", [1, 3], [falling(5), falling(30)])
+    return tmp_path
+
+
+def test_files_are_joined_and_halves_are_of_even_and_odd_numbers(folder: Path) -> None:
+    found = tosses.read(folder)
+    assert found is not None
+    assert [(toss.index, len(toss.state)) for toss in found.items] == [(0, 20), (1, 5), (3, 30)]
+    assert [toss.index for toss in found.half("chosen_on")] == [0]
+    assert [toss.index for toss in found.half("held_out")] == [1, 3]
+    assert len(found.half("all")) == 3
+
+
+def test_sets_are_equal_when_their_tosses_are(folder: Path) -> None:
+    one, other = tosses.read(folder), tosses.read(folder)
+    assert one == other
+    assert hash(one) == hash(other)
+    assert one != Tosses(one.items[:2] if one else ())
+
+
+def test_the_angular_velocity_is_turned_into_the_world() -> None:
+    state = falling()
+    state[0, 3:7] = np.sqrt(0.5), 0, 0, np.sqrt(0.5)  # a quarter turn about z: body x is world y
+    state[0, 10:13] = 2.0, 0.0, 0.0
+    assert Toss(0, state).angular_velocity == pytest.approx((0.0, 2.0, 0.0))
+    assert Toss(0, state).linear_velocity == (1.0, 0.0, 0.0)
+
+
+def test_a_folder_without_tosses_is_none(tmp_path: Path) -> None:
+    assert tosses.read(tmp_path) is None
+
+
+def arrays() -> dict[str, Any]:
+    return {"toss_index": np.array([0, 1]), "length": np.array([2, 3]), "state": falling(5)}
+
+
+def edited(name: str, value: Any) -> Callable[[dict[str, Any]], None]:
+    return lambda found: found.update({name: value})
+
+
+@pytest.mark.parametrize(
+    ("spoil", "sentence"),
+    [
+        (lambda found: found.pop("length"), "the array 'length' is missing"),
+        (edited("toss_index", np.array([1, 1])), "toss_index has a number twice or below 0"),
+        (edited("toss_index", np.array([0.5, 1])), "must be as many whole numbers"),
+        (edited("length", np.array([5])), "must be as many whole numbers"),
+        (edited("length", np.array([4, 1])), "a toss has under 2 rows"),
+        (edited("state", falling(4)), r"state has the shape \(4, 13\).*ask for 5 rows of 13"),
+        (edited("state", np.full((5, 13), np.nan)), "no numbers, too large, or no rotation"),
+        (edited("state", np.zeros((5, 13))), "no rotation"),
+    ],
+)
+def test_arrays_that_are_no_tosses_are_one_sentence(
+    tmp_path: Path, spoil: Callable[[dict[str, Any]], None], sentence: str
+) -> None:
+    found = arrays()
+    spoil(found)
+    np.savez(tmp_path / "contactnets_cube_tosses_190.npz", **found)
+    with pytest.raises(DataError, match=sentence) as caught:
+        tosses.read(tmp_path)
+    assert str(tmp_path) in str(caught.value)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.99])
+def test_a_file_that_is_cut_off_is_one_sentence(folder: Path, share: float) -> None:
+    path = folder / "contactnets_cube_tosses_a.npz"
+    content = path.read_bytes()
+    path.write_bytes(content[: int(share * len(content))])
+    with pytest.raises(DataError, match="contactnets_cube_tosses_a.npz holds no arrays"):
+        tosses.read(folder)
