@@ -70,6 +70,8 @@ class Body(_Placed):
             surfaces of a scene that bounce have the same one, as with friction.
         linear_damping: c of dv/dt = -c v of a free body [1/s].
         angular_damping: the same of its angular velocity [1/s].
+        moments: principal moments of inertia about the centre, along the body's axes [kg m^2], of a
+            body whose mass is not spread evenly; None: evenly.
 
     Raises:
         SceneError: a body that cannot exist; the message names body and value.
@@ -80,6 +82,7 @@ class Body(_Placed):
     restitution: float = 0.0
     linear_damping: float = 0.0
     angular_damping: float = 0.0
+    moments: Vector3 | None = None
 
     def __post_init__(self) -> None:
         check_name(self.name, "a body")
@@ -96,6 +99,11 @@ class Body(_Placed):
             raise SceneError(
                 f"{self.name!r} has a velocity and no mass, so it is fixed; give it a mass"
             )
+        if self.moments is not None:
+            what = f"the moments of inertia [kg m^2] of {self.name!r}"
+            check_numbers(self.moments, 3, what, 0.0, above=True)
+            if 2 * max(self.moments) > sum(self.moments):
+                raise SceneError(f"{what} are {self.moments}; none is larger than the other two")
 
     @property
     def fixed(self) -> bool:
@@ -121,9 +129,13 @@ class Body(_Placed):
     def volume(self) -> float:
         """[m^3]."""
 
-    @abstractmethod
     def inertia(self) -> FloatArray:
         """Principal moments about the centre, along the body's axes, (3,) [kg m^2]."""
+        return self.even_inertia() if self.moments is None else np.array(self.moments)
+
+    @abstractmethod
+    def even_inertia(self) -> FloatArray:
+        """The same of a body whose mass is spread evenly."""
 
     @abstractmethod
     def solids(self) -> list[Solid]:
@@ -167,6 +179,8 @@ class Body(_Placed):
         for name in ("restitution", "linear_damping", "angular_damping"):
             if getattr(self, name):
                 data[name] = getattr(self, name)
+        if self.moments is not None:
+            data["moments"] = list(self.moments)
         return data
 
     @classmethod
@@ -208,7 +222,7 @@ class Box(Body):
     def volume(self) -> float:
         return float(np.prod(self.size))
 
-    def inertia(self) -> FloatArray:
+    def even_inertia(self) -> FloatArray:
         """m/12 (b^2 + c^2) about the axis along a."""
         squares = np.square(self.size)
         return np.asarray(self.mass / 12.0 * (squares.sum() - squares))
@@ -253,7 +267,7 @@ class Sphere(Body):
     def volume(self) -> float:
         return 4 / 3 * math.pi * self.radius**3
 
-    def inertia(self) -> FloatArray:
+    def even_inertia(self) -> FloatArray:
         """2/5 m r^2."""
         return np.full(3, 0.4 * self.mass * self.radius**2)
 
@@ -297,7 +311,7 @@ class Cylinder(Body):
     def volume(self) -> float:
         return math.pi * self.radius**2 * self.length
 
-    def inertia(self) -> FloatArray:
+    def even_inertia(self) -> FloatArray:
         """m r^2 / 2 about the axis, m (3 r^2 + l^2) / 12 across it."""
         across = self.mass * (3 * self.radius**2 + self.length**2) / 12
         return np.array([across, across, self.mass * self.radius**2 / 2])
@@ -344,7 +358,7 @@ class Capsule(Body):
     def volume(self) -> float:
         return math.pi * self.radius**2 * (self.length + 4 / 3 * self.radius)
 
-    def inertia(self) -> FloatArray:
+    def even_inertia(self) -> FloatArray:
         """Of a cylinder and two half balls, these by Steiner's theorem about the middle; a half
         ball's centre of mass lies 3/8 r behind its flat side."""
         r, length = self.radius, self.length

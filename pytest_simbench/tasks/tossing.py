@@ -101,6 +101,7 @@ class Tossing(Task):
             cube.MASS,
             self.friction,
             ACRYLIC,
+            moments=(cube.INERTIA,) * 3,
             linear_velocity=toss.linear_velocity,
             angular_velocity=toss.angular_velocity,
         )

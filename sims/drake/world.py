@@ -164,6 +164,11 @@ class World:
             body, pose = self.plant.world_body(), part.pose
         else:
             inertia = getattr(trees.SpatialInertia, weighted)(part.mass, *arguments)
+            if part.moments is not None:
+                central = trees.RotationalInertia(*part.moments)
+                inertia = trees.SpatialInertia.MakeFromCentralInertia(
+                    part.mass, np.zeros(3), central
+                )
             body, pose = self.plant.AddRigidBody(part.name, inertia), Pose()
             if part.damping.any():
                 self._damp(body, part)

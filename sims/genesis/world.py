@@ -92,10 +92,11 @@ def material(friction: float, density: float | None = None) -> Any:
 
 def add_body(world: Any, body: Body) -> Any:
     """The entity of a body, fixed or free."""
-    density = None if body.fixed else body.mass / body.volume
+    uneven = body.moments is not None
+    density = None if body.fixed or uneven else body.mass / body.volume
     surface = genesis.surfaces.Default(color=body.colour)
     return world.add_entity(
-        _morph(body), material=material(body.friction, density), surface=surface
+        _described(body) if uneven else _morph(body), material=material(body.friction, density), surface=surface
     )
 
 
@@ -121,6 +122,43 @@ def _morph(body: Body) -> Any:
                 **place,
             )
     raise NotSupportedError(f"genesis has no {type(body).__name__}")
+
+
+def _described(body: Body) -> Any:
+    """A body with moments of inertia of its own, by a URDF: other morphs know a density."""
+    root = ET.Element("robot", name=body.name)
+    link = ET.SubElement(root, "link", name=body.name)
+    inertial = ET.SubElement(link, "inertial")
+    ET.SubElement(inertial, "origin", xyz="0 0 0", rpy="0 0 0")  # else it takes the shape's moments
+    ET.SubElement(inertial, "mass", value=repr(float(body.mass)))
+    xx, yy, zz = (repr(float(moment)) for moment in body.inertia())
+    ET.SubElement(inertial, "inertia", ixx=xx, iyy=yy, izz=zz, ixy="0", ixz="0", iyz="0")
+    for kind in ("visual", "collision"):
+        _shape(ET.SubElement(ET.SubElement(link, kind), "geometry"), body)
+    return genesis.morphs.URDF(
+        file=ET.tostring(root, encoding="unicode"),
+        pos=body.pose.position,
+        quat=body.pose.quaternion,
+        fixed=body.fixed,
+        default_armature=None,
+        requires_jac_and_IK=False,
+    )
+
+
+def _shape(geometry: ET.Element, body: Body) -> None:
+    """A body's shape in a URDF."""
+    match body:
+        case Box():
+            ET.SubElement(geometry, "box", size=" ".join(repr(float(edge)) for edge in body.size))
+        case Sphere():
+            ET.SubElement(geometry, "sphere", radius=repr(float(body.radius)))
+        case Cylinder():
+            size = {"radius": repr(float(body.radius)), "length": repr(float(body.length))}
+            ET.SubElement(geometry, "cylinder", size)
+        case _:
+            raise NotSupportedError(
+                f"genesis takes no moments of inertia of a {type(body).__name__}"
+            )
 
 
 def add_robot(world: Any, prepared: PreparedRobot) -> Any:

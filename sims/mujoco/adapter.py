@@ -215,6 +215,9 @@ class MuJoCo(Simulator):
             geom.condim, geom.priority = 3, 1
         if not part.fixed:
             geom.mass = part.mass
+            if part.moments is not None:
+                body.mass, body.inertia, body.explicitinertial = part.mass, part.moments, True
+                body.ipos, body.iquat = [0, 0, 0], [1, 0, 0, 0]
             body.add_freejoint(name=f"{part.name}/free")
 
     def read_back(self) -> dict[str, Any]:

@@ -109,8 +109,12 @@ def _add_robot(builder: Any, prepared: PreparedRobot, surface: Any) -> None:
 def _add_body(builder: Any, part: Body, surface: Any) -> None:
     pose, body = _transform(part.pose), -1
     if not part.fixed:
-        surface.density = part.mass / part.volume
-        body, pose = builder.add_body(xform=pose, label=part.name), None
+        inertial: dict[str, Any] = {}
+        if part.moments is None:
+            surface.density = part.mass / part.volume
+        else:
+            inertial = {"mass": part.mass, "inertia": wp.mat33(np.diag(part.moments))}
+        body, pose = builder.add_body(xform=pose, label=part.name, **inertial), None
         start = builder.joint_qd_start[builder.joint_child.index(body)]
         builder.joint_qd[start : start + 6] = map(float, part.velocity)
     given = {"xform": pose, "cfg": surface, "color": part.colour[:3], "label": part.name}

@@ -211,7 +211,8 @@ class PyBullet(Simulator):
             box.mass, shape, picture, box.pose.position, [x, y, z, w], physicsClientId=c
         )
         self._set_surface(body, -1, box.friction, box.restitution, box.damping)
-        if not isinstance(box, Box):  # Bullet takes a capsule for the box around it
+        # Bullet takes a capsule for the box around it.
+        if box.moments is not None or not isinstance(box, Box):
             pybullet.changeDynamics(
                 body, -1, localInertiaDiagonal=list(box.inertia()), physicsClientId=c
             )
