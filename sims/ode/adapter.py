@@ -53,6 +53,8 @@ class ODESettings(Settings):
         erp, cfm: of all joints: share of their error that is corrected in a step, and softness.
         contact_erp, contact_cfm: the same of contacts.
         contacts: the most of a pair of shapes that count, the deepest.
+        friction: how the friction pyramids lie: as ODE chooses (`pyramid`), or with an edge along
+            the slip (`slip`).
         drive: `velocity` motors with Webots' P controller, or `spring`: the scene's drive law.
         position_gain: P of `velocity` [1/s].
         sleeping: whether boxes at rest for 1 s (0.01 m/s, 0.01 rad/s) are left out.
@@ -66,6 +68,7 @@ class ODESettings(Settings):
     contact_erp: float = 0.2
     contact_cfm: float = 1e-3
     contacts: int = 10
+    friction: Literal["pyramid", "slip"] = "pyramid"
     drive: Drive = "velocity"
     position_gain: float = 10.0
     sleeping: bool = True
@@ -160,7 +163,9 @@ class ODE(Simulator):
         world.setQuickStepNumIterations(s.iterations)
         world.setAutoDisableFlag(s.sleeping)
         world.setAutoDisableTime(1.0)
-        self.contacts = Contacts(world, s.contact_erp, s.contact_cfm, s.contacts)
+        self.contacts = Contacts(
+            world, s.contact_erp, s.contact_cfm, s.contacts, s.friction == "slip"
+        )
         space = self.contacts.space
         self._advance = world.step if s.solver == "step" else world.quickStep
         self._ground = build.add_ground(space, scene.ground_friction, scene.ground_restitution)

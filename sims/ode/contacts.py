@@ -5,6 +5,7 @@ It calls back for each pair, here into Python. What this costs stands in docs/en
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -26,6 +27,10 @@ TOUCHES = {
     LINK: GROUND | FIXED | FREE,
 }
 """What a category collides with: all but links with links, and what never moves with its like."""
+
+
+SLIPS = 1e-4
+"""Slower contacts stick [m/s]; they have no direction worth the name."""
 
 
 @dataclass
@@ -80,14 +85,17 @@ class Contacts:
         world: of ODE.
         erp, cfm: share of a penetration that is corrected in a step, and softness [m/(N s)].
         most: joints of a pair of shapes; the deepest contacts become joints.
+        along: one edge of each friction pyramid lies along the slip. Along it the friction is then
+            Coulomb's. Otherwise ODE chooses the edges, and friction holds up to mu times the load
+            along each of them, together up to 1.4 times that.
 
     Attributes:
         space: that all geoms are in.
         count: of the joints in the last step.
     """
 
-    def __init__(self, world: Any, erp: float, cfm: float, most: int) -> None:
-        self.world, self.erp, self.cfm, self.most = world, erp, cfm, most
+    def __init__(self, world: Any, erp: float, cfm: float, most: int, along: bool) -> None:
+        self.world, self.erp, self.cfm, self.most, self.along = world, erp, cfm, most, along
         self.space, self.count = ode.SimpleSpace(), 0
         self._group = ode.JointGroup()
         self._soft = (erp, cfm) != (world.getERP(), world.getCFM())
@@ -122,8 +130,11 @@ class Contacts:
         world, group, joint = self.world, self._group, self._joint
         mode = self._mode | self._bouncy if bounce else self._mode
         for contact in contacts:
-            contact.setMode(mode)
+            direction = _slip(contact, one, other) if self.along else None
+            contact.setMode(mode if direction is None else mode | ode.ContactFDir1)
             contact.setMu(friction)
+            if direction is not None:
+                contact.setFDir1(direction)
             if bounce:
                 contact.setBounce(bounce)
             if self._soft:
@@ -135,6 +146,20 @@ class Contacts:
 
 def _nothing(_: Any, first: Any, second: Any) -> None:
     """Leave a pair alone."""
+
+
+def _slip(contact: Any, one: Any, other: Any) -> tuple[float, float, float] | None:
+    """Direction in which one body slips on the other where they touch; None where it sticks."""
+    place, normal, *_ = contact.getContactGeomParams()
+    slip = [0.0, 0.0, 0.0]
+    for body, sign in ((one, 1.0), (other, -1.0)):
+        if body is not None:
+            velocity = body.getPointVel(place)
+            slip = [s + sign * v for s, v in zip(slip, velocity, strict=True)]
+    across = sum(s * n for s, n in zip(slip, normal, strict=True))
+    x, y, z = (s - across * n for s, n in zip(slip, normal, strict=True))
+    speed = math.sqrt(x * x + y * y + z * z)
+    return (x / speed, y / speed, z / speed) if speed > SLIPS else None
 
 
 def _depth(contact: Any) -> float:

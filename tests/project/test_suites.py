@@ -7,16 +7,18 @@ from pathlib import Path
 
 import pytest
 
+from pytest_simbench.data import Tosses
 from pytest_simbench.measure.intervals import interval
 from pytest_simbench.measure.limits import FAILURES
 from pytest_simbench.measure.verdicts import Verdict, at_least, at_most, confidence, judge
-from pytest_simbench.tasks import Pushing, Stacking, Task, Throwing
+from pytest_simbench.tasks import Pushing, Stacking, Task, Throwing, Tossing
 
 ROOT = Path(__file__).resolve().parents[2]
 TASKS: dict[str, Task] = {
     "stacking": Stacking(),
     "throwing": Throwing(),
     "pushing": Pushing(),
+    "reality": Tossing(Tosses(())),
 }
 CLAIMS = [
     (task, relation, name, float(value))
@@ -52,6 +54,7 @@ def test_all_claims_were_found() -> None:
             ("pushing", name)
             for name in ("failures", "position_error", "heading_error", "path_error", "tipped")
         ),
+        *(("reality", name) for name in ("failures", "position_error")),
     ]
 
 

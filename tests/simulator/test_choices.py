@@ -13,7 +13,12 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.report.markdown import render_task as written
 from pytest_simbench.report.summary import summarise
 from pytest_simbench.report.tables import render_task
-from pytest_simbench.simulator.choices import SeedsSeen, published_again, seeds_seen
+from pytest_simbench.simulator.choices import (
+    DataSeen,
+    SeedsSeen,
+    published_again,
+    seeds_seen,
+)
 from pytest_simbench.simulator.registry import adapter, registered
 from tests.report.samples import METRICS, record
 from tests.tiny import Falling
@@ -59,6 +64,32 @@ def test_a_report_on_other_seeds_or_of_another_task_does_not(
     assert "chosen" not in render_task(found, 200)
 
 
+@pytest.mark.parametrize(
+    ("numbers", "sentence"),
+    [
+        ((0, 6, 7, 564), "numbers 0 to 564 in steps of 6 of cube_tosses, and 3 of these 4"),
+        ((3, 9, 570), ""),
+    ],
+)
+def test_a_report_on_the_data_of_choosing_says_so(numbers: Sequence[int], sentence: str) -> None:
+    declared = {"chosen_on": [DataSeen("cube_tosses", 0, 564, 6).to_wire()]}
+    records = [
+        record("pybullet", k, "tossing", details={**declared, "data": ["cube_tosses", number]})
+        for k, number in enumerate(numbers, start=1)
+    ]
+    (found,) = summarise(records, METRICS)
+    notes = [note for row in found.rows for note in row.notes]
+    whole = "its settings were chosen on {} repetitions are held against them: publish others"
+    assert notes == ([whole.format(sentence)] if sentence else [])
+
+
+def test_other_data_of_the_same_numbers_were_not_seen() -> None:
+    seen = DataSeen("cube_tosses", 0, 564, 6)
+    assert seen.holds("tossing", 1, ("cube_tosses", 6))
+    assert not seen.holds("tossing", 6, None)
+    assert not seen.holds("tossing", 6, ("other", 6))
+
+
 def test_only_repetitions_that_count_are_counted() -> None:
     records = [*run([2022, 3000]), *run([2023], status="interrupted")]
     (found,) = summarise(records, METRICS)
@@ -66,7 +97,7 @@ def test_only_repetitions_that_count_are_counted() -> None:
 
 
 def test_nothing_declared_is_nothing_said() -> None:
-    assert published_again([("throwing", 2022, [])]) == ""
+    assert published_again([("throwing", 2022, None, [])]) == ""
     assert published_again([]) == ""
     assert seeds_seen("pytest_simbench.sims.pybullet.adapter:PyBullet", "default") == ()
     assert seeds_seen("no.such.module:Adapter", "tuned") == ()
@@ -87,7 +118,7 @@ def test_every_adapter_speaks_of_profiles_that_it_has(name: str) -> None:
     cls = adapter(name)
     assert cls.chosen_on.keys() <= cls.profiles.keys()
     for seen in (seen for all_seen in cls.chosen_on.values() for seen in all_seen):
-        assert seen.task in ("stacking", "throwing")
+        assert isinstance(seen, DataSeen) or seen.task in ("stacking", "throwing")
         assert 0 <= seen.first <= seen.last
 
 
