@@ -26,10 +26,12 @@ from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Scen
 from pytest_simbench.simulator import (
     FOLLOWER,
     Capability,
+    DataSeen,
     Deviation,
     NotSupportedError,
     PreparedRobot,
     SeedsSeen,
+    Seen,
     Settings,
     Simulator,
     SimulatorInfo,
@@ -118,9 +120,15 @@ class DART(Simulator):
     profiles: ClassVar[Mapping[str, Settings]] = {
         "default": DARTSettings(),
         "tuned": DARTSettings(detector="ode", solver="nsgs", tolerance=1e-4, position_gain=0.5),
+        "real": DARTSettings(detector="ode", solver="nsgs", tolerance=1e-4, position_gain=0.5),
     }
-    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
         "tuned": (SeedsSeen("throwing", 100, 100), SeedsSeen("stacking", 100, 100)),
+        "real": (
+            SeedsSeen("throwing", 100, 100),
+            SeedsSeen("stacking", 100, 100),
+            DataSeen("cube_tosses", 0, 564, 6),
+        ),
     }
     settings: DARTSettings
 

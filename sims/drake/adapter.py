@@ -37,8 +37,10 @@ from numpy.typing import NDArray
 from pytest_simbench.scene import FloatArray, Robot, Scene
 from pytest_simbench.simulator import (
     Capability,
+    DataSeen,
     Deviation,
     SeedsSeen,
+    Seen,
     Settings,
     Simulator,
     SimulatorInfo,
@@ -124,9 +126,23 @@ class Drake(Simulator):
             pad_radius=0.003,
             shrink=1e-4,
         ),
+        "real": DrakeSettings(
+            timestep=0.001,
+            contact_model="point",
+            approximation="sap",
+            relaxation_time=0.01,
+            corner_radius=0.001,
+            pad_radius=0.003,
+            shrink=1e-4,
+        ),
     }
-    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
         "tuned": (SeedsSeen("throwing", 2121, 2130), SeedsSeen("stacking", 100, 100)),
+        "real": (
+            SeedsSeen("throwing", 2121, 2130),
+            SeedsSeen("stacking", 100, 100),
+            DataSeen("cube_tosses", 0, 564, 6),
+        ),
     }
     settings: DrakeSettings
 

@@ -22,9 +22,11 @@ from numpy.typing import NDArray
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
+    DataSeen,
     Deviation,
     PreparedRobot,
     SeedsSeen,
+    Seen,
     Settings,
     Simulator,
     SimulatorInfo,
@@ -100,9 +102,16 @@ class Genesis(Simulator):
             friction_cone="elliptic",
             box_box_detection=True,
         ),
+        "real": GenesisSettings(
+            timestep=0.002,
+            constraint_timeconst=0.004,
+            friction_cone="elliptic",
+            box_box_detection=True,
+        ),
     }
-    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
         "tuned": (SeedsSeen("throwing", 100, 101),),
+        "real": (SeedsSeen("throwing", 100, 101), DataSeen("cube_tosses", 0, 564, 6)),
     }
     settings: GenesisSettings
     world: Any = None

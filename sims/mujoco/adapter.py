@@ -19,10 +19,12 @@ from numpy.typing import NDArray
 from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Scene, Sphere
 from pytest_simbench.simulator import (
     Capability,
+    DataSeen,
     Deviation,
     NotSupportedError,
     PreparedRobot,
     SeedsSeen,
+    Seen,
     Settings,
     Simulator,
     SimulatorInfo,
@@ -114,9 +116,21 @@ class MuJoCo(Simulator):
             solref=(0.002, 1.0),
             solimp=(0.99, 0.9999, 0.001),
         ),
+        "real": MuJoCoSettings(
+            timestep=0.001,
+            cone="elliptic",
+            condim=4,
+            solref=(0.004, 2.0),
+            solimp=(0.99, 0.9999, 0.001),
+        ),
     }
-    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
         "tuned": (SeedsSeen("throwing", 1, 1), SeedsSeen("stacking", 1, 1)),
+        "real": (
+            SeedsSeen("throwing", 1, 1),
+            SeedsSeen("stacking", 1, 1),
+            DataSeen("cube_tosses", 0, 564, 6),
+        ),
     }
     settings: MuJoCoSettings
 

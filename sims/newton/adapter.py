@@ -22,8 +22,10 @@ from numpy.typing import NDArray
 from pytest_simbench.scene import FloatArray, Scene, rotation_matrix
 from pytest_simbench.simulator import (
     Capability,
+    DataSeen,
     Deviation,
     PreparedRobot,
+    Seen,
     Settings,
     Simulator,
     SimulatorInfo,
@@ -97,6 +99,18 @@ class Newton(Simulator):
             solimp=(0.99, 0.9999, 0.001),
             gap=0.0,
         ),
+        "real": NewtonSettings(
+            timestep=0.001,
+            cone="elliptic",
+            condim=4,
+            ke=250000.0,
+            kd=1000.0,
+            solimp=(0.99, 0.9999, 0.001),
+            gap=0.0,
+        ),
+    }
+    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
+        "real": (DataSeen("cube_tosses", 0, 564, 6),)
     }
     settings: NewtonSettings
 

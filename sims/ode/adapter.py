@@ -17,10 +17,12 @@ import numpy as np
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
+    DataSeen,
     Deviation,
     NotSupportedError,
     PreparedRobot,
     SeedsSeen,
+    Seen,
     Settings,
     Simulator,
     SimulatorInfo,
@@ -145,9 +147,15 @@ class ODE(Simulator):
             contact_cfm=1e-5,
             drive="spring",
         ),
+        "real": ODESettings(timestep=0.002, contact_cfm=1e-5, drive="spring", friction="slip"),
     }
-    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
         "tuned": (SeedsSeen("throwing", 100, 101), SeedsSeen("stacking", 100, 100)),
+        "real": (
+            SeedsSeen("throwing", 100, 101),
+            SeedsSeen("stacking", 100, 100),
+            DataSeen("cube_tosses", 0, 564, 6),
+        ),
     }
     settings: ODESettings
 

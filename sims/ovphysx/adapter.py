@@ -28,9 +28,11 @@ from numpy.typing import NDArray
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import (
     Capability,
+    DataSeen,
     Deviation,
     PreparedRobot,
     SeedsSeen,
+    Seen,
     Settings,
     Simulator,
     SimulatorInfo,
@@ -159,9 +161,13 @@ class OvPhysX(Simulator):
             angular_damping=0.0,
             sleeping=False,
         ),
+        "real": OvPhysXSettings(
+            timestep=0.001, body_iterations=4, arm_iterations=4, angular_damping=0.0, sleeping=False
+        ),
     }
-    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
         "tuned": (SeedsSeen("throwing", 100, 119),),
+        "real": (SeedsSeen("throwing", 100, 119), DataSeen("cube_tosses", 0, 564, 6)),
     }
     settings: OvPhysXSettings
 

@@ -22,10 +22,12 @@ from numpy.typing import NDArray
 from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Scene, Sphere
 from pytest_simbench.simulator import (
     Capability,
+    DataSeen,
     Deviation,
     NotSupportedError,
     PreparedRobot,
     SeedsSeen,
+    Seen,
     Settings,
     Simulator,
     SimulatorInfo,
@@ -152,9 +154,24 @@ class PyBullet(Simulator):
             friction_anchor=True,
             contact_erp=0.2,
         ),
+        "real": PyBulletSettings(
+            ordered_pairs=True,
+            position_gain=0.3,
+            linear_damping=0.0,
+            angular_damping=0.0,
+            solver_residual=0.0,
+            friction_anchor=True,
+            contact_erp=0.08,
+            timestep=0.001,
+        ),
     }
-    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
+    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
         "tuned": (SeedsSeen("throwing", 2022, 2041), SeedsSeen("stacking", 2024, 2024)),
+        "real": (
+            SeedsSeen("throwing", 2022, 2041),
+            SeedsSeen("stacking", 2024, 2024),
+            DataSeen("cube_tosses", 0, 564, 6),
+        ),
     }
     settings: PyBulletSettings
 

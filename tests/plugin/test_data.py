@@ -27,7 +27,7 @@ def test_a_set_is_read_from_the_folder_and_each_toss_is_a_repetition(
     tosses.write(path, [1, 2, 3], [falling(5), falling(6), falling(7)])
     result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-data=here")
     result.assert_outcomes(passed=1)
-    result.stdout.fnmatch_lines(["tossing: 2 repetitions each*"])
+    result.stdout.fnmatch_lines(["tossing: 2 repetitions, protocol fast"])
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,169 @@
+"""Motion-captured runs of a real Kinova Mico2 that moves freely, or pushes a cube (Collins, Howard,
+Leitner, *Quantifying the Reality Gap in Robotic Manipulation Tasks*, ICRA 2019)."""
+
+from __future__ import annotations
+
+import hashlib
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from pytest_simbench.data.errors import DataError
+from pytest_simbench.data.tosses import Half
+from pytest_simbench.scene import FloatArray
+from pytest_simbench.simulator.files import FileError, read_arrays
+
+NAME = "arm_pushes"
+
+FOLDER = "mico_push"
+
+FILES = ("runs.npz", "m1n6s300.urdf")
+
+PUSH = "CubeExp"
+"""How the names of the runs begin in which the arm pushes the cube."""
+
+LARGEST = 256 * 2**20
+"""Of the file of runs [bytes]; the shared one has 7 MB."""
+
+POSE = 7
+
+
+@dataclass(frozen=True, eq=False)
+class ArmRun:
+    """One run.
+
+    Attributes:
+        name: in the source: the experiment and a number of four digits.
+        time: of the rows [s], (n,).
+        hand, cube: poses of the marker body on the hand and of the cube, (n, 7): position [m] and
+            quaternion w, x, y, z, in the world, whose origin is the arm's base on the table.
+    """
+
+    name: str
+    time: FloatArray
+    hand: FloatArray
+    cube: FloatArray
+
+    @property
+    def number(self) -> int:
+        """In its experiment."""
+        return int(self.name[-4:])
+
+
+@dataclass(frozen=True, eq=False)
+class ArmRuns:
+    """Runs in the order of their names, and the arm's description.
+
+    Attributes:
+        items: the runs.
+        urdf: path of the description.
+    """
+
+    items: tuple[ArmRun, ...] = field(repr=False)
+    urdf: Path
+
+    def of(self, experiment: str, which: Half) -> tuple[ArmRun, ...]:
+        """Runs of an experiment by which something was chosen, or those held out, or all. Each
+        second pair of numbers is held out: 2 and 3, 6 and 7, and so on."""
+        named = [run for run in self.items if run.name.startswith(experiment)]
+        if which == "all":
+            return tuple(named)
+        return tuple(run for run in named if run.number // 2 % 2 == (which == "held_out"))
+
+    @cached_property
+    def digest(self) -> str:
+        """Of the runs: short, for records."""
+        content = hashlib.sha256()
+        for run in self.items:
+            content.update(f"{run.name} {len(run.time)}".encode())
+            for array in (run.time, run.hand, run.cube):
+                content.update(np.ascontiguousarray(array, "<f8").tobytes())
+        return content.hexdigest()[:12]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ArmRuns) and self.digest == other.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+
+def read(folder: Path) -> ArmRuns | None:
+    """The runs in a folder; None where they are not there.
+
+    Raises:
+        DataError: files that are broken, cut off, or something else.
+    """
+    paths = [folder / FOLDER / name for name in FILES]
+    if not all(path.exists() for path in paths):
+        return None
+    try:
+        arrays = read_arrays(paths[0], LARGEST)
+        runs = tuple(sorted(_runs(arrays), key=lambda run: run.name))
+    except FileError as error:
+        raise DataError(str(error)) from None
+    except ValueError as error:
+        raise DataError(f"{paths[0]} holds no runs: {error}") from None
+    return ArmRuns(runs, paths[1])
+
+
+def _runs(arrays: Mapping[str, np.ndarray]) -> list[ArmRun]:
+    """
+    Raises:
+        ValueError: what is wrong with the arrays.
+    """
+    if "runs" not in arrays:
+        raise ValueError("the array 'runs' is missing")
+    found = []
+    for name in map(str, arrays["runs"]):
+        if not name[-4:].isdecimal():
+            raise ValueError(f"the run {name!r:.80} has no number of four digits")
+        try:
+            time, hand, cube = (arrays[f"{name}/{what}"] for what in ("time", "hand", "cube"))
+        except KeyError as error:
+            raise ValueError(f"the array {error} is missing") from None
+        n = len(time) if time.ndim == 1 else 0
+        if n < 2 or hand.shape != (n, POSE) or cube.shape != (n, POSE):
+            raise ValueError(f"the run {name} has arrays that do not fit each other")
+        if not all(a.dtype.kind == "f" and np.isfinite(a).all() for a in (time, hand, cube)):
+            raise ValueError(f"the run {name} has values that are no numbers")
+        norms = np.linalg.norm([hand[:, 3:], cube[:, 3:]], axis=2)
+        if np.abs(norms - 1).max() > 1e-3 or not (np.diff(time) > 0).all():
+            raise ValueError(f"the run {name} has no rotations, or time that stands still")
+        found.append(ArmRun(name, *(np.asarray(a, float) for a in (time, hand, cube))))
+    return found
+
+
+def described(urdf: Path, finger_angle: float) -> str:
+    """The arm's description as engines can be given it: joints that turn without end get the limits
+    that stand beside them, and the fingers are held at an angle [rad].
+
+    Raises:
+        DataError: no URDF.
+    """
+    try:
+        root = ET.parse(urdf).getroot()
+    except (OSError, ET.ParseError) as error:
+        raise DataError(f"{urdf} is no robot description: {error}") from None
+    for joint in root.findall("joint"):
+        if joint.get("type") == "continuous":
+            joint.set("type", "revolute")
+        name = joint.get("name", "")
+        if "finger" in name and "tip" not in name:
+            _hold(joint, finger_angle)
+    return ET.tostring(root, encoding="unicode")
+
+
+def _hold(joint: ET.Element, angle: float) -> None:
+    """Make a revolute joint about its z axis a fixed one at an angle [rad]."""
+    from scipy.spatial.transform import Rotation
+
+    joint.set("type", "fixed")
+    origin = joint.find("origin")
+    assert origin is not None
+    turn = Rotation.from_euler("xyz", [float(part) for part in origin.get("rpy", "").split()])
+    turned = turn * Rotation.from_euler("z", angle)
+    origin.set("rpy", " ".join(repr(float(part)) for part in turned.as_euler("xyz")))
