@@ -40,8 +40,8 @@ GRIDS: Mapping[str, Mapping[str, tuple[Any, ...]]] = {
              "split_impulse": (False, True)},
     "newton": {"ke": (250000.0, 62500.0), "kd": (1000.0, 500.0)},
     "genesis": {"timestep": (0.002, 0.001), "constraint_timeconst": (0.004, 0.01)},
-    "ode": {"timestep": (0.002, 0.001), "solver": ("step", "quickstep"), "iterations": (100,),
-            "friction": ("slip",), "contact_erp": (0.2, 0.5), "contact_cfm": (1e-5, 1e-4, 1e-3)},
+    "ode": {"timestep": (0.002, 0.001), "friction": ("slip",), "contact_erp": (0.2, 0.5),
+            "contact_cfm": (1e-5, 1e-4, 1e-3)},
 }  # fmt: skip
 """Settings that decide how a contact gives way, and few values of each, around those of `tuned`."""
 

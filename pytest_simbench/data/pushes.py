@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pytest_simbench.data.errors import DataError
 from pytest_simbench.data.tosses import Half
@@ -159,8 +160,6 @@ def described(urdf: Path, finger_angle: float) -> str:
 
 def _hold(joint: ET.Element, angle: float) -> None:
     """Make a revolute joint about its z axis a fixed one at an angle [rad]."""
-    from scipy.spatial.transform import Rotation
-
     joint.set("type", "fixed")
     origin = joint.find("origin")
     assert origin is not None

@@ -1,5 +1,6 @@
 """The tasks: scene, procedure and score, the same for every simulator."""
 
+from pytest_simbench.tasks.arm_pushing import ArmPushing
 from pytest_simbench.tasks.base import Jitter, Outcome, Task
 from pytest_simbench.tasks.moments import Moment
 from pytest_simbench.tasks.pushing import CurvePushing, Pushing
@@ -9,6 +10,7 @@ from pytest_simbench.tasks.tossing import Tossing
 from pytest_simbench.tasks.towers import LeaningTowers
 
 __all__ = [
+    "ArmPushing",
     "CurvePushing",
     "Jitter",
     "LeaningTowers",

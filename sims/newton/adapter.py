@@ -103,7 +103,7 @@ class Newton(Simulator):
             timestep=0.001,
             cone="elliptic",
             condim=4,
-            ke=250000.0,
+            ke=62500.0,
             kd=1000.0,
             solimp=(0.99, 0.9999, 0.001),
             gap=0.0,

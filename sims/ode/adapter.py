@@ -55,8 +55,8 @@ class ODESettings(Settings):
         erp, cfm: of all joints: share of their error that is corrected in a step, and softness.
         contact_erp, contact_cfm: the same of contacts.
         contacts: the most of a pair of shapes that count, the deepest.
-        friction: how the friction pyramids lie: as ODE chooses (`pyramid`), or with an edge along
-            the slip (`slip`).
+        friction: in two directions that ODE chooses (`pyramid`), or along the slip alone where a
+            contact slips (`slip`).
         drive: `velocity` motors with Webots' P controller, or `spring`: the scene's drive law.
         position_gain: P of `velocity` [1/s].
         sleeping: whether boxes at rest for 1 s (0.01 m/s, 0.01 rad/s) are left out.
@@ -147,7 +147,7 @@ class ODE(Simulator):
             contact_cfm=1e-5,
             drive="spring",
         ),
-        "real": ODESettings(timestep=0.002, contact_cfm=1e-5, drive="spring", friction="slip"),
+        "real": ODESettings(timestep=0.001, contact_cfm=1e-3, drive="spring", friction="slip"),
     }
     chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
         "tuned": (SeedsSeen("throwing", 100, 101), SeedsSeen("stacking", 100, 100)),

@@ -85,9 +85,9 @@ class Contacts:
         world: of ODE.
         erp, cfm: share of a penetration that is corrected in a step, and softness [m/(N s)].
         most: joints of a pair of shapes; the deepest contacts become joints.
-        along: one edge of each friction pyramid lies along the slip. Along it the friction is then
-            Coulomb's. Otherwise ODE chooses the edges, and friction holds up to mu times the load
-            along each of them, together up to 1.4 times that.
+        along: where a contact slips, all of its friction acts along the slip, as Coulomb's does.
+            Otherwise ODE chooses two directions, and friction holds up to mu times the load in
+            each of them, together up to 1.4 times that.
 
     Attributes:
         space: that all geoms are in.
@@ -129,12 +129,14 @@ class Contacts:
         friction, bounce = min(a.friction, b.friction), min(a.bounce, b.bounce)
         world, group, joint = self.world, self._group, self._joint
         mode = self._mode | self._bouncy if bounce else self._mode
+        along = ode.ContactFDir1 | ode.ContactMu2
         for contact in contacts:
             direction = _slip(contact, one, other) if self.along else None
-            contact.setMode(mode if direction is None else mode | ode.ContactFDir1)
+            contact.setMode(mode if direction is None else mode | along)
             contact.setMu(friction)
             if direction is not None:
                 contact.setFDir1(direction)
+                contact.setMu2(0.0)
             if bounce:
                 contact.setBounce(bounce)
             if self._soft:

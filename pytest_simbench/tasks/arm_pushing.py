@@ -1,0 +1,265 @@
+"""A real arm pushed a cube; here its hand moves as the real one did. Where does the cube go?
+
+A repetition is one motion-captured run (Collins, Howard, Leitner, ICRA 2019). The joints follow
+the measured way of the hand, by inverse kinematics, so that nothing of the arm's control is in the
+score: what is left is contact.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from pytest_simbench.client.world import World
+from pytest_simbench.data import pushes
+from pytest_simbench.data.pushes import PUSH, ArmRun, ArmRuns
+from pytest_simbench.data.tosses import Half
+from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.robot.tracking import track
+from pytest_simbench.scene import Box, FloatArray, Gripper, Joint, Pose, Robot, Scene, Trajectory
+from pytest_simbench.simulator.robot_files import keep
+from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task
+from pytest_simbench.tasks.metrics import Metric
+
+CUBE_SIZE, CUBE_MASS = 0.075, 0.0884
+"""[m], [kg] (the source)."""
+
+HEIGHT = 0.055
+"""Of the arm's base above the table [m]: measured with all joints at 0."""
+
+JOINTS = tuple(f"m1n6s300_joint_{k}" for k in range(1, 7))
+TOOL = "m1n6s300_link_6"
+
+BEFORE_PUSH = np.radians([0.0, -60.0, 65.0, 90.0, 0.0, 0.0])
+"""What the arm was commanded before it pushed [rad]; joints 1, 5 and 6 stay at 0 (the source)."""
+
+HELD = (0, 4, 5)
+
+STIFFNESS, DAMPING, EFFORT, ARMATURE = 20_000.0, 2_000.0, 2_000.0, 0.1
+"""Of the drives: so stiff that the hand is where it was; the effort limit is the URDF's."""
+
+MOVED = 0.005
+"""A cube that is this far from its start [m] is pushed: five times what the cameras tremble."""
+
+BEFORE, AFTER = 1.0, 3.0
+"""What is simulated around that moment [s]: from before the contact until all is at rest."""
+
+SMOOTHED = 21
+"""Samples, 0.2 s: over so many the hand's way is smoothed, by parabolas."""
+
+TICK = 0.01
+"""Between samples [s]."""
+
+BLUE = (0.20, 0.35, 0.75, 1.0)
+
+CUBE = "cube"
+
+
+class Course(NamedTuple):
+    """What is simulated: joint path (n, 6) [rad], the cube's start, and its real way (n, 7)."""
+
+    path: FloatArray
+    start: Pose
+    real: FloatArray
+
+
+@dataclass(frozen=True)
+class ArmPushing(Task):
+    """Push a cube with the measured motion of a hand.
+
+    What the source does not tell was calibrated on the runs that are not held out: angle of the
+    fingers, friction, and where the marker body sits across the hand (docs/reality.md).
+
+    Attributes:
+        runs: the real ones.
+        half: which of them.
+        finger_angle: of the three fingers [rad].
+        marker_aside: of the marker body from where it seems to be with all joints at 0, along the
+            x axis of link 6, which is across the push [m].
+        friction: Coulomb coefficient of table, cube and hand.
+    """
+
+    name: ClassVar[str] = "arm_pushing"
+    study_timeout: ClassVar[float] = 300.0
+    brief: ClassVar[bool] = True
+
+    runs: ArmRuns
+    half: Half = "held_out"
+    finger_angle: float = 0.2
+    marker_aside: float = 0.006
+    friction: float = 0.3
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]:
+        return (
+            Metric("displacement", "displacement", unit="m", better=None,
+                   doc="of the cube along x, the direction of the push"),
+            Metric("displacement_error", "displacement error", unit="m", better="lower", least=0,
+                   doc="difference of that to the same real run's"),
+            Metric("turn_error", "turn error", unit="deg", better="lower", least=0,
+                   doc="difference of the cube's turn about the vertical to the same real run's"),
+            Metric("way_error", "way error", unit="m", better="lower", least=0,
+                   doc="distance of the cube from the real one's, mean over the time of the run"),
+        )  # fmt: skip
+
+    @property
+    def chosen(self) -> tuple[ArmRun, ...]:
+        """The runs that repetitions go through."""
+        return self.runs.of(PUSH, self.half)
+
+    @property
+    def repetitions(self) -> int:
+        return len(self.chosen)
+
+    @property
+    def references(self) -> Mapping[str, float]:  # type: ignore[override]
+        """The real ones' mean."""
+        real = [_displacement(run) for run in self.chosen]
+        return {"displacement": float(np.mean(real)), "displacement_error": 0.0,
+                "turn_error": 0.0, "way_error": 0.0}  # fmt: skip
+
+    def run(self, seed: int) -> ArmRun:
+        """The one of a seed."""
+        return self.chosen[seed % len(self.chosen)]
+
+    def sample(self, seed: int) -> tuple[str, int]:
+        return pushes.NAME, self.run(seed).number
+
+    def parameters(self) -> dict[str, Any]:
+        """The runs by their digest."""
+        told = {f"task.{item.name}": getattr(self, item.name) for item in fields(self)}
+        return {**told, "task.runs": self.runs.digest}
+
+    def scene(self, seed: int, jitter: Jitter) -> Scene:
+        course = self._course(seed)
+        box = Box(CUBE, (CUBE_SIZE,) * 3, course.start, CUBE_MASS, self.friction, BLUE)
+        robot = replace(self._arm(course.path[0]), friction=self.friction)
+        return Scene("arm pushing", (box,), robot, ground_friction=self.friction)
+
+    def perform(self, world: World, seed: int, count: Count) -> Outcome:
+        course = self._course(seed)
+        with world.stopwatch.measuring("plan"):
+            trajectory = self._trajectory(course.path, np.array(world.scene.gravity))
+        world.mark("start")
+        with world.phase("push"):
+            motion = world.follow(trajectory, log_period=TICK)
+        world.mark("end")
+        assert motion is not None  # a log was asked for
+        states = np.vstack([world_start(course.start), motion.bodies[:, 0, :7]])
+        n = min(len(states), len(course.real))
+        moved, real = states[:n], course.real[:n]
+        off = np.linalg.norm(moved[:, :2] - real[:, :2], axis=1)
+        turns = [_turn(way) for way in (moved, real)]
+        way = [float(rows[-1, 0] - rows[0, 0]) for rows in (moved, real)]
+        return Outcome(
+            {
+                "displacement": way[0],
+                "displacement_error": abs(way[0] - way[1]),
+                "turn_error": abs(turns[0] - turns[1]),
+                "way_error": float(off.mean()),
+            },
+            {
+                "run": self.run(seed).name,
+                "real_displacement": way[1],
+                "turn": turns[0],
+                "real_turn": turns[1],
+                "hand_error": float(np.abs(motion.joints[-1, 0] - course.path[-1]).max()),
+            },
+        )
+
+    def _arm(self, start: FloatArray) -> Robot:
+        return arm(self.runs.urdf, self.finger_angle, tuple(map(float, start)))
+
+    def _course(self, seed: int) -> Course:
+        return course(self.run(seed), self._arm(np.zeros(6)), self.marker(), self.marker_aside)
+
+    def marker(self) -> Pose:
+        """Of the marker body on link 6: the mean over the runs that are not held out."""
+        return marker(self.runs, self._arm(np.zeros(6)))
+
+    def _trajectory(self, path: FloatArray, gravity: FloatArray) -> Trajectory:
+        velocity = np.gradient(path, TICK, axis=0)
+        acceleration = np.gradient(velocity, TICK, axis=0)
+        model = RobotModel(self._arm(path[0]))
+        effort = model.inverse_dynamics(gravity, path, velocity, acceleration)
+        return Trajectory(TICK, path, velocity, effort)
+
+
+def world_start(pose: Pose) -> FloatArray:
+    """A row for the state before the first step, (7,)."""
+    return np.array([*pose.position, *pose.quaternion])
+
+
+@cache
+def arm(urdf: Path, finger_angle: float, start: tuple[float, ...]) -> Robot:
+    """The Mico2 with held fingers; on what it stands is not seen."""
+    described = keep(pushes.described(urdf, finger_angle), {})
+    joints = (
+        Joint(name, STIFFNESS, DAMPING, EFFORT, ARMATURE, at)
+        for name, at in zip(JOINTS, start, strict=True)
+    )
+    packages = {"kinova_description": str(urdf.parent)}
+    hand = Gripper((), 0.0, 0.0, 0.0)
+    base = Pose.at(0.0, 0.0, HEIGHT)
+    return Robot("mico", str(described), packages, "", tuple(joints), hand, TOOL, base)
+
+
+@cache
+def marker(runs: ArmRuns, robot: Robot) -> Pose:
+    """Of the marker body in the frame of link 6, from the beginnings of the runs, when all joints
+    were at 0."""
+    tool = RobotModel(robot).tool_pose(np.zeros(len(JOINTS))).inverse()
+    rows = []
+    for run in runs.of(PUSH, "chosen_on"):
+        at = (tool * Pose.from_array(np.median(run.hand[:50], axis=0))).as_array()
+        rows.append(at * np.array([1, 1, 1, *[math.copysign(1, at[3])] * 4]))
+    mean = np.mean(rows, axis=0)
+    mean[3:] /= np.linalg.norm(mean[3:])
+    return Pose.from_array(mean)
+
+
+@cache
+def course(run: ArmRun, robot: Robot, on_link: Pose, aside: float) -> Course:
+    """The part of a run in which the cube is pushed."""
+    pushed = _pushed(run)
+    rows = slice(pushed - round(BEFORE / TICK), pushed + round(AFTER / TICK))
+    hand = savgol_filter(run.hand[rows], SMOOTHED, 2, axis=0)
+    hand[:, 3:] /= np.linalg.norm(hand[:, 3:], axis=1, keepdims=True)
+    back = (Pose.at(aside, 0.0, 0.0) * on_link).inverse()
+    path = track(
+        RobotModel(robot), [Pose.from_array(row) * back for row in hand], BEFORE_PUSH, HELD
+    )
+    real = run.cube[rows]
+    first = np.median(real[: round(BEFORE / TICK / 2)], axis=0)
+    x, y = map(float, first[:2])
+    start = Pose.at(x, y, CUBE_SIZE / 2, yaw=_yaw(first))
+    return Course(savgol_filter(path, SMOOTHED, 2, axis=0), start, np.vstack([[first], real[1:]]))
+
+
+def _pushed(run: ArmRun) -> int:
+    """The row from which on the cube is not where it was; the cameras lose it for single rows."""
+    start = np.median(run.cube[:1000], axis=0)
+    away = np.linalg.norm(run.cube[:, :2] - start[:2], axis=1) > MOVED
+    return int(np.flatnonzero(~away)[-1]) + 1
+
+
+def _displacement(run: ArmRun) -> float:
+    ends = [np.median(run.cube[rows, 0]) for rows in (slice(0, 1000), slice(-50, None))]
+    return float(ends[1] - ends[0])
+
+
+def _yaw(row: FloatArray) -> float:
+    return Pose.from_array(row[:7] / np.array([1, 1, 1, *[np.linalg.norm(row[3:7])] * 4])).yaw
+
+
+def _turn(rows: FloatArray) -> float:
+    """From the first row to the last [deg]."""
+    turn = math.degrees(_yaw(rows[-1]) - _yaw(rows[0]))
+    return (turn + 180.0) % 360.0 - 180.0
