@@ -6,7 +6,7 @@ the cube's edge with settings fitted to these tosses (`--sim-profile real`; docs
 thresholds with `--sim-threshold position_error=16`.
 """
 
-from pytest_simbench.tasks import Tossing
+from pytest_simbench.tasks import ArmPushing, Tossing
 
 
 def test_tossing(repeat, data_set, threshold):
@@ -14,3 +14,10 @@ def test_tossing(repeat, data_set, threshold):
 
     result.assert_failures_at_most(threshold("failures", 0.15))
     result.assert_at_most("position_error", threshold("position_error", 30.0))
+
+
+def test_arm_pushing(repeat, data_set, threshold):
+    result = repeat(ArmPushing(data_set("arm_pushes")))
+
+    result.assert_failures_at_most(threshold("failures", 0.5))
+    result.assert_at_most("displacement_error", threshold("displacement_error", 0.03))

@@ -24,6 +24,12 @@ FOLDER = "mico_push"
 
 FILES = ("runs.npz", "m1n6s300.urdf")
 
+MESHES = (
+    "arm_mico", "base", "finger_distal", "finger_proximal", "forearm_mico", "hand_3finger",
+    "ring_big", "ring_small", "shoulder", "wrist",
+)  # fmt: skip
+"""Of the links and what covers their joints."""
+
 PUSH = "CubeExp"
 """How the names of the runs begin in which the arm pushes the cube."""
 
@@ -136,6 +142,50 @@ def _runs(arrays: Mapping[str, np.ndarray]) -> list[ArmRun]:
             raise ValueError(f"the run {name} has no rotations, or time that stands still")
         found.append(ArmRun(name, *(np.asarray(a, float) for a in (time, hand, cube))))
     return found
+
+
+def convert(files: Mapping[str, bytes], folder: Path) -> None:
+    """Write the runs and the arm's description of the source's files into a folder.
+
+    A run is a table separated by tabs: number, time [s], then for base, hand and cube the position
+    [mm], three angles, a residual, and the rotation matrix column by column.
+
+    Raises:
+        DataError: a file that holds something else.
+        OSError: the folder cannot be written to.
+    """
+    there = folder / FOLDER
+    (there / "meshes").mkdir(parents=True, exist_ok=True)
+    arrays: dict[str, np.ndarray] = {}
+    names = []
+    for path, content in sorted(files.items()):
+        file = Path(path)
+        if file.suffix == ".tsv":
+            names.append(file.stem.removesuffix("_6D"))
+            time, hand, cube = _table(content, path)
+            arrays |= {f"{names[-1]}/time": time, f"{names[-1]}/hand": hand}
+            arrays[f"{names[-1]}/cube"] = cube
+        else:
+            (there / ("meshes" if file.suffix == ".STL" else "") / file.name).write_bytes(content)
+    partial = there / "runs.partial"
+    with partial.open("wb") as packed:
+        np.savez_compressed(packed, runs=np.array(names), **arrays)  # type: ignore[arg-type]
+    partial.replace(there / FILES[0])
+
+
+def _table(content: bytes, path: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Time, hand and cube of a run's table."""
+    try:
+        rows = [line.split() for line in content.decode("ascii").splitlines()]
+        numbers = np.array(rows, float)
+        time, *bodies = numbers[:, 1], *np.split(numbers[:, 2:], 3, axis=1)
+        poses = []
+        for body in bodies[1:]:
+            turns = Rotation.from_matrix(body[:, 7:16].reshape(-1, 3, 3).transpose(0, 2, 1))
+            poses.append(np.hstack([body[:, :3] / 1000, turns.as_quat(scalar_first=True)]))
+    except (ValueError, IndexError) as error:
+        raise DataError(f"{path} is no table of a run: {error}") from None
+    return time, poses[0], poses[1]
 
 
 def described(urdf: Path, finger_angle: float) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pytest_simbench.data import tosses
+from pytest_simbench.data import pushes, tosses
 from pytest_simbench.data.errors import DataError, DataMissing
 
 VARIABLE = "SIMBENCH_DATA"
@@ -59,6 +59,22 @@ SETS = {
             licence="BSD-3-Clause",
             read=tosses.read,
             convert=tosses.convert,
+        ),
+        DataSet(
+            name=pushes.NAME,
+            title="46 runs of a Kinova Mico2, half of which push a cube",
+            repository="erwincoumans/quantifying-the-reality-gap-in-robotic-manipulation-tasks",
+            commit="2b21d34a506199eefb72c640ff1571dbb433ffea",
+            files=(
+                "Data/MotionCapture/Experiment1/",
+                "Data/MotionCapture/Experiment3/",
+                "Software/kinova_description/urdf/m1n6s300.urdf",
+                *(f"Software/kinova_description/meshes/{name}.STL" for name in pushes.MESHES),
+            ),
+            sha256="32fa5885be7ea985f6da7a734d71dc8385c73c316f0d6b1374bbd6cc539f853f",
+            licence="BSD-3-Clause",
+            read=pushes.read,
+            convert=pushes.convert,
         ),
     )
 }

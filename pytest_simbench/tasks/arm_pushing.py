@@ -93,7 +93,7 @@ class ArmPushing(Task):
     runs: ArmRuns
     half: Half = "held_out"
     finger_angle: float = 0.2
-    marker_aside: float = 0.006
+    marker_aside: float = 0.009
     friction: float = 0.3
 
     @property

@@ -104,6 +104,12 @@ class DART(Simulator):
             Deviation("link/*/damping", "DART has no damping of links"),
             Deviation("body/*/margin link/*/margin", "DART's shapes have no margin"),
             Deviation(
+                "link/*/meshes",
+                "DART's reader of meshes moves corners of some, by up to 0.02 mm in a Mico2",
+                within=1e-5,
+                elsewhere=5e-5,
+            ),
+            Deviation(
                 "joint/*finger_joint2/effort_limit",
                 "the second finger has no drive: it follows the first, by up to both their limits",
             ),

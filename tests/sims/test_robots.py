@@ -80,7 +80,7 @@ HANDS = {
 """A hand that only touches, one jaw, two fingers, three."""
 
 
-COUPLED = {"ode": {2}}
+COUPLED = {"ode": {0, 2}}
 """Engines that couple these numbers of fingers alone, and say so."""
 
 
