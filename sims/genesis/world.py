@@ -96,7 +96,9 @@ def add_body(world: Any, body: Body) -> Any:
     density = None if body.fixed or uneven else body.mass / body.volume
     surface = genesis.surfaces.Default(color=body.colour)
     return world.add_entity(
-        _described(body) if uneven else _morph(body), material=material(body.friction, density), surface=surface
+        _described(body) if uneven else _morph(body),
+        material=material(body.friction, density),
+        surface=surface,
     )
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import numpy as np
+
 from pytest_simbench.scene import Body, Box, Capsule, Cylinder, Joint, Pose, Scene, Sphere
 from pytest_simbench.simulator import PreparedRobot, Settings, lazy_import
 
