@@ -209,7 +209,11 @@ def check(python: Path, step: Step) -> str:
     with tempfile.TemporaryDirectory() as folder:
         for name, text in step.files:
             Path(folder, name).write_text(text, "utf-8")
-        variables = {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST", "PYTHON"))}
+        variables = {
+            k: v
+            for k, v in os.environ.items()
+            if not k.startswith(("PYTEST", "PYTHON", "SIMBENCH_DATA"))
+        }
         result = subprocess.run(
             [str(python), "-m", "pytest", *step.arguments], cwd=folder, env=variables,
             capture_output=True, text=True, check=False, timeout=600,

@@ -112,7 +112,8 @@ OPTIONS = (
            metavar="SECONDS"),
     Option("--sim-stall-timeout", SECONDS, "longest silence of a worker in seconds", 60.0,
            metavar="SECONDS"),
-    Option("--sim-profile", Word(), "settings profile, default or tuned", "tuned", metavar="NAME"),
+    Option("--sim-profile", Word(), "settings profile: default, tuned or real", "tuned",
+           metavar="NAME"),
     Option("--sim-set", Assignments("SIM.SETTING=VALUE"), "change one setting: "
            "mujoco.timestep=0.001", {}, metavar="SIM.SETTING=VALUE"),
     Option("--sim-python", Assignments("SIM=PATH", commas=False), "interpreter of a simulator's "

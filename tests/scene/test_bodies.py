@@ -154,3 +154,12 @@ def test_a_radius_and_a_length_are_above_0(wrong: float) -> None:
     ):
         with pytest.raises(SceneError, match=r"the (radius|length) \[m\] of 'b' is"):
             made()
+
+
+def test_moments_of_its_own_travel_and_must_be_possible() -> None:
+    box = Box("a", (1.0, 1.0, 1.0), Pose(), 1.0, moments=(0.2, 0.3, 0.4))
+    assert (box.inertia() == [0.2, 0.3, 0.4]).all()
+    assert Box.from_wire(box.to_wire()) == box
+    assert "moments" not in Box("a", (1.0, 1.0, 1.0), Pose(), 1.0).to_wire()
+    with pytest.raises(SceneError, match="none is larger than the other two"):
+        Box("a", (1.0, 1.0, 1.0), Pose(), 1.0, moments=(0.1, 0.2, 0.4))
