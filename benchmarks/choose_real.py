@@ -66,7 +66,7 @@ def score(case: Case, task: Tossing) -> tuple[float, float]:
         position, rotation = (statistics.fmean(column) for column in zip(*found, strict=True))
         return position, rotation
     finally:
-        executor.end_test()
+        executor.close()
 
 
 def main() -> None:

@@ -41,11 +41,6 @@ class Experiment:
         """The robot that was chosen, if the task has one."""
         return self.case.robot if ROBOT in vars(self.task) else None
 
-    @property
-    def reuses_worker(self) -> bool:
-        """Whether one worker serves several repetitions."""
-        return self.case.reuses_worker or (self.task.brief and not self.case.fresh)
-
     def problem(self) -> str | None:
         """What the case's robot cannot do of the task, in one sentence, or None."""
         if self.case.robot is None:

@@ -88,7 +88,7 @@ class ArmPushing(Task):
 
     name: ClassVar[str] = "arm_pushing"
     study_timeout: ClassVar[float] = 300.0
-    brief: ClassVar[bool] = True
+    shares_worker: ClassVar[bool] = True
 
     runs: ArmRuns
     half: Half = "held_out"

@@ -79,8 +79,6 @@ class Task(ABC):
         moments: where replays save and restore, and until which a disturbance is followed.
         shares_worker: it takes less time than the start of a worker, so one serves several tests.
         pictured: phases within which the task notes moments (`World.note`); pictures show them.
-        brief: a repetition is so short that starting a worker for each would cost more than it; one
-            worker serves several.
     """
 
     name: ClassVar[str]
@@ -90,7 +88,6 @@ class Task(ABC):
     moments: ClassVar[tuple[Moment, ...]] = ()
     shares_worker: ClassVar[bool] = False
     pictured: ClassVar[tuple[str, ...]] = ()
-    brief: ClassVar[bool] = False
 
     @property
     @abstractmethod

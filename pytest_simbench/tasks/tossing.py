@@ -46,7 +46,7 @@ class Tossing(Task):
 
     name: ClassVar[str] = "tossing"
     study_timeout: ClassVar[float] = 300.0
-    brief: ClassVar[bool] = True
+    shares_worker: ClassVar[bool] = True
     references: ClassVar[Mapping[str, float]] = {"position_error": 0.0, "rotation_error": 0.0}
 
     tosses: Tosses

@@ -18,6 +18,7 @@ DOCS = ROOT / "docs"
 sys.path.append(str(DOCS))  # for the scripts, which are no package
 
 import make_pushing  # noqa: E402
+import make_reality  # noqa: E402
 import make_results  # noqa: E402
 import make_truth  # noqa: E402
 import published_runs  # noqa: E402
@@ -42,6 +43,16 @@ def test_the_tables_of_pushing_are_up_to_date() -> None:
 def test_the_tables_of_laws_are_up_to_date() -> None:
     assert make_truth.PAGE.read_text("utf-8") == make_truth.page(), "run `docs/make_truth.py`"
     assert make_truth.page().count("\n| genesis | ") == 2  # tuned and default
+
+
+def test_the_tables_of_real_experiments_are_up_to_date_and_of_held_out_motions() -> None:
+    told = "run `python docs/make_reality.py`"
+    assert make_reality.PAGE.read_text("utf-8") == make_reality.page(), told
+    tosses = {int(line["number"]) for rows in make_reality.rows("tossing").values() for line in rows}
+    assert len(tosses) == 95
+    assert all(number % 2 for number in tosses)
+    runs = {int(line["number"]) for r in make_reality.rows("arm_pushing").values() for line in r}
+    assert runs == {3, 7, 11, 15, 19, 31}
 
 
 def test_no_profile_was_chosen_on_a_published_seed() -> None:

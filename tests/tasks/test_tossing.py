@@ -99,7 +99,7 @@ def tossed(case: Case, task: Tossing, numbers: Sequence[int]) -> list[Record]:
     try:
         made = [executor.repetition(experiment, number).run() for number in numbers]
     finally:
-        executor.end_test()
+        executor.close()
     for _, error in made:
         assert error is None
     return [record for record, _ in made]
