@@ -48,7 +48,8 @@ def test_the_tables_of_laws_are_up_to_date() -> None:
 def test_the_tables_of_real_experiments_are_up_to_date_and_of_held_out_motions() -> None:
     told = "run `python docs/make_reality.py`"
     assert make_reality.PAGE.read_text("utf-8") == make_reality.page(), told
-    tosses = {int(line["number"]) for rows in make_reality.rows("tossing").values() for line in rows}
+    tossed = make_reality.rows("tossing").values()
+    tosses = {int(line["number"]) for rows in tossed for line in rows}
     assert len(tosses) == 95
     assert all(number % 2 for number in tosses)
     runs = {int(line["number"]) for r in make_reality.rows("arm_pushing").values() for line in r}
