@@ -1,6 +1,13 @@
 """Laws: cases whose right answer is known, by which a simulator can be wrong all by itself."""
 
 from pytest_simbench.laws.base import LAW, Law, Reading
+from pytest_simbench.laws.bounce import (
+    BounceHeight,
+    BounceRatio,
+    ElasticChain,
+    ObliqueBounce,
+    ObliqueBounceStick,
+)
 from pytest_simbench.laws.contact import (
     CollisionMomentum,
     DeadCollision,
@@ -14,7 +21,16 @@ from pytest_simbench.laws.contact import (
     TippingSlope,
     Tower,
 )
+from pytest_simbench.laws.drives import (
+    EffortLimit,
+    FeedForward,
+    Sag,
+    SpringAndDamper,
+    StepResponse,
+    Tracking,
+)
 from pytest_simbench.laws.free import (
+    DampedFall,
     FallSpeed,
     FreeFall,
     FreeTop,
@@ -51,16 +67,10 @@ from pytest_simbench.laws.joints import (
     CompoundPendulum,
     DoublePendulum,
     DoublePendulumEnergy,
-    EffortLimit,
-    FeedForward,
     PendulumEnergy,
     PendulumPeriod,
-    Sag,
     SphericalPendulum,
-    SpringAndDamper,
-    StepResponse,
     SwingingSlider,
-    Tracking,
 )
 from pytest_simbench.laws.rolling import (
     FreeCylinder,
@@ -71,9 +81,10 @@ from pytest_simbench.laws.rolling import (
 )
 
 LAWS: tuple[Law, ...] = (
-    FreeFall(), FallSpeed(), ObliqueGravity(), Projectile(), Spin(), FreeTop(), FreeCylinder(),
-    TumbleEnergy(), TumbleMomentum(),
+    FreeFall(), FallSpeed(), DampedFall(), ObliqueGravity(), Projectile(), Spin(), FreeTop(),
+    FreeCylinder(), TumbleEnergy(), TumbleMomentum(),
     LandingTime(), DeadLanding(), DeadCollision(), CollisionMomentum(),
+    BounceHeight(), BounceRatio(), ElasticChain(), ObliqueBounce(), ObliqueBounceStick(),
     StickAngle(), StickAngleAcross(), StickAngleDiagonal(), Creep(), Carried(),
     SlideX(), SlideY(), SlideDiagonal(), SlideStraight(), StoppingDistance(),
     StoppingDistanceDiagonal(), Glide(), Belt(),

@@ -60,6 +60,28 @@ class FallSpeed(FreeFall):
 
 
 @dataclass(frozen=True)
+class DampedFall(FreeFall):
+    """A body that is damped by c v / m falls ever less fast, v = (g / c) (1 - exp(-c t)), towards
+    its terminal speed g / c (Stokes' law of resistance). Tolerance: late by one step, g dt."""
+
+    name = "damped_fall"
+    quantity: ClassVar[str] = "speed of the fall"
+    unit: ClassVar[str] = "m/s"
+
+    damping: float = 2.0
+
+    def build(self) -> Scene:
+        body = Box("body", (0.1,) * 3, Pose.at(0.0, 0.0, 8.0), 1.0, linear_damping=self.damping)
+        return Scene(self.name, (body,))
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        exact = GRAVITY / self.damping * -math.expm1(-self.damping * float(seen.t[-1]))
+        allowed = GRAVITY * seen.dt + rounding(exact, seen.steps)
+        return Reading(-float(seen.bodies[-1, 0, 9]), exact, allowed)
+
+
+@dataclass(frozen=True)
 class ObliqueGravity(Law):
     """Gravity has three components: after t a body has moved by g t^2 / 2 in each; the distance
     between where it is and where it should be is 0. Tolerance as of `FreeFall`."""

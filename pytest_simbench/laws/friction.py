@@ -11,7 +11,7 @@ import numpy as np
 
 from pytest_simbench.client.world import World
 from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, stillness, watch
-from pytest_simbench.laws.joints import STRONG, follow
+from pytest_simbench.laws.drives import STRONG, follow
 from pytest_simbench.laws.mechanisms import Part, mechanism
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Trajectory, Vector3
 

@@ -11,8 +11,8 @@ import numpy as np
 from pytest_simbench.client.world import World
 from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, stillness
 from pytest_simbench.laws.contact import tilt
+from pytest_simbench.laws.drives import STRONG, follow
 from pytest_simbench.laws.friction import BETWEEN, SHARES, boundary
-from pytest_simbench.laws.joints import STRONG, follow
 from pytest_simbench.laws.mechanisms import Part, mechanism
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import panda

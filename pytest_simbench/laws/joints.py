@@ -1,4 +1,4 @@
-"""Laws of joints that move freely, and of drives."""
+"""Laws of joints that move freely: pendulums and sliders."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from pytest_simbench.client.world import World
@@ -18,34 +17,12 @@ from pytest_simbench.laws.base import (
     Reading,
     Watched,
     rounding,
-    stillness,
     watch,
-    watched,
 )
 from pytest_simbench.laws.mechanisms import INERTIA_OF_A_POINT, Part, mechanism
-from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Scene, Trajectory, Vector3
+from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Scene, Vector3
 
 Y: Vector3 = (0.0, 1.0, 0.0)
-STRONG = 1e4
-"""Effort limit of a drive that is to obey its law [N m]."""
-
-
-def follow(world: World, rows: Trajectory) -> Watched:
-    """Have the drives follow, and see every step.
-
-    Raises:
-        ValueError: the engine told no step.
-    """
-    motion = world.follow(rows, log_period=0.0)
-    if motion is None or not len(motion):
-        raise ValueError("a motion was asked for step by step, and none came back")
-    return watched(motion)
-
-
-def held(position: float, seconds: float, velocity: float = 0.0, effort: float = 0.0) -> Trajectory:
-    """One joint told to be at `position` [rad or m] at the end, moving there at `velocity`."""
-    ends = np.array([[position - velocity * seconds], [position]])
-    return Trajectory(seconds, ends, np.full((2, 1), velocity), np.full((2, 1), effort))
 
 
 class _Passive(Law):
@@ -275,159 +252,3 @@ class SphericalPendulum(_Motion):
     def parts(self) -> tuple[Part, ...]:
         bob = Part("across", Y, centre=(0.0, 0.1, -0.5), start=0.3, inertia=(0.02, 0.04, 0.03))
         return Part("along", (1.0, 0.0, 0.0), start=0.8), bob
-
-
-class _Driven(Law):
-    """A wheel of 0.5 kg m^2 on a vertical axis, and its drive."""
-
-    phenomenon = "joints"
-    quantity: ClassVar[str] = "angle"
-    unit: ClassVar[str] = "rad"
-
-    inertia: ClassVar[float] = 0.5
-    seconds: float
-
-    def wheel(
-        self, stiffness: float, damping: float, start: float = 0.0, effort: float = STRONG
-    ) -> Scene:
-        """Its drive's stiffness [N m/rad], damping [N m s/rad] and effort limit [N m]."""
-        part = Part(
-            "wheel", (0.0, 0.0, 1.0), inertia=(self.inertia,) * 3, start=start,
-            stiffness=stiffness, damping=damping, effort=effort,
-        )  # fmt: skip
-        return Scene(self.name, robot=mechanism(self.name, part))
-
-
-@dataclass(frozen=True)
-class StepResponse(_Driven):
-    """A critically damped drive that is told to go from x0 to 0 is at x0 (1 + w t) exp(-w t), with
-    w^2 = k / I. Tolerance: |v| dt + |a| t dt at the largest, x0 w / e and x0 w^2."""
-
-    name = "step_response"
-
-    rate: float = 10.0
-    start: float = 0.5
-    seconds: float = 0.1
-
-    def build(self) -> Scene:
-        k, d = self.inertia * self.rate**2, 2 * self.inertia * self.rate
-        return self.wheel(k, d, self.start)
-
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, held(0.0, self.seconds))
-        t = float(seen.t[-1])
-        x = self.rate * t
-        exact = self.start * (1 + x) * math.exp(-x)
-        late = self.start * self.rate * (1 / math.e + x)
-        allowed = late * seen.dt + rounding(self.start, seen.steps)
-        return Reading(float(seen.joints[-1, 0, 0]), exact, allowed)
-
-
-@dataclass(frozen=True)
-class SpringAndDamper(_Driven):
-    """A weakly damped one swings: x0 exp(-z w t) (cos(u t) + z w / u sin(u t)), u = w sqrt(1 -
-    z^2). Tolerance as of `StepResponse`, with |v| up to x0 w."""
-
-    name = "spring_damper"
-
-    rate: float = 10.0
-    damping: float = 0.1
-    start: float = 0.5
-    seconds: float = 0.6
-
-    def build(self) -> Scene:
-        d = 2 * self.damping * self.inertia * self.rate
-        return self.wheel(self.inertia * self.rate**2, d, self.start)
-
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, held(0.0, self.seconds))
-        t, w, z = float(seen.t[-1]), self.rate, self.damping
-        u = w * math.sqrt(1 - z * z)
-        exact = self.start * math.exp(-z * w * t)
-        exact *= math.cos(u * t) + z * w / u * math.sin(u * t)
-        allowed = self.start * w * (1 + w * t) * seen.dt + rounding(self.start, seen.steps)
-        return Reading(float(seen.joints[-1, 0, 0]), exact, allowed)
-
-
-@dataclass(frozen=True)
-class EffortLimit(_Driven):
-    """A drive told to go far away pushes with its limit and no more: x = (F / I) t^2 / 2.
-    Tolerance: (F / I) t dt."""
-
-    name = "effort_limit"
-
-    effort: float = 2.0
-    seconds: float = 0.5
-
-    def build(self) -> Scene:
-        return self.wheel(2000.0, 20.0, effort=self.effort)
-
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, held(5.0, self.seconds))
-        t, pull = float(seen.t[-1]), self.effort / self.inertia
-        allowed = pull * t * seen.dt + rounding(1.0, seen.steps)
-        return Reading(float(seen.joints[-1, 0, 0]), pull * t * t / 2, allowed)
-
-
-@dataclass(frozen=True)
-class Tracking(_Driven):
-    """A drive that is told position and velocity of a steady turn follows it: x = v t (1 - exp(-w
-    t)) from rest, critically damped. Tolerance: late by one step, and a set point of the end of
-    each step holds from its beginning on: 2 v dt."""
-
-    name = "tracking"
-
-    speed: float = 1.0
-    rate: float = 10.0
-    seconds: float = 1.0
-
-    def build(self) -> Scene:
-        return self.wheel(self.inertia * self.rate**2, 2 * self.inertia * self.rate)
-
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, held(self.speed * self.seconds, self.seconds, self.speed))
-        t = float(seen.t[-1])
-        exact = self.speed * t * (1 - math.exp(-self.rate * t))
-        allowed = 2 * self.speed * seen.dt + rounding(1.0, seen.steps)
-        return Reading(float(seen.joints[-1, 0, 0]), exact, allowed)
-
-
-@dataclass(frozen=True)
-class Sag(Law):
-    """A level rod on a spring sags until k x = m g l cos x. Tolerance: what gravity turns it by
-    within one step, (g / l) dt^2, and rounding."""
-
-    name = "sag"
-    phenomenon = "joints"
-    quantity: ClassVar[str] = "angle"
-    unit: ClassVar[str] = "rad"
-
-    stiffness: float = 50.0
-    seconds: float = 2.0
-
-    def build(self) -> Scene:
-        part = Part(
-            "rod", Y, centre=(1.0, 0.0, 0.0), stiffness=self.stiffness,
-            damping=2 * math.sqrt(self.stiffness), effort=STRONG,
-        )  # fmt: skip
-        return Scene(self.name, robot=mechanism(self.name, part))
-
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
-        exact = brentq(lambda x: self.stiffness * x - GRAVITY * math.cos(x), 0.0, 1.5)
-        allowed = stillness(seen.dt, 1.0)
-        return Reading(float(seen.joints[-1, 0, 0]), float(exact), allowed)
-
-
-@dataclass(frozen=True)
-class FeedForward(Sag):
-    """The same rod is told the torque that gravity asks for, m g l: it stays level. Tolerance as
-    of `Sag`."""
-
-    name = "feed_forward"
-
-    seconds: float = 1.0
-
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, held(0.0, self.seconds, effort=-GRAVITY))
-        return Reading(float(seen.joints[-1, 0, 0]), 0.0, stillness(seen.dt, 1.0))

@@ -69,6 +69,16 @@ def faster(factor: float) -> Fault:
     return bodies(change)
 
 
+def bouncier(factor: float) -> Fault:
+    """Ground and bodies have another restitution."""
+
+    def change(scene: Scene) -> Scene:
+        found = bodies(lambda body: replace(body, restitution=factor * body.restitution))(scene)
+        return replace(found, ground_restitution=factor * scene.ground_restitution)
+
+    return change
+
+
 def sized(x: float, y: float, z: float, which: str = "") -> Fault:
     """They have another size [m]."""
     return bodies(lambda body: body.changed(size=(x, y, z)), which)
@@ -99,6 +109,9 @@ def step(scene: Scene) -> Scene:
 
 FAULTS: dict[str, Fault] = {
     **dict.fromkeys(("free_fall", "fall_speed", "oblique_gravity", "projectile"), heavier),
+    "damped_fall": bodies(lambda body: replace(body, linear_damping=2 * body.linear_damping)),
+    **dict.fromkeys(("bounce_height", "bounce_ratio", "elastic_chain"), bouncier(0.8)),
+    **dict.fromkeys(("oblique_bounce_slip", "oblique_bounce_stick"), rougher(0.2)),
     **dict.fromkeys(("spin", "glide"), faster(1.1)),
     "free_top": sized(0.2, 0.2, 0.4),
     **dict.fromkeys(("tumble_energy", "tumble_momentum"), sized(0.3, 0.1, 0.02)),

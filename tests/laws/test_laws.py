@@ -28,6 +28,7 @@ ELSEWHERE = {
     ),
     **dict.fromkeys(("dead_collision", "push_force"), "ode"),
     **dict.fromkeys(("grip_holds", "heavy_on_top"), "ode"),
+    **dict.fromkeys(("bounce_height", "oblique_bounce_slip", "oblique_bounce_stick"), "ode"),
 }  # fmt: skip
 """Laws that tuned MuJoCo does not keep, and who does."""
 

@@ -1,0 +1,162 @@
+"""Laws of impacts that bounce."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from pytest_simbench.client.world import World
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, rounding, watch
+from pytest_simbench.scene import Pose, Scene, Sphere
+
+RADIUS = 0.05
+"""[m]."""
+
+
+@dataclass(frozen=True)
+class BounceHeight(Law):
+    """A ball let go at the height h rises again to e^2 h (Newton's coefficient of restitution).
+    Tolerance: the impact is late by one step, in its place and in its speed, 2 v dt."""
+
+    name = "bounce_height"
+    phenomenon = "impact"
+    quantity: ClassVar[str] = "height of the bounce"
+    unit: ClassVar[str] = "m"
+
+    restitution: float = 0.8
+    height: float = 0.5
+
+    def build(self) -> Scene:
+        place = Pose.at(0.0, 0.0, RADIUS + self.height)
+        ball = Sphere("ball", RADIUS, place, 1.0, restitution=self.restitution)
+        return Scene(self.name, (ball,), ground_restitution=self.restitution)
+
+    @property
+    def fall(self) -> float:
+        """Time of the fall [s]."""
+        return math.sqrt(2 * self.height / GRAVITY)
+
+    def rises(self, seen: Watched) -> tuple[float, float]:
+        """Heights of the first and the second bounce [m], looked for when they should be."""
+        e, t, z = self.restitution, seen.t, seen.bodies[:, 0, 2] - RADIUS
+        first = (t > self.fall) & (t < self.fall * (1 + 2 * e))
+        second = t > self.fall * (1 + 2 * e)
+        return float(z[first].max()), float(z[second].max(initial=0.0))
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.fall * (1 + 2 * self.restitution))
+        allowed = 2 * GRAVITY * self.fall * seen.dt + rounding(1.0, seen.steps)
+        return Reading(self.rises(seen)[0], self.restitution**2 * self.height, allowed)
+
+
+@dataclass(frozen=True)
+class BounceRatio(BounceHeight):
+    """Each bounce is e^2 times as high as the one before. Tolerance: twice that of a bounce, as a
+    share of the first."""
+
+    name = "bounce_ratio"
+    quantity: ClassVar[str] = "second bounce over the first"
+    unit: ClassVar[str] = ""
+
+    def measure(self, world: World) -> Reading:
+        e = self.restitution
+        seen = watch(world, self.fall * (1 + 2 * e + 2 * e**2))
+        first, second = self.rises(seen)
+        allowed = 4 * GRAVITY * self.fall * seen.dt / (e**2 * self.height)
+        ratio = second / first if first > 0 else 0.0
+        return Reading(ratio, e**2, allowed + rounding(1.0, seen.steps))
+
+
+@dataclass(frozen=True)
+class ElasticChain(Law):
+    """A ball hits a row of three equal ones, all elastic and without friction: the last one goes on
+    with its speed, the others rest (Mariotte; Newton's cradle). The balls stand 1 cm apart, so that
+    the impacts come one after the other. Tolerance: what gravity changes within one step, g dt: an
+    impact is solved at once, whatever the step."""
+
+    name = "elastic_chain"
+    phenomenon = "impact"
+    quantity: ClassVar[str] = "speed of the last ball"
+    unit: ClassVar[str] = "m/s"
+
+    speed: float = 2.0
+    seconds: float = 0.3
+
+    def build(self) -> Scene:
+        balls = [
+            Sphere(
+                f"ball_{k}",
+                RADIUS,
+                Pose.at(k * (2 * RADIUS + 0.01), 0.0, RADIUS),
+                1.0,
+                0.0,
+                restitution=1.0,
+                linear_velocity=(self.speed if k == 0 else 0.0, 0.0, 0.0),
+            )
+            for k in range(4)
+        ]
+        return Scene(self.name, tuple(balls), ground_friction=0.0, ground_restitution=1.0)
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        allowed = GRAVITY * seen.dt + rounding(self.speed, seen.steps)
+        return Reading(float(seen.bodies[-1, -1, 7]), self.speed, allowed)
+
+
+@dataclass(frozen=True)
+class ObliqueBounce(Law):
+    """A ball that hits the ground aslant, without spin, slips all the time when mu is small: its
+    level speed loses mu (1 + e) v (Routh, Rigid Dynamics; Coulomb's law for impulses). Tolerance:
+    the impact is late by one step, mu (1 + e) g dt."""
+
+    name = "oblique_bounce_slip"
+    phenomenon = "impact"
+    quantity: ClassVar[str] = "level speed after the bounce"
+    unit: ClassVar[str] = "m/s"
+
+    friction: float = 0.2
+    restitution: float = 0.5
+    level: float = 4.0
+    height: float = 0.2
+
+    def build(self) -> Scene:
+        ball = Sphere(
+            "ball",
+            RADIUS,
+            Pose.at(0.0, 0.0, RADIUS + self.height),
+            1.0,
+            self.friction,
+            restitution=self.restitution,
+            linear_velocity=(self.level, 0.0, 0.0),
+        )
+        return Scene(
+            self.name,
+            (ball,),
+            ground_friction=self.friction,
+            ground_restitution=self.restitution,
+        )
+
+    @property
+    def exact(self) -> float:
+        """Level speed after the bounce [m/s]."""
+        down = math.sqrt(2 * GRAVITY * self.height)
+        return self.level - min(self.friction * (1 + self.restitution) * down, 2 / 7 * self.level)
+
+    def measure(self, world: World) -> Reading:
+        fall = math.sqrt(2 * self.height / GRAVITY)
+        seen = watch(world, fall * (1 + self.restitution))
+        share = self.friction * (1 + self.restitution)
+        allowed = share * GRAVITY * seen.dt + rounding(self.level, seen.steps)
+        return Reading(float(seen.bodies[-1, 0, 7]), self.exact, allowed)
+
+
+@dataclass(frozen=True)
+class ObliqueBounceStick(ObliqueBounce):
+    """Where mu is large it sticks, and leaves rolling: 5/7 of its level speed is left, whatever mu
+    and e. Tolerance as of `ObliqueBounce`."""
+
+    name = "oblique_bounce_stick"
+
+    friction: float = 0.8
+    level: float = 2.0
