@@ -162,12 +162,21 @@ class OvPhysX(Simulator):
             sleeping=False,
         ),
         "real": OvPhysXSettings(
-            timestep=0.001, body_iterations=4, arm_iterations=4, angular_damping=0.0, sleeping=False
+            timestep=0.001,
+            body_iterations=4,
+            arm_iterations=4,
+            angular_damping=0.0,
+            sleeping=False,
+            max_depenetration_velocity=0.1,  # docs/reality.md
         ),
     }
     chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
         "tuned": (SeedsSeen("throwing", 100, 119),),
-        "real": (SeedsSeen("throwing", 100, 119), DataSeen("cube_tosses", 0, 564, 6)),
+        "real": (
+            SeedsSeen("throwing", 100, 119),
+            DataSeen("cube_tosses", 0, 564, 6),
+            DataSeen("arm_pushes", 1, 33, 4),
+        ),
     }
     settings: OvPhysXSettings
 
