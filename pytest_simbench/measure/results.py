@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property
 from math import isfinite
 
 from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval, proportion
@@ -54,6 +53,7 @@ class ResultSet:
         self.metrics: dict[str, Metric] = {metric.name: metric for metric in metrics}
         self._costs = {metric.name: metric for metric in COSTS if metric.name not in self.metrics}
         self._intervals: dict[tuple[str, float], Interval] = {}
+        self._ok: tuple[tuple[Record, ...], tuple[Record, ...]] = ((), ())
 
     def __len__(self) -> int:
         return len(self.records)
@@ -69,10 +69,12 @@ class ResultSet:
         first = self.records[0]
         return f"{first.task} on {first.label}"
 
-    @cached_property
+    @property
     def ok(self) -> tuple[Record, ...]:
         """The repetitions that ended as they should."""
-        return tuple(record for record in self.records if record.ok)
+        if self._ok[0] is not self.records:  # a sequence of looks sets longer and longer ones
+            self._ok = self.records, tuple(record for record in self.records if record.ok)
+        return self._ok[1]
 
     @property
     def failures(self) -> tuple[Record, ...]:

@@ -55,10 +55,10 @@ def unruly(case: Case, name: str, **changes: object) -> Case:
 
 @contextmanager
 def at_most(seconds: float) -> Iterator[None]:
-    began = time.monotonic()
+    began, before = time.monotonic(), workers()
     yield
     assert time.monotonic() - began < seconds + SLACK
-    assert not workers()
+    assert not workers() - before
 
 
 def failure(case: Case, task: Falling | None = None) -> tuple[str, str, str]:

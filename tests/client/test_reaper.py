@@ -144,7 +144,7 @@ def test_reaping_ends_those_of_the_mark_alone() -> None:
     def start(mark: str) -> subprocess.Popen[bytes]:
         return subprocess.Popen(["sleep", "600"], env={**os.environ, reaper.VARIABLE: mark})
 
-    one, another = reaper.new_mark(), reaper.new_mark()
+    before, one, another = workers(), reaper.new_mark(), reaper.new_mark()
     mine, derived, others, longer = map(start, (one, f"{one}.1", another, f"{one}1"))
     try:
         reaper.reap(one)
@@ -154,7 +154,7 @@ def test_reaping_ends_those_of_the_mark_alone() -> None:
         for process in (others, longer):
             process.kill()
             process.wait()
-    assert not workers()
+    assert not workers() - before
 
 
 def forked(do: Callable[[], bool]) -> int:

@@ -96,8 +96,9 @@ def test_a_world_that_does_not_start_anew_is_refused(case: Case, idle: IdleWorke
 
 
 def test_the_dead_are_not_kept(case: Case, idle: IdleWorkers) -> None:
+    before = workers()
     run(costly(case), idle)
-    for worker in workers():
+    for worker in workers() - before:
         worker.kill()
         worker.wait()
     record = run(costly(case), idle, 2)
