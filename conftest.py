@@ -45,7 +45,8 @@ def engines() -> dict[str, bool]:
 
 def group(nodeid: str) -> str:
     """A slow engine's tests, another engine's tests of one file, the tests with a browser."""
-    file, _, test = nodeid.rpartition("/")[2].partition("::")
+    path, _, test = nodeid.partition("::")
+    file = path.rpartition("/")[2]
     named = sorted(engines().keys() & set(re.split(r"\W|_", f"{file} {test}")))
     slow = [name for name in named if engines()[name]]
     if slow or named:
