@@ -70,10 +70,11 @@ def _robot_line(robot: Robot) -> str:
     from pytest_simbench.tasks import Pushing, Stacking, Throwing
 
     arm, fingers = len(robot.arm_joints), len(robot.gripper.joints)
+    hand = f"{fingers} fingers that open to {robot.gripper.opened:g} m"
     x, y, z = robot.base.position
     line = (
-        f"{robot.name}: {arm} arm joints, {fingers} fingers that open to "
-        f"{robot.gripper.opened:g} m, base at ({x:g}, {y:g}, {z:g})"
+        f"{robot.name}: {arm} arm joints, {hand if fingers else 'a hand that only touches'}, "
+        f"base at ({x:g}, {y:g}, {z:g})"
     )
     tasks = (task(robot=robot) for task in (Stacking, Throwing, Pushing))
     return "".join([line, *(f"\n    no {t.name}: {p}" for t in tasks if (p := t.problem()))])

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 import tomllib
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pytest_simbench.robot import panda
+from pytest_simbench.robot.adapting import TOOL_LINK, add_tool, bound_joints, lock_joints
 from pytest_simbench.robot.collision import PlanningScene
 from pytest_simbench.robot.errors import RobotError
 from pytest_simbench.robot.model import RobotModel
@@ -25,7 +26,7 @@ from pytest_simbench.scene import Gripper, Joint, MotionLimits, Pose, Robot, Sce
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.files import FileError, read_file
 from pytest_simbench.simulator.mesh_check import PACKAGE
-from pytest_simbench.simulator.robot_files import content_of, description_xml, keep
+from pytest_simbench.simulator.robot_files import content, content_of, description_xml, keep
 from pytest_simbench.simulator.urdf import pose_of_rpy
 from pytest_simbench.simulator.urdf_check import MOVING, Description
 from pytest_simbench.simulator.xml_file import read_xml
@@ -64,13 +65,15 @@ def read_robot(path: str | Path) -> Robot:
 
 
 class _Hand(NamedTuple):
-    """What a file says of the hand; `mount` where it is another description's."""
+    """What a file says of the hand; `mount` where it is another description's, `tool` where the
+    tool centre point lies elsewhere in the link `tool_frame`."""
 
     joints: tuple[Joint, ...]
     gripper: Gripper
     tool_frame: str
     speed: float
-    mount: tuple[str, Pose] | None
+    mount: tuple[str, Pose] | None = None
+    tool: Pose | None = None
 
 
 class _Reader:
@@ -90,12 +93,12 @@ class _Reader:
         for name, place in table.names("packages").items():
             self.packages[name] = str(folder / place)
         self.urdf = self._path(table.text("urdf"))
-        description = Description(self.urdf, self.packages)
-        self.moving = {
-            joint.attrib["name"]: joint.find("limit")
-            for joint in description.joints
-            if joint.get("type") in MOVING
-        }
+        self._locked, self._changed = table.numbers("locked"), False
+        description = Description(self.urdf, self.packages, self._adapt)
+        self.moving = _moving(description.joints)
+        if self._changed:
+            kept = content(description, self.name)
+            self.urdf, self.packages = str(keep(kept["urdf"], kept["meshes"])), {}
 
     def read(self) -> Robot:
         """Arm and hand as one robot."""
@@ -127,6 +130,12 @@ class _Reader:
             limits = replace(limits, levers=levers_of(RobotModel(robot)))
         return _standing(replace(robot, limits=limits))
 
+    def _adapt(self, urdf: ET.Element) -> None:
+        """Make of the user's URDF what tasks can use."""
+        self._changed = bound_joints(urdf) or bool(self._locked)
+        _check_moving(self.table, "locked", self._locked, _moving(urdf.findall("joint")))
+        lock_joints(urdf, self._locked)
+
     def _path(self, text: str) -> str:
         """A path from the file's folder, or of a package."""
         package, _, rest = text.removeprefix(PACKAGE).partition("/")
@@ -142,12 +151,7 @@ class _Reader:
     def _drives(
         self, table: Table, names: Sequence[str], start: Sequence[float]
     ) -> tuple[Joint, ...]:
-        for name in names:
-            if name not in self.moving:
-                known = ", ".join(self.moving) or "none"
-                raise table.error(
-                    "joints", f"{name!r} is no moving joint of the URDF; it has {known}"
-                )
+        _check_moving(table, "joints", names, self.moving)
         n = len(names)
         columns = [table.each(key, n, least=SMALLEST) for key in ("stiffness", "damping")]
         effort = table.each("effort", n, self._of_urdf("effort", names), least=SMALLEST)
@@ -184,8 +188,7 @@ class _Reader:
         if "use" in hand:
             if hand.text("use") != "panda":
                 raise hand.error("use", 'the one hand that is known is "panda"')
-            xyz, rpy = hand.each("xyz", 3, 0.0), hand.each("rpy", 3, 0.0)
-            mount = hand.text("mount"), pose_of_rpy(xyz, rpy)
+            mount = hand.text("mount"), _pose(hand) or Pose()
             squeeze = hand.number("squeeze", panda.SQUEEZE, least=SMALLEST)
             hand.close()
             joints, gripper = panda.fingers(squeeze), panda.gripper(squeeze)
@@ -194,10 +197,11 @@ class _Reader:
 
     def _own_hand(self, hand: Table) -> _Hand:
         """A hand in the robot's own URDF; one without joints only touches."""
+        frame, tool = hand.text("tool_frame"), _pose(hand)
         if "joints" not in hand:
-            tool = hand.text("tool_frame")
             hand.close()
-            return _Hand((), Gripper((), 0.0, 0.0, 0.0), tool, panda.LIMITS.finger_speed, None)
+            nothing = Gripper((), 0.0, 0.0, 0.0)
+            return _Hand((), nothing, frame, panda.LIMITS.finger_speed, tool=tool)
         names = hand.texts("joints")
         opened, closed = hand.number("opened"), hand.number("closed")
         if not closed < opened:
@@ -207,15 +211,43 @@ class _Reader:
         if {joint.effort_limit for joint in joints} != {squeeze}:
             raise hand.error("effort", "give all fingers the same: it is the hand's squeeze [N]")
         speed = hand.number("speed", min(self._of_urdf("velocity", names)), least=SMALLEST)
-        tool = hand.text("tool_frame")
         hand.close()
-        return _Hand(joints, Gripper(names, opened, closed, squeeze), tool, speed, None)
+        return _Hand(joints, Gripper(names, opened, closed, squeeze), frame, speed, tool=tool)
+
+
+def _pose(table: Table) -> Pose | None:
+    """The pose that `xyz` and `rpy` give; None where neither is there."""
+    if "xyz" not in table and "rpy" not in table:
+        return None
+    return pose_of_rpy(table.each("xyz", 3, 0.0), table.each("rpy", 3, 0.0))
+
+
+def _moving(joints: Iterable[ET.Element]) -> dict[str, ET.Element | None]:
+    """The limits of the joints that move, by name."""
+    return {
+        joint.get("name", ""): joint.find("limit")
+        for joint in joints
+        if joint.get("type") in MOVING
+    }
+
+
+def _check_moving(table: Table, key: str, names: Iterable[str], moving: Collection[str]) -> None:
+    for name in names:
+        if name not in moving:
+            known = ", ".join(moving) or "none"
+            raise table.error(key, f"{name!r:.80} is no moving joint of the URDF; it has {known}")
 
 
 def _with_files(robot: Robot, hand: _Hand, srdf: str | None) -> Robot:
     """The robot with its hand mounted, and a list of the link pairs that are not checked."""
     lists = [read_xml(srdf, "the list of link pairs")] if srdf else []
-    if hand.mount is None:
+    if hand.tool is not None:
+        kept = content_of(robot)
+        urdf = ET.fromstring(kept["urdf"])
+        add_tool(urdf, robot.tool_frame, hand.tool)
+        path = keep(ET.tostring(urdf, encoding="unicode"), kept["meshes"])
+        robot = replace(robot, urdf=str(path), packages={}, tool_frame=TOOL_LINK)
+    elif hand.mount is None:
         urdf = description_xml(robot)
     else:
         whole = panda.panda()

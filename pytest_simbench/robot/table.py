@@ -55,6 +55,13 @@ class Table:
         inner.close()
         return found
 
+    def numbers(self, key: str) -> dict[str, float]:
+        """A table of numbers."""
+        inner = self.table(key)
+        found = {name: inner.number(name) for name in list(inner._left)}
+        inner.close()
+        return found
+
     def number(self, key: str, default: float | None = None, *, least: float = -1e6) -> float:
         """A finite number of at least `least`."""
         return self._number(key, self._take(key, default), least)

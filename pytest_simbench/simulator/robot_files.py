@@ -13,6 +13,7 @@ import os
 import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Mapping
+from copy import deepcopy
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from pytest_simbench.scene import Robot
 from pytest_simbench.simulator.files import FileError, read_file
 from pytest_simbench.simulator.mesh_check import LARGEST_MESH
 from pytest_simbench.simulator.urdf_check import Description
-from pytest_simbench.simulator.xml_file import LARGEST_FILE, read_xml
+from pytest_simbench.simulator.xml_file import LARGEST_FILE
 
 CONTENT = "content"
 """Key under which a robot's wire form carries its description."""
@@ -37,9 +38,12 @@ def description_xml(robot: Robot, name_of: Callable[[Path], str] = str) -> ET.El
     Raises:
         DescriptionError: a file is missing or wrong; says which.
     """
-    checked = Description(robot.urdf, robot.packages)
-    root = ET.Element("robot", name=robot.name)
-    for element in read_xml(robot.urdf, "the robot description"):
+    return _collision_xml(Description(robot.urdf, robot.packages), robot.name, name_of)
+
+
+def _collision_xml(checked: Description, name: str, name_of: Callable[[Path], str]) -> ET.Element:
+    root = ET.Element("robot", name=name)
+    for element in deepcopy(checked.xml):
         if element.tag not in ("link", "joint"):
             continue
         for visual in element.findall("visual"):
@@ -56,6 +60,11 @@ def content_of(robot: Robot) -> dict[str, Any]:
     Raises:
         DescriptionError: a file is missing or wrong; says which.
     """
+    return content(Description(robot.urdf, robot.packages), robot.name)
+
+
+def content(checked: Description, name: str) -> dict[str, Any]:
+    """The same of a description that was read, for a robot of that name."""
     meshes: dict[str, bytes] = {}
 
     def name_of(path: Path) -> str:
@@ -64,7 +73,7 @@ def content_of(robot: Robot) -> dict[str, Any]:
         meshes[name] = data
         return name
 
-    xml = description_xml(robot, name_of)
+    xml = _collision_xml(checked, name, name_of)
     return {"urdf": ET.tostring(xml, encoding="unicode"), "meshes": meshes}
 
 

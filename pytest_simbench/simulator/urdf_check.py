@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NoReturn
 
 import numpy as np
@@ -39,8 +39,12 @@ tensors are rounded to three or four digits."""
 class Description:
     """A URDF that was read and found sound.
 
+    Args:
+        change: is given the root element before anything is checked.
+
     Attributes:
         path: of the file, for messages.
+        xml: the root element.
         links: elements by name.
         joints: elements, in the order of the file.
         root: name of the link on which all others hang.
@@ -49,12 +53,19 @@ class Description:
         DescriptionError: the file is not there, or something in it cannot be; says what.
     """
 
-    def __init__(self, path: str, packages: Mapping[str, str]) -> None:
+    def __init__(
+        self,
+        path: str,
+        packages: Mapping[str, str],
+        change: Callable[[ET.Element], None] | None = None,
+    ) -> None:
         self.path = path
         self.packages = packages
         self._lines: dict[ET.Element, int] = {}
         self._meshes: dict[str, str] = {}
-        xml = read_xml(path, "the robot description", self._lines)
+        self.xml = xml = read_xml(path, "the robot description", self._lines)
+        if change is not None:
+            change(xml)
         if xml.tag != "robot":
             raise DescriptionError(f"{path} is no URDF: it holds <{xml.tag}>, not <robot>")
         self.links = self._named(xml.findall("link"))

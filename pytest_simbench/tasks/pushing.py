@@ -143,11 +143,9 @@ class Pushing(Task):
         return [tool_over(self.at(float(way)) * behind, self._heading(float(way))) for way in ways]
 
     def problem(self) -> str | None:
-        """The hand does not close to a flat front, or the way is out of reach."""
+        """The way is out of reach."""
         robot = self.arm
         model = RobotModel(robot)
-        if not model.has_parallel_fingers:
-            return f"robot {robot.name!r} has no hand with two parallel fingers to push with"
         home = robot.column("initial_position")[: model.arm]
         first, *others = self.tools()
         try:

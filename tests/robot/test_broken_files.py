@@ -141,7 +141,6 @@ IN_URDF = {
         r"follows itself \(<mimic>\); let one of the joints lead",
     ),
     "two roots": (swap("</robot>", '<link name="loose"/></robot>'), r"has 2 root links, not one"),
-    "an endless joint": (swap('type="revolute"', 'type="continuous"'), r"is continuous, which no"),
 }  # fmt: skip
 
 
