@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -12,6 +13,9 @@ from pytest_simbench.scene import Body, FloatArray
 SPAN = 0.01
 """Accelerations are the change of the joints' velocities over this time [s]: the engines' steps are
 1 to 4 ms, and over one step a contact would count by the length of the step."""
+
+TIE = 1e-6
+"""Of a sample. Half the span is 2.5 samples of 2 ms: 2 are taken, however the times are rounded."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +60,8 @@ def strain(
     """
     if len(time) < 2:
         return None
-    half = max(1, round(SPAN / 2 / float(time[1] - time[0])))
+    samples = SPAN / 2 / float(time[1] - time[0])
+    half = max(1, math.ceil(samples - 0.5 - TIE))
     if len(time) <= 2 * half:
         return None
     position, velocity = joints[:, 0, : model.arm], joints[:, 1, : model.arm]

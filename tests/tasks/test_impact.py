@@ -123,6 +123,16 @@ def test_the_throws_motion_ends_when_all_is_calm() -> None:
     assert TIME[found.rest] == pytest.approx(0.6 + 0.05 + 0.5, abs=0.01)
 
 
+def test_a_calm_before_the_hit_ends_nothing() -> None:
+    """It rolls a little, lies for 0.8 s, and flies."""
+    hit = going(1.0, 1.0, 1.475, 1.6)
+    flown = going(-0.1, 0.5, 0.0, 0.2) + going(0.0, 2.0, 1.0, 1.475) - still(0.0)
+    flown[:, 2:] = still(0.0)[:, 2:]
+    found = impact(TIME, flown, hit[:, None], EDGE, 0)
+    assert found.caused == (0,)
+    assert TIME[found.rest] == pytest.approx(1.6 + 0.05 + 0.5, abs=0.01)
+
+
 def test_motion_that_never_ends() -> None:
     found = impact(TIME, THROWN, going(1.0, 0.5, 0.475, 9.0)[:, None], EDGE, 0)
     assert found.caused == (0,)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pytest_simbench.robot.files import read_robot
 from pytest_simbench.robot.panda import panda
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks import Jitter, Outcome, Throwing
 from pytest_simbench.tasks.throwing import perfect_throw
+from tests.robot.small_arm import small_arm
 from tests.tasks.flying import GRAVITY, PROJECTILE, FlyingProcess
 from tests.tasks.scripted import Mishap, drop, move, perform, put
 
@@ -56,6 +59,8 @@ def test_a_perfect_throw() -> None:
     assert values(outcome) == {"moved": 2 / 6, "hit": 1.0, "moved_otherwise": 0.0}
     assert outcome.details["moved"] == ["pyramid_4", "pyramid_6"]
     assert process.counts == [(2, 6)]
+    (settled,) = (asked for asked in process.asked if asked.phase == "settle")
+    assert process.marks == pytest.approx({"start": 1.0, "end": settled.began})
     metrics = outcome.metrics
     assert metrics["lost_in_transit"] == 0.0
     landing = parabola(PERFECT.position, PERFECT.velocity)
@@ -309,3 +314,15 @@ def test_the_integrators_part_is_apart() -> None:
     )
     # 0.46 s of flight: 9 mm too low, at 4.9 m/s down and 2.7 m/s forwards 5 mm too short
     assert flown - outcome.metrics["landing_x"] == pytest.approx(-0.0051, abs=0.0006)
+
+
+def test_what_a_robot_cannot_do_is_a_sentence(tmp_path: Path) -> None:
+    robot = read_robot(small_arm(tmp_path))
+    problem = TASK.on(robot).problem()
+    assert problem is not None
+    assert "'small' has no swing for the throw: write one into its file" in problem
+    swing = robot.column("initial_position")[:3]
+    problem = TASK.on(replace(robot, swing=(tuple(swing), tuple(swing)))).problem()
+    assert problem is not None
+    assert "'small' cannot handle a cube at (" in problem
+    assert TASK.problem() is None
