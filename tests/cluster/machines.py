@@ -6,6 +6,7 @@ the others by a bridge, so that one can be cut off by `ip link set ... down`.
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import socket
@@ -19,6 +20,9 @@ from types import TracebackType
 
 import psutil
 
+from pytest_simbench.client.environments import MARKER, Environment
+from pytest_simbench.simulator.registry import adapter
+
 START_TIMEOUT = 90.0
 """For a head or a node to be there, on a busy machine [s]."""
 
@@ -30,6 +34,19 @@ def free_port() -> int:
     with socket.socket() as found:
         found.bind(("127.0.0.1", 0))
         return int(found.getsockname()[1])
+
+
+def release_in(folder: Path) -> str:
+    """The release of MuJoCo that is installed here, as one with an environment of its own in a
+    folder of environments: its interpreter is but another name for this one."""
+    name = f"mujoco=={adapter('mujoco').info.tested_version}"
+    environment = Environment.of(adapter(name).info, folder)
+    environment.python.parent.mkdir(parents=True)
+    environment.python.write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')
+    environment.python.chmod(0o755)
+    told = {"requirements": list(environment.info.requirements)}
+    (environment.folder / MARKER).write_text(json.dumps(told))
+    return name
 
 
 class Machines:

@@ -15,7 +15,8 @@ from typing import Any
 
 import pytest
 
-from tests.cluster.machines import Machines
+from pytest_simbench.simulator.registry import adapter
+from tests.cluster.machines import Machines, release_in
 from tests.plugin.test_same_records import TIMES
 
 TEST = """
@@ -52,8 +53,11 @@ def machines(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machines]:
     trouble.mkdir()
     with Machines(folder, lost_after=6.0) as found:
         found.wait("head")
-        for name in ("a", "b"):
-            found.node(name, "--sim", "mujoco", environment={"TROUBLE": str(trouble)})
+        environments = folder / "environments"
+        release = release_in(environments)
+        for name, sims in (("a", f"mujoco,{release}"), ("b", "mujoco")):
+            own = {"TROUBLE": str(trouble), "SIMBENCH_ENVIRONMENTS": str(environments)}
+            found.node(name, "--sim", sims, environment=own)
         found.wait()
         yield found
 
@@ -122,6 +126,32 @@ def test_a_process_killed_a_machine_stopped_and_one_added(
     assert "d" in {r["host"]["node"] for r in found.values()}
     assert all((spread / "out" / r["details"]["log"]).is_file() for r in found.values())
     assert len(list((spread / "out" / "traces").iterdir())) == 1
+
+
+def test_several_tests_at_once_and_a_release_that_one_node_has(
+    machines: Machines, pytester: pytest.Pytester
+) -> None:
+    pytester.makepyfile(
+        """
+        import pytest
+        from tests.tiny import Falling
+
+        @pytest.mark.parametrize("duration", [0.2, 0.3])
+        def test_falling(repeat, duration):
+            repeat(Falling(duration=duration))
+        """
+    )
+    release = f"mujoco=={adapter('mujoco').info.tested_version}"
+    result = pytester.runpytest_subprocess(
+        *(f"--sim={release}", "--reps=3", "-n2", "--sim-output=out"),
+        f"--sim-cluster={machines.address}",
+    )
+    result.assert_outcomes(passed=2)
+    found = [json.loads(line) for line in (pytester.path / "out" / "records.jsonl").open()]
+    assert len({(r["test"], r["repetition"]) for r in found}) == len(found) == 6
+    assert {(r["status"], r["simulator"], r["host"]["node"]) for r in found} == {
+        ("ok", release, "a")
+    }
 
 
 def test_what_nobody_offers_is_said_before_anything_runs(
