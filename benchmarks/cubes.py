@@ -4,8 +4,9 @@
 
 The 21 cubes of the stacking task stand on its table, all others on the ground behind it, and the
 Panda stands still. A step is an engine's own with its tuned settings, by the worker's clock of CPU
-time, over half a simulated second; the least of three such times, each in a fresh process. A plan is a way to above one of the cubes on the table: inverse
-kinematics of the grasps, collision checks, search and timing. No engine has a part in it.
+time, over half a simulated second; the least of three such times, each in a fresh process. A plan
+is a way to above one of the cubes on the table: inverse kinematics of the grasps, collision checks,
+search and timing. No engine has a part in it.
 """
 
 from __future__ import annotations

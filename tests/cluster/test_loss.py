@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -16,7 +15,7 @@ from typing import Any
 import pytest
 
 from pytest_simbench.simulator.registry import adapter
-from tests.cluster.machines import Machines, release_in
+from tests.cluster.machines import Machines, networks_allowed, release_in
 from tests.plugin.test_same_records import TIMES
 
 TEST = """
@@ -47,11 +46,11 @@ FULL = 2029
 
 @pytest.fixture(scope="module")
 def machines(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machines]:
-    """A head, and the nodes a and b."""
+    """A head, and the nodes a and b; each has a network of its own, where that is allowed."""
     folder = tmp_path_factory.mktemp("machines")
     trouble = folder / "trouble"
     trouble.mkdir()
-    with Machines(folder, lost_after=6.0) as found:
+    with Machines(folder, lost_after=6.0, networks=networks_allowed()) as found:
         found.wait("head")
         environments = folder / "environments"
         release = release_in(environments)
@@ -97,7 +96,7 @@ def until(condition: Any, seconds: float = 60.0) -> None:
         time.sleep(0.05)
 
 
-def test_a_process_killed_a_machine_stopped_and_one_added(
+def test_a_process_killed_a_machine_cut_off_and_one_added(
     machines: Machines, tmp_path: Path
 ) -> None:
     straight, spread = tmp_path / "straight", tmp_path / "spread"
@@ -108,7 +107,7 @@ def test_a_process_killed_a_machine_stopped_and_one_added(
     run = pytest_in(spread, "--sim-output=out", f"--sim-cluster={machines.address}")
     trouble = machines.folder / "trouble"
     until(lambda: len(list(trouble.glob("*"))) >= 2)
-    machines.signal("b", signal.SIGSTOP)  # nothing comes from it any more, and nobody says so
+    machines.cut("b")  # nothing comes from it any more, and nobody says so
     machines.node("d", "--sim", "mujoco", environment={"TROUBLE": str(trouble)})
     out, _ = run.communicate(timeout=120)
     assert run.returncode == 0, out
