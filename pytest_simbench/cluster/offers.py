@@ -117,7 +117,8 @@ class Node:
 
     def version(self, simulator: str) -> str | None:
         """Of a simulator there, or None; a release is asked for by its name, `mujoco==3.3.7`."""
-        return dict(map(_taken_apart, self.offers)).get(simulator)
+        versions = dict(_taken_apart(offer) for offer in self.offers if RELEASE in offer)
+        return versions.get(simulator)
 
     @property
     def stranger(self) -> str:
@@ -150,9 +151,9 @@ class Node:
 
 
 def _taken_apart(offer: str) -> tuple[str, str]:
-    """Name and version; what has no version is all name."""
-    name, equals, found = offer.rpartition("==")
-    return (name, found) if equals else (found, "")
+    """Name and version."""
+    name, _, found = offer.rpartition(RELEASE)
+    return name, found
 
 
 def refusal(nodes: Sequence[Node]) -> str:
