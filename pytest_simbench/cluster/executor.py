@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -53,6 +53,27 @@ LOOK_PERIOD = 0.5
 """Between two looks at the node of a job under way [s]."""
 
 
+@dataclass(frozen=True)
+class Shared:
+    """What all repetitions of an experiment share.
+
+    Attributes:
+        job: goes to the nodes.
+        of_robot: attributes of its records that tell of its robot's files: here, not on the node.
+    """
+
+    job: Packed
+    of_robot: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, experiment: Experiment, client: str) -> Shared:
+        task, robot = experiment.task, experiment.robot
+        told: dict[str, Any] = {}
+        if robot is not None:
+            told = {"scene": scene_digest(task), "robot": robot_told(robot)}
+        return cls(Job.of(experiment, client).pack(), told)
+
+
 class ClusterExecutor(Executor):
     """Repetitions on the nodes of a cluster.
 
@@ -63,7 +84,7 @@ class ClusterExecutor(Executor):
     def __init__(self, pool: Pool) -> None:
         self.pool = pool
         self._packing = threading.Lock()
-        self._packed: tuple[Experiment, Packed] | None = None
+        self._last: tuple[Experiment, Shared] | None = None
 
     @property
     def jobs(self) -> int:
@@ -78,23 +99,22 @@ class ClusterExecutor(Executor):
         interrupts: Interrupts | None = None,
     ) -> RemoteRepetition:
         return RemoteRepetition(
-            self.pool, self.packed, experiment, number, hooks or Hooks(), interrupts or Interrupts()
+            self.pool, self.shared, experiment, number, hooks or Hooks(), interrupts or Interrupts()
         )
 
     def probe(self, experiment: Experiment) -> tuple[Record, BaseException | None]:
         return self.repetition(experiment, 0).run()
 
-    def packed(self, experiment: Experiment) -> Packed:
-        """An experiment for the way to a node, once for all of its repetitions: a robot's meshes
-        and a data set have megabytes.
+    def shared(self, experiment: Experiment) -> Shared:
+        """What an experiment's repetitions share, made once: meshes and data sets are large.
 
         Raises:
             DescriptionError: a file of its robot is missing or wrong.
         """
         with self._packing:
-            if self._packed is None or self._packed[0] is not experiment:
-                self._packed = experiment, Job.of(experiment, self.pool.name).pack()
-            return self._packed[1]
+            if self._last is None or self._last[0] is not experiment:
+                self._last = experiment, Shared.of(experiment, self.pool.name)
+            return self._last[1]
 
 
 class _Lost(Exception):
@@ -107,7 +127,7 @@ class RemoteRepetition:
     def __init__(
         self,
         pool: Pool,
-        packed: Callable[[Experiment], Packed],
+        shared: Callable[[Experiment], Shared],
         experiment: Experiment,
         number: int,
         hooks: Hooks,
@@ -115,7 +135,7 @@ class RemoteRepetition:
     ) -> None:
         self.pool = pool
         self.experiment = experiment
-        self._packed = packed
+        self._shared = shared
         self.case = case = experiment.case
         self.number = number
         self.hooks = hooks
@@ -147,7 +167,7 @@ class RemoteRepetition:
             NodeLost: as many nodes as there may be were lost, or none is left.
             ExecutorError: the cluster is gone.
         """
-        job = self._packed(self.experiment)
+        job = self._shared(self.experiment).job
         avoid: set[str] = set()
         while True:
             reserved = self.pool.reserve(self._able, avoid, self._stop)
@@ -242,10 +262,7 @@ class RemoteRepetition:
         assert self._node is not None
         record = Record.from_json(answer["record"], f"the answer of {self._node.name}")
         details = {**record.details, **({"lost": self._lost} if self._lost else {})}
-        of_robot: dict[str, Any] = {}
-        if self.experiment.robot is not None:  # its files came by content
-            task, robot = self.experiment.task, self.experiment.robot
-            of_robot = {"scene": scene_digest(task), "robot": robot_told(robot)}
+        of_robot = self._shared(self.experiment).of_robot
         stem = file_stem(self.experiment, self.number)
         self._keep(str(details.get("log") or ""), "logs", answer["log"])
         problem = self._keep(f"{TRACES}/{stem}.npz", TRACES, answer["trace"])

@@ -77,11 +77,11 @@ def test_a_robot_travels_by_content(
 def test_it_is_packed_once_for_all_repetitions(case: Case) -> None:
     executor = ClusterExecutor(Told([]))
     one, other = Experiment(case, Falling()), Experiment(case, Falling(0.3))
-    packed = executor.packed(one)
-    assert executor.packed(one) is packed
-    there = Job.unpack(executor.packed(other).data or b"")
+    shared = executor.shared(one)
+    assert executor.shared(one) is shared
+    there = Job.unpack(executor.shared(other).job.data or b"")
     assert there.task.parameters() == other.task.parameters()
-    assert executor.packed(one).digest == packed.digest
+    assert executor.shared(one) == shared
 
 
 def test_it_goes_to_a_node_once(monkeypatch: pytest.MonkeyPatch) -> None:
