@@ -1,6 +1,6 @@
 """What a cluster costs a repetition beside its work: 10,000 empty jobs on two nodes here.
 
-    python benchmarks/cluster_dispatch.py [--jobs 10000]
+    python benchmarks/cluster_dispatch.py [--jobs 10000] [--robot xarm7]
 
 All but the simulator is real: the repeater's threads, a slot for each job, the job packed and sent,
 a whole record sent back, read and written. Memory of this process is looked at on the way.
@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ from pytest_simbench.experiment.repeater import Repeater  # noqa: E402
 from pytest_simbench.records.folder import RunFolder  # noqa: E402
 from pytest_simbench.records.record import Record  # noqa: E402
 from pytest_simbench.report.progress import Progress  # noqa: E402
+from pytest_simbench.robot.registry import find  # noqa: E402
 from pytest_simbench.tasks import Stacking  # noqa: E402
 from tests.cluster.machines import Machines  # noqa: E402
 
@@ -36,7 +38,7 @@ REAL = ROOT / "tests" / "measure" / "stacking_records.jsonl"
 """Real records, for their size."""
 
 
-def empty(data: bytes, line: str) -> dict[str, Any]:
+def empty(line: str, job: Any, number: int) -> dict[str, Any]:
     """What a node does instead of `cluster.node.run`."""
     return {"record": line, "error": None, "log": b"x" * 500, "trace": None}
 
@@ -44,18 +46,15 @@ def empty(data: bytes, line: str) -> dict[str, Any]:
 class EmptyPool(Pool):
     """Its jobs carry nothing out."""
 
-    line = ""
-
-    def submit(self, key: str, node: Any, data: bytes) -> Any:
-        return self._client.submit(
-            empty, data, self.line, key=key, workers=[node.address], pure=False
-        )
+    call = staticmethod(partial(empty, REAL.read_text().splitlines()[0]))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--jobs", type=int, default=10_000)
-    jobs = parser.parse_args().jobs
+    parser.add_argument("--robot", help="whose files go to the nodes; the Panda is there")
+    given = parser.parse_args()
+    jobs = given.jobs
     process = psutil.Process()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -65,11 +64,12 @@ def main() -> None:
                 machines.node(node, "--sim", "mujoco", "--slots", "8")
             machines.wait()
             case = Case.of("mujoco", test="t[m]", mode="headless", profile="tuned", folder=folder)
+            if given.robot:
+                case = replace(case, robot=find(given.robot))
             experiment = Experiment(case, Stacking())
             run = RunFolder(folder)
             run.lock()
             pool = EmptyPool(machines.address)
-            pool.line = REAL.read_text().splitlines()[0]
             memory: list[tuple[int, float]] = []
 
             def keep(record: Record) -> None:

@@ -77,10 +77,7 @@ def disturbed(machines: Machines, run: subprocess.Popen[bytes], out: Path, reps:
         machines.kill("a")
 
     def cut() -> None:
-        if machines.networks:
-            machines.link("b", "down")
-        else:
-            machines.signal("b", signal.SIGSTOP)
+        machines.cut("b")
 
     def add() -> None:
         machines.node("d", "--sim", ADDED, environment=environment(machines.folder, "d"))

@@ -1,8 +1,8 @@
 """Repetitions on several machines, by Dask distributed.
 
 - `offers`: what a machine has, and whether that is what a run needs.
-- `job`: one repetition as data, and what comes back of it.
-- `node`: carries a job out, on the node.
+- `job`: a test's repetitions as data, and what comes back of each.
+- `node`: carries a repetition out, on the node.
 - `pool`: the nodes as a client sees them; each job goes to one that has a free slot.
 - `executor.ClusterExecutor`: the executor that does all this for the repeater.
 - `__main__`: `python -m pytest_simbench.cluster head` and `node`.

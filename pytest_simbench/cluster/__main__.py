@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import logging
 import os
 import signal
 import socket
@@ -124,6 +125,7 @@ async def _node(given: argparse.Namespace) -> int:
     check_names(names or [])
     offers = here(given.slots, names)
     head = get_address_host(resolve_address(given.address))
+    logging.getLogger("distributed.nanny").setLevel(logging.CRITICAL)  # what it logs is told below
     told = _told()
     while not told.is_set():
         nanny = Nanny(

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pytest_simbench.client.errors import Interrupted, NodeLost, Unavailable, Where
-from pytest_simbench.cluster.job import Job, TaskFailed, heard
+from pytest_simbench.cluster.job import Job, Packed, TaskFailed, heard
 from pytest_simbench.cluster.offers import Node
 from pytest_simbench.cluster.pool import Pool
 from pytest_simbench.experiment.executor import Executor, ExecutorError, Hooks
@@ -53,6 +53,27 @@ LOOK_PERIOD = 0.5
 """Between two looks at the node of a job under way [s]."""
 
 
+@dataclass(frozen=True)
+class Shared:
+    """What all repetitions of an experiment share.
+
+    Attributes:
+        job: goes to the nodes.
+        of_robot: attributes of its records that tell of its robot's files: here, not on the node.
+    """
+
+    job: Packed
+    of_robot: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, experiment: Experiment, client: str) -> Shared:
+        task, robot = experiment.task, experiment.robot
+        told: dict[str, Any] = {}
+        if robot is not None:
+            told = {"scene": scene_digest(task), "robot": robot_told(robot)}
+        return cls(Job.of(experiment, client).pack(), told)
+
+
 class ClusterExecutor(Executor):
     """Repetitions on the nodes of a cluster.
 
@@ -62,6 +83,8 @@ class ClusterExecutor(Executor):
 
     def __init__(self, pool: Pool) -> None:
         self.pool = pool
+        self._packing = threading.Lock()
+        self._last: tuple[Experiment, Shared] | None = None
 
     @property
     def jobs(self) -> int:
@@ -76,11 +99,22 @@ class ClusterExecutor(Executor):
         interrupts: Interrupts | None = None,
     ) -> RemoteRepetition:
         return RemoteRepetition(
-            self.pool, experiment, number, hooks or Hooks(), interrupts or Interrupts()
+            self.pool, self.shared, experiment, number, hooks or Hooks(), interrupts or Interrupts()
         )
 
     def probe(self, experiment: Experiment) -> tuple[Record, BaseException | None]:
-        return RemoteRepetition(self.pool, experiment, 0, Hooks(), Interrupts()).run()
+        return self.repetition(experiment, 0).run()
+
+    def shared(self, experiment: Experiment) -> Shared:
+        """What an experiment's repetitions share, made once: meshes and data sets are large.
+
+        Raises:
+            DescriptionError: a file of its robot is missing or wrong.
+        """
+        with self._packing:
+            if self._last is None or self._last[0] is not experiment:
+                self._last = experiment, Shared.of(experiment, self.pool.name)
+            return self._last[1]
 
 
 class _Lost(Exception):
@@ -93,6 +127,7 @@ class RemoteRepetition:
     def __init__(
         self,
         pool: Pool,
+        shared: Callable[[Experiment], Shared],
         experiment: Experiment,
         number: int,
         hooks: Hooks,
@@ -100,6 +135,7 @@ class RemoteRepetition:
     ) -> None:
         self.pool = pool
         self.experiment = experiment
+        self._shared = shared
         self.case = case = experiment.case
         self.number = number
         self.hooks = hooks
@@ -131,7 +167,7 @@ class RemoteRepetition:
             NodeLost: as many nodes as there may be were lost, or none is left.
             ExecutorError: the cluster is gone.
         """
-        data = Job.of(self.experiment, self.number, self.pool.name).pack()
+        job = self._shared(self.experiment).job
         avoid: set[str] = set()
         while True:
             reserved = self.pool.reserve(self._able, avoid, self._stop)
@@ -142,13 +178,15 @@ class RemoteRepetition:
             key, self._node = reserved
             self.hooks.begin(self._node.name)
             try:
-                answer = self._on(self._node, key, data)
+                answer = self._on(self._node, key, job)
             except _Lost as lost:
                 self._lost.append(f"{self._node.name}: {lost}")
                 avoid.add(self._node.name)
                 if len(self._lost) == ATTEMPTS:
                     raise NodeLost(self._why("it is not tried again"), self.where) from None
                 continue
+            if "unknown" in answer:
+                continue  # it comes again, and with all of the job
             lacks = (answer["error"] or {}).get("type") == Unavailable.__name__
             avoid.add(self._node.name)
             if lacks and any(self._able(n) and n.name not in avoid for n in self.pool.nodes()):
@@ -167,14 +205,14 @@ class RemoteRepetition:
             self.pool.release(reserved[0])
         return Interrupted("the run was interrupted", self.where)
 
-    def _on(self, node: Node, key: str, data: bytes) -> Mapping[str, Any]:
+    def _on(self, node: Node, key: str, job: Packed) -> Mapping[str, Any]:
         """Have a node carry it out.
 
         Raises:
             _Lost: the node is lost.
             ExecutorError: the cluster is gone, or Dask cannot run anything there.
         """
-        future = self.pool.submit(key, node, data)
+        future = self.pool.submit(key, node, job, self.number)
         done = threading.Event()
         future.add_done_callback(lambda _: done.set())
         try:
@@ -185,7 +223,9 @@ class RemoteRepetition:
                 if not self.pool.lives(node):
                     raise _Lost(GONE)
                 shown = self._show(key, shown)
-            return self._result(future, node)
+            answer = self._result(future, node)
+            self.pool.note(node, job, there="unknown" not in answer)
+            return answer
         finally:
             self.pool.release(key, future)
 
@@ -222,10 +262,7 @@ class RemoteRepetition:
         assert self._node is not None
         record = Record.from_json(answer["record"], f"the answer of {self._node.name}")
         details = {**record.details, **({"lost": self._lost} if self._lost else {})}
-        of_robot: dict[str, Any] = {}
-        if self.experiment.robot is not None:  # its files came by content
-            task, robot = self.experiment.task, self.experiment.robot
-            of_robot = {"scene": scene_digest(task), "robot": robot_told(robot)}
+        of_robot = self._shared(self.experiment).of_robot
         stem = file_stem(self.experiment, self.number)
         self._keep(str(details.get("log") or ""), "logs", answer["log"])
         problem = self._keep(f"{TRACES}/{stem}.npz", TRACES, answer["trace"])

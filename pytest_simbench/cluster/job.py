@@ -1,4 +1,4 @@
-"""One repetition as data: what goes to a node, and what comes back.
+"""A test's repetitions as data: what goes to a node, and what comes back.
 
 A task of the package is known on the node. One that a test defines travels as code, so who can
 reach the scheduler can run code on the nodes; that is so with Dask anyway. What comes back is text
@@ -13,6 +13,7 @@ import threading
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import MISSING, dataclass, fields, replace
+from hashlib import blake2b
 from pathlib import Path
 from typing import Any, cast
 
@@ -74,26 +75,41 @@ class SentRobot:
 
 
 @dataclass(frozen=True)
+class Packed:
+    """A job for the way to a node.
+
+    Attributes:
+        data: all of it; None on the way to a node that has it already.
+        digest: by which the node knows it.
+    """
+
+    data: bytes | None
+    digest: str
+
+    @classmethod
+    def of(cls, data: bytes) -> Packed:
+        return cls(data, blake2b(data, digest_size=16).hexdigest())
+
+
+@dataclass(frozen=True)
 class Job:
-    """One repetition.
+    """What all repetitions of an experiment have in common.
 
     Attributes:
         case: attributes of the case that hold everywhere.
         task: as the test asks for it; its robot, if it has one, is in `task_robot`.
-        number: of the repetition; 0 starts and ends the simulator alone.
         client: whose it is; others may repeat a test of the same name.
         robot, task_robot: by content.
     """
 
     case: Mapping[str, Any]
     task: Task
-    number: int
     client: str = ""
     robot: SentRobot | None = None
     task_robot: SentRobot | None = None
 
     @classmethod
-    def of(cls, experiment: Experiment, number: int, client: str = "") -> Job:
+    def of(cls, experiment: Experiment, client: str = "") -> Job:
         case, task = experiment.case, experiment.asked
         kept = {f.name: getattr(case, f.name) for f in fields(case) if f.name not in OF_THE_MACHINE}
         own = getattr(task, ROBOT, None)
@@ -101,7 +117,6 @@ class Job:
         return cls(
             kept,
             replace(task, **{ROBOT: None}) if own else task,  # type: ignore[type-var]
-            number,
             client,
             None if case.robot is None else SentRobot.of(case.robot),
             None if own is None else SentRobot.of(own),
@@ -130,7 +145,7 @@ class Job:
         task = self.task if own is None else replace(self.task, **{ROBOT: own.here()})  # type: ignore[type-var]
         return Experiment(case, task)
 
-    def pack(self) -> bytes:
+    def pack(self) -> Packed:
         """For the way to a node. The task's class and its bases travel as code, where their
         modules are the tests' own; what else these import must be there on the node."""
         import cloudpickle
@@ -141,7 +156,7 @@ class Job:
                 if module is not None and not _installed(name, getattr(module, "__file__", None)):
                     cloudpickle.register_pickle_by_value(module)
                     stack.callback(cloudpickle.unregister_pickle_by_value, module)
-            return cast("bytes", cloudpickle.dumps(self))
+            return Packed.of(cloudpickle.dumps(self))
 
     @classmethod
     def unpack(cls, data: bytes) -> Job:

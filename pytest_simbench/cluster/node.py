@@ -1,4 +1,4 @@
-"""Carries one job out, in the process of a node that Dask runs.
+"""Carries one repetition of a job out, in the process of a node that Dask runs.
 
 Logs and traces lie in a temporary folder until they are on their way. Where starting is costly a
 worker waits for the next repetition of its case, for `IDLE` seconds.
@@ -13,6 +13,7 @@ import tempfile
 import threading
 import time
 import traceback
+from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -21,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_simbench.client.display import Displays
-from pytest_simbench.cluster.job import Job, told
+from pytest_simbench.cluster.job import Job, Packed, told
 from pytest_simbench.experiment.identity import file_stem
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.experiment.workers import IdleWorkers
@@ -41,6 +42,9 @@ OF_THE_MACHINE = (
     errno.EAGAIN,
 )  # fmt: skip
 """Errors that another machine may not have: a full disk, too many files or processes."""
+
+KEPT_JOBS = 32
+"""With a robot of many meshes each has some megabytes."""
 
 LARGEST_LOG = 2**20
 """Of a log that is sent back [bytes]; its end is kept. Workers' logs are cut to less."""
@@ -137,12 +141,17 @@ class Progress:
 
 
 def carry_out(
-    job: Job, slots: int, progress: Progress, started: Callable[[Repetition], object]
+    job: Job,
+    number: int,
+    slots: int,
+    progress: Progress,
+    started: Callable[[Repetition], object],
 ) -> dict[str, Any]:
     """Carry a repetition out.
 
     Args:
         job: what to do.
+        number: of the repetition; 0 starts and ends the simulator alone.
         slots: of the node; with several at once, records are contended.
         progress: kept up to date.
         started: told of the repetition before it runs, so that another thread may kill it.
@@ -158,18 +167,18 @@ def carry_out(
         experiment = job.experiment(bench.folder, contended=slots > 1, display=display)
         repetition = Repetition(
             experiment,
-            job.number,
+            number,
             idle=bench.idle,
             on_phase=progress.enter,
             on_count=progress.count,
         )
         started(repetition)
-        record, error = repetition.run() if job.number else repetition.probe()
+        record, error = repetition.run() if number else repetition.probe()
         if isinstance(error, OSError) and error.errno in OF_THE_MACHINE:
             raise error
         lines = "" if error is None else "".join(traceback.format_exception(error))
         name = str(record.details.get("log") or "")
-        trace = bench.folder / TRACES / f"{file_stem(experiment, job.number)}.npz"
+        trace = bench.folder / TRACES / f"{file_stem(experiment, number)}.npz"
         return {
             "record": record.to_json(),
             "error": told(error, lines),
@@ -193,14 +202,43 @@ def _taken(path: Path) -> bytes | None:
     return None
 
 
-def run(data: bytes) -> dict[str, Any]:
+class LatestJobs:
+    """Jobs that came lately, so that each has to come once."""
+
+    def __init__(self) -> None:
+        self._data: OrderedDict[str, bytes] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def find(self, job: Packed) -> bytes | None:
+        """All of a job, if it came with it or before."""
+        with self._lock:
+            data = self._data.pop(job.digest, job.data)
+            if data is not None:
+                self._data[job.digest] = data
+            while len(self._data) > KEPT_JOBS:
+                self._data.popitem(last=False)
+            return data
+
+
+_latest = LatestJobs()
+
+
+def run(packed: Packed, number: int) -> dict[str, Any]:
     """What Dask calls on a node.
 
+    Args:
+        packed: the job, or its digest alone.
+        number: see `carry_out`.
+
     Returns:
-        what `carry_out` does, or `lost`: why this node cannot carry it out, as text.
+        what `carry_out` does; or `lost`: why this node cannot carry it out, as text; or `unknown`:
+        the digest of a job that is not there.
     """
     from distributed import get_worker
 
+    data = _latest.find(packed)
+    if data is None:
+        return {"unknown": packed.digest}
     worker = get_worker()
     key = worker.get_current_task()
     progress, ended = Progress(), threading.Event()
@@ -222,7 +260,7 @@ def run(data: bytes) -> dict[str, Any]:
         threading.Thread(target=watch, args=(repetition,), daemon=True).start()
 
     try:
-        return carry_out(Job.unpack(data), worker.state.nthreads, progress, started)
+        return carry_out(Job.unpack(data), number, worker.state.nthreads, progress, started)
     except OSError as error:
         if error.errno not in OF_THE_MACHINE:
             raise

@@ -3,7 +3,8 @@
     simbench               its slots: repetitions that it carries out at once
     simbench==0.1.0        version of pytest-simbench
     python==3.11           of Python: a task that a test defines travels as code
-    mujoco==3.3.7          a simulator that is ready there, and the engine's version
+    mujoco==4.0.0          a simulator that is ready there, and the engine's version
+    mujoco==3.3.7==3.3.7   the same of a release that has an environment of its own there
     display, gpu, vulkan   a display (its own or Xvfb), a GPU of NVIDIA's, a Vulkan device
 
 Names are all that Dask keeps, so versions stand in them. The amount of each is the number of slots.
@@ -21,9 +22,10 @@ from os import environ
 from pathlib import Path
 
 from pytest_simbench import __version__
-from pytest_simbench.client.environments import missing, outside
+from pytest_simbench.client.environments import existing, missing, outside
 from pytest_simbench.simulator.info import SimulatorInfo
-from pytest_simbench.simulator.registry import adapter, registered
+from pytest_simbench.simulator.registry import adapter, problem, registered
+from pytest_simbench.simulator.versions import RELEASE, VersionedName
 
 SLOTS = "simbench"
 DISPLAY, GPU, VULKAN = "display", "gpu", "vulkan"
@@ -51,10 +53,11 @@ def here(slots: int, names: Iterable[str] | None = None) -> dict[str, float]:
 
     Args:
         slots: repetitions at once.
-        names: simulators to offer; None for all that are ready here.
+        names: simulators to offer; None for all that are ready here, and their releases in
+            environments of their own.
     """
     found = [SLOTS, PLUGIN, PYTHON]
-    for name in registered() if names is None else names:
+    for name in (*registered(), *_releases()) if names is None else names:
         info = adapter(name).info
         if not missing(info):
             found.append(f"{name}=={_version(info)}")
@@ -65,6 +68,12 @@ def here(slots: int, names: Iterable[str] | None = None) -> dict[str, float]:
     if _vulkan():
         found.append(VULKAN)
     return dict.fromkeys(found, float(slots))
+
+
+def _releases() -> list[str]:
+    """Releases of simulators that have a folder among the environments here."""
+    names = [folder.name for folder in existing() if VersionedName.of(folder.name).kind == RELEASE]
+    return [name for name in names if not problem(name)]
 
 
 def _version(info: SimulatorInfo) -> str:
@@ -107,12 +116,9 @@ class Node:
         return cls(address, str(name), int(resources[SLOTS]), frozenset(resources))
 
     def version(self, simulator: str) -> str | None:
-        """Of a simulator there, or None."""
-        for offer in self.offers:
-            name, equals, found = offer.partition("==")
-            if name == simulator and equals:
-                return found
-        return None
+        """Of a simulator there, or None; a release is asked for by its name, `mujoco==3.3.7`."""
+        versions = dict(_taken_apart(offer) for offer in self.offers if RELEASE in offer)
+        return versions.get(simulator)
 
     @property
     def stranger(self) -> str:
@@ -134,9 +140,20 @@ class Node:
 
     def __str__(self) -> str:
         own = (SLOTS, "python")
-        sims = sorted(o for o in self.offers if "==" in o and o.partition("==")[0] not in own)
-        told = [o.replace("==", " ") for o in sims] + [d for d in DEVICES if d in self.offers]
+        sims = [_taken_apart(offer) for offer in sorted(self.offers) if RELEASE in offer]
+        told = [
+            name if RELEASE in name else f"{name} {found}"
+            for name, found in sims
+            if name not in own
+        ]
+        told += [device for device in DEVICES if device in self.offers]
         return f"{self.name} has {', '.join(told) or 'no simulator'}"
+
+
+def _taken_apart(offer: str) -> tuple[str, str]:
+    """Name and version."""
+    name, _, found = offer.rpartition(RELEASE)
+    return name, found
 
 
 def refusal(nodes: Sequence[Node]) -> str:
@@ -155,7 +172,10 @@ def unmet(nodes: Sequence[Node], simulator: str, modes: Iterable[str]) -> str | 
         able = [node for node in nodes if node.has(simulator, mode)]
         if not able:
             what = f"{simulator} with a display" if mode == "gui" else simulator
-            return f"no node of the cluster offers {what}: {'; '.join(map(str, nodes))}"
+            told = f"no node of the cluster offers {what}: {'; '.join(map(str, nodes))}"
+            if RELEASE in simulator and not any(node.version(simulator) for node in nodes):
+                told += f"; on one of them: pytest --sim-install {simulator}, and start it again"
+            return told
         versions: dict[str, list[str]] = {}
         for node in able:
             versions.setdefault(node.version(simulator) or "", []).append(node.name)

@@ -10,10 +10,12 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from pytest_simbench.cluster import node as node_side
+from pytest_simbench.cluster.job import Packed
 from pytest_simbench.cluster.offers import Node
 from pytest_simbench.experiment.executor import ExecutorError
 
@@ -47,6 +49,9 @@ class Pool:
         ExecutorError: no scheduler answers there, or Dask is not installed.
     """
 
+    call = staticmethod(node_side.run)
+    """What a node is to do with a packed job and the number of a repetition."""
+
     def __init__(self, address: str) -> None:
         try:
             from distributed import Client, Security
@@ -60,7 +65,6 @@ class Pool:
                 "tls:// needs certificates for the client in Dask's configuration (docs/cluster.md)"
             )
         self.address = address
-        self.name = uuid4().hex
         try:
             self._client: Client = Client(
                 address, timeout=CONNECT_TIMEOUT, set_as_default=False, name="pytest-simbench"
@@ -77,6 +81,7 @@ class Pool:
         self._client.subscribe_topic(node_side.TOPIC, self._hear)
 
     def _begin(self) -> None:
+        self.name = uuid4().hex
         self._ready = threading.Condition()
         self._known: Mapping[str, Node] = {}
         self._others: Mapping[str, int] = {}
@@ -85,6 +90,7 @@ class Pool:
         self._looked = float("-inf")
         self._seen: dict[str, tuple[float, float]] = {}
         self._told: dict[str, Mapping[str, Any]] = {}
+        self._there: dict[str, set[str]] = {}
 
     def _hear(self, event: tuple[float, Mapping[str, Any]]) -> None:
         message = event[1]
@@ -186,11 +192,20 @@ class Pool:
         mine = sum(address == node.address for address in self._mine.values())
         return node.slots - mine - self._others.get(node.address, 0)
 
-    def submit(self, key: str, node: Node, data: bytes) -> Future:
-        """Send a job to the node that was reserved for it."""
+    def submit(self, key: str, node: Node, job: Packed, number: int) -> Future:
+        """Send a repetition to the node that was reserved for it; all of the job, unless that is
+        there."""
+        if job.digest in self._there.get(node.address, ()):
+            job = replace(job, data=None)
         return self._client.submit(
-            node_side.run, data, key=key, workers=[node.address], pure=False, retries=0
+            self.call, job, number, key=key, workers=[node.address], pure=False, retries=0
         )
+
+    def note(self, node: Node, job: Packed, *, there: bool) -> None:
+        """Remember whether a node has a job."""
+        with self._ready:
+            known = self._there.setdefault(node.address, set())
+            (known.add if there else known.discard)(job.digest)
 
     def give_up(self, node: Node) -> None:
         """Send nothing any more to this process of a node: it is lost."""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 _POOL: pytest.StashKey[Pool] = pytest.StashKey()
 
-HERE_ONLY = ("sim_python", "sim_spec", "sim_pictures")
+HERE_ONLY = ("sim_python", "sim_spec", "sim_pictures", "sim_install_missing")
 """Options of this machine, which mean nothing on a node."""
 
 

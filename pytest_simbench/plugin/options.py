@@ -122,8 +122,9 @@ OPTIONS = (
            "simulator's worker; repeat the option for another one", {}, metavar="SIM=SPEC"),
     Option("--sim-fresh", Flag(), "a new worker for each repetition even where starting is costly",
            False),
-    Option("--sim-jobs", Jobs(256), "repetitions in parallel workers, at most 256 (records are "
-           "marked contended), or auto: one for each core", 1, metavar="N"),
+    Option("--sim-jobs", Jobs(256), "repetitions at once, in the whole run also with -n, at most "
+           "256 (from 2 on records are marked contended), or auto: one for each core", 1,
+           metavar="N"),
     Option("--sim-cluster", Address(), "scheduler of a cluster whose nodes carry the repetitions "
            "out: tcp://head:8786 (docs/cluster.md)", metavar="ADDRESS"),
     Option("--sim-memory-limit", Number(1, 1e9), "memory a worker may use before it is killed",

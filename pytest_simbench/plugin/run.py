@@ -22,6 +22,7 @@ from pytest_simbench.records.text import for_terminal
 if TYPE_CHECKING:
     from pytest_simbench.experiment.executor import Executor
     from pytest_simbench.experiment.experiment import Experiment
+    from pytest_simbench.experiment.slots import Slots
     from pytest_simbench.plugin.compare import Comparison
     from pytest_simbench.plugin.resume import Resumed
     from pytest_simbench.report.progress import Progress
@@ -135,9 +136,23 @@ class Run:
             from pytest_simbench.cluster.executor import ClusterExecutor
 
             return ClusterExecutor(cluster.pool(self.config))
+        jobs = options.value(self.config, "sim_jobs")
+        if self._shared_by is not None and "simbench_slots" in self._shared_by:
+            from pytest_simbench.experiment.sharing import SharingExecutor
+
+            return SharingExecutor(jobs, self._shared_by["simbench_slots"])
         from pytest_simbench.experiment.executor import LocalExecutor
 
-        return LocalExecutor(options.value(self.config, "sim_jobs"))
+        return LocalExecutor(jobs)
+
+    @cached_property
+    def slots(self) -> Slots | None:
+        """What `--sim-jobs` gives to all workers of xdist together; None without that option."""
+        if cluster.asked(self.config) or not options.mentioned(self.config, ["sim_jobs"]):
+            return None
+        from pytest_simbench.experiment.slots import Slots
+
+        return Slots(options.value(self.config, "sim_jobs"))
 
     @property
     def progress(self) -> Progress:
@@ -313,5 +328,8 @@ class Run:
         """End what the run started."""
         if "executor" in vars(self):
             self.executor.close()
+        slots: Slots | None = vars(self).get("slots")
+        if slots is not None:
+            slots.close()
         self.displays.close()
         self.folder.close()

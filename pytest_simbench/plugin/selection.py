@@ -65,13 +65,15 @@ class Selection:
         from pytest_simbench.simulator.registry import problem
 
         found = problem(name) or self._settings_problem(name)
-        if found or name in self.pythons or name in self.specs:
+        if found:
             return found
         if self.nodes:
             from pytest_simbench.cluster.offers import unmet
 
             modes = [mode for mode in self.modes if mode in _info(name).modes]
             return unmet(self.nodes, name, modes)
+        if name in self.pythons or name in self.specs:
+            return None
         return missing(_info(name))
 
     def _settings_problem(self, name: str) -> str | None:
@@ -168,9 +170,11 @@ def _select(config: pytest.Config) -> Selection:
 
 
 def _installs(config: pytest.Config) -> bool:
-    """Whether missing environments are made before the run; xdist's workers find them made."""
+    """Whether missing environments are made before the run; xdist's workers find them made, and a
+    cluster's nodes have their own."""
     asked = ("sim_install_missing", "sim_history")
-    return any(options.value(config, name) for name in asked) and not hasattr(config, "workerinput")
+    here = not (hasattr(config, "workerinput") or cluster.asked(config))
+    return here and any(options.value(config, name) for name in asked)
 
 
 def _robot(text: str | None) -> Robot | None:

@@ -138,8 +138,11 @@ class SimSession:
             self.run.lock()
 
     def tell_worker(self, node: Any) -> None:
-        """Tell an xdist worker which run folder all share, and why it cannot be used."""
+        """Tell an xdist worker which run folder all share, why it cannot be used, and where the
+        slots of `--sim-jobs` are given out."""
         run = self.run
+        if run.slots is not None:
+            node.workerinput["simbench_slots"] = run.slots.address
         run.problem = run.problem or run.occupied()
         node.workerinput["simbench_folder"] = str(run.folder.path.absolute())
         node.workerinput["simbench_problem"] = run.problem

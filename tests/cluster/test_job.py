@@ -6,30 +6,34 @@ import subprocess
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from pytest_simbench.client.errors import Diverged, Where, WorkerError
-from pytest_simbench.cluster.job import Job, TaskFailed, heard, told
+from pytest_simbench.cluster.executor import ClusterExecutor
+from pytest_simbench.cluster.job import Job, Packed, TaskFailed, heard, told
+from pytest_simbench.cluster.node import LatestJobs
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import expected, robot_told
 from pytest_simbench.robot.registry import find
 from pytest_simbench.tasks import Stacking
+from tests.cluster.test_pool import A, Told
 from tests.tiny import Falling
 
 
 def test_the_experiment_is_the_same_on_the_node(case: Case, tmp_path: Path) -> None:
     experiment = Experiment(replace(case, changes={"timestep": 0.001}), Falling(0.3))
-    there = Job.unpack(Job.of(experiment, 3).pack()).experiment(tmp_path)
+    there = Job.unpack(Job.of(experiment).pack().data or b"").experiment(tmp_path)
     assert there.case.folder == tmp_path
     assert replace(expected(there, 3), scene="") == replace(expected(experiment, 3), scene="")
 
 
 def test_a_task_of_the_tests_travels_as_code(case: Case) -> None:
     """The node has neither the test nor what its class is derived from."""
-    packed = Job.of(Experiment(case, Falling(0.25)), 1).pack()
+    packed = Job.of(Experiment(case, Falling(0.25))).pack().data
     code = (
         "import sys; from pytest_simbench.cluster.job import Job\n"
         "job = Job.unpack(sys.stdin.buffer.read())\n"
@@ -42,7 +46,7 @@ def test_a_task_of_the_tests_travels_as_code(case: Case) -> None:
 
 def test_a_class_that_travelled_can_be_derived_from(case: Case) -> None:
     """Its parameters have the defaults that they had, also in who unpacks its own job."""
-    task = Job.unpack(Job.of(Experiment(case, Falling(0.25)), 1).pack()).task
+    task = Job.unpack(Job.of(Experiment(case, Falling(0.25))).pack().data or b"").task
 
     @dataclass(frozen=True)
     class Watched(type(task)):  # type: ignore[misc]
@@ -56,7 +60,7 @@ def test_a_robot_travels_by_content(
 ) -> None:
     robot = find("xarm7")
     experiment = Experiment(replace(case, robot=robot), Stacking())
-    job = Job.unpack(Job.of(experiment, 1).pack())
+    job = Job.unpack(Job.of(experiment).pack().data or b"")
     monkeypatch.setattr("pytest_simbench.simulator.robot_files.folder", lambda: tmp_path)
     assert job.robot is not None
     assert str(robot.urdf) not in str(job.robot.robot)
@@ -66,8 +70,36 @@ def test_a_robot_travels_by_content(
     assert Path(there.robot.srdf).parent == tmp_path
     assert robot_told(there.robot) == robot_told(robot)
     assert there.problem() is None
-    own = Job.unpack(Job.of(Experiment(case, Stacking(robot=robot)), 1).pack())
+    own = Job.unpack(Job.of(Experiment(case, Stacking(robot=robot))).pack().data or b"")
     assert robot_told(own.experiment(tmp_path).task.robot) == robot_told(robot)  # type: ignore[attr-defined]
+
+
+def test_it_is_packed_once_for_all_repetitions(case: Case) -> None:
+    executor = ClusterExecutor(Told([]))
+    one, other = Experiment(case, Falling()), Experiment(case, Falling(0.3))
+    shared = executor.shared(one)
+    assert executor.shared(one) is shared
+    there = Job.unpack(executor.shared(other).job.data or b"")
+    assert there.task.parameters() == other.task.parameters()
+    assert executor.shared(one) == shared
+
+
+def test_it_goes_to_a_node_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    sent: list[Packed] = []
+    pool, node = Told([A]), LatestJobs()
+    pool._client = SimpleNamespace(submit=lambda call, job, *_, **__: sent.append(job))  # type: ignore[assignment]
+    jobs = [Packed.of(b"one"), Packed.of(b"other")]
+    for job in (*jobs, *jobs):
+        pool.submit("key", A, job, 1)
+        assert node.find(sent[-1]) == job.data
+        pool.note(A, job, there=True)
+    assert [job.data for job in sent] == [b"one", b"other", None, None]
+    monkeypatch.setattr("pytest_simbench.cluster.node.KEPT_JOBS", 1)
+    assert node.find(sent[-1]) == b"other"  # the last that was asked for is kept
+    assert node.find(sent[-2]) is None
+    pool.note(A, jobs[0], there=False)
+    pool.submit("key", A, jobs[0], 1)
+    assert node.find(sent[-1]) == b"one"
 
 
 def test_errors_come_back_as_what_they_are() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -15,7 +14,8 @@ from typing import Any
 
 import pytest
 
-from tests.cluster.machines import Machines
+from pytest_simbench.simulator.registry import adapter
+from tests.cluster.machines import Machines, networks_allowed, release_in
 from tests.plugin.test_same_records import TIMES
 
 TEST = """
@@ -46,14 +46,17 @@ FULL = 2029
 
 @pytest.fixture(scope="module")
 def machines(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machines]:
-    """A head, and the nodes a and b."""
+    """A head, and the nodes a and b; each has a network of its own, where that is allowed."""
     folder = tmp_path_factory.mktemp("machines")
     trouble = folder / "trouble"
     trouble.mkdir()
-    with Machines(folder, lost_after=6.0) as found:
+    with Machines(folder, lost_after=6.0, networks=networks_allowed()) as found:
         found.wait("head")
-        for name in ("a", "b"):
-            found.node(name, "--sim", "mujoco", environment={"TROUBLE": str(trouble)})
+        environments = folder / "environments"
+        release = release_in(environments)
+        for name, sims in (("a", f"mujoco,{release}"), ("b", "mujoco")):
+            own = {"TROUBLE": str(trouble), "SIMBENCH_ENVIRONMENTS": str(environments)}
+            found.node(name, "--sim", sims, environment=own)
         found.wait()
         yield found
 
@@ -93,7 +96,7 @@ def until(condition: Any, seconds: float = 60.0) -> None:
         time.sleep(0.05)
 
 
-def test_a_process_killed_a_machine_stopped_and_one_added(
+def test_a_process_killed_a_machine_cut_off_and_one_added(
     machines: Machines, tmp_path: Path
 ) -> None:
     straight, spread = tmp_path / "straight", tmp_path / "spread"
@@ -104,7 +107,7 @@ def test_a_process_killed_a_machine_stopped_and_one_added(
     run = pytest_in(spread, "--sim-output=out", f"--sim-cluster={machines.address}")
     trouble = machines.folder / "trouble"
     until(lambda: len(list(trouble.glob("*"))) >= 2)
-    machines.signal("b", signal.SIGSTOP)  # nothing comes from it any more, and nobody says so
+    machines.cut("b")  # nothing comes from it any more, and nobody says so
     machines.node("d", "--sim", "mujoco", environment={"TROUBLE": str(trouble)})
     out, _ = run.communicate(timeout=120)
     assert run.returncode == 0, out
@@ -122,6 +125,32 @@ def test_a_process_killed_a_machine_stopped_and_one_added(
     assert "d" in {r["host"]["node"] for r in found.values()}
     assert all((spread / "out" / r["details"]["log"]).is_file() for r in found.values())
     assert len(list((spread / "out" / "traces").iterdir())) == 1
+
+
+def test_several_tests_at_once_and_a_release_that_one_node_has(
+    machines: Machines, pytester: pytest.Pytester
+) -> None:
+    pytester.makepyfile(
+        """
+        import pytest
+        from tests.tiny import Falling
+
+        @pytest.mark.parametrize("duration", [0.2, 0.3])
+        def test_falling(repeat, duration):
+            repeat(Falling(duration=duration))
+        """
+    )
+    release = f"mujoco=={adapter('mujoco').info.tested_version}"
+    result = pytester.runpytest_subprocess(
+        *(f"--sim={release}", "--reps=3", "-n2", "--sim-output=out"),
+        f"--sim-cluster={machines.address}",
+    )
+    result.assert_outcomes(passed=2)
+    found = [json.loads(line) for line in (pytester.path / "out" / "records.jsonl").open()]
+    assert len({(r["test"], r["repetition"]) for r in found}) == len(found) == 6
+    assert {(r["status"], r["simulator"], r["host"]["node"]) for r in found} == {
+        ("ok", release, "a")
+    }
 
 
 def test_what_nobody_offers_is_said_before_anything_runs(

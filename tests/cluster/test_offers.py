@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from pytest_simbench.cluster.offers import PLUGIN, PYTHON, Node, here, refusal, unmet
+from pytest_simbench.simulator.registry import adapter
+from tests.cluster.machines import release_in
 
 
 def node(name: str, *offers: str, slots: int = 1) -> Node:
@@ -27,6 +31,25 @@ def test_a_machine_offers_what_is_ready_on_it() -> None:
     assert found.has("mujoco", "headless")
     assert not found.has("pybullet", "headless")
     assert not found.stranger
+
+
+def test_a_release_with_an_environment_of_its_own_is_offered_by_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path))
+    name = release_in(tmp_path)
+    (tmp_path / "mujoco==0.1").mkdir()  # half made
+    (tmp_path / "nothing==1.0").mkdir()
+    found = Node.of("tcp://here:1", "here", here(1))
+    assert found is not None
+    assert found.has(name, "headless")
+    assert found.version("mujoco") == adapter("mujoco").info.tested_version
+    assert [offer for offer in found.offers if offer.count("==") == 2] == [f"{name}==unknown"]
+    assert f", {name}," in str(found)
+    assert str(unmet([lab("lab1", "mujoco==4.0.0")], name, ["headless"])) == (
+        f"no node of the cluster offers {name}: lab1 has mujoco 4.0.0; on one of them: pytest "
+        f"--sim-install {name}, and start it again"
+    )
 
 
 def test_a_worker_of_somebody_elses_is_no_node() -> None:

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from textwrap import dedent
 
@@ -15,12 +16,17 @@ import pytest
 
 TEST = """
     import os
+    import time
     from pathlib import Path
     from tests.tiny import Falling
 
     class Stopped(Falling):
         def perform(self, world, seed, count):
+            began = time.monotonic()
             outcome = super().perform(world, seed, count)
+            if "SPANS" in os.environ:
+                with Path(os.environ["SPANS"]).open("a") as file:
+                    print(began, time.monotonic(), file=file)
             outcome.details["bodies"] = world.bodies  # every bit of the state at the end
             if str(seed) == os.environ.get("STOP_AT"):
                 raise KeyboardInterrupt
@@ -86,6 +92,22 @@ def test_side_by_side(
 ) -> None:
     run(pytester, "--reps=4", "--sim-output=out", *arguments).assert_outcomes(passed=2)
     assert kept(folder / "out", jobs="--sim-jobs=2" in arguments) == straight
+
+
+def test_tests_share_the_jobs_of_the_run(
+    pytester: pytest.Pytester,
+    folder: Path,
+    straight: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two tests at once, and one repetition: its times are as if it had the machine to itself."""
+    monkeypatch.setenv("SPANS", str(pytester.path / "spans"))
+    run(pytester, "--reps=4", "--sim-output=out", "-n2", "--sim-jobs=1").assert_outcomes(passed=2)
+    assert kept(folder / "out") == straight
+    spans = [line.split() for line in (pytester.path / "spans").read_text().splitlines()]
+    in_order = sorted((float(began), float(ended)) for began, ended in spans)
+    assert len(in_order) == 8
+    assert all(one[1] <= other[0] for one, other in pairwise(in_order))
 
 
 @pytest.mark.parametrize("arguments", [[], ["-n2"]], ids=["plain", "xdist"])
