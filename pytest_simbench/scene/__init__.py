@@ -1,6 +1,7 @@
 """The declarative world: bodies, robot, gravity, friction, gains; frozen, in SI units."""
 
-from pytest_simbench.scene.bodies import Body, Box, Capsule, Cylinder, Solid, Sphere, penetration
+from pytest_simbench.scene.bodies import Box, Capsule, Cylinder, Sphere, penetration
+from pytest_simbench.scene.body import Body, Solid
 from pytest_simbench.scene.checks import SceneError
 from pytest_simbench.scene.pose import FloatArray, Pose, Quaternion, Vector3, rotation_matrix
 from pytest_simbench.scene.robot import Gripper, Joint, MotionLimits, Robot

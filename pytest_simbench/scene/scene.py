@@ -6,7 +6,8 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
 
-from pytest_simbench.scene.bodies import Body, penetration
+from pytest_simbench.scene.bodies import penetration
+from pytest_simbench.scene.body import Body
 from pytest_simbench.scene.checks import (
     RESERVED,
     SceneError,

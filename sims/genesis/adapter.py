@@ -32,9 +32,8 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
-from pytest_simbench.simulator.bounces import direct
 
-from ..mujoco.adapter import BOUNCES
+from ..mujoco.bounces import BOUNCES, direct
 from .engine import (
     array_of,
     forget_worlds,

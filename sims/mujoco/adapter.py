@@ -30,9 +30,9 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
-from pytest_simbench.simulator.bounces import direct
 
 from . import releases
+from .bounces import BOUNCES, direct
 from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack
 
@@ -42,12 +42,6 @@ ROBOT, WORLD = 1, 2
 """Collision groups: the robot's links touch everything but each other."""
 
 LINK_COLOUR, GROUND_COLOUR = (0.9, 0.9, 0.9, 1.0), (0.5, 0.5, 0.5, 1.0)
-
-
-BOUNCES = (
-    "restitution is a spring with a damper: an impact takes twelve steps, and is as deep as the "
-    "body moves in four; e is met within 0.03, and none below 0.21 can be had"
-)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ import numpy as np
 
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import PreparedRobot, lazy_import, one_value
-from pytest_simbench.simulator.bounces import restitution_of
 from pytest_simbench.simulator.quantities import touches
 from pytest_simbench.simulator.shapes import (
     box_corners,
@@ -20,6 +19,8 @@ from pytest_simbench.simulator.shapes import (
     reach,
     round_reach,
 )
+
+from .bounces import restitution_of
 
 mujoco = lazy_import("mujoco")
 

@@ -31,9 +31,8 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
-from pytest_simbench.simulator.bounces import direct
 
-from ..mujoco.adapter import BOUNCES
+from ..mujoco.bounces import BOUNCES, direct
 from ..mujoco.pictures import DISABLED, camera, renderer
 from ..mujoco.readback import Numbers, ReadBack
 from .world import NewtonSettings, build_model, make_solver, names
