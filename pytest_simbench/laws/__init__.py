@@ -79,10 +79,11 @@ from pytest_simbench.laws.rolling import (
     SlipToRoll,
     SpinToRoll,
 )
+from pytest_simbench.laws.wrenches import AxialForce, AxialTorque
 
 LAWS: tuple[Law, ...] = (
     FreeFall(), FallSpeed(), DampedFall(), ObliqueGravity(), Projectile(), Spin(), FreeTop(),
-    FreeCylinder(), TumbleEnergy(), TumbleMomentum(),
+    FreeCylinder(), TumbleEnergy(), TumbleMomentum(), AxialForce(), AxialTorque(),
     LandingTime(), DeadLanding(), DeadCollision(), CollisionMomentum(),
     BounceHeight(), BounceRatio(), ElasticChain(), ObliqueBounce(), ObliqueBounceStick(),
     StickAngle(), StickAngleAcross(), StickAngleDiagonal(), Creep(), Carried(),

@@ -7,6 +7,7 @@ from pytest_simbench.scene.pose import FloatArray, Pose, Quaternion, Vector3, ro
 from pytest_simbench.scene.robot import Gripper, Joint, MotionLimits, Robot
 from pytest_simbench.scene.scene import STANDARD_GRAVITY, Scene
 from pytest_simbench.scene.trajectory import Trajectory
+from pytest_simbench.scene.wrench import Wrench
 
 __all__ = [
     "STANDARD_GRAVITY",
@@ -27,6 +28,7 @@ __all__ = [
     "Sphere",
     "Trajectory",
     "Vector3",
+    "Wrench",
     "penetration",
     "rotation_matrix",
 ]

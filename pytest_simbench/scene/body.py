@@ -17,6 +17,7 @@ from pytest_simbench.scene.checks import (
 )
 from pytest_simbench.scene.overlap import Hull
 from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
+from pytest_simbench.scene.wrench import Wrench
 
 Colour = tuple[float, float, float, float]
 
@@ -54,6 +55,8 @@ class _Placed(ABC):
 class Body(_Placed):
     """A rigid body, free to move when it has a mass, fixed in the world when it has none.
 
+    One that is `prescribed` has no mass either: it keeps its velocities, whatever touches it.
+
     Attributes:
         name: unique in its scene.
         pose: of its centre, which is its centre of mass, in the world.
@@ -61,14 +64,17 @@ class Body(_Placed):
         friction: Coulomb coefficient mu of its surface, sliding. Every surface of a scene has the
             same one, so that the engines' different rules for combining two do not matter.
         colour: red, green, blue, alpha in 0..1.
-        linear_velocity: of a free body's centre at the start, in the world frame [m/s].
-        angular_velocity: of a free body at the start, in the world frame [rad/s].
+        linear_velocity: of its centre at the start, in the world frame [m/s].
+        angular_velocity: of the body at the start, in the world frame [rad/s].
         restitution: Newton's coefficient e: what an impact leaves of the normal velocity. All
             surfaces of a scene that bounce have the same one, as with friction.
         linear_damping: c of dv/dt = -c v of a free body [1/s].
         angular_damping: the same of its angular velocity [1/s].
         moments: principal moments of inertia about the centre, along the body's axes [kg m^2], of a
             body whose mass is not spread evenly; None: evenly.
+        prescribed: the body moves with its velocities all the time, as a belt, a driven plate or a
+            pusher does; forces, gravity and contacts change nothing of that.
+        wrenches: forces and torques on a free body, each for its time; those at one time add up.
 
     Raises:
         SceneError: a body that cannot exist; the message names body and value.
@@ -80,6 +86,8 @@ class Body(_Placed):
     linear_damping: float = 0.0
     angular_damping: float = 0.0
     moments: Vector3 | None = None
+    prescribed: bool = False
+    wrenches: tuple[Wrench, ...] = ()
 
     kinds: ClassVar[dict[str, type[Body]]] = {}
     """Every kind of body, by what `to_wire` calls it."""
@@ -102,8 +110,16 @@ class Body(_Placed):
             check_number(value, f"the {kind} damping [1/s] of {self.name!r}", 0.0)
         if self.fixed and any((*self.linear_velocity, *self.angular_velocity)):
             raise SceneError(
-                f"{self.name!r} has a velocity and no mass, so it is fixed; give it a mass"
+                f"{self.name!r} has a velocity and no mass, so it is fixed; give it a mass, or "
+                "make it `prescribed`"
             )
+        if self.prescribed and (self.mass or self.damping.any()):
+            raise SceneError(
+                f"{self.name!r} moves as prescribed, so it has no mass and no damping; leave them "
+                "out"
+            )
+        if self.wrenches and not self.mass:
+            raise SceneError(f"{self.name!r} has no mass, so no force moves it; give it a mass")
         if self.moments is not None:
             what = f"the moments of inertia [kg m^2] of {self.name!r}"
             check_numbers(self.moments, 3, what, 0.0, above=True)
@@ -112,7 +128,8 @@ class Body(_Placed):
 
     @property
     def fixed(self) -> bool:
-        return self.mass == 0.0
+        """Whether it never moves."""
+        return self.mass == 0.0 and not self.prescribed
 
     @property
     def velocity(self) -> FloatArray:
@@ -186,6 +203,10 @@ class Body(_Placed):
                 data[name] = getattr(self, name)
         if self.moments is not None:
             data["moments"] = list(self.moments)
+        if self.prescribed:
+            data["prescribed"] = True
+        if self.wrenches:
+            data["wrenches"] = [wrench.to_wire() for wrench in self.wrenches]
         return data
 
     @classmethod
@@ -195,6 +216,7 @@ class Body(_Placed):
             name: tuple(v) if isinstance(v, list) else v for name, v in data.items()
         }
         values["pose"] = Pose.from_wire(data["pose"])
+        values["wrenches"] = tuple(map(Wrench.from_wire, data.get("wrenches", ())))
         kind: Any = cls.kinds[values.pop("kind", "box")]
         made: Body = kind(**values)
         return made

@@ -265,6 +265,12 @@ class DART(Simulator):
         base[self._index] = self._gain * position + self._share * velocity
         self._base = base
 
+    def push(self, wrenches: FloatArray) -> None:
+        for body, row in zip(self._free, wrenches, strict=True):
+            body.clearExternalForces()  # they last
+            body.addExtForce(row[:3], np.zeros(3), False, True)
+            body.addExtTorque(row[3:], False)
+
     def step(self) -> None:
         if self._robot is not None:
             self._robot.setCommands(self._base - self._error_gain * self._robot.getPositions())

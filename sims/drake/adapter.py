@@ -203,6 +203,11 @@ class Drake(Simulator):
         )
         self._efforts.GetMutableData().get_mutable_value().SetFromVector(effort)
 
+    def push(self, wrenches: FloatArray) -> None:
+        forces = np.zeros(self.plant.num_velocities())
+        forces[self._bodies_at[:, 7:] - self.plant.num_positions()] = wrenches
+        self.plant.get_applied_generalized_force_input_port().FixValue(self.context, forces)
+
     def step(self) -> None:
         self._steps += 1
         self.simulator.AdvanceTo(self._steps * self.settings.timestep)

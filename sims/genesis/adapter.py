@@ -128,10 +128,13 @@ class Genesis(Simulator):
         options = dataclasses.replace(  # what is data, not code
             self.settings, timestep=1.0, substeps=1, constraint_timeconst=1.0, impedance=(0.9, 0.95)
         )
-        kind = (options, several, scene.robot is not None, bool(scene.free_bodies))
+        forces = scene.words & {"wrench"}  # whose kernels are others
+        kind = (options, several, scene.robot is not None, bool(scene.free_bodies), forces)
         if kind in self.compiled:
             return
         self.load(scene)
+        if forces:
+            self.push(np.zeros((len(self._free), 6)))
         self.step()
         self.body_state()
         self.read_back()
@@ -233,6 +236,12 @@ class Genesis(Simulator):
         self.solver.control_dofs_position_velocity(
             position + effort / self._stiffness, velocity, self._dofs
         )
+
+    def push(self, wrenches: FloatArray) -> None:
+        force, torque = np.hsplit(wrenches, 2)
+        solver = self.solver
+        solver.apply_links_external_force(force, self._free, ref="link_com")
+        solver.apply_links_external_torque(torque, self._free, ref="link_com")
 
     def step(self) -> None:
         self.world.step(update_visualizer=False)

@@ -172,7 +172,7 @@ class MuJoCo(Simulator):
         free = [model.joint(f"{body.name}/free") for body in scene.free_bodies]
         self._body_q = np.array([j.qposadr[0] + np.arange(7) for j in free], int).reshape(-1, 7)
         self._body_v = np.array([j.dofadr[0] + np.arange(3) for j in free], int).reshape(-1, 3)
-        self._rotations = np.array([model.body(b.name).id for b in scene.free_bodies], dtype=int)
+        self._body_ids = np.array([model.body(b.name).id for b in scene.free_bodies], dtype=int)
         for at, body in zip(self._body_v, scene.free_bodies, strict=True):
             data.qvel[at] = body.linear_velocity
             data.qvel[at + 3] = body.pose.rotation().T @ body.angular_velocity  # in its own frame
@@ -242,6 +242,9 @@ class MuJoCo(Simulator):
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self.data.ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness
+
+    def push(self, wrenches: FloatArray) -> None:
+        self.data.xfrc_applied[self._body_ids] = wrenches
 
     def step(self) -> None:
         mujoco.mj_step(self.model, self.data)

@@ -222,6 +222,10 @@ class Newton(Simulator):
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self._ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness
 
+    def push(self, wrenches: FloatArray) -> None:
+        for state in self._states:  # which take turns
+            state.body_f.numpy()[self._free] = wrenches
+
     def step(self) -> None:
         before, after = self._states
         timestep = float(self.solver.mj_model.opt.timestep)

@@ -219,6 +219,13 @@ class ODE(Simulator):
         if self._drives is not None:
             self._drives.command(position, velocity, effort)
 
+    def push(self, wrenches: FloatArray) -> None:
+        for body, row in zip(self._free, wrenches, strict=True):
+            if row.any():
+                body.enable()  # a force wakes nobody
+                body.addForce(row[:3])
+                body.addTorque(row[3:])
+
     def step(self) -> None:
         if self._drives is not None:
             self._drives.act()

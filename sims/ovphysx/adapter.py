@@ -229,11 +229,20 @@ class OvPhysX(Simulator):
             buffer[0, self._columns] = values
             binding.write(buffer)
 
+    def push(self, wrenches: FloatArray) -> None:
+        rows = np.hstack([wrenches, self.body_state()[:, :3]])  # and where the force acts
+        if self._steps == 0:
+            self.session.write("RIGID_BODY", "wrench", dict(zip(self._free, rows, strict=True)))
+        else:
+            binding, buffer = self._binding("RIGID_BODY_WRENCH")
+            buffer[:] = rows
+            binding.write(buffer)
+
     def step(self) -> None:
         if self._steps == 0 and self._targets is not None:
             for kind, values in zip(("Position", "Velocity"), self._targets, strict=True):
                 given = zip(self._joints, values / self._unit, strict=True)
-                self.session.write_joints(f"joint{kind}Target", dict(given))
+                self.session.write("ARTICULATION_JOINT", f"joint{kind}Target", dict(given))
         self.session.physx.step_sync(self.settings.timestep)
         self._steps += 1
         if self._steps == 1 and self._joints:

@@ -241,6 +241,14 @@ class PyBullet(Simulator):
             physicsClientId=self.client,
         )
 
+    def push(self, wrenches: FloatArray) -> None:
+        c = self.client
+        for body, row in zip(self._free, wrenches, strict=True):
+            place, _ = pybullet.getBasePositionAndOrientation(body, c)
+            force, torque = row[:3], row[3:]
+            pybullet.applyExternalForce(body, -1, force, place, pybullet.WORLD_FRAME, c)
+            pybullet.applyExternalTorque(body, -1, torque, pybullet.WORLD_FRAME, c)
+
     def step(self) -> None:
         pybullet.stepSimulation(self.client)
         self._steps += 1

@@ -184,8 +184,9 @@ class SAPIEN(Simulator):
         self._world = sapien.Scene([self._system])
         self._ground = self._add_ground(scene.ground_friction, scene.ground_restitution)
         self._bodies = {box.name: self._add_body(box) for box in scene.bodies}
+        self._free = [self._bodies[box.name] for box in scene.free_bodies]
         packed = self._system.rigid_dynamic_components
-        self._rows = [packed.index(self._bodies[box.name]) for box in scene.free_bodies]
+        self._rows = [packed.index(body) for body in self._free]
         self._robot: Any = None
         self._joints: list[Any] = []
         self._links: dict[str, Any] = {}
@@ -304,6 +305,11 @@ class SAPIEN(Simulator):
             set_target(target)
         for set_speed, speed in zip(self._speeds, velocity.tolist(), strict=True):
             set_speed(speed)
+
+    def push(self, wrenches: FloatArray) -> None:
+        for body, row in zip(self._free, wrenches, strict=True):
+            if row.any():  # which wakes it
+                body.add_force_torque(row[:3].astype(np.float32), row[3:].astype(np.float32))
 
     def step(self) -> None:
         self._system.step()
