@@ -103,6 +103,30 @@ def kicked() -> Scene:
     return Scene("kicked", (brick, turned), gravity=(0.0, 0.0, 0.0))
 
 
+def driven() -> Scene:
+    """A belt with a cube on it, and a plate that turns as it rises, both prescribed."""
+    turn = Pose((0.0, 1.5, 0.8), (0.8, 0.0, 0.6, 0.0))
+    belt = Box(
+        "belt",
+        (2.0, 0.4, 0.1),
+        Pose.at(0.0, 0.0, 0.5),
+        friction=0.5,
+        linear_velocity=(0.5, 0.0, 0.0),
+        prescribed=True,
+    )
+    plate = Box(
+        "plate",
+        (0.4, 0.3, 0.1),
+        turn,
+        friction=0.5,
+        linear_velocity=(0.0, 0.0, 0.2),
+        angular_velocity=(0.5, -0.3, 1.0),
+        prescribed=True,
+    )
+    carried = cube("cube", Pose.at(0.0, 0.0, 0.55 + EDGE / 2), friction=0.5)
+    return Scene("driven", (belt, carried, plate), ground_friction=0.5)
+
+
 def standing() -> Scene:
     """One of each round body, at rest on the plane: the can on its end, the pill on its side."""
     lying = Pose((0.6, 0.0, RADIUS), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0))

@@ -186,6 +186,7 @@ class OvPhysX(Simulator):
         self._text = usd.Stage(scene, self.prepared, _attributes(self.settings)).text()
         self._start()
         self._free = [usd.body_path(i) for i, box in enumerate(scene.bodies) if not box.fixed]
+        self._led = [usd.body_path(i) for i, box in enumerate(scene.bodies) if box.prescribed]
         self._joints: list[str] = []
         self._unit = np.empty(0)
         self._placed: dict[str, Pose] = {}
@@ -237,6 +238,11 @@ class OvPhysX(Simulator):
             binding, buffer = self._binding("RIGID_BODY_WRENCH")
             buffer[:] = rows
             binding.write(buffer)
+
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        for name, columns in (("Position", [0, 1, 2]), ("Orientation", [4, 5, 6, 3])):
+            targets = dict(zip(self._led, after[:, columns], strict=True))
+            self.session.write("RIGID_BODY", f"kinematicTarget{name}", targets)
 
     def step(self) -> None:
         if self._steps == 0 and self._targets is not None:

@@ -29,6 +29,7 @@ from pytest_simbench.simulator import (
     Settings,
     Simulator,
     SimulatorInfo,
+    heavy,
     lazy_import,
 )
 from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
@@ -158,8 +159,10 @@ class PyBullet(Simulator):
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=c)
         self._ground = pybullet.createMultiBody(0, plane, physicsClientId=c)
         set_surface(c, self._ground, s, scene.ground_friction, scene.ground_restitution)
-        self._bodies = {body.name: add_body(c, body, s) for body in scene.bodies}
+        self._bodies = {body.name: add_body(c, body, s, heavy(scene)) for body in scene.bodies}
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
+        self._led = [self._bodies[body.name] for body in scene.prescribed_bodies]
+        self._part_from_still(scene)
         self.prepared = None
         self._robot = -1
         self._couplings: list[int] = []
@@ -168,6 +171,14 @@ class PyBullet(Simulator):
         if scene.robot is not None:
             self.prepared = PreparedRobot(scene.robot)
             self._load_robot(self.prepared)
+
+    def _part_from_still(self, scene: Scene) -> None:
+        """Prescribed bodies do not touch what nothing can move."""
+        fixed = [self._bodies[body.name] for body in scene.fixed_bodies]
+        for body in self._led:
+            for other in (self._ground, *fixed, *self._led):
+                if other != body:
+                    pybullet.setCollisionFilterPair(body, other, -1, -1, 0, self.client)
 
     def _load_robot(self, prepared: PreparedRobot) -> None:
         c, robot = self.client, prepared.robot
@@ -220,6 +231,7 @@ class PyBullet(Simulator):
         return ReadBack(
             self.client,
             self._ground,
+            heavy(self.scene),
             self._bodies,
             self._robot,
             self._links,
@@ -248,6 +260,14 @@ class PyBullet(Simulator):
             force, torque = row[:3], row[3:]
             pybullet.applyExternalForce(body, -1, force, place, pybullet.WORLD_FRAME, c)
             pybullet.applyExternalTorque(body, -1, torque, pybullet.WORLD_FRAME, c)
+
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        c, falls = self.client, self.settings.timestep * np.asarray(self.scene.gravity)
+        for body, row in zip(self._led, before, strict=True):
+            w, x, y, z = row[3:7]
+            pybullet.resetBasePositionAndOrientation(body, row[:3], [x, y, z, w], c)
+            # Bullet has one gravity for all, which acts before contacts do
+            pybullet.resetBaseVelocity(body, row[7:10] - falls, row[10:], c)
 
     def step(self) -> None:
         pybullet.stepSimulation(self.client)

@@ -58,8 +58,8 @@ def _single(number: float) -> float:
     return float(np.float32(number))
 
 
-def add_body(client: int, box: Body, settings: PyBulletSettings) -> int:
-    """A body, fixed or free; Bullet's number of it."""
+def add_body(client: int, box: Body, settings: PyBulletSettings, most: float) -> int:
+    """A body; Bullet's number of it. A prescribed one weighs `most` [kg]."""
     c = client
     kind, size, length = _shape(box)
     lengths = {} if length is None else {"height": length}
@@ -69,15 +69,15 @@ def add_body(client: int, box: Body, settings: PyBulletSettings) -> int:
         kind, **size, **lengths, rgbaColor=box.colour, physicsClientId=c
     )
     w, x, y, z = box.pose.quaternion
+    mass = most if box.prescribed else box.mass
     body: int = pybullet.createMultiBody(
-        box.mass, shape, picture, box.pose.position, [x, y, z, w], physicsClientId=c
+        mass, shape, picture, box.pose.position, [x, y, z, w], physicsClientId=c
     )
     set_surface(c, body, settings, box.friction, box.restitution, box.damping)
     # Bullet takes a capsule for the box around it.
-    if box.moments is not None or not isinstance(box, Box):
-        pybullet.changeDynamics(
-            body, -1, localInertiaDiagonal=list(box.inertia()), physicsClientId=c
-        )
+    if box.moments is not None or box.prescribed or not isinstance(box, Box):
+        inertia = [most] * 3 if box.prescribed else list(box.inertia())
+        pybullet.changeDynamics(body, -1, localInertiaDiagonal=inertia, physicsClientId=c)
     if box.velocity.any():  # setting none changes the last bits of what follows
         pybullet.resetBaseVelocity(
             body, box.linear_velocity, box.angular_velocity, physicsClientId=c

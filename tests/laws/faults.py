@@ -128,6 +128,8 @@ FAULTS: dict[str, Fault] = {
     **dict.fromkeys(("tumble_energy", "tumble_momentum"), sized(0.3, 0.1, 0.02)),
     "axial_force": acting(force=(10.0, 0.0, 0.0)),  # doubled
     "axial_torque": acting(end=9.0),  # it never ends
+    "belt_speed": faster(0.9),
+    "ball_on_belt": faster(0.9),
     "free_cylinder": bodies(lambda body: body.changed(radius=0.1)),
     **dict.fromkeys(("rolling_sphere", "rolling_cylinder"), rougher(0.1)),
     **dict.fromkeys(("slip_to_roll", "spin_to_roll"), faster(1.2)),

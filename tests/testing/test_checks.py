@@ -39,6 +39,8 @@ FAULTS: list[tuple[type[Simulator], str]] = [
     (wrong.DoubleForce, "force_acts_for_its_time"),
     (wrong.EndlessTorque, "torque_acts_for_its_time"),
     (wrong.OwnAxes, "torque_acts_for_its_time"),
+    (wrong.FallingBelt, "moves_as_prescribed"),
+    (wrong.StandingBelt, "belt_carries"),
     (wrong.NoContacts, "contacts_counted"),
     (wrong_robots.SoftDrives, "static_hold"),
     (wrong_robots.SoftDrivesNotTold, "static_hold"),

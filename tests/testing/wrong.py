@@ -88,6 +88,24 @@ class OwnAxes(MuJoCo):
         super().push(np.hstack([wrenches[:, :3], torques]))
 
 
+class FallingBelt(MuJoCo):
+    """Only starts what it should lead."""
+
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        if not self.time:
+            self.model.body_gravcomp[:] = 0.0
+            super().lead(before, after)
+
+
+class StandingBelt(MuJoCo):
+    """Moves the belt, and its surface does not: as a body that is put from place to place."""
+
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        before = before.copy()
+        before[:, 7:] = 0.0
+        super().lead(before, after)
+
+
 class LongStep(Lying):
     def tamper(self) -> None:
         self.model.opt.timestep *= 1.001
