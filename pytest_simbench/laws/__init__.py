@@ -21,6 +21,7 @@ from pytest_simbench.laws.contact import (
     TippingSlope,
     Tower,
 )
+from pytest_simbench.laws.driven import BallOnBelt, BeltSpeed
 from pytest_simbench.laws.drives import (
     EffortLimit,
     FeedForward,
@@ -79,16 +80,17 @@ from pytest_simbench.laws.rolling import (
     SlipToRoll,
     SpinToRoll,
 )
+from pytest_simbench.laws.wrenches import AxialForce, AxialTorque
 
 LAWS: tuple[Law, ...] = (
     FreeFall(), FallSpeed(), DampedFall(), ObliqueGravity(), Projectile(), Spin(), FreeTop(),
-    FreeCylinder(), TumbleEnergy(), TumbleMomentum(),
+    FreeCylinder(), TumbleEnergy(), TumbleMomentum(), AxialForce(), AxialTorque(),
     LandingTime(), DeadLanding(), DeadCollision(), CollisionMomentum(),
     BounceHeight(), BounceRatio(), ElasticChain(), ObliqueBounce(), ObliqueBounceStick(),
     StickAngle(), StickAngleAcross(), StickAngleDiagonal(), Creep(), Carried(),
     SlideX(), SlideY(), SlideDiagonal(), SlideStraight(), StoppingDistance(),
-    StoppingDistanceDiagonal(), Glide(), Belt(),
-    Pivot(), RollingSphere(), RollingCylinder(), SlipToRoll(), SpinToRoll(),
+    StoppingDistanceDiagonal(), Glide(), Belt(), BeltSpeed(),
+    Pivot(), RollingSphere(), RollingCylinder(), SlipToRoll(), SpinToRoll(), BallOnBelt(),
     RestDepth(), Tower(), HeavyOnTop(), Overhang(), TippingEdge(), TippingSlope(),
     GripHolds(), GripSlips(), GripSlipsDiagonally(),
     PendulumPeriod(), CompoundPendulum(), PendulumEnergy(), DoublePendulum(),

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
 
-from pytest_simbench.scene.bodies import Body, penetration
+from pytest_simbench.scene.bodies import penetration
+from pytest_simbench.scene.body import Body
 from pytest_simbench.scene.checks import (
     RESERVED,
     SceneError,
@@ -81,7 +82,7 @@ class Scene:
                     "it, or give the scene a larger `room`"
                 )
         for a, b in combinations(self.bodies, 2):
-            if a.fixed and b.fixed:
+            if not (a.mass or b.mass):
                 continue
             depth = penetration(a, b)
             if depth > OVERLAP_TOLERANCE:
@@ -92,8 +93,14 @@ class Scene:
 
     @property
     def free_bodies(self) -> tuple[Body, ...]:
-        """The bodies that can move, in scene order: the rows of every body state."""
+        """The bodies that can move, in scene order: the rows of every body state. They are those
+        with a mass and the prescribed ones."""
         return tuple(body for body in self.bodies if not body.fixed)
+
+    @property
+    def prescribed_bodies(self) -> tuple[Body, ...]:
+        """The bodies that move as prescribed, in scene order."""
+        return tuple(body for body in self.bodies if body.prescribed)
 
     @property
     def fixed_bodies(self) -> tuple[Body, ...]:
@@ -101,13 +108,17 @@ class Scene:
 
     @property
     def words(self) -> frozenset[str]:
-        """What is in it: `box`, `sphere`, `cylinder`, `capsule`, `restitution`, `damping`."""
-        kinds = {type(body).__name__.lower() for body in self.bodies}
-        bouncing = any((self.ground_restitution, *(body.restitution for body in self.bodies)))
-        damped = any(body.damping.any() for body in self.bodies)
-        return frozenset(
-            kinds | ({"restitution"} if bouncing else set()) | ({"damping"} if damped else set())
-        )
+        """What is in it: `box`, `sphere`, `cylinder`, `capsule`, `restitution`, `damping`,
+        `wrench`, `prescribed`."""
+        bodies = self.bodies
+        found = {
+            "restitution": self.ground_restitution or any(body.restitution for body in bodies),
+            "damping": any(body.damping.any() for body in bodies),
+            "wrench": any(body.wrenches for body in bodies),
+            "prescribed": bool(self.prescribed_bodies),
+        }
+        kinds = {type(body).__name__.lower() for body in bodies}
+        return frozenset(kinds | {word for word, there in found.items() if there})
 
     def body(self, name: str) -> Body:
         """The body of that name.

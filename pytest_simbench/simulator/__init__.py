@@ -16,6 +16,7 @@ from pytest_simbench.simulator.errors import (
 from pytest_simbench.simulator.info import FOLLOWER, Capability, Deviation, SimulatorInfo
 from pytest_simbench.simulator.lazy import lazy_import
 from pytest_simbench.simulator.parity import one_value
+from pytest_simbench.simulator.prescribed import heavy
 from pytest_simbench.simulator.settings import Settings
 from pytest_simbench.simulator.urdf import PreparedRobot
 
@@ -39,6 +40,7 @@ __all__ = [
     "SimulatorInfo",
     "StateError",
     "UnavailableError",
+    "heavy",
     "lazy_import",
     "one_value",
 ]

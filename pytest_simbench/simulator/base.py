@@ -25,10 +25,10 @@ class Simulator(ABC):
 
     The life of a simulator: constructed with its settings, `load` once, then `command` and `step`
     again and again with state read in between, and `close` at the end. A command holds until the
-    next one. Free bodies are always given in the order of `scene.free_bodies`, joints in the
-    order of `scene.robot.joints`. Joint drives obey the law in `scene.Joint`; where the
-    engine has a native drive, it is used. Links of the robot do not collide with each other,
-    everything else does.
+    next one; what acts on bodies from outside is told before each step (`push`, `lead`). Free
+    bodies are always given in the order of `scene.free_bodies`, joints in the order of
+    `scene.robot.joints`. Joint drives obey the law in `scene.Joint`; where the engine has a native
+    drive, it is used. Links of the robot do not collide with each other, everything else does.
 
     Attributes:
         info: facts about the engine, its capabilities and its deviations.
@@ -69,6 +69,23 @@ class Simulator(ABC):
     @abstractmethod
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         """Set points of all joints, each (n_joints,): position, velocity, feed-forward effort."""
+
+    def push(self, wrenches: FloatArray) -> None:
+        """Force and torque on each free body in the next step, and in no other, (n_free, 6).
+
+        At the centre of mass, in the world frame [N, N m]. Only called in scenes with forces, and
+        again before each step in which one acts; zeros end what acted before.
+        """
+        raise self._missing("forces on bodies")
+
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        """Have the prescribed bodies move in the next step from one state to another.
+
+        Only called in scenes with such bodies, before each step. Rows are as in `body_state`, in
+        the order of `scene.prescribed_bodies`, (n_prescribed, 13) each: of the step's begin and
+        of its end. Velocities are those of the whole step.
+        """
+        raise self._missing("bodies that move as prescribed")
 
     @abstractmethod
     def step(self) -> None:

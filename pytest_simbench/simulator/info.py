@@ -45,7 +45,7 @@ class Deviation:
         elsewhere: the same with another robot than `MEASURED_ON`, whose links may be larger; None
             where it makes no difference.
         only: what a scene must have for it to count, one of `Scene.words` ("cylinder",
-            "restitution"); empty when it counts in every scene.
+            "prescribed"); empty when it counts in every scene.
     """
 
     quantity: str

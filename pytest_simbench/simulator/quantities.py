@@ -3,7 +3,7 @@
     gravity, timestep, gripper/coupled
     ground/{height, friction, restitution}
     body/NAME/{pose, boxes, rounds, meshes, friction, restitution, margin, dynamic, touches}
-        and of a free body {mass, com, inertia, damping, gravity, velocity}
+        and of a body with a mass {mass, com, inertia, damping, gravity, velocity}
     link/NAME/{pose, boxes, rounds, meshes, friction, restitution, margin, touches}
         and of a link that moves {mass, com, inertia, damping, gravity}
     joint/NAME/{axis, limits, effort_limit, stiffness, damping, friction, armature,
@@ -24,7 +24,7 @@ is the link `base`, whose frame is the world's.
 - damping of a body or link: resistance to its linear and angular motion, (2,) [1/s], 0 of links.
   A body's own replaces that of the settings.
 - gravity of a body or link: the share of the scene's gravity that it feels, 1.
-- dynamic: 1 if forces can move the body, else 0.
+- dynamic: 1 if forces can move the body, else 0; a prescribed one is moved by none.
 - velocity: of the centre of mass, then angular, in the world frame, (6,) [m/s, rad/s].
 - touches: the shares of ground, bodies and links that it can collide with, (3,). Links do not
   collide with links; what can never meet (fixed things) is left out of count; 0 where
@@ -68,13 +68,13 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
             friction=body.friction,
             restitution=body.restitution,
             margin=0.0,
-            dynamic=float(not body.fixed),
+            dynamic=float(body.mass > 0),
         )
         boxes: list[FloatArray] = []
         rounds: list[FloatArray] = []
         (boxes if isinstance(body, Box) else rounds).append(body.reach(DIRECTIONS))
         quantities |= outlines(f"body/{body.name}", boxes, [], rounds)
-        if not body.fixed:
+        if body.mass:
             inertia = np.diag(body.inertia())
             quantities |= _inertial(f"body/{body.name}", body.mass, np.zeros(3), inertia)
             quantities[f"body/{body.name}/velocity"] = body.velocity
@@ -141,7 +141,7 @@ def touches(
     """
     links = _links(prepared)
     bodies = [f"body/{body.name}" for body in scene.bodies]
-    still = {"ground", *(f"body/{body.name}" for body in scene.fixed_bodies)}
+    still = {"ground", *(f"body/{body.name}" for body in scene.bodies if not body.mass)}
     if prepared is not None:
         still.add(f"link/{prepared.root}")
 

@@ -23,7 +23,16 @@ import pytest
 from pytest_simbench.client.environments import missing
 from pytest_simbench.simulator import Simulator
 from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.testing import contract, drives, dynamics, interaction, parity, physics, state
+from pytest_simbench.testing import (
+    acting,
+    contract,
+    drives,
+    dynamics,
+    interaction,
+    parity,
+    physics,
+    state,
+)
 from pytest_simbench.testing.checks import CHECKS, Check
 from pytest_simbench.testing.expected import (
     ConformanceWarning,
@@ -40,6 +49,7 @@ __all__ = [
     "ConformanceTest",
     "ConformanceWarning",
     "Subject",
+    "acting",
     "close_workers",
     "conformance_checks",
     "contract",

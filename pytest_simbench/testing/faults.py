@@ -75,6 +75,14 @@ def true_scene() -> Scene:
             ),
             Cylinder("can", 0.033, 0.11, LYING, 0.3, 0.7),
             Capsule("pill", 0.02, 0.06, Pose.at(0.8, -0.2, 0.36, yaw=0.3), 0.08, 0.7),
+            Box(
+                "belt",
+                (0.5, 0.2, 0.1),
+                Pose.at(-0.6, 0.5, 0.3, yaw=0.2),
+                friction=0.7,
+                linear_velocity=(0.3, 0.0, 0.0),
+                prescribed=True,
+            ),
             Cylinder("pillar", 0.04, 0.2, Pose.at(0.5, -0.6, 0.1), friction=0.7),
         ),
         robot=replace(scenes.arm(), friction=0.7),
@@ -332,6 +340,9 @@ FAULTS: dict[str, Fault] = {
     ),
     "fixed_body": Fault(
         "the cube is fixed in the world", "body/cube/dynamic", of_body("cube", mass=0.0)
+    ),
+    "driven_body": Fault(
+        "the belt is a free body", "body/belt/dynamic", of_body("belt", prescribed=False, mass=0.4)
     ),
     "gravity": Fault(
         "gravity is 1 % stronger", "gravity", of_scene(gravity=(0.303, -0.202, -3.737))

@@ -18,6 +18,7 @@ from pytest_simbench.scene import (
     Scene,
     Sphere,
     Vector3,
+    Wrench,
 )
 
 GRAVITY = -STANDARD_GRAVITY[2]
@@ -89,6 +90,41 @@ def damped() -> Scene:
         angular_damping=0.5,
     )
     return Scene("damped", (ball,), gravity=(0.0, 0.0, 0.0))
+
+
+def kicked() -> Scene:
+    """A turned brick that a force pulls and a turned cube that a torque turns, from 0.1 s to 0.3 s,
+    without weight."""
+    turn = Pose((0.1, -0.2, 2.0), (0.5, 0.5, -0.1, 0.7))
+    force = Wrench(force=(1.0, -2.0, 0.5), start=0.1, end=0.3)
+    torque = Wrench(torque=(1e-4, -2e-4, 5e-5), start=0.1, end=0.3)
+    brick = Box("brick", (0.1, 0.06, 0.03), turn, 0.5, wrenches=(force,))
+    turned = replace(cube("cube", turn.translated(x=0.5)), wrenches=(torque,))
+    return Scene("kicked", (brick, turned), gravity=(0.0, 0.0, 0.0))
+
+
+def driven() -> Scene:
+    """A belt with a cube on it, and a plate that turns as it rises, both prescribed."""
+    turn = Pose((0.0, 1.5, 0.8), (0.8, 0.0, 0.6, 0.0))
+    belt = Box(
+        "belt",
+        (2.0, 0.4, 0.1),
+        Pose.at(0.0, 0.0, 0.5),
+        friction=0.5,
+        linear_velocity=(0.5, 0.0, 0.0),
+        prescribed=True,
+    )
+    plate = Box(
+        "plate",
+        (0.4, 0.3, 0.1),
+        turn,
+        friction=0.5,
+        linear_velocity=(0.0, 0.0, 0.2),
+        angular_velocity=(0.5, -0.3, 1.0),
+        prescribed=True,
+    )
+    carried = cube("cube", Pose.at(0.0, 0.0, 0.55 + EDGE / 2), friction=0.5)
+    return Scene("driven", (belt, carried, plate), ground_friction=0.5)
 
 
 def standing() -> Scene:

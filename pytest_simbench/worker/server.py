@@ -30,6 +30,7 @@ from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.simulator.robot_check import check_names
 from pytest_simbench.simulator.robot_files import received
 from pytest_simbench.simulator.settings import changed
+from pytest_simbench.worker.acting import Acting
 from pytest_simbench.worker.state import check_following, check_log, check_start, checked_state
 from pytest_simbench.worker.stepping import Film, Stepper
 from pytest_simbench.worker.text import LONGEST_LOGGED, named, readable, told
@@ -131,7 +132,8 @@ class Server:
         check_names(world)
         simulator.load(world)
         self.scene = world
-        self.stepper = Stepper(simulator, lambda at: self.send({"alive": float(at)}))
+        acting = Acting.of(simulator, world)
+        self.stepper = Stepper(simulator, lambda at: self.send({"alive": float(at)}), acting)
         self.stepper.real_time = self.real_time
         check_start(simulator, world)
         excused: list[str] = []

@@ -72,7 +72,9 @@ def check_start(simulator: Simulator, scene: Scene) -> None:
     for what, values in (("joints", joints), ("bodies", bodies)):
         if not np.isfinite(values).all():
             raise StateError(f"{name}: the state of the {what} is not finite after loading")
+    led = [body.prescribed for body in scene.free_bodies]  # they begin in the first step
     asked = np.array([body.velocity for body in scene.free_bodies]).reshape(-1, 6)
+    asked[led] = bodies[led, 7:]
     wrong = [joints[1], bodies[:, 7:] - asked]
     allowed = [REST_TOLERANCE, REST_TOLERANCE + SPEED_TOLERANCE * np.abs(asked)]
     fastest = max((float(np.abs(values).max()) for values in wrong if values.size), default=0.0)

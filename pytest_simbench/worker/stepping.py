@@ -11,6 +11,7 @@ import numpy as np
 
 from pytest_simbench.scene import FloatArray, Trajectory
 from pytest_simbench.simulator import DivergedError, Simulator
+from pytest_simbench.worker.acting import Acting
 from pytest_simbench.worker.control import Clock, Control
 
 HEARTBEAT_PERIOD = 0.5
@@ -81,15 +82,22 @@ class Stepper:
     """Steps one simulator through trajectories and waits, and keeps its clocks.
 
     Attributes:
+        acting: what moves bodies from outside; None: nothing.
         film: pictures along the way, outside of the measured stepping time; None: none.
         clocks: totals since loading.
         control: the workload that shows the machine's speed meanwhile.
         real_time: wait for the wall clock after each step, as the study's simulators did.
     """
 
-    def __init__(self, simulator: Simulator, heartbeat: Callable[[float], None]) -> None:
+    def __init__(
+        self,
+        simulator: Simulator,
+        heartbeat: Callable[[float], None],
+        acting: Acting | None = None,
+    ) -> None:
         self.simulator = simulator
         self.heartbeat = heartbeat
+        self.acting = acting
         self.clocks = Clocks()
         self._clock = Clock()
         self.control = Control(self._clock)
@@ -131,12 +139,15 @@ class Stepper:
         log = Log()
         step, command, clock = simulator.step, simulator.command, self._clock
         totals, keep_up = self.clocks, self.control.keep_up
+        act = self.acting.steps() if self.acting is not None else None
         cpu_began = time.process_time()
         began, waited = clock()
         beat = resumed = began
         for k in range(1, steps + 1):
             if rows is not None:
                 command(*rows[k - 1])
+            if act is not None:
+                act()
             step()
             logs = log_every and k % log_every == 0
             films = film_every and (totals.steps + k) % film_every == 0

@@ -22,7 +22,16 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Scene, Sphere
+from pytest_simbench.scene import (
+    Body,
+    Box,
+    Capsule,
+    Cylinder,
+    FloatArray,
+    Scene,
+    Sphere,
+    rotation_matrix,
+)
 from pytest_simbench.simulator import (
     FOLLOWER,
     Capability,
@@ -145,6 +154,7 @@ class DART(Simulator):
         self._ground = self._add_ground(scene.ground_friction, scene.ground_restitution)
         self._bodies = {box.name: self._add_body(box) for box in scene.bodies}
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
+        self._led = [self._bodies[box.name] for box in scene.prescribed_bodies]
         self._robot: Any = None
         self.prepared = None
         self._base = np.empty(0)
@@ -198,10 +208,13 @@ class DART(Simulator):
             skeleton.setMobile(False)
         else:
             joint, body = skeleton.createFreeJointAndBodyNodePair()
-            inertia = dynamics.Inertia()
-            inertia.setMass(box.mass)
-            inertia.setMoment(np.diag(box.inertia()))
-            body.setInertia(inertia)
+            if box.prescribed:
+                joint.setActuatorType(dynamics.ActuatorType.VELOCITY)
+            else:
+                inertia = dynamics.Inertia()
+                inertia.setMass(box.mass)
+                inertia.setMoment(np.diag(box.inertia()))
+                body.setInertia(inertia)
             joint.setPositions(dynamics.FreeJoint.convertToPositions(place))
             damping = [*(box.angular_damping * box.inertia()), *[box.linear_damping * box.mass] * 3]
             for k, value in enumerate(damping):
@@ -264,6 +277,22 @@ class DART(Simulator):
         base = np.zeros(len(self._index))
         base[self._index] = self._gain * position + self._share * velocity
         self._base = base
+
+    def push(self, wrenches: FloatArray) -> None:
+        for body, row in zip(self._free, wrenches, strict=True):
+            body.clearExternalForces()  # they last
+            body.addExtForce(row[:3], np.zeros(3), False, True)
+            body.addExtTorque(row[3:], False)
+
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        for body, row in zip(self._led, before, strict=True):
+            joint, place = body.getParentJoint(), dartpy.math.Isometry3()
+            place.set_translation(row[:3])
+            place.set_rotation(rotation_matrix(row[3:7]))
+            joint.setPositions(dartpy.dynamics.FreeJoint.convertToPositions(place))
+            joint.setLinearVelocity(row[7:10])
+            joint.setAngularVelocity(row[10:])
+            joint.setCommands(joint.getVelocities())
 
     def step(self) -> None:
         if self._robot is not None:

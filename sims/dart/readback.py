@@ -90,7 +90,7 @@ class ReadBack:
         mobile = body.getSkeleton().isMobile() and joint.getNumDofs() == 6
         driven = {dartpy.dynamics.ActuatorType.FORCE, dartpy.dynamics.ActuatorType.PASSIVE}
         found[f"{prefix}/dynamic"] = float(mobile and joint.getActuatorType() in driven)
-        if joint.getNumDofs():
+        if joint.getNumDofs() and joint.getActuatorType() in driven:
             found |= _inertial(prefix, body)
             speeds = [body.getCOMLinearVelocity(), body.getAngularVelocity()]
             found[f"{prefix}/velocity"] = np.concatenate(speeds)

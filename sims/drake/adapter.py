@@ -173,6 +173,7 @@ class Drake(Simulator):
         for at, box in zip(self._bodies_at, scene.free_bodies, strict=True):
             state[at[7:]] = box.velocity
         self.plant.SetPositionsAndVelocities(self.context, state)
+        self._led = [body.prescribed for body in scene.free_bodies]
         self._steps = 0
         self._has_camera = False
         self.simulator.Initialize()
@@ -202,6 +203,16 @@ class Drake(Simulator):
             np.concatenate([position, velocity])
         )
         self._efforts.GetMutableData().get_mutable_value().SetFromVector(effort)
+
+    def push(self, wrenches: FloatArray) -> None:
+        forces = np.zeros(self.plant.num_velocities())
+        forces[self._bodies_at[:, 7:] - self.plant.num_positions()] = wrenches
+        self.plant.get_applied_generalized_force_input_port().FixValue(self.context, forces)
+
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        state = self.plant.GetPositionsAndVelocities(self.context).copy()
+        state[self._bodies_at[self._led]] = before
+        self.plant.SetPositionsAndVelocities(self.context, state)
 
     def step(self) -> None:
         self._steps += 1

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.scene import FloatArray, Pose
-from pytest_simbench.simulator import PreparedRobot, lazy_import, one_value
+from pytest_simbench.simulator import PreparedRobot, heavy, lazy_import, one_value
 from pytest_simbench.simulator.quantities import touches
 from pytest_simbench.simulator.shapes import (
     box_corners,
@@ -60,8 +60,9 @@ class ReadBack:
         if not free:
             frame = self.inspector.GetPoseInFrame(world.shapes[name][0])
         found = self._part(prefix, name, world.plant.EvalBodyPoseInWorld(self.context, body), frame)
-        found[f"{prefix}/dynamic"] = float(free and not body.is_locked(self.context))
-        if free:
+        light = body.default_mass() < heavy(world.scene)  # else it moves as prescribed
+        found[f"{prefix}/dynamic"] = float(free and light and not body.is_locked(self.context))
+        if free and light:
             found |= self._inertial(prefix, body)
             speed = world.plant.EvalBodySpatialVelocityInWorld(self.context, body)
             found[f"{prefix}/velocity"] = [*speed.translational(), *speed.rotational()]

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Pose, Scene, Sphere
-from pytest_simbench.simulator import NotSupportedError, PreparedRobot, Settings, lazy_import
+from pytest_simbench.simulator import NotSupportedError, PreparedRobot, Settings, heavy, lazy_import
 from pytest_simbench.simulator.shapes import mesh_points
 from pytest_simbench.simulator.urdf import Link, Shape
 
@@ -162,6 +162,8 @@ class World:
         solid, weighted, arguments = _solid(part)
         if part.fixed:
             body, pose = self.plant.world_body(), part.pose
+        elif part.prescribed:
+            body, pose = self._add_heavy(part), Pose()
         else:
             inertia = getattr(trees.SpatialInertia, weighted)(part.mass, *arguments)
             if part.moments is not None:
@@ -169,15 +171,25 @@ class World:
                 inertia = trees.SpatialInertia.MakeFromCentralInertia(
                     part.mass, np.zeros(3), central
                 )
-            body, pose = self.plant.AddRigidBody(part.name, inertia), Pose()
+            own = trees.default_model_instance()
+            body, pose = self.plant.AddRigidBody(part.name, own, inertia), Pose()
             if part.damping.any():
                 self._damp(body, part)
         core = solid
-        if isinstance(part, Box) and not part.fixed and self.settings.corner_radius:
+        if isinstance(part, Box) and part.mass and self.settings.corner_radius:
             core = self._add_corners(body, part)
         self._add_shape(body, part.name, "box", core, pose, part.friction)
         self._add_picture(body, part.name, solid, pose, part.colour)
         return body
+
+    def _add_heavy(self, part: Body) -> Any:
+        """A body that nothing moves, without weight; Drake has none that move as prescribed."""
+        plant, mass = self.plant, heavy(self.scene)
+        central = trees.RotationalInertia(mass, mass, mass)
+        alone = plant.AddModelInstance(f"{part.name}/prescribed")
+        plant.mutable_gravity_field().set_enabled(alone, False)
+        inertia = trees.SpatialInertia.MakeFromCentralInertia(mass, np.zeros(3), central)
+        return plant.AddRigidBody(part.name, alone, inertia)
 
     def _damp(self, body: Any, part: Body) -> None:
         """The damping of a floating joint, whose torque is the same about all axes."""
@@ -245,6 +257,12 @@ class World:
             apart.append(geometry.GeometrySet(frames))
         if self._spheres:  # they carry flat faces; one on top of another would roll off
             apart.append(geometry.GeometrySet(self._spheres))
+        led = [made for body in self.scene.prescribed_bodies for made in self.shapes[body.name]]
+        if led:  # they touch what they can move
+            still = [body.name for body in self.scene.bodies if not body.mass]
+            fixed = [made for name in ("ground", *still) for made in self.shapes[name]]
+            pair = geometry.GeometrySet(led), geometry.GeometrySet(fixed)
+            manager.Apply(geometry.CollisionFilterDeclaration().ExcludeBetween(*pair))
         for group in apart:
             manager.Apply(geometry.CollisionFilterDeclaration().ExcludeWithin(group))
 

@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.simulator import (
     FOLLOWER,
     Deviation,
@@ -183,6 +184,14 @@ class Gazebo(Simulator):
         # A velocity command finds the effort itself, so there is nothing to feed forward.
         if self._drives is not None:
             self._drives.command(position, velocity)
+
+    def push(self, wrenches: FloatArray) -> None:
+        vector3, turned = bindings().math.Vector3d, self._physics.turns_torques
+        turns = rotations(self.body_state()[:, 3:7]) if turned else None
+        for k, (row, link) in enumerate(zip(wrenches, self._free, strict=True)):
+            torque = row[3:] if turns is None else turns[k].T @ row[3:]
+            if row.any():
+                link.add_world_wrench(self.server.ecm, vector3(*row[:3]), vector3(*torque))
 
     def step(self) -> None:
         if self._drives is not None:

@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.scene import FloatArray, Scene, rotation_matrix
 from pytest_simbench.simulator import (
     Capability,
     DataSeen,
@@ -30,11 +30,11 @@ from pytest_simbench.simulator import (
     Settings,
     Simulator,
     SimulatorInfo,
+    heavy,
     lazy_import,
 )
-from pytest_simbench.simulator.bounces import direct
 
-from ..mujoco.adapter import BOUNCES
+from ..mujoco.bounces import BOUNCES, direct
 from .engine import (
     array_of,
     forget_worlds,
@@ -129,10 +129,13 @@ class Genesis(Simulator):
         options = dataclasses.replace(  # what is data, not code
             self.settings, timestep=1.0, substeps=1, constraint_timeconst=1.0, impedance=(0.9, 0.95)
         )
-        kind = (options, several, scene.robot is not None, bool(scene.free_bodies))
+        forces = scene.words & {"wrench", "prescribed"}  # whose kernels are others
+        kind = (options, several, scene.robot is not None, bool(scene.free_bodies), forces)
         if kind in self.compiled:
             return
         self.load(scene)
+        if "wrench" in forces:
+            self.push(np.zeros((len(self._free), 6)))
         self.step()
         self.body_state()
         self.read_back()
@@ -150,12 +153,13 @@ class Genesis(Simulator):
         self._ground = world.add_entity(
             genesis.morphs.Plane(), material=material(scene.ground_friction)
         )
-        self._boxes = {box.name: add_body(world, box) for box in scene.bodies}
+        self._boxes = {box.name: add_body(world, box, heavy(scene)) for box in scene.bodies}
         self._robot: Any = None if self.prepared is None else add_robot(world, self.prepared)
         world.build()
         self.solver = world.rigid_solver
         self._set_contacts(scene)
         self._free = [self._boxes[box.name].links[0].idx for box in scene.free_bodies]
+        self._led = [self._boxes[box.name].links[0] for box in scene.prescribed_bodies]
         self._start_bodies(scene)
         self._dofs: list[int] = []
         if scene.robot is not None:
@@ -234,6 +238,18 @@ class Genesis(Simulator):
         self.solver.control_dofs_position_velocity(
             position + effort / self._stiffness, velocity, self._dofs
         )
+
+    def push(self, wrenches: FloatArray) -> None:
+        force, torque = np.hsplit(wrenches, 2)
+        solver = self.solver
+        solver.apply_links_external_force(force, self._free, ref="link_com")
+        solver.apply_links_external_torque(torque, self._free, ref="link_com")
+
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        for link, row in zip(self._led, before, strict=True):
+            spin = rotation_matrix(row[3:7]).T @ row[10:]
+            dofs = list(range(link.dof_start, link.dof_end))
+            self.solver.set_dofs_velocity([*row[7:10], *spin], dofs)
 
     def step(self) -> None:
         self.world.step(update_visualizer=False)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.scene import FloatArray, Pose, Scene, rotation_matrix
-from pytest_simbench.simulator import PreparedRobot, lazy_import, one_value
+from pytest_simbench.simulator import PreparedRobot, heavy, lazy_import, one_value
 from pytest_simbench.simulator.quantities import touches
 from pytest_simbench.simulator.shapes import (
     box_corners,
@@ -70,8 +70,9 @@ class ReadBack:
         for name, link, pose in zip(self.boxes, links, self._poses(links), strict=True):
             prefix = f"body/{name}"
             reported |= self._part(prefix, link, pose)
-            reported[f"{prefix}/dynamic"] = float(self._is_free(link))
-            if link.n_dofs:
+            led = self._array("links", "inertial_mass")[link.idx] >= heavy(self.scene)
+            reported[f"{prefix}/dynamic"] = float(self._is_free(link) and not led)
+            if link.n_dofs and not led:
                 reported |= self._inertial(prefix, link)
                 reported[f"{prefix}/damping"] = self._damping(link)
                 reported[f"{prefix}/velocity"] = self._velocity(link)

@@ -85,19 +85,22 @@ def new_world(scene: Scene, settings: GenesisSettings, *, window: bool) -> Any:
     )
 
 
-def material(friction: float, density: float | None = None) -> Any:
+def material(friction: float, density: float | None = None, **others: float) -> Any:
     """Of a friction coefficient, the least at least, and a density [kg/m^3] or the engine's own."""
-    return genesis.materials.Rigid(rho=density, friction=max(friction, LEAST_FRICTION))
+    return genesis.materials.Rigid(rho=density, friction=max(friction, LEAST_FRICTION), **others)
 
 
-def add_body(world: Any, body: Body) -> Any:
-    """The entity of a body, fixed or free."""
+def add_body(world: Any, body: Body, most: float) -> Any:
+    """The entity of a body; a prescribed one weighs `most` [kg]."""
+    stuff = {"gravity_compensation": 1.0} if body.prescribed else {}
+    if body.prescribed:
+        body = body.changed(prescribed=False, mass=most, moments=(most,) * 3)
     uneven = body.moments is not None
     density = None if body.fixed or uneven else body.mass / body.volume
     surface = genesis.surfaces.Default(color=body.colour)
     return world.add_entity(
         _described(body) if uneven else _morph(body),
-        material=material(body.friction, density),
+        material=material(body.friction, density, **stuff),
         surface=surface,
     )
 

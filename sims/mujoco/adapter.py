@@ -16,7 +16,8 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Scene, Sphere
+from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Scene, Sphere, Vector3
+from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.simulator import (
     Capability,
     DataSeen,
@@ -28,26 +29,23 @@ from pytest_simbench.simulator import (
     Settings,
     Simulator,
     SimulatorInfo,
+    heavy,
     lazy_import,
 )
-from pytest_simbench.simulator.bounces import direct
 
 from . import releases
+from .bounces import BOUNCES, direct
+from .heavy import leave_out
 from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack
 
 mujoco = lazy_import("mujoco")
 
-ROBOT, WORLD = 1, 2
-"""Collision groups: the robot's links touch everything but each other."""
+ROBOT, WORLD, LED = 1, 2, 4
+"""Collision groups: the robot's links touch everything but each other; prescribed bodies touch what
+they can move."""
 
 LINK_COLOUR, GROUND_COLOUR = (0.9, 0.9, 0.9, 1.0), (0.5, 0.5, 0.5, 1.0)
-
-
-BOUNCES = (
-    "restitution is a spring with a damper: an impact takes twelve steps, and is as deep as the "
-    "body moves in four; e is met within 0.03, and none below 0.21 can be had"
-)
 
 
 @dataclass(frozen=True)
@@ -158,6 +156,7 @@ class MuJoCo(Simulator):
         self._set_surface(
             ground, scene.ground_friction, scene.ground_restitution, WORLD, WORLD | ROBOT
         )
+        self._heavy = heavy(scene)
         for part in scene.bodies:
             self._add_body(spec, part)
         spec.worldbody.add_light(pos=[0.5, 0, 3], dir=[0, 0, -1])
@@ -178,7 +177,7 @@ class MuJoCo(Simulator):
         free = [model.joint(f"{body.name}/free") for body in scene.free_bodies]
         self._body_q = np.array([j.qposadr[0] + np.arange(7) for j in free], int).reshape(-1, 7)
         self._body_v = np.array([j.dofadr[0] + np.arange(3) for j in free], int).reshape(-1, 3)
-        self._rotations = np.array([model.body(b.name).id for b in scene.free_bodies], dtype=int)
+        self._body_ids = np.array([model.body(b.name).id for b in scene.free_bodies], dtype=int)
         for at, body in zip(self._body_v, scene.free_bodies, strict=True):
             data.qvel[at] = body.linear_velocity
             data.qvel[at + 3] = body.pose.rotation().T @ body.angular_velocity  # in its own frame
@@ -186,7 +185,10 @@ class MuJoCo(Simulator):
             if body.damping.any():
                 model.dof_damping[at] = body.linear_damping * body.mass
                 model.dof_damping[at + 3] = body.angular_damping * body.inertia()
+        self._led = np.flatnonzero([body.prescribed for body in scene.free_bodies])
         mujoco.mj_forward(model, data)
+        if len(self._led):
+            leave_out(model, self._body_v[self._led, 0])
         self._viewer: Any = None
         self._renderer: Any = None
         if self.gui:
@@ -227,11 +229,16 @@ class MuJoCo(Simulator):
         self._set_surface(geom, part.friction, part.restitution, WORLD, WORLD | ROBOT)
         if not isinstance(part, Box):  # their contacts neither roll nor spin with friction
             geom.condim, geom.priority = 3, 1
-        if not part.fixed:
+        if part.prescribed:
+            geom.contype, geom.conaffinity = LED, ROBOT
+            _set_inertia(body, self._heavy, (self._heavy,) * 3)
+            body.gravcomp = 1.0
+            body.add_freejoint(name=f"{part.name}/free")
+        elif not part.fixed:
+            geom.conaffinity |= LED
             geom.mass = part.mass
             if part.moments is not None:
-                body.mass, body.inertia, body.explicitinertial = part.mass, part.moments, True
-                body.ipos, body.iquat = [0, 0, 0], [1, 0, 0, 0]
+                _set_inertia(body, part.mass, part.moments)
             body.add_freejoint(name=f"{part.name}/free")
 
     def read_back(self) -> dict[str, Any]:
@@ -249,6 +256,15 @@ class MuJoCo(Simulator):
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self.data.ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness
 
+    def push(self, wrenches: FloatArray) -> None:
+        self.data.xfrc_applied[self._body_ids] = wrenches
+
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        self.data.qpos[self._body_q[self._led]] = before[:, :7]
+        self.data.qvel[self._body_v[self._led]] = before[:, 7:10]
+        spins = np.einsum("nij,ni->nj", rotations(before[:, 3:7]), before[:, 10:])
+        self.data.qvel[self._body_v[self._led] + 3] = spins  # in its own frame
+
     def step(self) -> None:
         mujoco.mj_step(self.model, self.data)
 
@@ -261,8 +277,7 @@ class MuJoCo(Simulator):
         state[:, :7] = self.data.qpos[self._body_q]
         state[:, 7:10] = self.data.qvel[self._body_v]
         local = self.data.qvel[self._body_v + 3]
-        rotations = _rotations(state[:, 3:7])
-        state[:, 10:] = np.einsum("nij,nj->ni", rotations, local)
+        state[:, 10:] = np.einsum("nij,nj->ni", rotations(state[:, 3:7]), local)
         return state
 
     def joint_state(self) -> FloatArray:
@@ -334,6 +349,12 @@ def _geom(body: Body) -> tuple[str, list[float]]:
     raise NotSupportedError(f"mujoco has no {type(body).__name__}")
 
 
+def _set_inertia(body: Any, mass: float, moments: Vector3) -> None:
+    """About its origin, along its axes."""
+    body.mass, body.inertia, body.explicitinertial = mass, moments, True
+    body.ipos, body.iquat = [0, 0, 0], [1, 0, 0, 0]
+
+
 def _mujoco_urdf(prepared: PreparedRobot) -> str:
     """The reduced URDF with MuJoCo's compiler element: paths kept, visuals dropped."""
     compiler = (
@@ -367,14 +388,3 @@ def _couple_fingers(spec: Any, first: str, second: str) -> None:
         data=releases.equality_data(mujoco, [0.0, 1.0]),
         solref=[2 * spec.option.timestep, 1.0],
     )
-
-
-def _rotations(quaternions: FloatArray) -> FloatArray:
-    """Rotation matrices (n, 3, 3) of quaternions w, x, y, z (n, 4)."""
-    w, x, y, z = quaternions.T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.array(rows).transpose(2, 0, 1)

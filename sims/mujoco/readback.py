@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.scene import FloatArray, Pose, Scene
-from pytest_simbench.simulator import PreparedRobot, lazy_import, one_value
-from pytest_simbench.simulator.bounces import restitution_of
+from pytest_simbench.simulator import PreparedRobot, heavy, lazy_import, one_value
 from pytest_simbench.simulator.quantities import touches
 from pytest_simbench.simulator.shapes import (
     box_corners,
@@ -20,6 +19,8 @@ from pytest_simbench.simulator.shapes import (
     reach,
     round_reach,
 )
+
+from .bounces import restitution_of
 
 mujoco = lazy_import("mujoco")
 
@@ -84,10 +85,11 @@ class ReadBack:
         """A box, whose frame is its shape's: a fixed one may have no body of its own."""
         model, body = self.model, int(self.model.geom_bodyid[geom])
         place, turn = self.data.geom_xpos[geom], self.data.geom_xmat[geom].reshape(3, 3)
-        free = self._can_move(body)
+        light = self.model.body_mass[body] < heavy(self.scene)  # else it moves as prescribed
+        free = light and self._can_move(body)
         found = self._surface(prefix, [geom], place, turn)
         found[f"{prefix}/dynamic"] = float(free)
-        if model.body_dofnum[body]:
+        if model.body_dofnum[body] and light:
             found |= self._inertial(prefix, body, place, turn)
             found[f"{prefix}/velocity"] = self._velocity(body)
             dof = model.body_dofadr[body] + np.arange(6)

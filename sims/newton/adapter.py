@@ -29,14 +29,18 @@ from pytest_simbench.simulator import (
     Settings,
     Simulator,
     SimulatorInfo,
+    heavy,
     lazy_import,
 )
-from pytest_simbench.simulator.bounces import direct
 
-from ..mujoco.adapter import BOUNCES
+from ..mujoco.bounces import BOUNCES, direct
+from ..mujoco.heavy import leave_out
 from ..mujoco.pictures import DISABLED, camera, renderer
 from ..mujoco.readback import Numbers, ReadBack
 from .world import NewtonSettings, build_model, make_solver, names
+
+LED = 1 << 20
+"""Collision group of prescribed bodies, which Newton gives nobody."""
 
 newton = lazy_import("newton")
 wp = lazy_import("warp")
@@ -162,6 +166,13 @@ class Newton(Simulator):
                 model.dof_damping[at : at + 3] = body.linear_damping * body.mass
                 model.dof_damping[at + 3 : at + 6] = body.angular_damping * body.inertia()
 
+        if led := [body.name for body in scene.prescribed_bodies]:
+            geoms = [self._geom(name) for name in led]
+            moving = model.body_dofnum[model.geom_bodyid] > 0
+            model.geom_conaffinity[moving] |= LED  # they touch what they can move
+            model.geom_contype[geoms], model.geom_conaffinity[geoms] = LED, 0
+            leave_out(model, [model.body_dofadr[model.geom_bodyid[geom]] for geom in geoms])
+
     def _show_mujoco_the_start(self) -> None:
         """Newton hands its state to MuJoCo only in `step`; it may be looked at before."""
         model, data = self.solver.mj_model, self.solver.mj_data
@@ -190,6 +201,9 @@ class Newton(Simulator):
         self._joints = joints = np.array([labels.index(name) for name in driven], dtype=int)
         self._q = model.joint_q_start.numpy()[joints]
         self._v = model.joint_qd_start.numpy()[joints]
+        led = [model.body_label.index(body.name) for body in scene.prescribed_bodies]
+        children = model.joint_child.numpy().tolist()
+        self._led = led, [children.index(body) for body in led]
         self._free = [model.body_label.index(body.name) for body in scene.free_bodies]
         if scene.robot is not None:
             self._stiffness = scene.robot.column("stiffness")
@@ -222,6 +236,19 @@ class Newton(Simulator):
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self._ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness
+
+    def push(self, wrenches: FloatArray) -> None:
+        for state in self._states:  # which take turns
+            state.body_f.numpy()[self._free] = wrenches
+
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        state, model = self._states[0], self.model
+        weight = heavy(self.scene) * np.asarray(self.scene.gravity)
+        for body, joint, row in zip(*self._led, before, strict=True):
+            q, v = model.joint_q_start.numpy()[joint], model.joint_qd_start.numpy()[joint]
+            state.joint_q.numpy()[q : q + 7] = row[[0, 1, 2, 4, 5, 6, 3]]
+            state.joint_qd.numpy()[v : v + 6] = row[7:]
+            state.body_f.numpy()[body, :3] = -weight
 
     def step(self) -> None:
         before, after = self._states

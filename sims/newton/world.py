@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from pytest_simbench.scene import Body, Box, Capsule, Cylinder, Joint, Pose, Scene, Sphere
-from pytest_simbench.simulator import PreparedRobot, Settings, lazy_import
+from pytest_simbench.simulator import PreparedRobot, Settings, heavy, lazy_import
 
 newton = lazy_import("newton")
 wp = lazy_import("warp")
@@ -51,7 +51,7 @@ def build_model(scene: Scene, prepared: PreparedRobot | None, settings: NewtonSe
         _add_robot(builder, prepared, _surface(prepared.robot.friction, settings))
     builder.add_ground_plane(cfg=_surface(scene.ground_friction, settings), label="ground")
     for body in scene.bodies:
-        _add_body(builder, body, _surface(body.friction, settings))
+        _add_body(builder, body, _surface(body.friction, settings), heavy(scene))
     model = builder.finalize(device="cpu")
     # What MuJoCo needs of a contact beyond Newton's own parameters.
     model.mujoco.condim.fill_(settings.condim)
@@ -108,11 +108,13 @@ def _add_robot(builder: Any, prepared: PreparedRobot, surface: Any) -> None:
         builder.set_joint_mimic(joints.index(second), joints.index(first))
 
 
-def _add_body(builder: Any, part: Body, surface: Any) -> None:
+def _add_body(builder: Any, part: Body, surface: Any, most: float) -> None:
     pose, body = _transform(part.pose), -1
     if not part.fixed:
         inertial: dict[str, Any] = {}
-        if part.moments is None:
+        if part.prescribed:
+            inertial = {"mass": most, "inertia": wp.mat33(most * np.eye(3))}
+        elif part.moments is None:
             surface.density = part.mass / part.volume
         else:
             inertial = {"mass": part.mass, "inertia": wp.mat33(np.diag(part.moments))}

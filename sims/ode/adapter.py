@@ -181,6 +181,7 @@ class ODE(Simulator):
             box.name: build.add_body(world, space, box, s.timestep) for box in scene.bodies
         }
         self._free = [self._bodies[box.name].body for box in scene.free_bodies]
+        self._led = [self._bodies[box.name].body for box in scene.prescribed_bodies]
         self._links: dict[str, Part] = {}
         self._axes: dict[str, Axis] = {}
         self._drives: Drives | None = None
@@ -218,6 +219,20 @@ class ODE(Simulator):
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         if self._drives is not None:
             self._drives.command(position, velocity, effort)
+
+    def push(self, wrenches: FloatArray) -> None:
+        for body, row in zip(self._free, wrenches, strict=True):
+            if row.any():
+                body.enable()  # a force wakes nobody
+                body.addForce(row[:3])
+                body.addTorque(row[3:])
+
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        for body, row in zip(self._led, before, strict=True):
+            body.setPosition(row[:3])
+            body.setQuaternion(row[3:7])
+            body.setLinearVel(row[7:10])
+            body.setAngularVel(row[10:])
 
     def step(self) -> None:
         if self._drives is not None:

@@ -72,7 +72,7 @@ class ReadBack:
         }
         for name, part in self.bodies.items():
             reported |= self._part(f"body/{name}", part)
-            if part.body is not None:
+            if part.body is not None and not part.body.isKinematic():
                 velocity = [*part.body.getLinearVel(), *part.body.getAngularVel()]
                 reported[f"body/{name}/velocity"] = velocity
             free = part.body is not None and not part.body.isKinematic()
@@ -102,7 +102,7 @@ class ReadBack:
         if part.geoms:
             found[f"{prefix}/friction"] = part.surface.friction
             found[f"{prefix}/restitution"] = part.surface.bounce
-        if part.body is not None:
+        if part.body is not None and not part.body.isKinematic():
             found |= self._inertial(prefix, part)
         return found
 

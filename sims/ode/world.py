@@ -38,11 +38,14 @@ def add_body(world: Any, space: Any, box: Body, timestep: float) -> Part:
     """A body, fixed or free, in a world with this time step [s]."""
     geom = _solid(space, box)
     part = Part(Surface(None, box.friction, box.restitution))
-    part.add(geom, FIXED if box.fixed else FREE)
+    part.add(geom, FREE if box.mass else FIXED)
     if box.fixed:
         place(geom, box.pose)
         return part
-    part.surface.body = _body(world, box.mass, np.diag(box.inertia()), box.pose)
+    weight = (1.0, np.eye(3)) if box.prescribed else (box.mass, np.diag(box.inertia()))
+    part.surface.body = _body(world, *weight, box.pose)
+    if box.prescribed:
+        part.body.setKinematic()
     set_damping(part.body, box.damping * timestep)
     part.body.setLinearVel(box.linear_velocity)
     part.body.setAngularVel(box.angular_velocity)

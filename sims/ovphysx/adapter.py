@@ -186,6 +186,7 @@ class OvPhysX(Simulator):
         self._text = usd.Stage(scene, self.prepared, _attributes(self.settings)).text()
         self._start()
         self._free = [usd.body_path(i) for i, box in enumerate(scene.bodies) if not box.fixed]
+        self._led = [usd.body_path(i) for i, box in enumerate(scene.bodies) if box.prescribed]
         self._joints: list[str] = []
         self._unit = np.empty(0)
         self._placed: dict[str, Pose] = {}
@@ -229,11 +230,25 @@ class OvPhysX(Simulator):
             buffer[0, self._columns] = values
             binding.write(buffer)
 
+    def push(self, wrenches: FloatArray) -> None:
+        rows = np.hstack([wrenches, self.body_state()[:, :3]])  # and where the force acts
+        if self._steps == 0:
+            self.session.write("RIGID_BODY", "wrench", dict(zip(self._free, rows, strict=True)))
+        else:
+            binding, buffer = self._binding("RIGID_BODY_WRENCH")
+            buffer[:] = rows
+            binding.write(buffer)
+
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        for name, columns in (("Position", [0, 1, 2]), ("Orientation", [4, 5, 6, 3])):
+            targets = dict(zip(self._led, after[:, columns], strict=True))
+            self.session.write("RIGID_BODY", f"kinematicTarget{name}", targets)
+
     def step(self) -> None:
         if self._steps == 0 and self._targets is not None:
             for kind, values in zip(("Position", "Velocity"), self._targets, strict=True):
                 given = zip(self._joints, values / self._unit, strict=True)
-                self.session.write_joints(f"joint{kind}Target", dict(given))
+                self.session.write("ARTICULATION_JOINT", f"joint{kind}Target", dict(given))
         self.session.physx.step_sync(self.settings.timestep)
         self._steps += 1
         if self._steps == 1 and self._joints:

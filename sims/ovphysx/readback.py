@@ -62,7 +62,7 @@ def read_back(
         else:
             outline = outlines(prefix, [], [], [session.reach(shape, pose, Pose())])
         reported |= _part(values, path, prefix) | outline
-        if not box.fixed:
+        if box.mass:
             reported |= _inertial(values, path, prefix)
             velocity = [values[name][path] for name in ("linearVelocity", "angularVelocity")]
             reported[f"{prefix}/velocity"] = np.concatenate(velocity)

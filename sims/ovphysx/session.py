@@ -88,15 +88,19 @@ class Session:
                 found[name].update(zip(paths, rows, strict=True))
         return found
 
-    def write_joints(self, attribute: str, values: Mapping[str, float]) -> None:
-        """Set an attribute of all joints, by prim path."""
+    def write(self, kind: str, attribute: str, values: Mapping[str, Any]) -> None:
+        """Set an attribute of all objects of a kind (`SimObjectType`), by prim path; 0 where none
+        is given."""
         dictionary = ovstage.PathDictionary(self._stage)
-        kind = ovphysx_types.SimObjectType.ARTICULATION_JOINT
-        with self.physx.write_sync(kind, attribute) as session:
+        target = getattr(ovphysx_types.SimObjectType, kind)
+        with self.physx.write_sync(target, attribute) as session:
             for group in session.groups:
                 paths = dictionary.get_path_strings(group.prim_list)
-                for path, tensor in zip(paths, group.tensors, strict=True):
-                    tensor.numpy()[:] = values[path]
+                rows = [tensor.numpy() for tensor in group.tensors]
+                if len(rows) < len(paths):  # one tensor of all
+                    rows = [*rows[0]]
+                for path, row in zip(paths, rows, strict=True):
+                    row[...] = values.get(path, 0.0)
                 session.commit_sync(group)
 
     def size(self, collider: str, pose: Pose) -> FloatArray:

@@ -129,13 +129,13 @@ class Stage:
         return usd.prim("Plane", "ground", _COLLIDER, lines)
 
     def _body(self, index: int, box: Body) -> str:
-        """A rigid body; kinematic where it is fixed, since PhysX reports nothing of static ones."""
+        """A rigid body; kinematic where it has no mass: PhysX reports nothing of static ones."""
         kind, size = _solid(box)
         shape = usd.prim(
             kind, "shape", _COLLIDER, [*size, *self._surface(box.friction, box.restitution)]
         )
         lines = [*usd.placed(box.pose), *self._rigid(box)]
-        if box.fixed:
+        if not box.mass:
             lines.append("bool physics:kinematicEnabled = true")
         else:
             lines += usd.mass_lines(box.mass, np.zeros(3), np.diag(box.inertia()))

@@ -13,75 +13,31 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Scene, Sphere
+from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
     DataSeen,
     Deviation,
-    NotSupportedError,
     PreparedRobot,
     SeedsSeen,
     Seen,
     Settings,
     Simulator,
     SimulatorInfo,
+    heavy,
     lazy_import,
 )
 from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
 
 from .readback import ReadBack
+from .world import ROBOT, PyBulletSettings, add_body, set_surface
 
 pybullet = lazy_import("pybullet")
-
-ROBOT, WORLD = 1, 2
-"""Collision groups: the robot's links touch everything but each other."""
-
-
-@dataclass(frozen=True)
-class PyBulletSettings(Settings):
-    """PyBullet's options; defaults are the engine's own, found by comparing tumbling boxes bit for
-    bit with an engine whose parameters were never set (contact ERP 0.08, friction cone on).
-
-    Attributes:
-        timestep: [s]; 1/240 is what PyBullet's guide recommends to keep.
-        solver_iterations: of the constraint solver.
-        solver_residual: residual below which it stops earlier.
-        position_gain, velocity_gain: of the joint motors, see the module's docstring.
-        linear_damping, angular_damping: of free bodies [1/s].
-        contact_erp: share of a penetration that is corrected in a step.
-        friction_erp: the same for friction anchors.
-        cone_friction: implicit friction cone instead of the pyramid.
-        spinning_friction: torsional friction coefficient of the cubes [m].
-        friction_anchor: tie contacts of the robot to where they first touched, by friction_erp.
-        sleeping: whether bodies at rest are frozen.
-        ordered_pairs: sort the overlapping pairs before each step.
-    """
-
-    timestep: float = 1.0 / 240.0
-    solver_iterations: int = 50
-    solver_residual: float = 1e-7
-    position_gain: float = 0.1
-    velocity_gain: float = 1.0
-    linear_damping: float = 0.04
-    angular_damping: float = 0.04
-    contact_erp: float = 0.08
-    friction_erp: float = 0.2
-    cone_friction: bool = True
-    spinning_friction: float = 0.0
-    friction_anchor: bool = False
-    sleeping: bool = False
-    ordered_pairs: bool = False
-
-
-def _single(number: float) -> float:
-    """Rounded to single precision, as Bullet's own default damping of 0.04 is."""
-    return float(np.float32(number))
 
 
 class PyBullet(Simulator):
@@ -202,9 +158,11 @@ class PyBullet(Simulator):
         )
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=c)
         self._ground = pybullet.createMultiBody(0, plane, physicsClientId=c)
-        self._set_surface(self._ground, -1, scene.ground_friction, scene.ground_restitution)
-        self._bodies = {box.name: self._add_body(box) for box in scene.bodies}
+        set_surface(c, self._ground, s, scene.ground_friction, scene.ground_restitution)
+        self._bodies = {body.name: add_body(c, body, s, heavy(scene)) for body in scene.bodies}
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
+        self._led = [self._bodies[body.name] for body in scene.prescribed_bodies]
+        self._part_from_still(scene)
         self.prepared = None
         self._robot = -1
         self._couplings: list[int] = []
@@ -214,72 +172,13 @@ class PyBullet(Simulator):
             self.prepared = PreparedRobot(scene.robot)
             self._load_robot(self.prepared)
 
-    def _add_body(self, box: Body) -> int:
-        c = self.client
-        kind, size, length = _shape(box)
-        lengths = {} if length is None else {"height": length}
-        shape = pybullet.createCollisionShape(kind, **size, **lengths, physicsClientId=c)
-        lengths = {} if length is None else {"length": length}
-        picture = pybullet.createVisualShape(
-            kind, **size, **lengths, rgbaColor=box.colour, physicsClientId=c
-        )
-        w, x, y, z = box.pose.quaternion
-        body: int = pybullet.createMultiBody(
-            box.mass, shape, picture, box.pose.position, [x, y, z, w], physicsClientId=c
-        )
-        self._set_surface(body, -1, box.friction, box.restitution, box.damping)
-        # Bullet takes a capsule for the box around it.
-        if box.moments is not None or not isinstance(box, Box):
-            pybullet.changeDynamics(
-                body, -1, localInertiaDiagonal=list(box.inertia()), physicsClientId=c
-            )
-        if box.velocity.any():  # setting none changes the last bits of what follows
-            pybullet.resetBaseVelocity(
-                body, box.linear_velocity, box.angular_velocity, physicsClientId=c
-            )
-        return body
-
-    def _set_surface(
-        self,
-        body: int,
-        link: int,
-        friction: float,
-        restitution: float = 0.0,
-        damping: FloatArray | None = None,
-    ) -> None:
-        s, c = self.settings, self.client
-        linear, angular = s.linear_damping, s.angular_damping
-        if damping is not None and damping.any():
-            linear, angular = damping.tolist()
-        pybullet.changeDynamics(
-            body,
-            link,
-            lateralFriction=math.sqrt(friction),  # of a pair, Bullet takes the product
-            spinningFriction=s.spinning_friction,
-            rollingFriction=0.0,
-            restitution=math.sqrt(restitution),  # the product too
-            jointDamping=0.0,
-            frictionAnchor=int(s.friction_anchor and link >= 0),
-            physicsClientId=c,
-        )
-        if link < 0:
-            # In a call for a link, damping or activation state make PyBullet 3.2.7 drop everything
-            # else without a word: the fingers kept friction 0.5 until the parity check spoke.
-            pybullet.changeDynamics(
-                body,
-                -1,
-                linearDamping=_single(linear),
-                angularDamping=_single(angular),
-                activationState=(
-                    pybullet.ACTIVATION_STATE_ENABLE_SLEEPING
-                    if s.sleeping
-                    else pybullet.ACTIVATION_STATE_DISABLE_SLEEPING
-                ),
-                physicsClientId=c,
-            )
-        group = ROBOT if body == getattr(self, "_robot", None) else WORLD
-        mask = WORLD if group == ROBOT else WORLD | ROBOT
-        pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=self.client)
+    def _part_from_still(self, scene: Scene) -> None:
+        """Prescribed bodies do not touch what nothing can move."""
+        fixed = [self._bodies[body.name] for body in scene.fixed_bodies]
+        for body in self._led:
+            for other in (self._ground, *fixed, *self._led):
+                if other != body:
+                    pybullet.setCollisionFilterPair(body, other, -1, -1, 0, self.client)
 
     def _load_robot(self, prepared: PreparedRobot) -> None:
         c, robot = self.client, prepared.robot
@@ -299,7 +198,7 @@ class PyBullet(Simulator):
         self._links[prepared.root] = -1
         self._joints = [index[name] for name in robot.joint_names]
         for link in range(-1, len(infos)):
-            self._set_surface(self._robot, link, robot.friction)
+            set_surface(c, self._robot, self.settings, robot.friction, link=link, group=ROBOT)
         for joint, drive in zip(self._joints, robot.joints, strict=True):
             pybullet.resetJointState(self._robot, joint, drive.initial_position, physicsClientId=c)
         self._couplings = [
@@ -332,6 +231,7 @@ class PyBullet(Simulator):
         return ReadBack(
             self.client,
             self._ground,
+            heavy(self.scene),
             self._bodies,
             self._robot,
             self._links,
@@ -352,6 +252,22 @@ class PyBullet(Simulator):
             *self._gains,
             physicsClientId=self.client,
         )
+
+    def push(self, wrenches: FloatArray) -> None:
+        c = self.client
+        for body, row in zip(self._free, wrenches, strict=True):
+            place, _ = pybullet.getBasePositionAndOrientation(body, c)
+            force, torque = row[:3], row[3:]
+            pybullet.applyExternalForce(body, -1, force, place, pybullet.WORLD_FRAME, c)
+            pybullet.applyExternalTorque(body, -1, torque, pybullet.WORLD_FRAME, c)
+
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        c, falls = self.client, self.settings.timestep * np.asarray(self.scene.gravity)
+        for body, row in zip(self._led, before, strict=True):
+            w, x, y, z = row[3:7]
+            pybullet.resetBasePositionAndOrientation(body, row[:3], [x, y, z, w], c)
+            # Bullet has one gravity for all, which acts before contacts do
+            pybullet.resetBaseVelocity(body, row[7:10] - falls, row[10:], c)
 
     def step(self) -> None:
         pybullet.stepSimulation(self.client)
@@ -408,17 +324,3 @@ class PyBullet(Simulator):
         client = getattr(self, "client", None)  # none, when loading failed before
         if client is not None and pybullet.isConnected(client):
             pybullet.disconnect(client)
-
-
-def _shape(body: Body) -> tuple[int, dict[str, Any], float | None]:
-    """Bullet's kind of a body's shape, its size, and its length [m]; None where it has none."""
-    match body:
-        case Box():
-            return pybullet.GEOM_BOX, {"halfExtents": [edge / 2 for edge in body.size]}, None
-        case Sphere():
-            return pybullet.GEOM_SPHERE, {"radius": body.radius}, None
-        case Cylinder():
-            return pybullet.GEOM_CYLINDER, {"radius": body.radius}, body.length
-        case Capsule():
-            return pybullet.GEOM_CAPSULE, {"radius": body.radius}, body.length
-    raise NotSupportedError(f"pybullet has no {type(body).__name__}")

@@ -31,6 +31,7 @@ class ReadBack:
     Args:
         client: of PyBullet.
         ground: its body.
+        heavy: mass from which on a body is one that moves as prescribed [kg].
         bodies: body of each box.
         robot: body of the robot.
         links: number of each link; -1 is the base.
@@ -43,6 +44,7 @@ class ReadBack:
         self,
         client: int,
         ground: int,
+        heavy: float,
         bodies: Mapping[str, int],
         robot: int,
         links: Mapping[str, int],
@@ -50,7 +52,7 @@ class ReadBack:
         couplings: Sequence[int],
         prepared: PreparedRobot | None,
     ) -> None:
-        self.c, self.ground, self.bodies = client, ground, bodies
+        self.c, self.ground, self.heavy, self.bodies = client, ground, heavy, bodies
         self.robot, self.links, self.joints = robot, links, joints
         self.couplings, self.prepared = couplings, prepared
 
@@ -68,7 +70,7 @@ class ReadBack:
         }
         held = self._held()
         for name, body in self.bodies.items():
-            free = self._dynamics(body)[0] > 0
+            free = 0 < self._dynamics(body)[0] < self.heavy  # else fixed, or it moves as prescribed
             reported |= self._part(f"body/{name}", body, -1)
             if free:
                 reported |= self._inertial(f"body/{name}", body, -1)

@@ -184,8 +184,10 @@ class SAPIEN(Simulator):
         self._world = sapien.Scene([self._system])
         self._ground = self._add_ground(scene.ground_friction, scene.ground_restitution)
         self._bodies = {box.name: self._add_body(box) for box in scene.bodies}
+        self._free = [self._bodies[box.name] for box in scene.free_bodies]
+        self._led = [self._bodies[box.name] for box in scene.prescribed_bodies]
         packed = self._system.rigid_dynamic_components
-        self._rows = [packed.index(self._bodies[box.name]) for box in scene.free_bodies]
+        self._rows = [packed.index(body) for body in self._free]
         self._robot: Any = None
         self._joints: list[Any] = []
         self._links: dict[str, Any] = {}
@@ -225,6 +227,9 @@ class SAPIEN(Simulator):
         if box.fixed:
             entity = builder.build_static(box.name)
             return entity.find_component_by_type(physx.PhysxRigidStaticComponent)
+        if box.prescribed:
+            entity = builder.build_kinematic(box.name)
+            return entity.find_component_by_type(physx.PhysxRigidDynamicComponent)
         builder.set_mass_and_inertia(box.mass, sapien.Pose(), box.inertia())
         entity = builder.build(box.name)
         body = entity.find_component_by_type(physx.PhysxRigidDynamicComponent)
@@ -304,6 +309,15 @@ class SAPIEN(Simulator):
             set_target(target)
         for set_speed, speed in zip(self._speeds, velocity.tolist(), strict=True):
             set_speed(speed)
+
+    def push(self, wrenches: FloatArray) -> None:
+        for body, row in zip(self._free, wrenches, strict=True):
+            if row.any():  # which wakes it
+                body.add_force_torque(row[:3].astype(np.float32), row[3:].astype(np.float32))
+
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        for body, row in zip(self._led, after, strict=True):
+            body.kinematic_target = sapien.Pose(row[:3], row[3:7])
 
     def step(self) -> None:
         self._system.step()

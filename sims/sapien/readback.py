@@ -68,7 +68,7 @@ class ReadBack:
             reported |= _part(f"body/{name}", body)
             static = isinstance(body, physx.PhysxRigidStaticComponent)
             reported[f"body/{name}/dynamic"] = float(not static and _free(body))
-            if not static:
+            if not (static or body.kinematic):
                 reported |= _inertial(f"body/{name}", body)
                 velocity = np.concatenate([body.linear_velocity, body.angular_velocity])
                 reported[f"body/{name}/velocity"] = velocity

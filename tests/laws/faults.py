@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from pytest_simbench.scene import Body, Box, Pose, Robot, Scene
 
@@ -107,6 +108,16 @@ def step(scene: Scene) -> Scene:
     return replace(scene, bodies=(*scene.bodies, plate))
 
 
+def acting(**values: Any) -> Fault:
+    """Forces on bodies act otherwise."""
+
+    def change(body: Body) -> Body:
+        wrenches = tuple(replace(wrench, **values) for wrench in body.wrenches)
+        return replace(body, wrenches=wrenches)
+
+    return bodies(change)
+
+
 FAULTS: dict[str, Fault] = {
     **dict.fromkeys(("free_fall", "fall_speed", "oblique_gravity", "projectile"), heavier),
     "damped_fall": bodies(lambda body: replace(body, linear_damping=2 * body.linear_damping)),
@@ -115,6 +126,10 @@ FAULTS: dict[str, Fault] = {
     **dict.fromkeys(("spin", "glide"), faster(1.1)),
     "free_top": sized(0.2, 0.2, 0.4),
     **dict.fromkeys(("tumble_energy", "tumble_momentum"), sized(0.3, 0.1, 0.02)),
+    "axial_force": acting(force=(10.0, 0.0, 0.0)),  # doubled
+    "axial_torque": acting(end=9.0),  # it never ends
+    "belt_speed": faster(0.9),
+    "ball_on_belt": faster(0.9),
     "free_cylinder": bodies(lambda body: body.changed(radius=0.1)),
     **dict.fromkeys(("rolling_sphere", "rolling_cylinder"), rougher(0.1)),
     **dict.fromkeys(("slip_to_roll", "spin_to_roll"), faster(1.2)),

@@ -14,6 +14,7 @@ import numpy as np
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.simulator import SimulatorInfo
 from pytest_simbench.simulator.quantities import expected_quantities
 
@@ -60,6 +61,49 @@ class AngularDamping(Lying):
     def step(self) -> None:
         super().step()
         self.data.qvel[3:6] *= 1 - 0.04 * self.settings.timestep
+
+
+class NoForce(MuJoCo):
+    def push(self, wrenches: FloatArray) -> None:
+        pass
+
+
+class DoubleForce(MuJoCo):
+    def push(self, wrenches: FloatArray) -> None:
+        super().push(2 * wrenches)
+
+
+class EndlessTorque(MuJoCo):
+    def push(self, wrenches: FloatArray) -> None:
+        if wrenches.any():
+            super().push(wrenches)
+
+
+class OwnAxes(MuJoCo):
+    """Takes torques in the bodies' axes."""
+
+    def push(self, wrenches: FloatArray) -> None:
+        turns = rotations(self.body_state()[:, 3:7])
+        torques = np.einsum("nij,nj->ni", turns, wrenches[:, 3:])
+        super().push(np.hstack([wrenches[:, :3], torques]))
+
+
+class FallingBelt(MuJoCo):
+    """Only starts what it should lead."""
+
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        if not self.time:
+            self.model.body_gravcomp[:] = 0.0
+            super().lead(before, after)
+
+
+class StandingBelt(MuJoCo):
+    """Moves the belt, and its surface does not: as a body that is put from place to place."""
+
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        before = before.copy()
+        before[:, 7:] = 0.0
+        super().lead(before, after)
 
 
 class LongStep(Lying):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pytest_simbench.simulator.bounces import LARGEST, damping_ratio, direct, restitution_of
+from sims.mujoco.bounces import LARGEST, damping_ratio, direct, restitution_of
 
 
 def left(stiffness: float, damping: float) -> float:

@@ -1,0 +1,222 @@
+"""What all rigid bodies have: where they are, what they are made of, how they start to move."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+
+from pytest_simbench.scene.checks import (
+    SceneError,
+    check_name,
+    check_number,
+    check_numbers,
+    check_pose,
+)
+from pytest_simbench.scene.overlap import Hull
+from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
+from pytest_simbench.scene.wrench import Wrench
+
+Colour = tuple[float, float, float, float]
+
+WOOD: Colour = (0.72, 0.56, 0.38, 1.0)
+
+STILL: Vector3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A simple solid that a body is drawn with.
+
+    Attributes:
+        kind: `box`, `ball`, or `tube`, a cylinder along its z axis.
+        extents: its edges, or those of the box around it [m].
+        pose: of its centre in the body's frame.
+    """
+
+    kind: Literal["box", "ball", "tube"]
+    extents: Vector3
+    pose: Pose = field(default_factory=Pose)
+
+
+class _Placed(ABC):
+    """The fields that all kinds of bodies have and give by position, after those of their kind."""
+
+    name: str
+    pose: Pose
+    mass: float
+    friction: float
+    colour: Colour
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body(_Placed):
+    """A rigid body, free to move when it has a mass, fixed in the world when it has none.
+
+    One that is `prescribed` has no mass either: it keeps its velocities, whatever touches it.
+
+    Attributes:
+        name: unique in its scene.
+        pose: of its centre, which is its centre of mass, in the world.
+        mass: [kg], spread evenly; 0 fixes the body in the world.
+        friction: Coulomb coefficient mu of its surface, sliding. Every surface of a scene has the
+            same one, so that the engines' different rules for combining two do not matter.
+        colour: red, green, blue, alpha in 0..1.
+        linear_velocity: of its centre at the start, in the world frame [m/s].
+        angular_velocity: of the body at the start, in the world frame [rad/s].
+        restitution: Newton's coefficient e: what an impact leaves of the normal velocity. All
+            surfaces of a scene that bounce have the same one, as with friction.
+        linear_damping: c of dv/dt = -c v of a free body [1/s].
+        angular_damping: the same of its angular velocity [1/s].
+        moments: principal moments of inertia about the centre, along the body's axes [kg m^2], of a
+            body whose mass is not spread evenly; None: evenly.
+        prescribed: the body moves with its velocities all the time, as a belt, a driven plate or a
+            pusher does; forces, gravity and contacts change nothing of that.
+        wrenches: forces and torques on a free body, each for its time; those at one time add up.
+
+    Raises:
+        SceneError: a body that cannot exist; the message names body and value.
+    """
+
+    linear_velocity: Vector3 = STILL
+    angular_velocity: Vector3 = STILL
+    restitution: float = 0.0
+    linear_damping: float = 0.0
+    angular_damping: float = 0.0
+    moments: Vector3 | None = None
+    prescribed: bool = False
+    wrenches: tuple[Wrench, ...] = ()
+
+    kinds: ClassVar[dict[str, type[Body]]] = {}
+    """Every kind of body, by what `to_wire` calls it."""
+
+    def __init_subclass__(cls, kind: str = "", **others: Any) -> None:
+        super().__init_subclass__(**others)
+        if kind:
+            Body.kinds[kind] = cls
+
+    def __post_init__(self) -> None:
+        check_name(self.name, "a body")
+        check_pose(self.pose, repr(self.name))
+        check_number(self.mass, f"the mass [kg] of {self.name!r}", 0.0)
+        check_number(self.friction, f"the friction of {self.name!r}", 0.0)
+        check_numbers(self.colour, 4, f"the colour of {self.name!r}", 0.0)
+        check_numbers(self.linear_velocity, 3, f"the linear velocity [m/s] of {self.name!r}")
+        check_numbers(self.angular_velocity, 3, f"the angular velocity [rad/s] of {self.name!r}")
+        check_number(self.restitution, f"the restitution of {self.name!r}", 0.0, 1.0)
+        for kind, value in zip(("linear", "angular"), self.damping.tolist(), strict=True):
+            check_number(value, f"the {kind} damping [1/s] of {self.name!r}", 0.0)
+        if self.fixed and any((*self.linear_velocity, *self.angular_velocity)):
+            raise SceneError(
+                f"{self.name!r} has a velocity and no mass, so it is fixed; give it a mass, or "
+                "make it `prescribed`"
+            )
+        if self.prescribed and (self.mass or self.damping.any()):
+            raise SceneError(
+                f"{self.name!r} moves as prescribed, so it has no mass and no damping; leave them "
+                "out"
+            )
+        if self.wrenches and not self.mass:
+            raise SceneError(f"{self.name!r} has no mass, so no force moves it; give it a mass")
+        if self.moments is not None:
+            what = f"the moments of inertia [kg m^2] of {self.name!r}"
+            check_numbers(self.moments, 3, what, 0.0, above=True)
+            if 2 * max(self.moments) > sum(self.moments):
+                raise SceneError(f"{what} are {self.moments}; none is larger than the other two")
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it never moves."""
+        return self.mass == 0.0 and not self.prescribed
+
+    @property
+    def velocity(self) -> FloatArray:
+        """Linear, then angular velocity at the start, as in body states, (6,) [m/s, rad/s]."""
+        return np.array([*self.linear_velocity, *self.angular_velocity])
+
+    @property
+    def damping(self) -> FloatArray:
+        """Linear and angular, (2,) [1/s]."""
+        return np.array([self.linear_damping, self.angular_damping])
+
+    @property
+    @abstractmethod
+    def extents(self) -> Vector3:
+        """Edges of the smallest box along the body's axes that it fits into [m]."""
+
+    @property
+    @abstractmethod
+    def volume(self) -> float:
+        """[m^3]."""
+
+    def inertia(self) -> FloatArray:
+        """Principal moments about the centre, along the body's axes, (3,) [kg m^2]."""
+        return self.even_inertia() if self.moments is None else np.array(self.moments)
+
+    @abstractmethod
+    def even_inertia(self) -> FloatArray:
+        """The same of a body whose mass is spread evenly."""
+
+    @abstractmethod
+    def solids(self) -> list[Solid]:
+        """What the body is drawn with."""
+
+    @abstractmethod
+    def core(self, share: float) -> tuple[Hull, float]:
+        """What is left when the body loses a layer, and how thick that is [m].
+
+        Of what has edges the layer is `share` of half its shortest edge, and the core with a layer
+        around it is the body with its edges rounded. Of spheres and capsules it is the radius, and
+        they are whole again.
+        """
+
+    def reach(self, directions: FloatArray) -> FloatArray:
+        """How far the body reaches from its centre in directions of its frame (n, 3) [m], (n,)."""
+        hull, depth = self.core(0.0)
+        found: FloatArray = hull.reach(directions) + depth * np.linalg.norm(directions, axis=1)
+        return found
+
+    def changed(self, **values: Any) -> Self:
+        """The same body with some of its fields replaced."""
+        return replace(self, **values)
+
+    def moved_to(self, pose: Pose) -> Self:
+        return self.changed(pose=pose)
+
+    def to_wire(self) -> dict[str, Any]:
+        """As plain data; what is as by default is left out, but for what a box always had."""
+        data = {
+            "name": self.name,
+            "pose": self.pose.to_wire(),
+            "mass": self.mass,
+            "friction": self.friction,
+            "colour": list(self.colour),
+        }
+        if self.linear_velocity != STILL:
+            data["linear_velocity"] = list(self.linear_velocity)
+        if self.angular_velocity != STILL:
+            data["angular_velocity"] = list(self.angular_velocity)
+        for name in ("restitution", "linear_damping", "angular_damping"):
+            if getattr(self, name):
+                data[name] = getattr(self, name)
+        if self.moments is not None:
+            data["moments"] = list(self.moments)
+        if self.prescribed:
+            data["prescribed"] = True
+        if self.wrenches:
+            data["wrenches"] = [wrench.to_wire() for wrench in self.wrenches]
+        return data
+
+    @classmethod
+    def from_wire(cls, data: dict[str, Any]) -> Body:
+        """The body of `to_wire`, of its own kind."""
+        values: dict[str, Any] = {
+            name: tuple(v) if isinstance(v, list) else v for name, v in data.items()
+        }
+        values["pose"] = Pose.from_wire(data["pose"])
+        values["wrenches"] = tuple(map(Wrench.from_wire, data.get("wrenches", ())))
+        kind: Any = cls.kinds[values.pop("kind", "box")]
+        made: Body = kind(**values)
+        return made
