@@ -7,11 +7,14 @@ Needs the data set arm_pushes (`pytest --sim-download arm_pushes`, or $SIMBENCH_
 runs are never looked at.
 
 `push` finds one set of values for all the simulators given, with their profile `real`: the least
-squares of three things of each run: how far the cube goes [mm], how it turns [degrees], and where
-it is when the real one is half way [mm]. One step of Gauss and Newton from the values that are
-committed, with derivatives by differences to both sides; the standard errors come from what is left
-over. `follow` needs no simulator: it finds when the motions begin, and which joint angles put the
-marker body where the cameras see it at rest; the standard deviations are over the runs.
+squares of two things of each run, how far the cube goes [mm] and how it turns [degrees]. One step
+of Gauss and Newton from the values that are committed, with derivatives by differences to both
+sides; the standard errors come from what is left over. Two things tell two values, so friction
+stays as it is; what it changes is printed. So is the delay of the cube half way, which none of them
+brings into order.
+
+`follow` needs no simulator: it finds when the motions begin, and which joint angles put the marker
+body where the cameras see it at rest; the standard deviations are over the runs.
 """
 
 from __future__ import annotations
@@ -36,11 +39,10 @@ from pytest_simbench.tasks import ArmFollowing, ArmPushing
 from pytest_simbench.tasks.arm_following import TICK, began, started
 from pytest_simbench.tasks.arm_pushing import JOINTS, arm, marker
 
-STEPS: Mapping[str, float] = {"finger_angle": 0.05, "friction": 0.05, "marker_aside": 0.002}
+STEPS: Mapping[str, float] = {"finger_angle": 0.05, "marker_aside": 0.002}
 """To both sides of a value, for the derivatives: as large as what one wants to know."""
 
-HALF_WAY_SPEED = 150.0
-"""Of the real cube half way [mm/s]: what a second of delay is in millimetres."""
+FRICTION_STEP = 0.05
 
 MILLIMETRE, DEGREE, PRIOR = 1000.0, float(np.degrees(1.0)), float(np.degrees(1.0)) / 3
 """Weights at rest: 1 mm and 1 degree of the marker body count as 3 degrees off a command."""
@@ -52,60 +54,68 @@ COMMANDED = [0, 1, 2, 3]
 """Joints that are fitted at rest; what 5 and 6 do the cameras hardly tell."""
 
 
-def residuals(task: ArmPushing, simulators: list[str]) -> FloatArray:
-    """What is off in each run of each simulator, (n_simulators * n_runs, 3) [mm, degrees, mm]."""
-    rows = []
-    for simulator in simulators:
-        with tempfile.TemporaryDirectory() as folder:
-            case = Case.of(
-                simulator, test="calibrate", mode="headless", profile="real", folder=Path(folder)
-            )
-            experiment, executor = Experiment(case, task), LocalExecutor()
-            try:
-                for number in range(1, task.repetitions + 1):
-                    record, error = executor.repetition(experiment, number).run()
-                    if error is not None:
-                        raise SystemExit(f"{simulator}: {error}")
-                    told = record.details
-                    far = 1000.0 * (record.metrics["displacement"] - told["real_displacement"])
-                    late = -HALF_WAY_SPEED * told["delay"]
-                    rows.append((far, told["turn"] - told["real_turn"], late))
-            finally:
-                executor.close()
-    return np.array(rows)
+class Pushes:
+    """The runs that are not held out on a few simulators, a worker each."""
+
+    def __init__(self, simulators: Sequence[str], folder: Path) -> None:
+        self.cases = [
+            Case.of(name, test="calibrate", mode="headless", profile="real", folder=folder)
+            for name in simulators
+        ]
+        self.executors = [LocalExecutor() for _ in self.cases]
+
+    def off(self, task: ArmPushing) -> FloatArray:
+        """What is off in each run of each simulator: distance [mm], turn [degrees] and delay half
+        way [ms], (n_simulators * n_runs, 3)."""
+        rows = []
+        for case, executor in zip(self.cases, self.executors, strict=True):
+            for number in range(1, task.repetitions + 1):
+                record, error = executor.repetition(Experiment(case, task), number).run()
+                if error is not None:
+                    raise SystemExit(f"{case.simulator}: {error}")
+                told = record.details
+                far = 1000.0 * (record.metrics["displacement"] - told["real_displacement"])
+                rows.append((far, told["turn"] - told["real_turn"], 1000.0 * told["delay"]))
+        found = np.array(rows)
+        far, turned, late = found.mean(axis=0)
+        print(f"  fingers {task.finger_angle:.3f} rad, marker {1000 * task.marker_aside:.1f} mm, "
+              f"friction {task.friction:.2f}: {far:+.2f} mm, {turned:+.2f} degrees, {late:+.0f} ms",
+              flush=True)  # fmt: skip
+        return found
+
+    def close(self) -> None:
+        for executor in self.executors:
+            executor.close()
 
 
 def push(runs: ArmRuns, simulators: list[str]) -> None:
     """Print the values, how well they are known, and what is left."""
     task = ArmPushing(runs, half="chosen_on")
-    names = list(STEPS)
-    at = np.array([getattr(task, name) for name in names])
+    at = np.array([getattr(task, name) for name in STEPS])
+    print(f"{', '.join(simulators)}: {task.repetitions} runs each")
+    with tempfile.TemporaryDirectory() as folder:
+        pushes = Pushes(simulators, Path(folder))
+        try:
 
-    def off(values: FloatArray) -> FloatArray:
-        tried = replace(task, **dict(zip(names, map(float, values), strict=True)))
-        found = residuals(tried, simulators)
-        told = ", ".join(f"{n} {v:.4g}" for n, v in zip(names, values, strict=True))
-        far, turned, late = found.mean(axis=0)
-        print(f"  {told}: {far:+.2f} mm, {turned:+.2f} deg, {late:+.2f} mm half way", flush=True)
-        return found.ravel()
+            def off(values: FloatArray) -> FloatArray:
+                tried = replace(task, **dict(zip(STEPS, map(float, values), strict=True)))
+                return pushes.off(tried)[:, :2].ravel()
 
-    here = off(at)
-    columns = []
-    for k, step in enumerate(STEPS.values()):
-        aside = np.eye(len(at))[k] * step
-        columns.append((off(at + aside) - off(at - aside)) / (2 * step))
+            here = off(at)
+            columns = []
+            for k, step in enumerate(STEPS.values()):
+                aside = np.eye(len(at))[k] * step
+                columns.append((off(at + aside) - off(at - aside)) / (2 * step))
+            pushes.off(replace(task, friction=task.friction + FRICTION_STEP))
+        finally:
+            pushes.close()
     slopes = np.stack(columns, axis=1)
     moved, *_ = np.linalg.lstsq(slopes, -here, rcond=None)
     left = here + slopes @ moved
     spread = float(left @ left) / (len(left) - len(at))
-    covariance = spread * np.linalg.inv(slopes.T @ slopes)
-    errors = np.sqrt(np.diag(covariance))
-    print(f"{', '.join(simulators)}: {len(runs.of('CubeExp', 'chosen_on'))} runs each")
-    for k, name in enumerate(names):
-        print(f"  {name}: {at[k]:.4g} committed, {at[k] + moved[k]:.4g} +- {errors[k]:.2g} found")
-    print("  correlations:")
-    for name, row in zip(names, covariance / np.outer(errors, errors), strict=True):
-        print(f"    {name}: {np.round(row, 2)}")
+    errors = np.sqrt(spread * np.diag(np.linalg.inv(slopes.T @ slopes)))
+    for name, old, change, error in zip(STEPS, at, moved, errors, strict=True):
+        print(f"  {name}: {old:.4g} committed, {old + change:.4g} +- {error:.2g} found")
     print(f"  root of the mean square: {np.sqrt(np.mean(here**2)):.2f} committed, "
           f"{np.sqrt(np.mean(left**2)):.2f} expected where found")  # fmt: skip
 

@@ -32,6 +32,7 @@ from pytest_simbench.tasks.arm_pushing import (
     JOINTS,
     MARKER_ASIDE,
     arm,
+    calibrated,
     marker,
     yaw,
 )
@@ -138,9 +139,9 @@ class ArmFollowing(Task):
         return replace(self, most=SMALLEST)
 
     def parameters(self) -> dict[str, Any]:
-        """The runs by their digest."""
+        """The runs by their digest, and on which ones fingers, friction and marker were found."""
         told = {f"task.{item.name}": getattr(self, item.name) for item in fields(self)}
-        return {**told, "task.runs": self.runs.digest}
+        return {**told, "task.runs": self.runs.digest, "task.calibrated_on": calibrated(self.runs)}
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         run = self.run(seed)

@@ -136,9 +136,9 @@ class ArmPushing(Task):
         return pushes.NAME, self.run(seed).number
 
     def parameters(self) -> dict[str, Any]:
-        """The runs by their digest."""
+        """The runs by their digest, and on which ones fingers, friction and marker were found."""
         told = {f"task.{item.name}": getattr(self, item.name) for item in fields(self)}
-        return {**told, "task.runs": self.runs.digest}
+        return {**told, "task.runs": self.runs.digest, "task.calibrated_on": calibrated(self.runs)}
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         course = self._course(seed)
@@ -199,6 +199,12 @@ class ArmPushing(Task):
 def world_start(pose: Pose) -> FloatArray:
     """A row for the state before the first step, (7,)."""
     return np.array([*pose.position, *pose.quaternion])
+
+
+def calibrated(runs: ArmRuns) -> str:
+    """The runs on which the committed values were calibrated, by their numbers."""
+    numbers = ", ".join(str(run.number) for run in runs.of(PUSH, "chosen_on"))
+    return f"{PUSH} {numbers}"
 
 
 @cache
