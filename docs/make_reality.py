@@ -1,6 +1,7 @@
-"""Makes the tables of docs/reality.md from docs/data/tossing.csv and docs/data/arm_pushing.csv.
+"""Makes the tables of docs/reality.md from docs/data/tossing.csv, arm_pushing.csv and so on.
 
-python docs/make_reality.py RUN...    reads run folders into the CSV files, then writes the tables
+python docs/make_reality.py RUN...    reads run folders into the CSV files, then writes the tables;
+                                      lines of simulators and profiles that are in no run stay
 python docs/make_reality.py           writes the tables
 
 A table stands between `<!-- reality: TASK -->` and `<!-- end -->`.
@@ -25,7 +26,11 @@ PAGE = DOCS / "reality.md"
 METRICS = {
     "tossing": ("position_error", "rotation_error"),
     "arm_pushing": ("displacement", "displacement_error", "turn_error", "way_error"),
+    "arm_following": ("hand_error", "rest_error"),
+    "arm_following_corrected": ("hand_error", "rest_error"),
 }
+FOLLOWING = ("arm_following", "arm_following_corrected")
+EXPERIMENTS = ("Single", "CubeExp")
 HEADER = ("profile", "simulator", "version", "number", "status")
 PROFILES = ("default", "tuned", "real")
 NAMES = {**SIMULATORS, "ode": "ODE"}
@@ -39,6 +44,11 @@ def data(task: str) -> Path:
     return DOCS / "data" / f"{task}.csv"
 
 
+def columns(task: str) -> tuple[str, ...]:
+    """Of a task's CSV file; the cube's displacement is no metric of those that follow commands."""
+    return (*HEADER, *METRICS[task], *(("displacement",) if task in FOLLOWING else ()))
+
+
 def read(folders: list[str]) -> None:
     """Run folders into the CSV files."""
     found: dict[str, list[list[str]]] = {task: [] for task in METRICS}
@@ -49,19 +59,31 @@ def read(folders: list[str]) -> None:
             other = ("python", "pytest-simbench")
             version = next((v for k, v in record.versions.items() if k not in other), "")
             number = str((record.details.get("data") or ["", ""])[1])
+            if record.task in FOLLOWING:
+                number = record.details.get("run", number)
             told = [record.profile, record.simulator, version, number, record.status]
-            values = [record.metrics.get(name) for name in METRICS[record.task]]
+            held = {**record.details, **record.metrics}
+            values = [held.get(name) for name in columns(record.task)[len(HEADER) :]]
             cells = ["" if value is None else f"{value:.6g}" for value in values]
             found[record.task].append([*told, *cells])
     for task, lines in found.items():
+        measured = {(line[1], line[0]) for line in lines}
+        kept = [
+            [line[name] for name in columns(task)]
+            for key, old in rows(task).items()
+            if key not in measured
+            for line in old
+        ]
         with data(task).open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerows([[*HEADER, *METRICS[task]], *lines])
+            writer.writerows([columns(task), *kept, *lines])
 
 
 def rows(task: str) -> Rows:
     """What was measured."""
     found: Rows = defaultdict(list)
+    if not data(task).exists():
+        return found
     with data(task).open(newline="", encoding="utf-8") as file:
         for line in csv.DictReader(file):
             found[line["simulator"], line["profile"]].append(line)
@@ -99,6 +121,44 @@ def arm_pushing() -> str:
     return "\n".join(text)
 
 
+def arm_following() -> str:
+    """Means over the runs of each experiment, commands as given and corrected."""
+    found = {task: rows(task) for task in FOLLOWING}
+    heads = ("free motion mm", "push mm", "cube moved mm")
+    both = [*(f"given: {head}" for head in heads), *(f"corrected: {head}" for head in heads)]
+    text = [f"| simulator | {' | '.join(both)} |", "| :-- |" + " --: |" * len(both)]
+    for name in NAMES:
+        cells = [NAMES[name]]
+        for task in FOLLOWING:
+            lines = found[task][name, "real"]
+            free, push = ([x for x in lines if x["number"].startswith(e)] for e in EXPERIMENTS)
+            for part, metric in (
+                (free, "hand_error"), (push, "hand_error"), (push, "displacement")
+            ):  # fmt: skip
+                values = _values(part, metric)
+                cells.append(f"{1000 * statistics.fmean(values):.1f}" if values else "-")
+        if set(cells[1:]) != {"-"}:
+            text.append(f"| {' | '.join(cells)} |")
+    return "\n".join(text)
+
+
+def source_simulations() -> str:
+    """What the source's own simulations have (`benchmarks/source_simulations.py`)."""
+    heads = ("free motion mm", "push mm", "cube moved mm")
+    text = [f"| the source's | {' | '.join(heads)} |", "| :-- |" + " --: |" * len(heads)]
+    cells: dict[str, list[str]] = defaultdict(list)
+    with (DOCS / "data" / "source_simulations.csv").open(newline="", encoding="utf-8") as file:
+        for line in csv.DictReader(file):
+            names = ("hand_error",) if line["experiment"] == "Single" else (
+                "hand_error", "displacement",
+            )  # fmt: skip
+            for metric in names:
+                value = line[metric]
+                told = f"{1000 * float(value):.1f}" if value else "diverged"
+                cells[line["simulator"]].append(told)
+    return "\n".join([*text, *(f"| {name} | {' | '.join(row)} |" for name, row in cells.items())])
+
+
 def _values(lines: list[dict[str, str]], metric: str) -> list[float]:
     return [float(line[metric]) for line in lines if line[metric]]
 
@@ -116,7 +176,12 @@ def _largest(lines: list[dict[str, str]], metric: str) -> str:
     return f"{statistics.fmean(values):.1f} [{max(values):.1f}]"
 
 
-TABLES: dict[str, Callable[[], str]] = {"tossing": tossing, "arm_pushing": arm_pushing}
+TABLES: dict[str, Callable[[], str]] = {
+    "tossing": tossing,
+    "arm_pushing": arm_pushing,
+    "arm_following": arm_following,
+    "source_simulations": source_simulations,
+}
 
 
 def page() -> str:

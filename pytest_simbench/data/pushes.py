@@ -30,13 +30,38 @@ MESHES = (
 )  # fmt: skip
 """Of the links and what covers their joints."""
 
-PUSH = "CubeExp"
-"""How the names of the runs begin in which the arm pushes the cube."""
+FREE, PUSH = "Single", "CubeExp"
+"""How the names of the runs begin in which the arm moves freely, and pushes the cube."""
 
 LARGEST = 256 * 2**20
 """Of the file of runs [bytes]; the shared one has 7 MB."""
 
 POSE = 7
+
+
+@dataclass(frozen=True)
+class Command:
+    """What the arm is told at a time.
+
+    Attributes:
+        time: since the first command [s].
+        angles: targets of the six joints [degrees].
+    """
+
+    time: float
+    angles: tuple[float, ...]
+
+
+COMMANDS: Mapping[str, tuple[Command, ...]] = {
+    FREE: (Command(0.0, (0.0, -100.0, 0.0, 0.0, 0.0, 0.0)),),
+    PUSH: (
+        Command(0.0, (0.0, 30.0, 120.0, 90.0, 0.0, 0.0)),
+        Command(8.0, (0.0, -60.0, 65.0, 90.0, 0.0, 0.0)),
+        Command(14.0, (0.0, -67.0, 30.0, 90.0, 0.0, 0.0)),
+    ),
+}
+"""Of the experiments; the arm starts with all joints at 0 (`Software/Rotations.py` of the source;
+the recordings hold no commands)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +84,17 @@ class ArmRun:
     def number(self) -> int:
         """In its experiment."""
         return int(self.name[-4:])
+
+    @property
+    def experiment(self) -> str:
+        """`FREE` or `PUSH`, or another one of the source's."""
+        return self.name[:-4]
+
+    @property
+    def displacement(self) -> float:
+        """Of the cube along x, the direction of the push [m]."""
+        before, after = np.median(self.cube[:60, 0]), np.median(self.cube[-50:, 0])
+        return float(after - before)
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,6 +57,9 @@ SMOOTHED = 21
 TICK = 0.01
 """Between samples [s]."""
 
+FINGER_ANGLE, FRICTION, MARKER_ASIDE = 0.2, 0.3, 0.009
+"""Calibrated by `benchmarks/calibrate_push.py`: see `ArmPushing`."""
+
 BLUE = (0.20, 0.35, 0.75, 1.0)
 
 CUBE = "cube"
@@ -92,9 +95,9 @@ class ArmPushing(Task):
 
     runs: ArmRuns
     half: Half = "held_out"
-    finger_angle: float = 0.2
-    marker_aside: float = 0.009
-    friction: float = 0.3
+    finger_angle: float = FINGER_ANGLE
+    marker_aside: float = MARKER_ASIDE
+    friction: float = FRICTION
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
@@ -121,7 +124,7 @@ class ArmPushing(Task):
     @property
     def references(self) -> Mapping[str, float]:  # type: ignore[override]
         """The real ones' mean."""
-        real = [_displacement(run) for run in self.chosen]
+        real = [run.displacement for run in self.chosen]
         return {"displacement": float(np.mean(real)), "displacement_error": 0.0,
                 "turn_error": 0.0, "way_error": 0.0}  # fmt: skip
 
@@ -133,9 +136,9 @@ class ArmPushing(Task):
         return pushes.NAME, self.run(seed).number
 
     def parameters(self) -> dict[str, Any]:
-        """The runs by their digest."""
+        """The runs by their digest, and on which ones fingers, friction and marker were found."""
         told = {f"task.{item.name}": getattr(self, item.name) for item in fields(self)}
-        return {**told, "task.runs": self.runs.digest}
+        return {**told, "task.runs": self.runs.digest, "task.calibrated_on": calibrated(self.runs)}
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         course = self._course(seed)
@@ -170,6 +173,7 @@ class ArmPushing(Task):
                 "real_displacement": way[1],
                 "turn": turns[0],
                 "real_turn": turns[1],
+                "delay": _half_way(moved, way[1]) - _half_way(real, way[1]),
                 "hand_error": float(np.abs(motion.joints[-1, 0] - course.path[-1]).max()),
             },
         )
@@ -195,6 +199,12 @@ class ArmPushing(Task):
 def world_start(pose: Pose) -> FloatArray:
     """A row for the state before the first step, (7,)."""
     return np.array([*pose.position, *pose.quaternion])
+
+
+def calibrated(runs: ArmRuns) -> str:
+    """The runs on which the committed values were calibrated, by their numbers."""
+    numbers = ", ".join(str(run.number) for run in runs.of(PUSH, "chosen_on"))
+    return f"{PUSH} {numbers}"
 
 
 @cache
@@ -239,7 +249,7 @@ def course(run: ArmRun, robot: Robot, on_link: Pose, aside: float) -> Course:
     real = run.cube[rows]
     first = np.median(real[: round(BEFORE / TICK / 2)], axis=0)
     x, y = map(float, first[:2])
-    start = Pose.at(x, y, CUBE_SIZE / 2, yaw=_yaw(first))
+    start = Pose.at(x, y, CUBE_SIZE / 2, yaw=yaw(first))
     return Course(savgol_filter(path, SMOOTHED, 2, axis=0), start, np.vstack([[first], real[1:]]))
 
 
@@ -250,16 +260,18 @@ def _pushed(run: ArmRun) -> int:
     return int(np.flatnonzero(~away)[-1]) + 1
 
 
-def _displacement(run: ArmRun) -> float:
-    ends = [np.median(run.cube[rows, 0]) for rows in (slice(0, 1000), slice(-50, None))]
-    return float(ends[1] - ends[0])
-
-
-def _yaw(row: FloatArray) -> float:
+def yaw(row: FloatArray) -> float:
+    """Turn about the vertical of a row that begins with position and quaternion [rad]."""
     return Pose.from_array(row[:7] / np.array([1, 1, 1, *[np.linalg.norm(row[3:7])] * 4])).yaw
 
 
 def _turn(rows: FloatArray) -> float:
     """From the first row to the last [deg]."""
-    turn = math.degrees(_yaw(rows[-1]) - _yaw(rows[0]))
+    turn = math.degrees(yaw(rows[-1]) - yaw(rows[0]))
     return (turn + 180.0) % 360.0 - 180.0
+
+
+def _half_way(rows: FloatArray, whole: float) -> float:
+    """When the cube is half of that way along x from its start [s]; the end where it never is."""
+    gone = rows[:, 0] - rows[0, 0] > whole / 2
+    return TICK * float(np.argmax(gone) if gone.any() else len(rows))

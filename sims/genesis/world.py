@@ -177,6 +177,7 @@ def add_robot(world: Any, prepared: PreparedRobot) -> Any:
         file=ET.tostring(xml, encoding="unicode"),
         fixed=True,
         merge_fixed_links=False,
+        decimate=False,  # else hulls of more than 500 faces are simplified, by up to 0.3 mm
         default_armature=None,
         requires_jac_and_IK=False,
     )

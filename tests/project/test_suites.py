@@ -12,14 +12,26 @@ from pytest_simbench.data.pushes import ArmRuns
 from pytest_simbench.measure.intervals import interval
 from pytest_simbench.measure.limits import FAILURES
 from pytest_simbench.measure.verdicts import Verdict, at_least, at_most, confidence, judge
-from pytest_simbench.tasks import ArmPushing, Pushing, Stacking, Task, Throwing, Tossing
+from pytest_simbench.tasks import (
+    ArmFollowing,
+    ArmPushing,
+    Pushing,
+    Stacking,
+    Task,
+    Throwing,
+    Tossing,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
 TASKS: dict[str, tuple[Task, ...]] = {
     "stacking": (Stacking(),),
     "throwing": (Throwing(),),
     "pushing": (Pushing(),),
-    "reality": (Tossing(Tosses(())), ArmPushing(ArmRuns((), Path()))),
+    "reality": (
+        Tossing(Tosses(())),
+        ArmPushing(ArmRuns((), Path())),
+        ArmFollowing(ArmRuns((), Path())),
+    ),
 }
 CLAIMS = [
     (task, relation, name, float(value))
@@ -56,8 +68,8 @@ def test_all_claims_were_found() -> None:
             ("pushing", name)
             for name in ("failures", "position_error", "heading_error", "path_error", "tipped")
         ),
-        *(("reality", name) for name in ("failures", "position_error")),
-        *(("reality", name) for name in ("failures", "displacement_error")),
+        *(("reality", name) for name in ("failures", "position_error", "position_error")),
+        *(("reality", name) for name in ("turn_error", "hand_error", "hand_error")),
     ]
 
 

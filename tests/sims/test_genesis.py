@@ -10,18 +10,35 @@ import inspect
 import sys
 from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from pytest_simbench.sims.genesis.adapter import Genesis
 from pytest_simbench.sims.genesis.engine import quick_inspection
+from scipy.spatial import ConvexHull
 
 from pytest_simbench.client.errors import EngineFailed
-from pytest_simbench.scene import Scene, Trajectory
+from pytest_simbench.scene import Gripper, Joint, Robot, Scene, Trajectory
 from pytest_simbench.testing import scenes
 
+from ..simulator.test_urdf_check import TRIANGLE
 from .worlds import Worlds
+
+EGG = """<robot name="egg">
+  <link name="foot"/>
+  <link name="egg">
+    <inertial><mass value="1"/>
+      <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>
+    <collision><geometry><mesh filename="egg.stl"/></geometry></collision>
+  </link>
+  <joint name="turn" type="revolute">
+    <origin xyz="0 0 0.5"/><parent link="foot"/><child link="egg"/>
+    <axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="50" velocity="1"/>
+  </joint>
+</robot>
+"""
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +82,24 @@ def test_the_worker_survives_a_bad_option(worlds: Worlds) -> None:
     with pytest.raises(EngineFailed, match="elliptic"):
         worlds.load(scenes.tower(), friction_cone="elliptic", noslip_iterations=5)
     assert worlds.load(scenes.tower()).time == 0.0
+
+
+def test_hulls_of_more_than_500_faces_are_kept_whole(worlds: Worlds, tmp_path: Path) -> None:
+    """The engine simplifies them by default; the parity check then refuses the world."""
+    points = np.random.default_rng(1).normal(size=(400, 3))
+    points *= [[0.03, 0.04, 0.06]] / np.linalg.norm(points, axis=1, keepdims=True)
+    faces = ConvexHull(points).simplices
+    assert len(faces) > 500
+    triangles = np.zeros(len(faces), TRIANGLE)
+    triangles["corners"] = points[faces]
+    header = b"\0" * 80 + len(faces).to_bytes(4, "little")
+    (tmp_path / "egg.stl").write_bytes(header + triangles.tobytes())
+    (tmp_path / "egg.urdf").write_text(EGG)
+    joint = Joint("turn", 100.0, 10.0, 50.0, 0.1, 0.0)
+    hand = Gripper((), 0.0, 0.0, 0.0)
+    robot = Robot("egg", str(tmp_path / "egg.urdf"), {}, "", (joint,), hand, "egg")
+    world = worlds.load(Scene("egg", (), robot))
+    assert not any("meshes" in excused for excused in world.excused)
 
 
 def test_import_is_spared_only_what_finds_nothing() -> None:

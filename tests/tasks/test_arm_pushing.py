@@ -39,4 +39,5 @@ def test_the_cube_goes_where_the_real_one_went(case: Case) -> None:
     assert record.metrics["turn_error"] < 5.0
     assert record.details["data"] == ["arm_pushes", task.run(record.seed).number]
     assert record.settings["task.half"] == "held_out"
+    assert record.settings["task.calibrated_on"] == "CubeExp 1, 5, 9, 13, 17, 33"
     assert task.references["displacement"] == pytest.approx(0.095, abs=0.003)

@@ -1,0 +1,86 @@
+"""A real arm's commands on an engine: the hand goes about where the real one went."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pytest_simbench.data import DataMissing, read
+from pytest_simbench.data.pushes import COMMANDS, FREE, PUSH, ArmRun, ArmRuns, Command
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.records.record import Record
+from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.tasks import ArmFollowing, CorrectedArmFollowing
+from pytest_simbench.tasks.arm_following import CONTROL_PERIOD, REACHED, hands, reference, started
+from pytest_simbench.tasks.arm_pushing import arm
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
+import calibrate_push
+
+
+@pytest.fixture(scope="module")
+def runs() -> ArmRuns:
+    try:
+        found: ArmRuns = read("arm_pushes")
+    except DataMissing as error:
+        pytest.skip(str(error))
+    return found
+
+
+def test_joints_move_at_30_degrees_a_second_and_then_halve_what_is_missing() -> None:
+    path = np.degrees(reference((0.0, 5.0), (Command(0.1, (10.0, 5.0)),), 14))
+    assert path[:, 1] == pytest.approx(5.0)
+    assert path[:3, 0] == pytest.approx(0.0)
+    step = 30.0 * CONTROL_PERIOD
+    assert path[2:8, 0] == pytest.approx(step * np.arange(6))
+    missing = 10.0 - path[8:, 0]
+    assert missing[1:] == pytest.approx(missing[:-1] / 2)
+
+
+def test_a_hand_that_follows_its_commands_began_when_they_came(runs: ArmRuns) -> None:
+    robot = arm(runs.urdf, 0.2, (0.0,) * 6)
+    path = reference((0.0,) * 6, COMMANDS[PUSH], 100)
+    at, time = hands(RobotModel(robot), path), np.arange(0.0, 6.0, 0.01)
+    knots = 1.3 + CONTROL_PERIOD * np.arange(len(path))
+    way = np.stack([np.interp(time, knots, column) for column in at.T], axis=1)
+    hand = np.hstack([way, np.tile([1.0, 0.0, 0.0, 0.0], (len(time), 1))])
+    hand[50, :3] += 0.3  # the cameras lost it
+    assert started(ArmRun(f"{PUSH}0001", time, hand, hand), robot) == pytest.approx(1.3, abs=0.02)
+
+
+def test_what_the_real_arm_made_of_its_commands_is_found_again(runs: ArmRuns) -> None:
+    for experiment, found in calibrate_push.reached(runs).items():
+        times, angles = found.mean(axis=0)[:, 0], found.mean(axis=0)[:, 1:]
+        assert times == pytest.approx([row.time for row in REACHED[experiment]], abs=0.01)
+        assert angles == pytest.approx(np.array([r.angles for r in REACHED[experiment]]), abs=0.06)
+        assert found.std(axis=0)[:, 2:4].max() < 0.2  # of the joints that carry the arm
+
+
+def test_the_hand_goes_where_the_real_one_went(case: Case, runs: ArmRuns) -> None:
+    def followed(task: ArmFollowing, number: int) -> Record:
+        record, error = Repetition(Experiment(case, task), number).run()
+        assert error is None
+        assert record.details["joint_error"] < 0.002  # rad: the drives do what they are told
+        assert record.settings["task.half"] == "held_out"
+        return record
+
+    given = followed(ArmFollowing(runs, most=2), 2)
+    free, push = (followed(CorrectedArmFollowing(runs, most=2), number) for number in (1, 2))
+    names = [record.details["run"][:-4] for record in (given, free, push)]
+    assert names == [PUSH, FREE, PUSH]
+    assert 0.02 < given.metrics["hand_error"] < 0.035  # the real one stops 8 degrees off
+    assert max(r.metrics["hand_error"] for r in (free, push)) < 0.012
+    assert push.details["displacement"] == pytest.approx(0.095, abs=0.02)
+
+
+def test_a_smoke_run_has_both_experiments(runs: ArmRuns) -> None:
+    task = ArmFollowing(runs)
+    assert task.repetitions == 12
+    assert [run.experiment for run in task.smoke().chosen] == [FREE, PUSH]
+    assert replace(task, half="chosen_on").chosen[0].number == 1
