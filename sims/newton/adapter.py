@@ -84,6 +84,7 @@ class Newton(Simulator):
             "pyglet==2.1.19",
             "pillow==13.0.0",
         ),
+        companions={"1.0": ("newton[sim]", "numpy", "trimesh", "pyglet", "pillow")},
         caches={"WARP_CACHE_PATH": "warp"},
         install_size_mb=900,
         environment=DISABLED,
