@@ -56,6 +56,7 @@ class Newton(Simulator):
         engine="MuJoCo",
         language="Python (Warp), C",
         tested_version="1.8.0",
+        oldest_version="1.5.2",
         capabilities=frozenset(
             {
                 Capability.WINDOW,
