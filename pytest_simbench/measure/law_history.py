@@ -11,13 +11,15 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from pytest_simbench.measure.history import FEWEST
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import series
 from pytest_simbench.simulator.versions import RELEASE, VersionedName, release_numbers
 from pytest_simbench.tasks.metrics import significant
 from pytest_simbench.tasks.phenomena import PHENOMENA, PHENOMENON
+
+FEWEST = 2
+"""Releases that make a history: what changed between two is a fact."""
 
 FACTOR = 2.0
 """By which an error over its tolerance must grow or shrink: a tolerance is a bound (`BROKEN`)."""
@@ -131,7 +133,7 @@ class LawHistory:
 
 
 def law_histories(records: Iterable[Record]) -> list[LawHistory]:
-    """The histories of laws in a run: of each simulator with three or more releases."""
+    """The histories of laws in a run: of each simulator with two or more releases."""
     by_law: dict[str, list[Record]] = {}
     for record in records:
         named = VersionedName.of(record.simulator).kind == RELEASE
