@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import series
-from pytest_simbench.simulator.versions import RELEASE, VersionedName, release_numbers
+from pytest_simbench.simulator.versions import BUILD, RELEASE, VersionedName, release_numbers
 from pytest_simbench.tasks.metrics import significant
 from pytest_simbench.tasks.phenomena import PHENOMENA, PHENOMENON
 
@@ -82,7 +82,7 @@ class LawHistory:
         simulator: without a version.
         test: without its parameters.
         variant: mode and profile.
-        releases: versions, oldest first.
+        releases: versions, oldest first; then builds, with an `@` before their names.
         laws: in the order of their phenomena.
     """
 
@@ -133,21 +133,22 @@ class LawHistory:
 
 
 def law_histories(records: Iterable[Record]) -> list[LawHistory]:
-    """The histories of laws in a run: of each simulator with two or more releases."""
+    """The histories of laws in a run: of each simulator with two or more releases and builds."""
     by_law: dict[str, list[Record]] = {}
     for record in records:
-        named = VersionedName.of(record.simulator).kind == RELEASE
-        if named and record.settings.get(PHENOMENON):
+        if VersionedName.of(record.simulator).kind and record.settings.get(PHENOMENON):
             by_law.setdefault(record.task, []).append(record)
     places: dict[tuple[str, ...], dict[tuple[str, str], dict[str, list[Record]]]] = {}
     for law, of_law in by_law.items():
         for row in series(of_law):
             name, key = VersionedName.of(row.key.simulator), row.key
             laws = places.setdefault((name.base, key.function, key.mode, key.profile), {})
-            laws.setdefault((law, key.parameters), {})[name.which] = row.records
+            label = name.which if name.kind == RELEASE else f"{BUILD}{name.which}"
+            laws.setdefault((law, key.parameters), {})[label] = row.records
     found = []
     for (base, function, mode, profile), laws in places.items():
-        releases = sorted({v for row in laws.values() for v in row}, key=release_numbers)
+        known = {label for row in laws.values() for label in row}
+        releases = sorted(known, key=lambda label: (label[0] == BUILD, release_numbers(label)))
         if len(releases) >= FEWEST:
             rows = [_row(law, laws, releases) for law in laws]
             rows.sort(key=lambda row: _order(row.phenomenon))

@@ -18,10 +18,12 @@ RELEASES = ("1.2", "1.9", "1.10", "2.0")
 def asked(
     law: str, version: str, *ratios: float | None, phenomenon: str = "sliding"
 ) -> list[Record]:
-    """A law asked of a release, once for each ratio; None is a repetition that failed."""
+    """A law asked of a release or a build (`@mine`), once for each ratio; None is a repetition that
+    failed."""
+    name = f"engine{version}" if version[0] == "@" else f"engine=={version}"
     named = {
-        "simulator": f"engine=={version}",
-        "test": f"test_law[engine=={version}-headless-{law}]",
+        "simulator": name,
+        "test": f"test_law[{name}-headless-{law}]",
         "task": law,
         "settings": {PHENOMENON: phenomenon},
     }
@@ -79,6 +81,12 @@ def test_what_decides_nothing_is_no_change(ratios: tuple[float | None, ...]) -> 
 def test_two_releases_are_enough() -> None:
     told = only([*asked("glide", "1.9", 3.0), *asked("glide", "1.10", 0.5)]).sentences()
     assert told[0] == "1.10: glide is kept (3x -> 0.5x)"
+
+
+def test_a_build_comes_after_the_releases() -> None:
+    history = only([*asked("glide", "@mine", 8.0), *asked("glide", "1.9", 0.5)])
+    assert history.releases == ("1.9", "@mine")
+    assert history.sentences()[0] == "@mine: glide is broken (0.5x -> 8x)"
 
 
 def test_what_grows_a_little_with_each_release_is_told() -> None:
