@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import psutil
+from packaging.utils import canonicalize_version
 
 from pytest_simbench import __version__
 from pytest_simbench.client import bootstrap, reaper
@@ -32,6 +33,8 @@ from pytest_simbench.client.errors import (
 from pytest_simbench.client.frame import Frame
 from pytest_simbench.client.launch import Constructed, Launch
 from pytest_simbench.client.logs import shorten_log, tail_of_log
+from pytest_simbench.simulator.registry import adapter
+from pytest_simbench.simulator.versions import RELEASE, VersionedName
 from pytest_simbench.worker.text import named, readable
 from pytest_simbench.worker.wire import pack, unpack
 
@@ -170,7 +173,8 @@ class WorkerProcess:
             timeout: for the whole request [s]; None: silence ends it after `stall_timeout`.
 
         Raises:
-            WorkerError: as `request`.
+            WorkerError: as `request`; its engine is of another version than the simulator's name
+                says.
         """
         answer = self.request(
             "construct",
@@ -181,7 +185,10 @@ class WorkerProcess:
             gui=gui,
             real_time=real_time,
         )
-        return Constructed(**answer)
+        constructed = Constructed(**answer)
+        if problem := _another_release(self.where.simulator, constructed.versions):
+            raise self._ended_by(WorkerStartError, problem)
+        return constructed
 
     def film(
         self, take: Callable[[Frame], None] | None, period: float, size: tuple[int, int]
@@ -360,3 +367,19 @@ class WorkerProcess:
         if popen is not None:
             with contextlib.suppress(psutil.Error):
                 self._family |= reaper.descendants([psutil.Process(popen.pid)])
+
+
+def _another_release(simulator: str, versions: Mapping[str, str]) -> str:
+    """That an engine is of another version than its simulator's name says, whichever interpreter
+    or host it is in; empty if it is not, and where it does not tell."""
+    name = VersionedName.of(simulator)
+    if name.kind != RELEASE:
+        return ""
+    distribution = adapter(simulator).info.distribution
+    found = versions.get(distribution)
+    if found is None or canonicalize_version(found) == canonicalize_version(name.which):
+        return ""
+    return (
+        f"{simulator} was asked for, and the worker's interpreter has {distribution} {found}; name "
+        f"one that has {name.which}, or write {name.base}@PYTHON to call it by what it has"
+    )

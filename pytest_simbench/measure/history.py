@@ -13,6 +13,7 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import series
 from pytest_simbench.simulator.versions import RELEASE, VersionedName, release_numbers
 from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.tasks.phenomena import PHENOMENON
 
 FEWEST = 3
 """Releases that make a history; two are compared by verdicts."""
@@ -71,9 +72,35 @@ class History:
     def title(self) -> str:
         return f"{self.simulator}, {self.task} ({self.variant})"
 
+    def sentences(self) -> list[str]:
+        """What changed with which release, how much, and how sure; and which releases failed."""
+        found = []
+        for course in self.courses:
+            present = [v for v, values in zip(self.releases, course.values, strict=True) if values]
+            metric = course.metric
+            for change in course.changes:
+                verb = "fell" if change.after < change.before else "rose"
+                found.append(
+                    f"{metric.title} {verb} with {present[change.place]}: "
+                    f"{metric.format(change.before)} -> {metric.format(change.after)}, "
+                    f"p = {change.p_value:.2g}"
+                )
+        if not found:
+            found.append("no change is supported by these repetitions")
+        for release, result in zip(self.releases, self.results, strict=True):
+            if result.failures:
+                cause, records = next(iter(result.causes().items()))
+                total = len(result.ok) + len(result.failures)
+                message = records[0].error.message if records[0].error else ""
+                found.append(
+                    f"{release}: {len(result.failures)} of {total} repetitions failed, most often "
+                    f"{cause}: {message[:200]}"
+                )
+        return found
+
 
 def histories(records: Iterable[Record], metrics: Mapping[str, Sequence[Metric]]) -> list[History]:
-    """The histories in a run: of each simulator with three or more releases, each test.
+    """The histories in a run: of each simulator with three or more releases, each test but laws.
 
     Args:
         records: of the run.
@@ -81,7 +108,8 @@ def histories(records: Iterable[Record], metrics: Mapping[str, Sequence[Metric]]
     """
     by_task: dict[str, list[Record]] = {}
     for record in records:
-        if VersionedName.of(record.simulator).kind == RELEASE:
+        law = record.settings.get(PHENOMENON)  # `law_history` has them
+        if not law and VersionedName.of(record.simulator).kind == RELEASE:
             by_task.setdefault(record.task, []).append(record)
     found = []
     for task, of_task in by_task.items():
@@ -135,30 +163,3 @@ def _matters(metric: Metric, change: ChangePoint) -> bool:
     deterministic engine's rounding is significant too."""
     shown = metric.format(change.before) != metric.format(change.after)
     return shown and abs(change.after - change.before) >= metric.smallest_difference
-
-
-def sentences(history: History) -> list[str]:
-    """What changed with which release, how much, and how sure; and which releases failed."""
-    found = []
-    for course in history.courses:
-        present = [v for v, values in zip(history.releases, course.values, strict=True) if values]
-        metric = course.metric
-        for change in course.changes:
-            verb = "fell" if change.after < change.before else "rose"
-            found.append(
-                f"{metric.title} {verb} with {present[change.place]}: "
-                f"{metric.format(change.before)} -> {metric.format(change.after)}, "
-                f"p = {change.p_value:.2g}"
-            )
-    if not found:
-        found.append("no change is supported by these repetitions")
-    for release, result in zip(history.releases, history.results, strict=True):
-        if result.failures:
-            cause, records = next(iter(result.causes().items()))
-            total = len(result.ok) + len(result.failures)
-            message = records[0].error.message if records[0].error else ""
-            found.append(
-                f"{release}: {len(result.failures)} of {total} repetitions failed, most often "
-                f"{cause}: {message[:200]}"
-            )
-    return found

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
 
-from pytest_simbench.measure.history import History, sentences
 from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
@@ -19,6 +18,7 @@ from pytest_simbench.report import history, markdown
 from pytest_simbench.report import outcome as outcome_of
 from pytest_simbench.report.badge import badge
 from pytest_simbench.report.figures import FiguresUnavailable, write_figures
+from pytest_simbench.report.history import AnyHistory
 from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.outcome import Outcome
 from pytest_simbench.report.page import PAGE_NAME, Compared, page_of
@@ -53,7 +53,7 @@ class Written:
     problems: tuple[str, ...] = ()
     complete: bool = True
     summaries: tuple[TaskSummary, ...] = ()
-    histories: tuple[History, ...] = ()
+    histories: tuple[AnyHistory, ...] = ()
 
 
 def write_report(
@@ -97,7 +97,7 @@ def write_files(
     figures: bool = True,
     comparison: Compared | None = None,
     run: Path | None = None,
-    histories: Sequence[History] = (),
+    histories: Sequence[AnyHistory] = (),
 ) -> Written:
     """Write all files; what cannot be written is told, and the rest is written all the same.
 
@@ -126,7 +126,7 @@ def write_files(
             problems.append(str(error))
         except OSError as error:
             failed.append(f"pictures: {_unwritable(folder, error)}")
-    told_of = {found.title: sentences(found) for found in histories}
+    told_of = {found.title: found.sentences() for found in histories}
     text = markdown.render_run(summaries, [picture.name for picture in pictures], told_of)
     sheets, told = _sheets(run or folder, records) if figures else ({}, [])
     problems += told

@@ -8,37 +8,41 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pytest_simbench.measure.history import Course, History, histories, sentences
+from pytest_simbench.measure.history import Course, History, histories
 from pytest_simbench.measure.intervals import interval
+from pytest_simbench.measure.law_history import LawHistory, law_histories
 from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.names import file_name
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.text import for_figure
 from pytest_simbench.report.figures import COLOURS, DPI, drawing
+from pytest_simbench.report.law_history import draw_laws
+
+AnyHistory = History | LawHistory
 
 SHOWN = 6
 """Panels of a picture at most: those that changed come first."""
 
 
-def of_run(reading: Reading) -> list[History]:
-    """The histories in a run."""
-    return histories(reading.records, reading.metrics)
+def of_run(reading: Reading) -> list[AnyHistory]:
+    """The histories in a run: of each test, and one of all laws."""
+    return [*histories(reading.records, reading.metrics), *law_histories(reading.records)]
 
 
-def lines(found: Sequence[History], width: int) -> list[str]:
+def lines(found: Sequence[AnyHistory], width: int) -> list[str]:
     """For the terminal."""
     result = []
     for history in found:
         span = f"{len(history.releases)} releases, {history.releases[0]} to {history.releases[-1]}"
         result.append(f"{history.title}: {span}")
-        for text in sentences(history):
+        for text in history.sentences():
             result += textwrap.wrap(
                 text, width, initial_indent="  ", subsequent_indent="    ", break_long_words=False
             )
     return result
 
 
-def write_pictures(folder: Path, found: Sequence[History]) -> list[Path]:
+def write_pictures(folder: Path, found: Sequence[AnyHistory]) -> list[Path]:
     """Draw each history as a PNG file, `SIMULATOR_TASK_history.png`, and return the paths.
 
     Raises:
@@ -50,7 +54,8 @@ def write_pictures(folder: Path, found: Sequence[History]) -> list[Path]:
         for history in found:
             name = file_name(f"{history.simulator}_{history.task}_history", *history.identity)
             picture = io.BytesIO()
-            draw(history).savefig(picture, format="png", dpi=DPI)
+            figure = draw_laws(history) if isinstance(history, LawHistory) else draw(history)
+            figure.savefig(picture, format="png", dpi=DPI)
             paths.append(folder / f"{name}.png")
             write_whole(paths[-1], picture.getvalue())
     return paths

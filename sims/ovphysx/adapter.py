@@ -107,6 +107,7 @@ class OvPhysX(Simulator):
         engine="PhysX 5",
         language="C++",
         tested_version="0.7.0.74035321",
+        oldest_version="0.7.0.74035321",
         capabilities=frozenset({Capability.DETERMINISTIC, Capability.SAVE_RESTORE}),
         deviations=(
             Deviation("timestep", "an argument of each step, which PhysX does not report"),

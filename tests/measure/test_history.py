@@ -8,7 +8,7 @@ import pytest
 
 from pytest_simbench.measure.bisection import between, first_worse, like_the_bad_one, steps
 from pytest_simbench.measure.gate import side_by_side
-from pytest_simbench.measure.history import histories, sentences
+from pytest_simbench.measure.history import histories
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.record import Record
 from tests.records.build import METRICS, failed, record
@@ -40,7 +40,7 @@ def test_what_changed_with_which_release() -> None:
     assert (history.simulator, history.task, history.variant) == (
         "engine", "stacking", "headless tuned",
     )  # fmt: skip
-    told = sentences(history)
+    told = history.sentences()
     assert any(t.startswith("placed fell with 1.10: 96.67 % -> 56.67 %, p = 0.0") for t in told)
     assert any(t.startswith("peak RAM rose with 1.11: 161 MB -> 201 MB") for t in told)
     assert len(told) == 2
@@ -50,7 +50,7 @@ def test_a_small_change_of_a_cost_is_the_machines() -> None:
     found = [r for v, ram in (("1", 160), ("2", 160), ("3", 170), ("4", 170))
              for r in release(v, 1.0, ram=ram)]  # fmt: skip
     (history,) = histories(found, {"stacking": METRICS})
-    assert sentences(history) == ["no change is supported by these repetitions"]
+    assert history.sentences() == ["no change is supported by these repetitions"]
 
 
 def test_a_deterministic_engines_rounding_is_not_told() -> None:
@@ -58,7 +58,7 @@ def test_a_deterministic_engines_rounding_is_not_told() -> None:
              for v, tiny in (("1", 0), ("2", 0), ("3", 1e-7), ("4", 1e-7))
              for r in release(v, 1.0)]  # fmt: skip
     (history,) = histories(found, {"stacking": METRICS})
-    assert sentences(history) == ["no change is supported by these repetitions"]
+    assert history.sentences() == ["no change is supported by these repetitions"]
 
 
 def test_a_release_that_fails_is_named_with_its_message() -> None:
@@ -68,7 +68,7 @@ def test_a_release_that_fails_is_named_with_its_message() -> None:
     ]
     found = [*release("1", 1.0), *release("2", 1.0), *broken]
     (history,) = histories(found, {"stacking": METRICS})
-    assert sentences(history)[-1] == (
+    assert history.sentences()[-1] == (
         "3: 4 of 4 repetitions failed, most often WorkerHung in settle: no answer for 30 s"
     )
 

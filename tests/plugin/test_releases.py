@@ -3,6 +3,7 @@ stopped by the gate."""
 
 from __future__ import annotations
 
+import json
 import os
 
 import pytest
@@ -59,6 +60,20 @@ def test_history_bisection_and_gate(pytester: pytest.Pytester) -> None:
          '  versions.planted-engine was "1.2", is "1.3"',
          "FAILED *[[]planted==1.3-headless[]]: landed fell from 100 % to 0 %"]
     )  # fmt: skip
+
+
+@pytest.mark.usefixtures("planted")
+def test_a_worker_with_another_release_than_its_name_says(pytester: pytest.Pytester) -> None:
+    other = pytester.path / "environments" / "planted==1.4" / "bin" / "python"
+    result = pytester.runpytest_subprocess(
+        "--sim=planted==1.2", f"--sim-spec=planted==1.2=popen//python={other}", "--reps=1"
+    )
+    result.stdout.fnmatch_lines(["FAILED falling, planted==1.2 *: 1 x WorkerStartError in launch:"])
+    (record,) = pytester.path.glob(".simbench/*/records.jsonl")
+    assert json.loads(record.read_text())["error"]["message"] == (
+        "planted==1.2 was asked for, and the worker's interpreter has planted-engine 1.4; name one "
+        "that has 1.2, or write planted@PYTHON to call it by what it has"
+    )
 
 
 @pytest.mark.usefixtures("planted")
