@@ -65,11 +65,13 @@ def test_the_world_is_that_of_the_engine() -> None:
     scene = replace(SCENE, bodies=(replace(CUBE, name="robot", pose=Pose.at(1.0, 1.0, 0.025)),))
     prepared = PreparedRobot(SCENE.robot)
     for engine, elements in (("dartsim", "ode/mu"), ("bullet-featherstone", "bullet/friction")):
-        physics = Physics(engine, 0.001, "ode", "dantzig")
+        physics = Physics(engine, 0.001, "ode", "dantzig", torsional_friction=0.25)
         world = ET.fromstring(world_text(scene, prepared, physics, "w")).find("world")
         assert world is not None
         assert world.findtext("plugin/engine/filename") == f"gz-physics-{engine}-plugin"
         assert world.find(f"model/link/collision/surface/friction/{elements}") is not None
+        twist = world.findtext("model/link/collision/surface/friction/torsional/coefficient")
+        assert twist == {"dartsim": None, "bullet-featherstone": "0.25"}[engine]
         model = world.find(f"model[@name='{robot_model(scene)}']")
         assert model is not None
         assert len(world.findall("model[@name='robot']")) == 1
