@@ -51,6 +51,7 @@ MEASURED = {
     "*/margin": "links_are_felt",
     "body/*/damping": "damps_as_the_scene_says",
     "link/*/damping": "limp_arm_falls",
+    "body/*/velocity": "thrown_as_the_scene_says",
     "body/*/gravity": "every_body_falls",
     "link/*/gravity": "limp_arm_falls",
     "body/*/touches": "tower_stands",

@@ -31,6 +31,7 @@ from .drives import Drives
 from .readback import ReadBack
 from .sdf import Physics, robot_model, world_text
 from .server import Server, new_name
+from .wrenches import Wrenches
 
 PACKAGES = ("python3-numpy", "gz-harmonic")
 """The second is of the Open Source Robotics Foundation's own package archive."""
@@ -50,6 +51,9 @@ class GazeboSettings(Settings):
         solver: of dartsim: `dantzig` (pivoting) or `pgs` (projected Gauss-Seidel, 30 passes).
         position_gain: share of the position error that the drives correct in a step; the default
             is that of gz_ros2_control, Gazebo has none.
+        torsional_friction: what bullet-featherstone holds against a spin about a contact's normal,
+            as a share of the normal force; a pair has about twice as much [m]. SDF's default is 1,
+            so nothing can be turned on the ground. dartsim has none.
     """
 
     timestep: float = 0.001
@@ -57,6 +61,7 @@ class GazeboSettings(Settings):
     detector: Literal["ode", "fcl", "bullet", "dart"] = "ode"
     solver: Literal["dantzig", "pgs"] = "dantzig"
     position_gain: float = 0.1
+    torsional_friction: float = 1.0
 
 
 class Gazebo(Simulator):
@@ -83,10 +88,14 @@ class Gazebo(Simulator):
             Deviation("body/*/damping link/*/damping", "Gazebo tells no damping of links"),
             Deviation(
                 "",
-                "Gazebo's engines do not damp bodies: what the scene asks is left out",
+                "Gazebo's engines do not damp bodies: a force and a torque do it in each step",
                 only="damping",
             ),
-            Deviation("body/*/margin link/*/margin", "Gazebo's shapes have no margin"),
+            Deviation("body/*/margin", "Gazebo's boxes and round shapes have no margin outside"),
+            Deviation(
+                "link/*/margin",
+                "Gazebo tells no margin; bullet-featherstone puts one of 10 mm around a mesh",
+            ),
             Deviation(
                 "body/*/velocity",
                 "Gazebo tells no velocity before the first step, in which a force gives it",
@@ -121,7 +130,7 @@ class Gazebo(Simulator):
     def load(self, scene: Scene) -> None:
         s = self.settings
         self.scene, self._steps = scene, 0
-        self._physics = Physics(s.engine, s.timestep, s.detector, s.solver)
+        self._physics = Physics(s.engine, s.timestep, s.detector, s.solver, s.torsional_friction)
         self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         name = new_name()
         text = world_text(scene, self.prepared, self._physics, name)
@@ -133,7 +142,9 @@ class Gazebo(Simulator):
         ]
         for link in self._free:
             link.enable_velocity_checks(ecm)
-        self._throw()
+        self._wrenches = Wrenches(
+            ecm, scene.free_bodies, self._free, s.timestep, self._physics.turns_torques
+        )
         self._drives: Drives | None = None
         if self.prepared is not None:
             self._drives = Drives(
@@ -144,27 +155,6 @@ class Gazebo(Simulator):
                 s.position_gain,
                 self._physics.coupled,
             )
-
-    def _throw(self) -> None:
-        """Give bodies their velocity by a force and a torque in the first step.
-
-        Without gravity a step of duration h under the force m v / h ends at the velocity v, and so
-        does one that begins with v. Gazebo's velocity commands would hold on in all further steps.
-        """
-        vector3, h = bindings().math.Vector3d, self.settings.timestep
-        self._thrown = np.zeros((len(self._free), 6))
-        bodies = self.scene.free_bodies
-        for row, body, link in zip(self._thrown, bodies, self._free, strict=True):
-            if not body.velocity.any():
-                continue
-            row[:] = body.velocity
-            turn = body.pose.rotation()
-            inertia = turn @ np.diag(body.inertia()) @ turn.T
-            force = body.mass / h * body.velocity[:3]
-            torque = inertia @ body.velocity[3:] / h
-            if self._physics.turns_torques:
-                torque = turn.T @ torque
-            link.add_world_wrench(self.server.ecm, vector3(*force), vector3(*torque))
 
     def _model(self, name: str) -> Any:
         ecm = self.server.ecm
@@ -196,6 +186,8 @@ class Gazebo(Simulator):
     def step(self) -> None:
         if self._drives is not None:
             self._drives.act()
+        if self._wrenches.damps:
+            self._wrenches.act(self.body_state())
         self.server.step()
         self._steps += 1
 
@@ -206,7 +198,7 @@ class Gazebo(Simulator):
     def body_state(self) -> FloatArray:
         state, ecm = np.zeros((len(self._free), 13)), self.server.ecm
         if not self._steps:  # Gazebo tells no velocity before it has made a step
-            state[:, 7:] = self._thrown
+            state[:, 7:] = self._wrenches.thrown
         for row, link in zip(state, self._free, strict=True):
             place = link.world_pose(ecm)
             at, turn = place.pos(), place.rot()

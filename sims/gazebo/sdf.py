@@ -40,12 +40,14 @@ class Physics:
         timestep: [s].
         detector: collision detector of dartsim.
         solver: of dartsim.
+        torsional_friction: of bullet-featherstone, for each surface [m].
     """
 
     engine: str
     timestep: float
     detector: str
     solver: str
+    torsional_friction: float = 1.0
 
     @property
     def coupled(self) -> bool:
@@ -244,6 +246,9 @@ def _add_surface(
     own = ET.SubElement(element, physics.friction_names[0].partition("/")[0])
     for name in physics.friction_names:
         _text(own, name.partition("/")[2], mu)
+    if physics.engine == FEATHERSTONE:  # dartsim only warns that it has none
+        torsional = ET.SubElement(element, "torsional")
+        _text(torsional, "coefficient", repr(physics.torsional_friction))
 
 
 def _add_inertial(link: ET.Element, mass: float, pose: Pose, tensor: Iterable[float]) -> None:

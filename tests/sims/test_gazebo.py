@@ -18,8 +18,8 @@ from pytest_simbench.sims.gazebo import bindings, messages
 from pytest_simbench.sims.gazebo.adapter import Gazebo
 from pytest_simbench.sims.gazebo.sdf import Physics, robot_model, world_text
 
-from pytest_simbench.client.errors import EngineFailed, WorkerExited
-from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.client.errors import EngineFailed, WorkerExited, WorkerHung
+from pytest_simbench.scene import Box, Pose, Scene, Sphere
 from pytest_simbench.simulator import PreparedRobot, UnavailableError
 from pytest_simbench.simulator.parity import compare
 from pytest_simbench.simulator.quantities import expected_quantities
@@ -65,11 +65,13 @@ def test_the_world_is_that_of_the_engine() -> None:
     scene = replace(SCENE, bodies=(replace(CUBE, name="robot", pose=Pose.at(1.0, 1.0, 0.025)),))
     prepared = PreparedRobot(SCENE.robot)
     for engine, elements in (("dartsim", "ode/mu"), ("bullet-featherstone", "bullet/friction")):
-        physics = Physics(engine, 0.001, "ode", "dantzig")
+        physics = Physics(engine, 0.001, "ode", "dantzig", torsional_friction=0.25)
         world = ET.fromstring(world_text(scene, prepared, physics, "w")).find("world")
         assert world is not None
         assert world.findtext("plugin/engine/filename") == f"gz-physics-{engine}-plugin"
         assert world.find(f"model/link/collision/surface/friction/{elements}") is not None
+        twist = world.findtext("model/link/collision/surface/friction/torsional/coefficient")
+        assert twist == {"dartsim": None, "bullet-featherstone": "0.25"}[engine]
         model = world.find(f"model[@name='{robot_model(scene)}']")
         assert model is not None
         assert len(world.findall("model[@name='robot']")) == 1
@@ -137,3 +139,25 @@ def test_a_server_that_is_ended(number: signal.Signals, told: str) -> None:
         os.kill(worlds.worker.pid, number)
         with pytest.raises(WorkerExited, match=told):
             world.wait(5.0)
+
+
+def test_a_server_that_is_stopped() -> None:
+    """It is waited for as long as for any worker that is silent, and then killed."""
+    with Worlds(FaultyGazebo) as worlds:
+        world, process = worlds.load(Scene("one", (CUBE,))), worlds.worker
+        process.launch = replace(process.launch, stall_timeout=3.0)
+        os.kill(process.pid, signal.SIGSTOP)
+        with pytest.raises(WorkerHung, match="no sign of life for 3 s and was killed; raise --sim"):
+            world.wait(5.0)
+        assert not process.alive
+
+
+def test_a_spin_on_the_ground(worlds: Worlds) -> None:
+    """SDF's default holds a ball that spins on the spot; 0 lets it spin on."""
+    ball = Sphere("ball", 0.03, Pose.at(0.0, 0.0, 0.03), 0.1, angular_velocity=(0.0, 0.0, 6.0))
+    spins = []
+    for changes in ({}, {"torsional_friction": 0.0}):
+        world = worlds.load(Scene("spinning", (ball,)), **changes)
+        world.wait(0.1)
+        spins.append(float(world.bodies[0, 12]))
+    np.testing.assert_allclose(spins, [0.0, 6.0], atol=0.01)

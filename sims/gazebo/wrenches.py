@@ -1,0 +1,70 @@
+"""What the scene asks of free bodies and Gazebo's engines do not have: a velocity at the start and
+damping. Both are forces and torques, each for one step."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import Body, FloatArray, rotation_matrix
+
+from .bindings import bindings
+
+
+class Wrenches:
+    """Forces and torques on the free bodies.
+
+    Args:
+        ecm: the world's entities and components.
+        bodies: the scene's free bodies.
+        links: theirs, entities of the bindings.
+        timestep: [s].
+        turned: whether the engine takes a torque in the body's axes, not in the world's.
+
+    Attributes:
+        thrown: velocities at the start, (n_free, 6).
+    """
+
+    def __init__(
+        self, ecm: Any, bodies: tuple[Body, ...], links: list[Any], timestep: float, turned: bool
+    ) -> None:
+        self._ecm, self._timestep, self._turned = ecm, timestep, turned
+        self.thrown = np.array([body.velocity for body in bodies]).reshape(-1, 6)
+        self._damped = [
+            (row, body, links[row], np.expm1(-timestep * np.repeat(body.damping, 3)))
+            for row, body in enumerate(bodies)
+            if np.any(body.damping)
+        ]
+        for body, link in zip(bodies, links, strict=True):
+            if body.velocity.any():
+                self._change(link, body, body.pose.rotation(), body.velocity)
+
+    def act(self, states: FloatArray) -> None:
+        """Before a step: damp the bodies that the scene damps. A step of duration h leaves
+        exp(-c h) of a velocity.
+
+        Args:
+            states: of the free bodies, (n_free, 13).
+        """
+        for row, body, link, lost in self._damped:
+            turn = rotation_matrix(states[row, 3:7])
+            self._change(link, body, turn, lost * states[row, 7:])
+
+    @property
+    def damps(self) -> bool:
+        """Whether any body is damped."""
+        return bool(self._damped)
+
+    def _change(self, link: Any, body: Body, turn: FloatArray, by: FloatArray) -> None:
+        """Give a body other velocities in the next step [m/s, rad/s], (6,).
+
+        A force m v / h changes a velocity by v in a step of duration h. Gazebo's own velocity
+        commands would hold on in all further steps.
+        """
+        vector3, h = bindings().math.Vector3d, self._timestep
+        inertia = turn @ np.diag(body.inertia()) @ turn.T
+        torque = inertia @ by[3:] / h
+        if self._turned:
+            torque = turn.T @ torque
+        link.add_world_wrench(self._ecm, vector3(*(body.mass / h * by[:3])), vector3(*torque))
