@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import sys
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -54,3 +56,23 @@ def test_example_workflow(pytester: pytest.Pytester) -> None:
     result = pytester.runpytest_subprocess(*gate, *smallest)
     assert result.ret == 0
     result.stdout.fnmatch_lines(["no metric got worse beyond its limit"])
+
+
+def test_build_workflow(pytester: pytest.Pytester) -> None:
+    """Its commands name suites and options that there are, and its kit is one; nothing is run."""
+    text = (DOCS / "build_workflow.yml").read_text("utf-8")
+    (kit,) = re.findall(r"<<END\n(.*?)\n +END", text, re.DOTALL)
+    pytester.makepyfile(test_kit=textwrap.dedent(kit).replace("build/bin/python", sys.executable))
+    commands = re.findall(r"pytest (--pyargs (?:.|\n +)*?)(?=\n +- )", text)
+    assert len(commands) == 3
+    line = " ".join(commands).replace('"', "").replace("build/bin/python", sys.executable)
+    line = line.replace("=mujoco==4.0.0,", f"=mujoco@last={sys.executable},")  # not installed here
+    words = line.replace("mujoco==4.0.0", "mujoco@last").split()
+    words = [word for word in words if word not in ("--pyargs", "--sim-install-missing")]
+    result = pytester.runpytest_subprocess("--collect-only", "--pyargs", *words, "test_kit.py")
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(
+        ["*test_stacking[[]mujoco@build-headless[]]*", "*test_throwing[[]mujoco@build-headless[]]*",
+         "*test_law[[]mujoco@build-headless-tower[]]*",
+         "*test_conformance[[]mujoco-tuned-slides_flat[]]*"]
+    )  # fmt: skip
