@@ -91,7 +91,7 @@ class Genesis(Simulator):
         costly_start=True,
         compile_timeout=1800.0,
         requirements=("torch==2.13.0", "genesis-world==1.2.3"),
-        companions={"1.0": ("torch==2.13.0", "numpy")},
+        companions={"1.2": ("torch==2.13.0", "numpy")},
         caches={"QD_OFFLINE_CACHE_FILE_PATH": "quadrants", "GS_CACHE_FILE_PATH": "genesis"},
         install_size_mb=3700,
         language="Python (Quadrants)",

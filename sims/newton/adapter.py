@@ -60,7 +60,7 @@ class Newton(Simulator):
         engine="MuJoCo",
         language="Python (Warp), C",
         tested_version="1.8.0",
-        oldest_version="1.5.2",
+        oldest_version="1.8.0",  # older ones have no `newton.solvers.mujoco`: no actuators
         capabilities=frozenset(
             {
                 Capability.WINDOW,
@@ -89,7 +89,7 @@ class Newton(Simulator):
             "pyglet==2.1.19",
             "pillow==13.0.0",
         ),
-        companions={"1.0": ("newton[sim]", "numpy", "trimesh", "pyglet", "pillow")},
+        companions={"1.8": ("newton[sim]", "numpy", "trimesh", "pyglet", "pillow")},
         caches={"WARP_CACHE_PATH": "warp"},
         install_size_mb=900,
         environment=DISABLED,

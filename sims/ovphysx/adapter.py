@@ -107,7 +107,7 @@ class OvPhysX(Simulator):
         engine="PhysX 5",
         language="C++",
         tested_version="0.7.0.74035321",
-        oldest_version="0.7.0.74035321",
+        oldest_version="0.7.0.74035321",  # older ones tell no joint before the first step
         capabilities=frozenset({Capability.DETERMINISTIC, Capability.SAVE_RESTORE}),
         deviations=(
             Deviation("timestep", "an argument of each step, which PhysX does not report"),

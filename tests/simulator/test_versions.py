@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 from pytest_simbench.simulator.errors import SimulatorError
-from pytest_simbench.simulator.registry import UnknownSimulatorError, adapter, address
+from pytest_simbench.simulator.registry import UnknownSimulatorError, adapter, address, registered
 from pytest_simbench.simulator.versions import VersionedName, covers, release_numbers
 
 INFO = replace(
@@ -99,3 +100,15 @@ def test_the_adapter_of_a_version() -> None:
         adapter("nosuch==3.3.7")
     with pytest.raises(SimulatorError, match="packages of the system"):
         adapter("ode==1.0")
+
+
+@pytest.mark.parametrize("name", registered())
+def test_older_releases_than_were_tried_are_refused_in_one_sentence(name: str) -> None:
+    info = adapter(name).info
+    if info.system_packages:
+        assert not info.oldest_version  # the system has one release
+        return
+    assert info.tested(info.oldest_version)
+    assert re.fullmatch(r"the adapter was tested with .* not with 0\.0\.1", info.refused("0.0.1"))
+    with pytest.raises(SimulatorError, match=r"==0\.0\.1: the adapter was tested"):
+        adapter(f"{name}==0.0.1")
