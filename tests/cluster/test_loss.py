@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -14,9 +15,15 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.client.errors import NodeLost
+from pytest_simbench.cluster.executor import ClusterExecutor
+from pytest_simbench.cluster.pool import Pool
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.simulator.registry import adapter
 from tests.cluster.machines import Machines, networks_allowed, release_in
 from tests.plugin.test_same_records import TIMES
+from tests.tiny import Falling
 
 TEST = """
     import errno, os, signal, time
@@ -125,6 +132,24 @@ def test_a_process_killed_a_machine_cut_off_and_one_added(
     assert "d" in {r["host"]["node"] for r in found.values()}
     assert all((spread / "out" / r["details"]["log"]).is_file() for r in found.values())
     assert len(list((spread / "out" / "traces").iterdir())) == 1
+
+
+def test_what_a_node_has_found_is_lost_with_it(machines: Machines, case: Case) -> None:
+    """The repetition has ended, and then the process does, before anybody has the record."""
+
+    class Dying:  # in here, so that it travels as code
+        def __reduce__(self) -> Any:
+            os.kill(os.getpid(), signal.SIGKILL)
+            return object, ()
+
+    pool = Pool(machines.address)
+    pool.call = lambda job, number: {"record": Dying()}  # type: ignore[method-assign]
+    record, error = ClusterExecutor(pool).repetition(Experiment(case, Falling()), 1).run()
+    pool.close()
+    assert isinstance(error, NodeLost), error
+    assert record.status == "failed"
+    assert len(record.details["lost"]) == 2
+    assert all("its process ended" in told for told in record.details["lost"])
 
 
 def test_several_tests_at_once_and_a_release_that_one_node_has(
