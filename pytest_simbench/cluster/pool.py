@@ -8,6 +8,7 @@ a node that comes later gets work at once, and what is tried again is decided he
 from __future__ import annotations
 
 import asyncio
+import logging
 import threading
 import time
 from collections.abc import Callable, Collection, Mapping
@@ -58,18 +59,24 @@ class Pool:
             raise ExecutorError(
                 "a cluster needs Dask: pip install 'pytest-simbench[cluster]'"
             ) from None
-        secret = Security().get_connection_args("client").get("ssl_context") is not None
-        if address.lower().startswith("tls") and not secret:
+        security, tls = Security(), address.lower().startswith("tls")
+        if tls and security.get_connection_args("client").get("ssl_context") is None:
             raise ExecutorError(
                 "tls:// needs certificates for the client in Dask's configuration (docs/cluster.md)"
             )
+        if security.require_encryption and not tls:
+            raise ExecutorError(
+                "Dask's configuration here asks for encryption; start the head with --tls, and "
+                "write tls://"
+            )
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # said here, and shorter
         self.address = address
         try:
             self._client: Client = Client(
                 address, timeout=CONNECT_TIMEOUT, set_as_default=False, name="pytest-simbench"
             )
             settings = self._client.get_metadata([SETTINGS], default={})
-        except (OSError, TimeoutError, ValueError, TypeError) as error:
+        except (OSError, RuntimeError, ValueError, TypeError) as error:
             reason = " ".join(str(error).split())[:300]
             raise ExecutorError(
                 f"no scheduler of Dask answers at {address} ({reason}); start one: "
@@ -124,6 +131,8 @@ class Pool:
     def _look(self) -> None:
         if time.monotonic() - self._looked < LOOK_PERIOD:
             return
+        if not self.joined:
+            raise self.gone()
         try:
             workers = self._client.scheduler_info(n_workers=-1)["workers"]
             processing = self._client.processing()
