@@ -43,12 +43,6 @@ def empty(line: str, job: Any, number: int) -> dict[str, Any]:
     return {"record": line, "error": None, "log": b"x" * 500, "trace": None}
 
 
-class EmptyPool(Pool):
-    """Its jobs carry nothing out."""
-
-    call = staticmethod(partial(empty, REAL.read_text().splitlines()[0]))
-
-
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--jobs", type=int, default=10_000)
@@ -69,7 +63,8 @@ def main() -> None:
             experiment = Experiment(case, Stacking())
             run = RunFolder(folder)
             run.lock()
-            pool = EmptyPool(machines.address)
+            pool = Pool(machines.address)
+            pool.call = partial(empty, REAL.read_text().splitlines()[0])
             memory: list[tuple[int, float]] = []
 
             def keep(record: Record) -> None:

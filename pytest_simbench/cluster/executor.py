@@ -11,16 +11,17 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import CancelledError, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pytest_simbench.client.errors import Interrupted, NodeLost, Unavailable, Where
 from pytest_simbench.cluster.job import Job, Packed, TaskFailed, heard
 from pytest_simbench.cluster.offers import Node
 from pytest_simbench.cluster.pool import Pool
-from pytest_simbench.experiment.executor import Executor, ExecutorError, Hooks
+from pytest_simbench.experiment.executor import Executor, Hooks
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import (
     file_stem,
@@ -34,9 +35,6 @@ from pytest_simbench.recordings.trace import FOLDER as TRACES
 from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.records.record import Failure, Record, Status
 from pytest_simbench.worker.text import told
-
-if TYPE_CHECKING:
-    from distributed import Future
 
 ATTEMPTS = 2
 """Of a repetition: after a lost node once more elsewhere."""
@@ -213,20 +211,20 @@ class RemoteRepetition:
             ExecutorError: the cluster is gone, or Dask cannot run anything there.
         """
         future = self.pool.submit(key, node, job, self.number)
-        done = threading.Event()
-        future.add_done_callback(lambda _: done.set())
+        coming = self.pool.result(future)
         try:
             shown: Mapping[str, Any] = {}
-            while not done.wait(LOOK_PERIOD):
+            while not wait([coming], LOOK_PERIOD).done:
                 if self._stop.is_set():
                     raise self._interrupted(None)
                 if not self.pool.lives(node):
                     raise _Lost(GONE)
                 shown = self._show(key, shown)
-            answer = self._result(future, node)
+            answer = self._result(coming, node)
             self.pool.note(node, job, there="unknown" not in answer)
             return answer
         finally:
+            coming.cancel()
             self.pool.release(key, future)
 
     def _show(self, key: str, shown: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -238,21 +236,21 @@ class RemoteRepetition:
                 self.hooks.count(now["done"], now["total"])
         return now
 
-    def _result(self, future: Future, node: Node) -> Mapping[str, Any]:
+    def _result(self, coming: Future[Mapping[str, Any]], node: Node) -> Mapping[str, Any]:
         from distributed.scheduler import KilledWorker
 
-        if future.status == "error":
-            error = future.exception()
-            if not isinstance(error, KilledWorker):
-                raise TaskFailed(f"{node.name} cannot run it: {type(error).__name__}: {error}")
+        try:
+            answer = coming.result()
+        except KilledWorker:
             self.pool.give_up(node)
-            raise _Lost(GONE)
-        if future.status != "finished":
-            raise ExecutorError(
-                f"the scheduler at {self.pool.address} is gone; the records so far are kept, and "
-                "--sim-resume completes the run"
-            )
-        answer: Mapping[str, Any] = future.result()
+            raise _Lost(GONE) from None
+        except CancelledError:  # Dask does so when the connection to the scheduler breaks
+            raise self.pool.gone() from None
+        except Exception as error:
+            if not self.pool.joined:
+                raise self.pool.gone() from None
+            told = f"{node.name} cannot run it: {type(error).__name__}: {error}"
+            raise TaskFailed(told) from None
         if "lost" in answer:
             raise _Lost(str(answer["lost"]))
         return answer

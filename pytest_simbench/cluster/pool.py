@@ -7,9 +7,12 @@ a node that comes later gets work at once, and what is tried again is decided he
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import threading
 import time
 from collections.abc import Callable, Collection, Mapping
+from concurrent.futures import Future as Coming
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
@@ -49,9 +52,6 @@ class Pool:
         ExecutorError: no scheduler answers there, or Dask is not installed.
     """
 
-    call = staticmethod(node_side.run)
-    """What a node is to do with a packed job and the number of a repetition."""
-
     def __init__(self, address: str) -> None:
         try:
             from distributed import Client, Security
@@ -59,29 +59,36 @@ class Pool:
             raise ExecutorError(
                 "a cluster needs Dask: pip install 'pytest-simbench[cluster]'"
             ) from None
-        secret = Security().get_connection_args("client").get("ssl_context") is not None
-        if address.lower().startswith("tls") and not secret:
+        security, tls = Security(), address.lower().startswith("tls")
+        if tls and security.get_connection_args("client").get("ssl_context") is None:
             raise ExecutorError(
                 "tls:// needs certificates for the client in Dask's configuration (docs/cluster.md)"
             )
+        if security.require_encryption and not tls:
+            raise ExecutorError(
+                "Dask's configuration here asks for encryption; start the head with --tls, and "
+                "write tls://"
+            )
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # said here, and shorter
         self.address = address
         try:
             self._client: Client = Client(
                 address, timeout=CONNECT_TIMEOUT, set_as_default=False, name="pytest-simbench"
             )
-        except (OSError, TimeoutError, ValueError, TypeError) as error:
+            settings = self._client.get_metadata([SETTINGS], default={})
+        except (OSError, RuntimeError, ValueError, TypeError) as error:
             reason = " ".join(str(error).split())[:300]
             raise ExecutorError(
                 f"no scheduler of Dask answers at {address} ({reason}); start one: "
                 "python -m pytest_simbench.cluster head"
             ) from None
         self._begin()
-        settings = self._client.get_metadata([SETTINGS], default={})
         self.lost_after = float(settings.get("lost-after", LOST_AFTER))
         self._client.subscribe_topic(node_side.TOPIC, self._hear)
 
     def _begin(self) -> None:
         self.name = uuid4().hex
+        self.call: Callable[[Packed, int], dict[str, Any]] = node_side.run
         self._ready = threading.Condition()
         self._known: Mapping[str, Node] = {}
         self._others: Mapping[str, int] = {}
@@ -124,14 +131,13 @@ class Pool:
     def _look(self) -> None:
         if time.monotonic() - self._looked < LOOK_PERIOD:
             return
+        if not self.joined:
+            raise self.gone()
         try:
             workers = self._client.scheduler_info(n_workers=-1)["workers"]
             processing = self._client.processing()
         except (OSError, TimeoutError, RuntimeError) as error:
-            raise ExecutorError(
-                f"the scheduler at {self.address} is gone ({error}); the records so far are kept, "
-                "and --sim-resume completes the run"
-            ) from None
+            raise self.gone(f" ({error})") from None
         now = time.monotonic()
         found = {}
         for address, worker in workers.items():
@@ -199,6 +205,24 @@ class Pool:
             job = replace(job, data=None)
         return self._client.submit(
             self.call, job, number, key=key, workers=[node.address], pure=False, retries=0
+        )
+
+    def result(self, future: Future) -> Coming[Mapping[str, Any]]:
+        """What a job will give. It may never come: what a node has found is lost with it, and Dask
+        waits for another node to find it again, which it may not."""
+        result = self._client.gather(future, asynchronous=True)
+        return asyncio.run_coroutine_threadsafe(result, self._client.loop.asyncio_loop)
+
+    @property
+    def joined(self) -> bool:
+        """Whether there is a connection to the scheduler."""
+        return bool(self._client.status == "running")
+
+    def gone(self, reason: str = "") -> ExecutorError:
+        """That the scheduler is gone, to be raised."""
+        return ExecutorError(
+            f"the scheduler at {self.address} is gone{reason}; the records so far are kept, and "
+            "--sim-resume completes the run"
         )
 
     def note(self, node: Node, job: Packed, *, there: bool) -> None:

@@ -101,6 +101,11 @@ class Slots:
         self._thread.join(1.0)
 
 
+def key_of(test: str) -> bytes:
+    """The name of a test, as it is sent."""
+    return blake2b(test.encode(), digest_size=KEY).digest()
+
+
 @contextmanager
 def slot(address: str, test: str, stop: Callable[[], bool]) -> Iterator[bool]:
     """Wait for a slot, and hold it in this block.
@@ -120,7 +125,7 @@ def slot(address: str, test: str, stop: Callable[[], bool]) -> Iterator[bool]:
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         try:
             connection.connect(f"\0{address}")
-            connection.send(blake2b(test.encode(), digest_size=KEY).digest())
+            connection.send(key_of(test))
         except OSError:
             raise gone from None
         connection.settimeout(LOOK_PERIOD)

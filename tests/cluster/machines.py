@@ -29,8 +29,8 @@ START_TIMEOUT = 90.0
 NET = f"10.217.{os.getpid() % 256}"
 """Of the networks: a private one, which is another one in each process."""
 
-FILTERED = Path("/proc/sys/net/bridge/bridge-nf-call-iptables")
-"""Whether a firewall looks at what goes over a bridge; Docker's lets nothing through."""
+DOCKER = Path("/sys/class/net/docker0")
+"""Where it is, its firewall may let nothing through between two ports of another bridge."""
 
 
 def free_port() -> int:
@@ -207,6 +207,6 @@ def networks_allowed() -> bool:
         _ip("netns", "del", space)
         _ip("link", "add", bridge, "type", "bridge")
         _ip("link", "del", bridge)
-        return not FILTERED.exists() or FILTERED.read_text().strip() == "0"
+        return not DOCKER.exists()
     except (OSError, subprocess.CalledProcessError):
         return False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -14,9 +15,15 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.client.errors import NodeLost
+from pytest_simbench.cluster.executor import ClusterExecutor
+from pytest_simbench.cluster.pool import Pool
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.simulator.registry import adapter
 from tests.cluster.machines import Machines, networks_allowed, release_in
 from tests.plugin.test_same_records import TIMES
+from tests.tiny import Falling
 
 TEST = """
     import errno, os, signal, time
@@ -50,7 +57,7 @@ def machines(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machines]:
     folder = tmp_path_factory.mktemp("machines")
     trouble = folder / "trouble"
     trouble.mkdir()
-    with Machines(folder, lost_after=6.0, networks=networks_allowed()) as found:
+    with Machines(folder, lost_after=10.0, networks=networks_allowed()) as found:
         found.wait("head")
         environments = folder / "environments"
         release = release_in(environments)
@@ -89,11 +96,18 @@ def alike(record: dict[str, Any]) -> dict[str, Any]:
     return {**kept, "host": host, "details": details}
 
 
-def until(condition: Any, seconds: float = 60.0) -> None:
+def until(condition: Any, seconds: float = 120.0) -> None:
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end
         time.sleep(0.05)
+
+
+def wait_for(machines: Machines, name: str) -> None:
+    """Until a node is there whose process another test has ended."""
+    pool = Pool(machines.address)
+    until(lambda: name in {node.name for node in pool.nodes()})
+    pool.close()
 
 
 def test_a_process_killed_a_machine_cut_off_and_one_added(
@@ -109,7 +123,7 @@ def test_a_process_killed_a_machine_cut_off_and_one_added(
     until(lambda: len(list(trouble.glob("*"))) >= 2)
     machines.cut("b")  # nothing comes from it any more, and nobody says so
     machines.node("d", "--sim", "mujoco", environment={"TROUBLE": str(trouble)})
-    out, _ = run.communicate(timeout=120)
+    out, _ = run.communicate(timeout=400)
     assert run.returncode == 0, out
     assert "of them failed for it" in out
     expected, found = records(straight), records(spread)
@@ -127,9 +141,28 @@ def test_a_process_killed_a_machine_cut_off_and_one_added(
     assert len(list((spread / "out" / "traces").iterdir())) == 1
 
 
+def test_what_a_node_has_found_is_lost_with_it(machines: Machines, case: Case) -> None:
+    """The repetition has ended, and then the process does, before anybody has the record."""
+
+    class Dying:  # in here, so that it travels as code
+        def __reduce__(self) -> Any:
+            os.kill(os.getpid(), signal.SIGKILL)
+            return object, ()
+
+    pool = Pool(machines.address)
+    pool.call = lambda job, number: {"record": Dying()}  # type: ignore[method-assign]
+    record, error = ClusterExecutor(pool).repetition(Experiment(case, Falling()), 1).run()
+    pool.close()
+    assert isinstance(error, NodeLost), error
+    assert record.status == "failed"
+    assert len(record.details["lost"]) == 2
+    assert all("its process ended" in told for told in record.details["lost"])
+
+
 def test_several_tests_at_once_and_a_release_that_one_node_has(
     machines: Machines, pytester: pytest.Pytester
 ) -> None:
+    wait_for(machines, "a")
     pytester.makepyfile(
         """
         import pytest
@@ -156,6 +189,7 @@ def test_several_tests_at_once_and_a_release_that_one_node_has(
 def test_what_nobody_offers_is_said_before_anything_runs(
     machines: Machines, pytester: pytest.Pytester
 ) -> None:
+    wait_for(machines, "a")
     pytester.makepyfile("def test_it(repeat): pass")
     result = pytester.runpytest_subprocess("--sim=pybullet", f"--sim-cluster={machines.address}")
     assert result.ret == pytest.ExitCode.USAGE_ERROR

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import pytest
 
 from pytest_simbench.experiment.executor import ExecutorError
-from pytest_simbench.experiment.slots import Slots, slot
+from pytest_simbench.experiment.slots import Slots, key_of, slot
 
 
 @pytest.fixture
@@ -28,8 +28,7 @@ def held_for(slots: Slots, test: str, seconds: float) -> None:
 
 
 def test_the_longest_that_waits_comes_first_and_before_it_who_is_not_known(slots: Slots) -> None:
-    held_for(slots, "long", 0.2)
-    held_for(slots, "short", 0.0)
+    slots._ended |= {key_of("long"): (100, 6000.0), key_of("short"): (100, 100.0)}
     order: list[str] = []
 
     def wait(test: str) -> None:
@@ -47,6 +46,12 @@ def test_the_longest_that_waits_comes_first_and_before_it_who_is_not_known(slots
     for thread in waiting:
         thread.join()
     assert order == ["new", "long", "long", "short", "short"]
+
+
+def test_it_is_told_how_long_a_repetition_took(slots: Slots) -> None:
+    held_for(slots, "mine", 0.1)
+    held_for(slots, "other", 0.0)  # now the end of the first was heard
+    assert 0.1 <= slots._mean(key_of("mine")) < float("inf")
 
 
 def test_a_process_that_is_killed_gives_its_slot_back(slots: Slots) -> None:
