@@ -213,6 +213,18 @@ class World:
     def contact_count(self) -> int:
         return int(self.process.request("contact_count"))
 
+    def contact_forces(self) -> dict[tuple[str, str], FloatArray]:
+        """Contact forces of the last step, by the pair that touches: `("body/cube", "ground")`.
+
+        Names are "ground", `body/NAME` and `link/NAME`; each pair is there in both orders. The
+        wrench, (6,), is what the second does to the first: net force [N], and torque about the
+        world's origin [N m], in the world frame. Pairs that do not touch may be missing.
+        """
+        found: dict[tuple[str, str], FloatArray] = {}
+        for first, second, wrench in self.process.request("contact_forces"):
+            found[first, second], found[second, first] = wrench, -wrench
+        return found
+
     def render(self, width: int = 640, height: int = 480) -> NDArray[np.uint8]:
         """An offscreen picture, (height, width, 3)."""
         picture: NDArray[np.uint8] = self.process.request("render", width=width, height=height)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -119,6 +119,15 @@ class Simulator(ABC):
     def contact_count(self) -> int:
         """Number of contact points at present."""
         raise self._missing("contact count")
+
+    def contact_forces(self) -> Iterable[tuple[str, str, FloatArray]]:
+        """What touches what, and how strongly, in the last step.
+
+        Two of "ground", `body/NAME` and `link/NAME`, and the wrench of the second on the first,
+        (6,): force [N], and torque about the world's origin [N m], in the world frame. A pair may
+        come several times, as one point of contact each, and in either order: they are added up.
+        """
+        raise self._missing("contact forces")
 
     def render(self, width: int, height: int) -> NDArray[np.uint8]:
         """A picture of the world without a window, (height, width, 3), RGB; from where

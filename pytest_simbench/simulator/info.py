@@ -21,6 +21,7 @@ class Capability(StrEnum):
     EXACT_RESTORE = "exact_restore"
     """A restored run equals, bit for bit, the one that was neither saved nor restored."""
     CONTACT_COUNT = "contact_count"
+    CONTACT_FORCES = "contact_forces"
     DETERMINISTIC = "deterministic"
     GPU = "gpu"
 

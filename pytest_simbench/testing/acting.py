@@ -1,14 +1,15 @@
-"""Checks of what moves bodies from outside: forces for a time, motions that are prescribed."""
+"""Checks of forces on bodies, those of contacts too, and of motions that are prescribed."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray
+from pytest_simbench.scene import FloatArray, Pose, Scene
+from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
-from pytest_simbench.testing.scenes import EDGE, GRAVITY
-from pytest_simbench.testing.subject import Subject, require_close
+from pytest_simbench.testing.scenes import EDGE, GRAVITY, MASS
+from pytest_simbench.testing.subject import Subject, require, require_close
 from pytest_simbench.worker.acting import prescribed
 
 
@@ -81,3 +82,43 @@ def belt_carries(subject: Subject) -> None:
     require_close("speed of the cube at the end", float(rows[-1, 7]), speed, 0.02 * speed, "m/s")
     height = float(rows[-1, 2]) - scene.body("cube").pose.position[2]
     require_close("height gained on the belt", height, 0.0, EDGE / 50, "m")
+
+
+def _told(subject: Subject, scene: Scene, loads: dict[tuple[str, str], float]) -> None:
+    """At rest the second of each pair holds the first against the weight of its load [kg]; the
+    torque about the vertical through the first one's centre is 0."""
+    with subject.world(scene) as world:
+        world.wait(0.3)
+        told, places = world.contact_forces(), world.poses()
+    for pair, load in loads.items():
+        require(pair in told, f"no contact of {pair[0]} with {pair[1]}; there are {sorted(told)}")
+        force, torque = np.hsplit(told[pair], 2)
+        limit = 0.02 * abs(load) * GRAVITY
+        off = float(np.abs(force + load * np.asarray(scene.gravity)).max())
+        require_close(f"error of {pair[1]}'s force on {pair[0]}", off, 0.0, limit, "N")
+        place = np.asarray(places[pair[0].partition("/")[2]].position)
+        about = float((torque - np.cross(place, force))[2])
+        require_close("torque about the vertical", about, 0.0, limit * EDGE, "N m")
+
+
+@check(Capability.CONTACT_FORCES)
+def weight_is_told(subject: Subject) -> None:
+    """The ground carries a cube at rest with m g, upward; one that carries another with twice
+    that, while the upper one weighs m g on it: each within 2 %."""
+    low = scenes.cube("low", Pose.at(0.4, 0.0, EDGE / 2))
+    high = scenes.cube("high", Pose.at(0.4, 0.0, 1.5 * EDGE))
+    alone = scenes.cube("alone", Pose.at(-0.3, 0.2, EDGE / 2))
+    loads = {
+        ("body/alone", "ground"): MASS,
+        ("body/low", "ground"): 2 * MASS,
+        ("body/high", "body/low"): MASS,
+        ("body/low", "body/high"): -MASS,
+    }
+    _told(subject, Scene("weighed", (low, high, alone)), loads)
+
+
+@check(Capability.CONTACT_FORCES)
+def friction_is_told(subject: Subject) -> None:
+    """On a slope of 0.2 the ground holds a slab at rest against all of its weight, friction and
+    normal force together, within 2 %."""
+    _told(subject, scenes.incline(0.2, 0.5), {("body/slab", "ground"): MASS})

@@ -20,6 +20,8 @@ from dataclasses import asdict
 from importlib.util import find_spec
 from typing import Any
 
+import numpy as np
+
 from pytest_simbench import __version__
 from pytest_simbench.scene import Scene, Trajectory
 from pytest_simbench.simulator import Simulator, SimulatorError, SimulatorInfo
@@ -182,6 +184,16 @@ class Server:
 
     def do_contact_count(self) -> int:
         return self._constructed().contact_count()
+
+    def do_contact_forces(self) -> list[tuple[str, str, Any]]:
+        """Of each pair once: the sum of what the simulator tells of it."""
+        total: dict[tuple[str, str], Any] = {}
+        for first, second, wrench in self._constructed().contact_forces():
+            pair, sign = (first, second), 1.0
+            if second < first:
+                pair, sign = (second, first), -1.0
+            total[pair] = total.get(pair, 0.0) + sign * np.asarray(wrench, dtype=float)
+        return [(*pair, wrench) for pair, wrench in total.items()]
 
     def do_render(self, width: int, height: int) -> Any:
         return self._constructed().render(width, height)

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 import tempfile
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
@@ -101,6 +101,7 @@ class DART(Simulator):
                 Capability.WINDOW,
                 Capability.SAVE_RESTORE,
                 Capability.CONTACT_COUNT,
+                Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -111,6 +112,7 @@ class DART(Simulator):
                 "servo motors are velocity constraints, neither springs nor dampers",
             ),
             Deviation("link/*/damping", "DART has no damping of links"),
+            Deviation("", "what sleeps has contacts without force"),
             Deviation("body/*/margin link/*/margin", "DART's shapes have no margin"),
             Deviation(
                 "link/*/meshes",
@@ -334,6 +336,21 @@ class DART(Simulator):
 
     def _all(self) -> list[Any]:
         return [self.world.getSkeleton(i) for i in range(self.world.getNumSkeletons())]
+
+    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        for contact in self.world.getLastCollisionResult().getContacts():
+            first, second = (
+                self._name_of(end.getShapeFrame().asShapeNode().getBodyNodePtr())
+                for end in (contact.collisionObject1, contact.collisionObject2)
+            )
+            force = np.asarray(contact.force)
+            yield first, second, np.concatenate([force, np.cross(contact.point, force)])
+
+    def _name_of(self, body: Any) -> str:
+        owner = body.getSkeleton().getName()
+        if self._robot is not None and owner == self._robot.getName():
+            return f"link/{body.getName()}"
+        return owner if owner == "ground" else f"body/{owner}"
 
     def contact_count(self) -> int:
         return int(self.world.getLastCollisionResult().getNumContacts())

@@ -28,7 +28,7 @@ What was learnt (1.51, tuned settings but for the one named, seed 100):
 from __future__ import annotations
 
 import gc
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -80,6 +80,7 @@ class Drake(Simulator):
                 Capability.SAVE_RESTORE,
                 Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
+                Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -242,6 +243,30 @@ class Drake(Simulator):
         if commanded is not None:
             self.command(*commanded)
         self.simulator.Initialize()
+
+    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        results = self.plant.get_contact_results_output_port().Eval(self.context)
+        names = {made: name for name, group in self._named_shapes() for made in group}
+        for k in range(results.num_point_pair_contacts()):
+            info = results.point_pair_contact_info(k)
+            pair, force = info.point_pair(), np.asarray(info.contact_force())  # on the second
+            wrench = np.concatenate([force, np.cross(info.contact_point(), force)])
+            yield names[pair.id_B], names[pair.id_A], wrench
+        for k in range(results.num_hydroelastic_contacts()):
+            info = results.hydroelastic_contact_info(k)
+            surface, spatial = (
+                info.contact_surface(),
+                info.F_Ac_W(),
+            )  # on the first, at the centroid
+            force = np.asarray(spatial.translational())
+            torque = spatial.rotational() + np.cross(surface.centroid(), force)
+            yield names[surface.id_M()], names[surface.id_N()], np.concatenate([force, torque])
+
+    def _named_shapes(self) -> Iterator[tuple[str, list[Any]]]:
+        """Drake's shapes of the ground, each body and each link."""
+        for name, made in self.world.shapes.items():
+            kind = "body/" if name in self.world.bodies else "link/"
+            yield name if name == "ground" else kind + name, made
 
     def contact_count(self) -> int:
         results = self.plant.get_contact_results_output_port().Eval(self.context)

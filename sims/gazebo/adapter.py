@@ -91,6 +91,11 @@ class Gazebo(Simulator):
                 "Gazebo's engines do not damp bodies: a force and a torque do it in each step",
                 only="damping",
             ),
+            Deviation(
+                "",
+                "the adapter moves no body as prescribed: such a body stands still",
+                only="prescribed",
+            ),
             Deviation("body/*/margin", "Gazebo's boxes and round shapes have no margin outside"),
             Deviation(
                 "link/*/margin",
@@ -175,6 +180,9 @@ class Gazebo(Simulator):
         if self._drives is not None:
             self._drives.command(position, velocity)
 
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        pass  # declared: prescribed bodies stand
+
     def push(self, wrenches: FloatArray) -> None:
         vector3, turned = bindings().math.Vector3d, self._physics.turns_torques
         turns = rotations(self.body_state()[:, 3:7]) if turned else None
@@ -203,8 +211,8 @@ class Gazebo(Simulator):
             place = link.world_pose(ecm)
             at, turn = place.pos(), place.rot()
             row[:7] = at.x(), at.y(), at.z(), turn.w(), turn.x(), turn.y(), turn.z()
-            if self._steps:
-                linear = link.world_linear_velocity(ecm)
+            linear = link.world_linear_velocity(ecm) if self._steps else None
+            if linear is not None:  # as of a prescribed body, which stands
                 angular = link.world_angular_velocity(ecm)
                 row[7:10] = linear.x(), linear.y(), linear.z()
                 row[10:] = angular.x(), angular.y(), angular.z()

@@ -136,7 +136,7 @@ def _add_ground(world: ET.Element, scene: Scene, physics: Physics) -> None:
 
 
 def _add_body(world: ET.Element, body: Body, physics: Physics) -> None:
-    if body.fixed:
+    if not body.mass:  # fixed, or prescribed, which Gazebo has not
         link = _add_static(world, body.name, body.pose)
     else:
         model = ET.SubElement(world, "model", name=body.name)

@@ -37,7 +37,7 @@ class Wrenches:
             if np.any(body.damping)
         ]
         for body, link in zip(bodies, links, strict=True):
-            if body.velocity.any():
+            if body.mass and body.velocity.any():  # not a prescribed one
                 self._change(link, body, body.pose.rotation(), body.velocity)
 
     def act(self, states: FloatArray) -> None:

@@ -131,12 +131,12 @@ class Genesis(Simulator):
         options = dataclasses.replace(  # what is data, not code
             self.settings, timestep=1.0, substeps=1, constraint_timeconst=1.0, impedance=(0.9, 0.95)
         )
-        forces = scene.words & {"wrench", "prescribed"}  # whose kernels are others
+        forces = scene.words & {"wrench"}  # whose kernels are others
         kind = (options, several, scene.robot is not None, bool(scene.free_bodies), forces)
         if kind in self.compiled:
             return
         self.load(scene)
-        if "wrench" in forces:
+        if forces:
             self.push(np.zeros((len(self._free), 6)))
         self.step()
         self.body_state()

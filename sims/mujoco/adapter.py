@@ -9,7 +9,7 @@ What was learnt stands in docs/engines/mujoco.md.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -38,6 +38,7 @@ from .bounces import BOUNCES, direct
 from .heavy import leave_out
 from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack
+from .touching import contact_forces
 
 mujoco = lazy_import("mujoco")
 
@@ -95,6 +96,7 @@ class MuJoCo(Simulator):
                 Capability.SAVE_RESTORE,
                 Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
+                Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -242,8 +244,11 @@ class MuJoCo(Simulator):
             body.add_freejoint(name=f"{part.name}/free")
 
     def read_back(self) -> dict[str, Any]:
+        return ReadBack(self.model, self.data, self.scene, self.prepared, self._numbers()).all()
+
+    def _numbers(self) -> Numbers:
         model, prepared = self.model, self.prepared
-        numbers = Numbers(
+        return Numbers(
             model.geom("ground").id,
             {box.name: model.geom(box.name).id for box in self.scene.bodies},
             {} if prepared is None else {name: model.body(name).id for name in prepared.links},
@@ -251,7 +256,6 @@ class MuJoCo(Simulator):
             if prepared is None
             else {name: model.joint(name).id for name in prepared.robot.joint_names},
         )
-        return ReadBack(model, self.data, self.scene, prepared, numbers).all()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self.data.ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness
@@ -292,6 +296,9 @@ class MuJoCo(Simulator):
     def restore(self, state: FloatArray) -> None:
         mujoco.mj_setState(self.model, self.data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
         mujoco.mj_forward(self.model, self.data)
+
+    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        return contact_forces(self.model, self.data, self._numbers())
 
     def contact_count(self) -> int:
         return int(self.data.ncon)

@@ -13,7 +13,7 @@ drive. Joint 1 of the Panda then gains 58 % of the momentum that its effort limi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -37,6 +37,7 @@ from ..mujoco.bounces import BOUNCES, direct
 from ..mujoco.heavy import leave_out
 from ..mujoco.pictures import DISABLED, camera, renderer
 from ..mujoco.readback import Numbers, ReadBack
+from ..mujoco.touching import contact_forces
 from .world import NewtonSettings, build_model, make_solver, names
 
 LED = 1 << 20
@@ -68,6 +69,7 @@ class Newton(Simulator):
                 Capability.SAVE_RESTORE,
                 Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
+                Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -213,19 +215,21 @@ class Newton(Simulator):
 
     def read_back(self) -> dict[str, Any]:
         """From MuJoCo's model, which is what is stepped."""
+        model, data = self.solver.mj_model, self.solver.mj_data
+        return ReadBack(model, data, self.scene, self.prepared, self._numbers()).all()
+
+    def _numbers(self) -> Numbers:
         prepared = self.prepared
         bodies = self.solver.mjc_body_to_newton.numpy()[0].tolist()
         labels = names(self.model.body_label)
         links = () if prepared is None else prepared.links
         joints = () if prepared is None else prepared.robot.joint_names
-        numbers = Numbers(
+        return Numbers(
             self._geom("ground"),
             {box.name: self._geom(box.name) for box in self.scene.bodies},
             {name: bodies.index(labels.index(name)) for name in links},
             dict(zip(joints, self._mujoco_joints(), strict=True)),
         )
-        model, data = self.solver.mj_model, self.solver.mj_data
-        return ReadBack(model, data, self.scene, prepared, numbers).all()
 
     def _geom(self, label: str) -> int:
         """MuJoCo's number of Newton's shape with this label."""
@@ -301,6 +305,9 @@ class Newton(Simulator):
         mujoco.mj_setState(self.solver.mj_model, self.solver.mj_data, state["memory"], kind)
         mujoco.mj_forward(self.solver.mj_model, self.solver.mj_data)
         self._steps = state["steps"]
+
+    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        return contact_forces(self.solver.mj_model, self.solver.mj_data, self._numbers())
 
     def contact_count(self) -> int:
         """Contacts that take part in the solution; MuJoCo also lists those within the gap."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -62,6 +62,7 @@ class PyBullet(Simulator):
                 Capability.SAVE_RESTORE,
                 Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
+                Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -301,6 +302,18 @@ class PyBullet(Simulator):
         self._steps, commanded = state[1], state[2]
         if commanded is not None:  # motor targets are not part of Bullet's state
             self.command(*commanded)
+
+    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        links = {number: f"link/{name}" for name, number in self._links.items()}
+        names = {body: f"body/{name}" for name, body in self._bodies.items()}
+        names[self._ground] = "ground"
+        for point in pybullet.getContactPoints(physicsClientId=self.client) or ():
+            first, second = (
+                links[link] if body == self._robot else names[body]
+                for body, link in ((point[1], point[3]), (point[2], point[4]))
+            )
+            force = np.array([point[9], point[10], point[12]]) @ [point[7], point[11], point[13]]
+            yield first, second, np.concatenate([force, np.cross(point[5], force)])
 
     def contact_count(self) -> int:
         return len(pybullet.getContactPoints(physicsClientId=self.client) or ())

@@ -10,7 +10,7 @@ stiffness that its URDF loader gives a mimic joint. See docs/engines/sapien.md.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -114,6 +114,7 @@ class SAPIEN(Simulator):
                 Capability.OFFSCREEN,
                 Capability.SAVE_RESTORE,
                 Capability.CONTACT_COUNT,
+                Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -131,6 +132,7 @@ class SAPIEN(Simulator):
                 "impacts slower than bounce_threshold (2 m/s) do not bounce",
                 only="restitution",
             ),
+            Deviation("", "contact forces are those along the normals, without friction"),
             Deviation("", "window and pictures take a Vulkan device"),
             Deviation("", "a restored world has the saved poses and velocities, but new contacts"),
         ),
@@ -346,6 +348,19 @@ class SAPIEN(Simulator):
         self._build(self.scene)
         self._system.unpack(state[0])
         self._steps = state[1]
+
+    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        for contact in self._system.get_contacts():
+            first, second = map(self._name_of, contact.bodies)
+            for point in contact.points:
+                force = np.asarray(point.impulse, dtype=float) / self.settings.timestep
+                yield first, second, np.concatenate([force, np.cross(point.position, force)])
+
+    def _name_of(self, component: Any) -> str:
+        if component == self._ground:
+            return "ground"
+        kind = "body" if component in self._bodies.values() else "link"
+        return f"{kind}/{component.entity.name if kind == 'body' else component.name}"
 
     def contact_count(self) -> int:
         return sum(len(contact.points) for contact in self._system.get_contacts())

@@ -41,6 +41,8 @@ FAULTS: list[tuple[type[Simulator], str]] = [
     (wrong.OwnAxes, "torque_acts_for_its_time"),
     (wrong.FallingBelt, "moves_as_prescribed"),
     (wrong.StandingBelt, "belt_carries"),
+    (wrong.WrongSign, "weight_is_told"),
+    (wrong.NormalAlone, "friction_is_told"),
     (wrong.NoContacts, "contacts_counted"),
     (wrong_robots.SoftDrives, "static_hold"),
     (wrong_robots.SoftDrivesNotTold, "static_hold"),

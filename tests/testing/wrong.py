@@ -6,6 +6,7 @@ check under test has to find it, not the parity check at loading.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -104,6 +105,20 @@ class StandingBelt(MuJoCo):
         before = before.copy()
         before[:, 7:] = 0.0
         super().lead(before, after)
+
+
+class WrongSign(MuJoCo):
+    """Tells what the first does to the second."""
+
+    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        return ((first, second, -wrench) for first, second, wrench in super().contact_forces())
+
+
+class NormalAlone(MuJoCo):
+    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        upright = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+        for first, second, wrench in super().contact_forces():
+            yield first, second, upright * wrench
 
 
 class LongStep(Lying):
