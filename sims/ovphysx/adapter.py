@@ -188,6 +188,9 @@ class OvPhysX(Simulator):
         self._start()
         self._free = [usd.body_path(i) for i, box in enumerate(scene.bodies) if not box.fixed]
         self._led = [usd.body_path(i) for i, box in enumerate(scene.bodies) if box.prescribed]
+        self._still = {  # kinematic too, so they must be given a target with the others
+            usd.body_path(i): box.pose.as_array() for i, box in enumerate(scene.bodies) if box.fixed
+        }
         self._joints: list[str] = []
         self._unit = np.empty(0)
         self._placed: dict[str, Pose] = {}
@@ -241,8 +244,9 @@ class OvPhysX(Simulator):
             binding.write(buffer)
 
     def lead(self, before: FloatArray, after: FloatArray) -> None:
+        rows = self._still | dict(zip(self._led, after, strict=True))
         for name, columns in (("Position", [0, 1, 2]), ("Orientation", [4, 5, 6, 3])):
-            targets = dict(zip(self._led, after[:, columns], strict=True))
+            targets = {path: row[columns] for path, row in rows.items()}
             self.session.write("RIGID_BODY", f"kinematicTarget{name}", targets)
 
     def step(self) -> None:
