@@ -19,7 +19,7 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.records.names import file_name
 from pytest_simbench.records.record import Record, Status
 from pytest_simbench.records.series import short
-from pytest_simbench.scene import Robot
+from pytest_simbench.scene import MotionLimits, Robot
 from pytest_simbench.simulator.robot_files import CONTENT, with_content
 from pytest_simbench.tasks.base import Jitter, Task
 
@@ -109,13 +109,16 @@ def versions(case: Case) -> dict[str, str]:
 
 def robot_told(robot: Robot | None) -> dict[str, str]:
     """Name of a robot and twelve digits of everything that it is; empty for a task's own robot."""
-    if robot is None:
-        return {}
+    return {} if robot is None else dict(_robot_told(robot, robot.limits, robot.swing))
+
+
+@lru_cache(maxsize=16)
+def _robot_told(robot: Robot, limits: MotionLimits | None, swing: object) -> dict[str, str]:
+    """The same; limits and swing are arguments since robots that differ in them alone are equal."""
     wire = with_content({"robot": robot.to_wire()}, robot)["robot"]
     meshes = sorted(wire[CONTENT].pop("meshes"))  # named by their content
-    limits = asdict(robot.limits) if robot.limits else None
-    swing = [robot.swing] if robot.swing else []
-    data = json.dumps([wire, meshes, limits, *swing])
+    bounds = asdict(limits) if limits else None
+    data = json.dumps([wire, meshes, bounds, *([swing] if swing else [])])
     return {"name": robot.name, "digest": hashlib.sha256(data.encode()).hexdigest()[:12]}
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import gc
+import json
 import os
 import subprocess
 import sys
 import tempfile
+import weakref
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pytest_simbench.records import lines
 from pytest_simbench.records.folder import RECORDS, RunFolder
 from pytest_simbench.records.lines import LARGEST_LINE, LinesFile
 
@@ -217,3 +221,44 @@ def test_a_newline_that_became_nul_loses_no_record(tmp_path: Path) -> None:
     reading = RunFolder.of(path).read()
     assert [r.repetition for r in reading.records] == [0, 1, 2]
     assert reading.problems == (f"{path}:1: the line is damaged and left out: it holds NUL bytes",)
+
+
+@pytest.mark.parametrize("much", [0, 10**9], ids=["much", "little"])
+def test_much_is_kept_from_the_garbage_collector_and_freed_as_ever(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, much: int
+) -> None:
+    """Objects of the permanent generation are no longer looked through, and go with their last
+    reference."""
+    monkeypatch.setattr(lines, "MUCH", much)
+    path = tmp_path / "some.jsonl"
+    path.write_text(json.dumps({"a": [1]}) + "\n")
+    gc.unfreeze()
+    found = lines.read(path, lambda data, where: Kept(data))
+    assert gc.isenabled()
+    assert (gc.get_freeze_count() > 0) == (much == 0)
+    freed = weakref.ref(found.items[0])
+    del found
+    assert freed() is None
+    gc.unfreeze()
+
+
+def test_a_reader_that_raises_leaves_the_garbage_collector_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lines, "MUCH", 0)
+    (tmp_path / "some.jsonl").write_text("{}\n")
+
+    def broken(data: object, where: str) -> None:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        lines.read(tmp_path / "some.jsonl", broken)
+    assert gc.isenabled()
+    gc.unfreeze()
+
+
+class Kept:
+    """What can be weakly referred to."""
+
+    def __init__(self, data: dict[str, object]) -> None:
+        self.data = data
