@@ -45,12 +45,27 @@ GRIDS: Mapping[str, Mapping[str, tuple[Any, ...]]] = {
 }  # fmt: skip
 """Settings that decide how a contact gives way, and few values of each, around those of `tuned`."""
 
+MORE: Mapping[str, tuple[Mapping[str, Any], ...]] = {
+    "drake": tuple(
+        {"timestep": 0.001, **changes}
+        for changes in (
+            {"point_stiffness": 3e5}, {"point_stiffness": 1e5}, {"relaxation_time": 0.003},
+            {"corner_radius": 0.004}, {"timestep": 0.0005},
+            {"approximation": "lagged", "hunt_crossley_dissipation": 1.0},
+            {"corner_radius": 0.0, "compliance": "compliant",
+             "contact_model": "hydroelastic_with_fallback"},
+        )
+    ),
+}  # fmt: skip
+"""Single changes that were tried besides."""
+
 
 def candidates(simulator: str) -> Iterator[dict[str, Any]]:
-    """Every combination of a grid."""
+    """Every combination of a grid, and what was tried besides."""
     grid = GRIDS[simulator]
     for values in itertools.product(*grid.values()):
         yield dict(zip(grid, values, strict=True))
+    yield from map(dict, MORE.get(simulator, ()))
 
 
 def score(case: Case, task: Tossing) -> tuple[float, float]:

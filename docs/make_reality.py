@@ -126,9 +126,9 @@ def arm_following() -> str:
     found = {task: rows(task) for task in FOLLOWING}
     heads = ("free motion mm", "push mm", "cube moved mm")
     both = [*(f"given: {head}" for head in heads), *(f"corrected: {head}" for head in heads)]
-    text = [f"| simulator | {' | '.join(both)} |", "| :-- |" + " --: |" * len(both)]
+    text = [f"| simulator | runs | {' | '.join(both)} |", "| :-- |" + " --: |" * (len(both) + 1)]
     for name in NAMES:
-        cells = [NAMES[name]]
+        cells = [NAMES[name], str(len(found[FOLLOWING[0]][name, "real"]))]
         for task in FOLLOWING:
             lines = found[task][name, "real"]
             free, push = ([x for x in lines if x["number"].startswith(e)] for e in EXPERIMENTS)
@@ -137,7 +137,7 @@ def arm_following() -> str:
             ):  # fmt: skip
                 values = _values(part, metric)
                 cells.append(f"{1000 * statistics.fmean(values):.1f}" if values else "-")
-        if set(cells[1:]) != {"-"}:
+        if set(cells[2:]) != {"-"}:
             text.append(f"| {' | '.join(cells)} |")
     return "\n".join(text)
 

@@ -54,6 +54,10 @@ def test_the_tables_of_real_experiments_are_up_to_date_and_of_held_out_motions()
     assert all(number % 2 for number in tosses)
     runs = {int(line["number"]) for r in make_reality.rows("arm_pushing").values() for line in r}
     assert runs == {3, 7, 11, 15, 19, 31}
+    for task in make_reality.FOLLOWING:
+        names = {line["number"] for rows in make_reality.rows(task).values() for line in rows}
+        assert len(names) == 12
+        assert all(int(name[-4:]) // 2 % 2 for name in names)
 
 
 def test_no_profile_was_chosen_on_a_published_seed() -> None:
