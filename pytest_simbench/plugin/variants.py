@@ -9,6 +9,8 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from pytest_simbench.records.series import step_text
+
 USUAL = "tuned"
 """The settings profile of a run that names none."""
 
@@ -54,11 +56,6 @@ class Variant(NamedTuple):
         profile = self.profile if profiles > 1 and self.profile != USUAL else ""
         step = "" if self.timestep is None else f"dt={step_text(self.timestep)}"
         return "-".join(filter(None, [self.simulator, self.mode, robot, profile, step]))
-
-
-def step_text(seconds: float) -> str:
-    """A time step as ids name it: `0.5ms`."""
-    return f"{1e3 * seconds:.4g}ms"
 
 
 def variants(
