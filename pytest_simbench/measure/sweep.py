@@ -57,7 +57,7 @@ class Line:
     """One configuration of one simulator at a law.
 
     Attributes:
-        who: simulator, mode, profile, and which of several such configurations, from 1.
+        who: simulator, mode, profile, and which of several such tests or configurations, from 1.
         points: the longest step first.
         order: of the error's convergence.
     """
@@ -170,18 +170,19 @@ def choice(laws: Sequence[Swept], who: tuple[str, str, str, int]) -> Choice | No
 
 def _lines(records: Sequence[Record], unit: str) -> list[Line]:
     """Of one law."""
-    of: dict[tuple[str, str, str], list[Record]] = {}
+    of: dict[tuple[str, str, str, str], list[Record]] = {}
     for record in sorted(records, key=lambda r: RowKey.of(r).order):
-        of.setdefault((record.simulator, record.mode, record.profile), []).append(record)
-    found = []
+        of.setdefault(RowKey.of(record)[:4], []).append(record)
+    found: list[Line] = []
     for key, group in of.items():
         stepless = [replace(r, settings={**r.settings, "timestep": 0.0}) for r in group]
         origin = {id(copy): record for copy, record in zip(stepless, group, strict=True)}
-        for number, same in enumerate(configurations(stepless), start=1):
+        for same in configurations(stepless):
             points = _points([origin[id(copy)] for copy in same], unit)
             fine = [point for point in points if math.isfinite(point.error)]
             columns = ([getattr(p, name) for p in fine] for name in ("step", "error", "rounding"))
-            found.append(Line((*key, number), tuple(points), convergence(*columns)))
+            number = 1 + sum(line.who[:3] == key[:3] for line in found)
+            found.append(Line((*key[:3], number), tuple(points), convergence(*columns)))
     return found
 
 
