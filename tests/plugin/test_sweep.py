@@ -63,7 +63,7 @@ def test_a_sweep_of_two_profiles_is_one_run_that_is_resumed_and_reported(
     assert len(ids(out)) == len(set(ids(out))) == 2 * 2 * 3
     assert "test_law[mujoco-headless-default-dt=1ms-free_fall]" in ids(out)
     text = (out / "report.md").read_text()
-    assert "free\\_fall | 1.00 [0.9" in text
+    assert "free\\_fall | 1.00 [" in text
     assert "no such step for me" in text
     again = pytester.runpytest_subprocess("--sim-report", "out")
     again.stdout.fnmatch_lines(["the same laws over time steps", "mujoco (tuned) *2/2 2ms *"])
