@@ -18,6 +18,7 @@ from statistics import fmean
 import numpy as np
 
 from pytest_simbench.laws import LAW
+from pytest_simbench.laws.base import rounding
 from pytest_simbench.measure.convergence import Convergence, convergence
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import RowKey, configurations
@@ -27,8 +28,9 @@ from pytest_simbench.tasks.phenomena import PHENOMENON
 REFERENCE = 1e-3
 """[s]. An accuracy is that which this step may cost."""
 
-SINGLE = 2.0**-24
-"""Half of the last digit of single precision (IEEE 754), which several engines compute in."""
+PERCENT = 200.0
+"""What rounding counts for where the error is a share of an energy or a momentum, a product of two
+numbers that are rounded."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,8 @@ class Point:
         error: the worst of the repetitions, in the law's unit; infinite where one failed.
         tolerance: of the law at that step; None where a repetition failed.
         cost: CPU seconds for a simulated second, the mean; None where it is not known.
-        rounding: what single precision may make of the error, in its unit.
+        rounding: what single precision, in which several engines compute, may make of the error,
+            in its unit, as laws allow for it.
         message: why it failed, in one line.
     """
 
@@ -207,12 +210,10 @@ def _point(step: float, records: Sequence[Record], unit: str) -> Point:
         return Point(step, math.inf, None, cost, message=message or "no error was recorded")
     told = [record.details.get(LAW) or {} for record in records]
     tolerances = [t["tolerance"] for t in told if isinstance(t.get("tolerance"), int | float)]
-    scale = max([100.0 if unit == "%" else 1.0, *(abs(t.get("exact") or 0.0) for t in told)])
+    scale = max([PERCENT if unit == "%" else 1.0, *(abs(t.get("exact") or 0.0) for t in told)])
     many = max(record.stepping.get("steps") or 1.0 for record in records)
-    # Roundings of either sign add up to the square root of their number (Higham, Accuracy and
-    # Stability of Numerical Algorithms, section 2.8).
-    rounding = SINGLE * scale * math.sqrt(many)
-    return Point(step, max(known), max(tolerances, default=None), cost, rounding)
+    tolerance = max(tolerances, default=None)
+    return Point(step, max(known), tolerance, cost, rounding(scale, int(many)))
 
 
 def _cheapest(points: Sequence[Point]) -> Point | None:
