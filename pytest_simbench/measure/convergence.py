@@ -34,8 +34,8 @@ class Convergence:
     """What errors at several time steps tell.
 
     Attributes:
-        kind: `order` was fitted; every error is 0 (`exact`); all is `rounding`; or it is `unknown`,
-            since fewer than two steps have an error above rounding.
+        kind: `order` was fitted; every error is 0 (`exact`); at most one is more than `rounding`;
+            or it is `unknown`, with fewer than two steps.
         order: the slope; nan where none was fitted.
         low, high: its 95 % interval; infinite for two steps, nan where none was fitted.
         points: errors that it was fitted to.
@@ -71,11 +71,11 @@ def convergence(
     h, e = h[order], e[order]
     if len(h) and not e.any():
         return Convergence("exact")
-    told = _told(h, e, level)
-    if not told:
-        return Convergence("rounding" if len(h) else "unknown")
-    if len(told) == 1:
+    if len(h) < 2:
         return Convergence("unknown")
+    told = _told(h, e, level)
+    if len(told) < 2:
+        return Convergence("rounding")
     return _fitted(np.log(h[told]), np.log(e[told]))
 
 
