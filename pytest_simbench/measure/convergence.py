@@ -22,7 +22,10 @@ Kind = Literal["order", "exact", "rounding", "unknown"]
 
 FALLS = 0.5
 """An error that falls at least as fast as the step's square root still tells of the step, however
-small it is."""
+small it is, as long as it goes on at the same rate:"""
+
+SAME_RATE = 0.8
+"""the slopes between neighbours differ by no larger factor."""
 
 A_FALL = 4
 """Steps in a row along which it must fall so where every error is as small as rounding: rounding
@@ -98,7 +101,17 @@ def _told(h: np.ndarray, e: np.ndarray, level: np.ndarray) -> list[int]:
 
 def _falls(h: np.ndarray, e: np.ndarray, k: int) -> bool:
     """Whether the error at a place tells of the step as the one before it does."""
-    return bool(0 < e[k] <= e[k - 1] * (h[k] / h[k - 1]) ** FALLS)
+    if not (e[k] and e[k - 1]):
+        return False
+    slope = _slope(h, e, k)
+    before = _slope(h, e, k - 1) if k > 1 and e[k - 2] else 0.0
+    same = before < FALLS or SAME_RATE * before <= slope <= before / SAME_RATE
+    return slope >= FALLS and same
+
+
+def _slope(h: np.ndarray, e: np.ndarray, k: int) -> float:
+    """From the place before to this one."""
+    return math.log(e[k] / e[k - 1]) / math.log(h[k] / h[k - 1])
 
 
 def _fitted(x: np.ndarray, y: np.ndarray) -> Convergence:

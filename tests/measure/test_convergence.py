@@ -38,7 +38,7 @@ def test_neither_unit_nor_sequence_nor_the_unit_of_time_matters(
 
 def test_a_floor_of_rounding_is_left_out() -> None:
     """Single precision: the error of a second order falls to 1e-7, and rounding grows again."""
-    errors = [1e-5, 2.5e-6, 6e-7, 2e-7, 3e-7, 5e-7]
+    errors = [1e-5, 2.5e-6, 6e-7, 1.7e-7, 3e-7, 5e-7]
     found = convergence(STEPS, errors, rounding=5e-7)
     assert found.points == 4  # the fourth lies below the level, and still goes on falling
     assert found.order == pytest.approx(2, abs=0.15)
@@ -55,6 +55,15 @@ def test_a_clean_fall_below_rounding_is_an_order() -> None:
     """An engine that computes in double precision, where single precision is allowed for."""
     found = convergence(STEPS, [h**3 for h in STEPS], rounding=1e-6)
     assert found.order == pytest.approx(3)
+
+
+def test_a_floor_of_double_precision_is_left_out_where_single_precision_is_allowed_for() -> None:
+    """A free top in MuJoCo with its integrator RK4; the fifth step is rounding, and smaller."""
+    errors = [1.286e-08, 8.033e-10, 5.021e-11, 2.943e-12, 4.497e-13, 8.096e-13]
+    found = convergence(STEPS, errors, rounding=1e-4)
+    assert found.points == 4
+    assert found.low < 4 < found.high
+    assert found.order == pytest.approx(4, abs=0.05)
 
 
 def test_zeros_are_exact_and_a_zero_among_others_is_left_out() -> None:
