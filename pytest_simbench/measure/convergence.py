@@ -27,6 +27,10 @@ small it is, as long as it goes on at the same rate:"""
 SAME_RATE = 0.8
 """the slopes between neighbours differ by no larger factor."""
 
+FEWEST = 3
+"""Steps with an error above rounding, without which nothing is fitted: two tell a slope of any
+size. A sweep of two steps tells just that, without an interval."""
+
 A_FALL = 4
 """Steps in a row along which it must fall so where every error is as small as rounding: rounding
 alone does that once in 24 times at most."""
@@ -37,8 +41,8 @@ class Convergence:
     """What errors at several time steps tell.
 
     Attributes:
-        kind: `order` was fitted; every error is 0 (`exact`); at most one is more than `rounding`;
-            or it is `unknown`, with fewer than two steps.
+        kind: `order` was fitted; every error is 0 (`exact`); nearly all are `rounding`; or it is
+            `unknown`, with fewer than two steps.
         order: the slope; nan where none was fitted.
         low, high: its 95 % interval; infinite for two steps, nan where none was fitted.
         points: errors that it was fitted to.
@@ -77,7 +81,7 @@ def convergence(
     if len(h) < 2:
         return Convergence("unknown")
     told = _told(h, e, level)
-    if len(told) < 2:
+    if len(told) < min(FEWEST, len(h)):
         return Convergence("rounding")
     return _fitted(np.log(h[told]), np.log(e[told]))
 

@@ -31,7 +31,7 @@ LEGEND = (
 READING = (
     "Order: the slope of the error over the step, both logarithmic, with its 95 % interval; 1 is "
     "what an integrator of the first order has, 0 says that the step does not matter. Exact: every "
-    "error is 0. Rounding: none is above what single precision may add up to."
+    "error is 0. Rounding: nearly all are as small as single precision may add up to."
 )
 
 Who = tuple[str, str, str, int]

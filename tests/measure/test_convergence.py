@@ -70,6 +70,7 @@ def test_zeros_are_exact_and_a_zero_among_others_is_left_out() -> None:
     assert convergence(STEPS, [0.0] * 6).kind == "exact"
     assert convergence(STEPS, [*STEPS[:5], 0.0]).order == pytest.approx(1)
     assert convergence(STEPS, [1e-3, *[0.0] * 5]).kind == "rounding"
+    assert convergence(STEPS, [1e-3, 1e-5, *[0.0] * 4]).kind == "rounding"
 
 
 def test_two_steps_give_an_order_without_an_interval() -> None:
