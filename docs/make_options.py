@@ -74,7 +74,8 @@ def option_row(option: Option) -> tuple[str, str, str, str]:
     """The cells of an option."""
     values = option.metavar or ""
     typed = " ".join([option.flag, *([values] if isinstance(values, str) else values)]).strip()
-    default = "" if option.default in (None, False, [], {}) else f"`{option.default}`"
+    told = ",".join(option.default) if isinstance(option.default, tuple) else option.default
+    default = "" if told in (None, False, [], {}) else f"`{told}`"
     meaning = option.help + ("" if option.ini else " (*no ini*)")
     return f"`{typed}`", f"`{option.short}`" if option.short else "", default, meaning
 

@@ -1,10 +1,13 @@
-"""Makes the tables of docs/truth.md from docs/data/truth.csv, which holds every law of every run.
+"""Makes the tables of docs/truth.md from docs/data/truth.csv, which holds every law of every run,
+and from docs/data/sweep.csv, which holds laws over time steps.
 
-python docs/make_truth.py RUN...    reads run folders into the CSV, then writes the tables
-python docs/make_truth.py           writes the tables
+python docs/make_truth.py RUN...            reads run folders into truth.csv, then writes the tables
+python docs/make_truth.py --sweep RUN...    the same into sweep.csv, and draws its pictures
+python docs/make_truth.py                   writes the tables
 
 A table stands between `<!-- truth: PART PROFILE -->` and `<!-- end -->`; PART is `sentences`,
-`phenomena`, `laws` or `list`.
+`phenomena`, `laws` or `list`, and with the word `sweep` in place of a profile `steps`, `orders`
+(of free motion), `cheapest` (all phenomena) or `failures`.
 """
 
 from __future__ import annotations
@@ -12,51 +15,99 @@ from __future__ import annotations
 import csv
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from pytest_simbench.laws import LAW, LAWS
+from pytest_simbench.measure.sweep import Swept, sweeps
 from pytest_simbench.records.folder import RunFolder
-from pytest_simbench.records.record import Record
+from pytest_simbench.records.record import OWN_TIMESTEP, Failure, Record
 from pytest_simbench.records.text import for_markdown
-from pytest_simbench.report import markdown, truth
+from pytest_simbench.report import markdown, sweep, truth
+from pytest_simbench.report.figures import drawing
 from pytest_simbench.report.summary import TaskSummary, summarise
-from pytest_simbench.tasks.phenomena import PHENOMENON
+from pytest_simbench.tasks.phenomena import PHENOMENA, PHENOMENON
 
 DOCS = Path(__file__).resolve().parent
 DATA, PAGE = DOCS / "data" / "truth.csv", DOCS / "truth.md"
+SWEEP, PICTURES = DOCS / "data" / "sweep.csv", DOCS / "pictures"
+DRAWN = "free motion"
+"""Whose pictures are on the page."""
 READING = ("value", "exact", "tolerance")
 HEADER = (
     "profile", "simulator", "version", "timestep", "phenomenon", "law", "status", *READING,
     "error", "ratio", "unit", "cpu", "simulated",
 )  # fmt: skip
+SWEPT = ("own", "steps", "message")
+"""Columns of sweep.csv beside these."""
 BY_NAME = {law.name: law for law in LAWS}
 
 
-def read(folders: list[str]) -> None:
-    """Run folders into the CSV."""
-    with DATA.open("w", newline="", encoding="utf-8") as file:
+def read(folders: list[str], swept: bool = False) -> None:
+    """Run folders into the CSV; of a sweep into its own."""
+    with (SWEEP if swept else DATA).open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(HEADER)
+        writer.writerow(HEADER + SWEPT * swept)
         for record in (r for f in folders for r in RunFolder(Path(f)).read().records):
-            if PHENOMENON not in record.settings:
-                continue
-            other = ("python", "pytest-simbench")
-            version = next((v for k, v in record.versions.items() if k not in other), "")
-            told = record.details.get(LAW, {})
-            numbers = [told.get(name) for name in READING]
-            numbers += [record.metrics.get(name) for name in ("error", "ratio")]
-            costs = [record.stepping.get(name) for name in ("cpu", "simulated")]
-            writer.writerow(
-                [
-                    record.profile, record.simulator, version, record.settings["timestep"],
-                    record.settings[PHENOMENON], record.task, record.status,
-                    *map(_text, numbers), BY_NAME[record.task].unit, *map(_text, costs),
-                ]
-            )  # fmt: skip
+            if PHENOMENON in record.settings and (swept or not record.swept):
+                writer.writerow(_line(record) + _of_sweep(record) * swept)
+
+
+def _line(record: Record) -> list[object]:
+    other = ("python", "pytest-simbench")
+    version = next((v for k, v in record.versions.items() if k not in other), "")
+    told = record.details.get(LAW, {})
+    numbers = [told.get(name) for name in READING]
+    numbers += [record.metrics.get(name) for name in ("error", "ratio")]
+    costs = [record.stepping.get(name) for name in ("cpu", "simulated")]
+    return [
+        record.profile, record.simulator, version, record.settings["timestep"],
+        record.settings[PHENOMENON], record.task, record.status,
+        *map(_text, numbers), BY_NAME[record.task].unit, *map(_text, costs),
+    ]  # fmt: skip
+
+
+def _of_sweep(record: Record) -> list[object]:
+    message = " ".join(record.error.message.split()) if record.error else ""
+    return [
+        _text(record.details.get(OWN_TIMESTEP)), _text(record.stepping.get("steps")), message
+    ]  # fmt: skip
 
 
 def _text(value: float | None) -> str:
     return "" if value is None else f"{value:.6g}"
+
+
+def found_sweeps() -> list[Swept]:
+    """What sweep.csv tells, laws in their order."""
+    with SWEEP.open(newline="", encoding="utf-8") as file:
+        lines = list(csv.DictReader(file))
+    order = list(BY_NAME)
+    lines.sort(key=lambda line: order.index(line["law"]))
+    metrics = {name: law.metrics for name, law in BY_NAME.items()}
+    return sweeps([_record_of_sweep(line) for line in lines], metrics)
+
+
+def _record_of_sweep(line: dict[str, str]) -> Record:
+    told = {name: float(line[name]) for name in READING if line[name]}
+    own = {OWN_TIMESTEP: float(line["own"])} if line["own"] else {}
+    plain = _record(line)
+    return replace(
+        plain,
+        settings={**plain.settings, "timestep": float(line["timestep"])},
+        stepping={**plain.stepping, **({"steps": float(line["steps"])} if line["steps"] else {})},
+        details={**({LAW: told} if told else {}), **own},
+        error=None if plain.ok else Failure("", line["message"]),
+    )
+
+
+def draw() -> None:
+    """The pictures of the page."""
+    found = found_sweeps()
+    with drawing():
+        for over in sweep.OVER:
+            path = PICTURES / f"sweep_{DRAWN.replace(' ', '_')}_{over}.png"
+            sweep.draw(found, DRAWN, over).savefig(path, dpi=90)
 
 
 def summaries(profile: str) -> list[TaskSummary]:
@@ -89,6 +140,8 @@ def part(name: str, profile: str) -> str:
     """One table, or the sentences."""
     if name == "list":
         return _list()
+    if profile == "sweep":
+        return _sweep(name)
     found = summaries(profile)
     if name == "sentences":
         return "\n".join(f"- {text}" for text in truth.sentences(found))
@@ -96,6 +149,25 @@ def part(name: str, profile: str) -> str:
         return markdown.table(truth.table(found))
     texts = [f"{title}:\n\n{markdown.table(table)}" for title, table in truth.details(found)]
     return "\n\n".join(text[0].upper() + text[1:] for text in texts)
+
+
+def _sweep(name: str) -> str:
+    """One table of laws over time steps."""
+    found = found_sweeps()
+    if name == "steps":
+        return markdown.table(sweep.table(found))
+    tables = dict(sweep.details(found))
+    if name == "failures":
+        failed = [table for title, table in tables.items() if title.startswith("what failed")]
+        return "\n".join(map(markdown.table, failed)) or "Nothing failed."
+    if name == "orders":
+        return markdown.table(tables[f"{DRAWN}: order of convergence"])
+    texts = [
+        f"{title[0].upper()}{title[1:]}:\n\n{markdown.table(table)}"
+        for title, table in tables.items()
+        if title.partition(":")[0] in PHENOMENA
+    ]
+    return "\n\n".join(texts)
 
 
 def _list() -> str:
@@ -121,6 +193,9 @@ def page() -> str:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:]:
+    if sys.argv[1:2] == ["--sweep"]:
+        read(sys.argv[2:], swept=True)
+        draw()
+    elif sys.argv[1:]:
         read(sys.argv[1:])
     PAGE.write_text(page(), "utf-8")

@@ -63,6 +63,8 @@ class Case:
         folder: the run folder.
         attempt: of the same repetitions in this process, see `records.record`.
         robot: that does the tasks; None for the tasks' own.
+        own_timestep: of the profile [s], where `changes` has another one for a sweep over steps;
+            its records tell it (`details`), and so that they belong to a sweep.
     """
 
     test: str
@@ -90,6 +92,7 @@ class Case:
     contended: bool = False
     attempt: int = 1
     robot: Robot | None = None
+    own_timestep: float | None = None
 
     @classmethod
     def of(cls, simulator: str, *, python: str | None = None, **more: Any) -> Case:

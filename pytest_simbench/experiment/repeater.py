@@ -76,11 +76,16 @@ class Repeater:
     def _one(self, number: int) -> Record:
         with Interrupts() as interrupts:
             record, error = self._kept(number, interrupts)
-        if error is not None and (
-            isinstance(error, WorldParityError) or not isinstance(error, WorkerError)
-        ):
+        if error is not None and self._ends_all(error):
             raise error
         return record
+
+    def _ends_all(self, error: BaseException) -> bool:
+        """Whether no repetition is tried after this error. At a time step that is not the profile's
+        own, what a simulator cannot do is a finding, and its record tells it."""
+        if self.experiment.case.own_timestep is not None and isinstance(error, Exception):
+            return False
+        return isinstance(error, WorldParityError) or not isinstance(error, WorkerError)
 
     def _kept(self, number: int, interrupts: Interrupts) -> tuple[Record, BaseException | None]:
         """Run one repetition and keep its record."""

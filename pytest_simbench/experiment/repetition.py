@@ -30,7 +30,7 @@ from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.workers import IdleWorkers
 from pytest_simbench.recordings import film
 from pytest_simbench.recordings.trace import FOLDER, Trace
-from pytest_simbench.records.record import Failure, Record, Status
+from pytest_simbench.records.record import OWN_TIMESTEP, Failure, Record, Status
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.choices import seeds_seen
 from pytest_simbench.tasks.base import Outcome
@@ -231,6 +231,8 @@ class Repetition:
         seconds["other"] = max(0.0, total - sum(seconds.values()))
         seconds["total"] = total
         details = {**outcome.details, "log": self._log_name()}
+        if case.own_timestep is not None:
+            details[OWN_TIMESTEP] = case.own_timestep
         if sample := self.experiment.task.sample(self.seed):
             details["data"] = list(sample)
         if seen := seeds_seen(case.adapter, case.profile):

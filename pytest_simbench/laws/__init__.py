@@ -41,21 +41,6 @@ from pytest_simbench.laws.free import (
     TumbleEnergy,
     TumbleMomentum,
 )
-from pytest_simbench.laws.friction import (
-    Belt,
-    Carried,
-    Creep,
-    Glide,
-    SlideDiagonal,
-    SlideStraight,
-    SlideX,
-    SlideY,
-    StickAngle,
-    StickAngleAcross,
-    StickAngleDiagonal,
-    StoppingDistance,
-    StoppingDistanceDiagonal,
-)
 from pytest_simbench.laws.hands import (
     GripHolds,
     GripSlips,
@@ -79,6 +64,23 @@ from pytest_simbench.laws.rolling import (
     RollingSphere,
     SlipToRoll,
     SpinToRoll,
+)
+from pytest_simbench.laws.sliding import (
+    Belt,
+    Glide,
+    SlideDiagonal,
+    SlideStraight,
+    SlideX,
+    SlideY,
+    StoppingDistance,
+    StoppingDistanceDiagonal,
+)
+from pytest_simbench.laws.sticking import (
+    Carried,
+    Creep,
+    StickAngle,
+    StickAngleAcross,
+    StickAngleDiagonal,
 )
 from pytest_simbench.laws.wrenches import AxialForce, AxialTorque
 

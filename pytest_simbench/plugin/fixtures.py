@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from pytest_simbench.measure.results import ResultSet
     from pytest_simbench.plugin.repeatability import Perturber
     from pytest_simbench.plugin.run import Run
+    from pytest_simbench.plugin.variants import Variant
     from pytest_simbench.repeatability.replay_result import Replay
     from pytest_simbench.scene import Robot, Scene
     from pytest_simbench.tasks.base import Task
@@ -62,22 +63,28 @@ def _is_fixture(thing: object) -> bool:
 
 
 @pytest.fixture(scope="session")
-def sim_case(request: pytest.FixtureRequest) -> tuple[str, str]:
-    """Name and mode of the parametrised simulator."""
-    name, mode = request.param
-    return name, mode
+def sim_case(request: pytest.FixtureRequest) -> Variant:
+    """What the test is made for: simulator, mode, profile and time step."""
+    found: Variant = request.param
+    return found
 
 
 @pytest.fixture(scope="session")
-def sim_name(sim_case: tuple[str, str]) -> str:
+def sim_name(sim_case: Variant) -> str:
     """Name of the simulator under test."""
-    return sim_case[0]
+    return sim_case.simulator
 
 
 @pytest.fixture(scope="session")
-def sim_mode(sim_case: tuple[str, str]) -> str:
+def sim_mode(sim_case: Variant) -> str:
     """`headless` or `gui`."""
-    return sim_case[1]
+    return sim_case.mode
+
+
+@pytest.fixture(scope="session")
+def sim_swept(sim_case: Variant) -> bool:
+    """Whether the time step is another one than the profile's own (`--sim-sweep`)."""
+    return sim_case.swept
 
 
 @pytest.fixture
@@ -92,12 +99,12 @@ def output_path(request: pytest.FixtureRequest) -> Path:
     return session_of(request.config).run.use()
 
 
-def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: Any) -> Case:
+def _case(config: pytest.Config, variant: Variant, test: str, **more: Any) -> Case:
     """What the options say of a simulator's repetitions."""
     from pytest_simbench.experiment.case import Case
     from pytest_simbench.experiment.protocol import PROTOCOLS
 
-    name, mode = sim_case
+    name, mode = variant.simulator, variant.mode
     session = session_of(config)
     chosen, this = session.selection, session.run
     elsewhere = cluster.asked(config)  # nodes find interpreters and displays themselves
@@ -107,9 +114,10 @@ def _case(config: pytest.Config, sim_case: tuple[str, str], test: str, **more: A
         python=chosen.pythons.get(name),
         test=test,
         mode=mode,
-        profile=chosen.profile,
+        profile=variant.profile,
+        own_timestep=variant.own_timestep,
         folder=this.use(),
-        changes={**settings, **chosen.changes_of(name)},
+        changes={**settings, **chosen.changes_of(name), **variant.changes},
         spec=chosen.specs.get(name),
         robot=chosen.robot,
         display=_display(this) if mode == "gui" and not elsewhere else None,
@@ -134,18 +142,18 @@ def _display(this: Run) -> Displays:
 
 @pytest.fixture
 def simbench_case(
-    request: pytest.FixtureRequest, sim_case: tuple[str, str], sim_settings: dict[str, Any]
+    request: pytest.FixtureRequest, sim_case: Variant, sim_settings: dict[str, Any]
 ) -> Case:
     """Everything that the repetitions of this test have in common."""
     from pytest_simbench.plugin.selection import number_mark
 
     given = options.value(request.config, "sim_timeout")
-    profile = session_of(request.config).selection.profile
+    named = sim_case.simulator, sim_case.profile
     return _case(
         request.config,
         sim_case,
         request.node.nodeid,
-        settings=arguments.checked_settings(sim_settings, sim_case[0], profile),
+        settings=arguments.checked_settings(sim_settings, *named),
         timeout=given if given is not None else number_mark(request.node, "sim_timeout"),
     )
 
@@ -269,9 +277,7 @@ def simulator(simbench_handle: SimulatorHandle) -> SimulatorHandle:
 
 
 @pytest.fixture(scope="session")
-def simbench_handle(
-    request: pytest.FixtureRequest, sim_case: tuple[str, str]
-) -> Iterator[SimulatorHandle]:
+def simbench_handle(request: pytest.FixtureRequest, sim_case: Variant) -> Iterator[SimulatorHandle]:
     """The session's handle, whatever is named `simulator` here."""
     from pytest_simbench.experiment.handle import SimulatorHandle
 

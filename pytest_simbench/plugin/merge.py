@@ -25,6 +25,7 @@ from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.records.text import for_terminal
 
 if TYPE_CHECKING:
+    from pytest_simbench.measure.sweep import Swept
     from pytest_simbench.report.outcome import Outcome
     from pytest_simbench.report.summary import TaskSummary
 
@@ -137,7 +138,7 @@ def merge_runs(config: pytest.Config) -> int:
         passed = together([outcome.passed for outcome in outcomes])
         problems += [*wrong, write_outcome(folder.path, Outcome(passed))]
         problems.append(publish(config, kept, passed))
-        _print(config, written.summaries, problems)
+        _print(config, written.summaries, written.sweeps, problems)
         if written.complete and not unsaved:
             print(where(folder.path / PAGE_NAME, config.invocation_params.dir))
     finally:
@@ -154,7 +155,7 @@ def report_runs(config: pytest.Config) -> int:
     Raises:
         pytest.UsageError: a run that cannot be read, or runs that are not parts of one.
     """
-    from pytest_simbench.report import history, repeatability
+    from pytest_simbench.report import history, repeatability, sweep
     from pytest_simbench.report.changes import render_terminal
     from pytest_simbench.report.files import Written, in_order, summaries_of, where, write_files
     from pytest_simbench.report.page import PAGE_NAME
@@ -164,7 +165,7 @@ def report_runs(config: pytest.Config) -> int:
     (first, folder), *others = runs.folders.items()
     whole = runs.merged("--sim-report")[1] if others else runs.readings[first]
     summaries, written = summaries_of(whole), Written()
-    histories = history.of_run(whole)
+    histories, sweeps = history.of_run(whole), sweep.of_run(whole)
     outcomes, wrong = runs.outcomes()
     tables, problems = ([], []) if others else repeatability.write_tables(folder.path, target)
     if not (whole.records or tables or problems):
@@ -173,14 +174,14 @@ def report_runs(config: pytest.Config) -> int:
         run = None if others else folder.path
         compared = None if others else outcomes[0].compared
         written = write_files(
-            target, summaries, in_order(whole.records), True, compared, run, histories
+            target, summaries, in_order(whole.records), True, compared, run, histories, sweeps
         )
     recorded = [*wrong, publish(config, whole.records, together([o.passed for o in outcomes]))]
     if target is not None and not others:
         recorded += recording.record(config, folder.path, target, whole.records)
     elif options.value(config, recording.RECORD):
         recorded.append("no recordings: join the runs with --sim-merge first")
-    _print(config, summaries, [*runs.problems, *written.problems, *recorded])
+    _print(config, summaries, sweeps, [*runs.problems, *written.problems, *recorded])
     for line in history.lines(histories, shutil.get_terminal_size().columns):
         print(for_terminal(line))
     if not others and outcomes[0].compared is not None:
@@ -216,12 +217,21 @@ def _target(config: pytest.Config, folders: list[RunFolder]) -> Path | None:
     return target
 
 
-def _print(config: pytest.Config, summaries: Sequence[TaskSummary], problems: list[str]) -> None:
+def _print(
+    config: pytest.Config,
+    summaries: Sequence[TaskSummary],
+    sweeps: Sequence[Swept],
+    problems: list[str],
+) -> None:
+    from pytest_simbench.report import sweep
     from pytest_simbench.report.brief import render_brief
     from pytest_simbench.report.tables import render_run
 
-    show = render_run if config.get_verbosity() > 0 else render_brief
-    print(show(summaries, shutil.get_terminal_size().columns))
+    verbose, width = config.get_verbosity() > 0, shutil.get_terminal_size().columns
+    print((render_run if verbose else render_brief)(summaries, width))
+    if sweeps:
+        told = (sweep.whole if verbose else sweep.brief)(sweeps, width)
+        print("\n".join([f"\n{sweep.TITLE}", *map(for_terminal, told)]))
     for problem in filter(None, problems):
         print(for_terminal(problem))
 

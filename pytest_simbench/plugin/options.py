@@ -22,9 +22,10 @@ from pytest_simbench.plugin.values import (
     LastReleases,
     Limits,
     Number,
+    Profiles,
     Repetitions,
     Simulators,
-    Word,
+    Steps,
     Words,
 )
 from pytest_simbench.plugin.values import Auto as Auto
@@ -112,8 +113,11 @@ OPTIONS = (
            metavar="SECONDS"),
     Option("--sim-stall-timeout", SECONDS, "longest silence of a worker in seconds", 60.0,
            metavar="SECONDS"),
-    Option("--sim-profile", Word(), "settings profile: default, tuned or real", "tuned",
-           metavar="NAME"),
+    Option("--sim-profile", Profiles(), "settings profile: default, tuned or real; several "
+           "(default,tuned) make each test for each", ("tuned",), metavar="NAME"),
+    Option("--sim-sweep", Steps(), "make each test for several time steps: for these [s], or, "
+           "without any, for six from four times the profile's own to an eighth of it",
+           metavar="STEP,...", ini=False, arguments={"nargs": "?", "const": True}),
     Option("--sim-set", Assignments("SIM.SETTING=VALUE"), "change one setting: "
            "mujoco.timestep=0.001", {}, metavar="SIM.SETTING=VALUE"),
     Option("--sim-python", Assignments("SIM=PATH", commas=False), "interpreter of a simulator's "

@@ -278,7 +278,7 @@ class Run:
         if not self.reading.records and not self._repeated():
             return
         from pytest_simbench.plugin.merge import publish
-        from pytest_simbench.report import markdown
+        from pytest_simbench.report import markdown, sweep
         from pytest_simbench.report.brief import render_brief
         from pytest_simbench.report.files import write_outcome, write_report
         from pytest_simbench.report.github import append_summary
@@ -293,13 +293,19 @@ class Run:
         unsaved = self.folder.flush()
         problems = [*self._problems, *self.reading.problems, *self.reading.refused]
         problems += [*written.problems, cluster.lost(self.reading.records)]
-        if written.summaries:
+        if written.summaries or written.sweeps:
             changes = comparison.markdown() if comparison else ""
-            page = markdown.render_run(written.summaries)
+            page = markdown.render_run(written.summaries, sweeps=written.sweeps)
             problems.append(append_summary("\n".join([changes, page])))
             reporter.write_sep("=", "simulator comparison")
-            show = render_run if self.config.get_verbosity() > 0 else render_brief
+            verbose = self.config.get_verbosity() > 0
+            show = render_run if verbose else render_brief
             reporter.write_line(show(written.summaries, reporter._tw.fullwidth))
+        if written.sweeps:
+            reporter.write_sep("=", sweep.TITLE)
+            tell = sweep.whole if verbose else sweep.brief
+            for line in tell(written.sweeps, reporter._tw.fullwidth):
+                reporter.write_line(for_terminal(line))
         if written.histories:
             reporter.write_sep("=", "history")
             for line in lines(written.histories, reporter._tw.fullwidth):

@@ -13,11 +13,13 @@ from pytest_simbench.plugin.history import releases_of
 from pytest_simbench.plugin.interpreters import checked_specification, interpreter_path
 from pytest_simbench.plugin.simulator_names import install_missing, progress, read_names
 from pytest_simbench.plugin.values import BadValue, shown
+from pytest_simbench.plugin.variants import Variant, problem, variants
 
 if TYPE_CHECKING:
     from pytest_simbench.cluster.offers import Node
     from pytest_simbench.scene import Robot
     from pytest_simbench.simulator.info import SimulatorInfo
+    from pytest_simbench.simulator.settings import Settings
 
 MODES = ("headless", "gui")
 
@@ -30,27 +32,44 @@ class Selection:
         simulators: names, in order.
         explicit: the names that were asked for one by one; a missing one is an error.
         modes: `headless`, `gui`.
-        profile: settings profile.
+        profiles: settings profiles.
         changes: simulator name to changed settings, as texts; those of a bare name hold for all
             of its versions.
         pythons, specs: simulator name to interpreter or execnet specification.
         robot: that does the tasks; None for the tasks' own, the Panda.
         nodes: of the cluster that carries repetitions out; none for this machine.
+        sweep: time steps to make each test for [s]; True for those around each profile's own, None
+            for these alone.
     """
 
     simulators: tuple[str, ...]
     explicit: frozenset[str]
     modes: tuple[str, ...]
-    profile: str
+    profiles: tuple[str, ...]
     changes: dict[str, dict[str, str]] = field(default_factory=dict)
     pythons: dict[str, str] = field(default_factory=dict)
     specs: dict[str, str] = field(default_factory=dict)
     robot: Robot | None = None
     nodes: tuple[Node, ...] = ()
+    sweep: bool | tuple[float, ...] | None = None
 
-    def id_of(self, name: str, mode: str) -> str:
+    def id_of(self, variant: Variant) -> str:
         """Of the parameter of a test; the default robot adds nothing."""
-        return "-".join([name, mode, *([self.robot.name] if self.robot else [])])
+        return variant.id_with(self.robot.name if self.robot else "", len(self.profiles))
+
+    def variants(self, name: str, mode: str) -> list[Variant]:
+        """What a test is made for, of one simulator and mode."""
+        from pytest_simbench.simulator.registry import problem
+
+        found = []
+        for profile in self.profiles:
+            unknown = problem(name) or self._settings_problem(name, (profile,))
+            if self.sweep is None or unknown:
+                found.append(Variant(name, mode, profile))
+            else:
+                own = self._settings(name, profile).timestep
+                found += variants(name, mode, profile, own, self.sweep)
+        return found
 
     def changes_of(self, name: str) -> dict[str, str]:
         """Changed settings of a simulator."""
@@ -58,13 +77,18 @@ class Selection:
 
         return {**self.changes.get(base_name(name), {}), **self.changes.get(name, {})}
 
-    def missing(self, name: str) -> str | None:
+    def missing(self, name: str, profiles: Sequence[str] = ()) -> str | None:
         """Why a simulator cannot run here, or on the cluster, with what mends it; None when it
-        can."""
+        can.
+
+        Args:
+            name: of the simulator.
+            profiles: that it needs; none for all of the run.
+        """
         from pytest_simbench.client.environments import missing
         from pytest_simbench.simulator.registry import problem
 
-        found = problem(name) or self._settings_problem(name)
+        found = problem(name) or self._settings_problem(name, profiles)
         if found:
             return found
         if self.nodes:
@@ -76,14 +100,25 @@ class Selection:
             return None
         return missing(_info(name))
 
-    def _settings_problem(self, name: str) -> str | None:
-        from pytest_simbench.simulator.errors import SettingsError
+    def _settings(self, name: str, profile: str) -> Settings:
+        """Of a simulator, in a profile, as the user changed them.
+
+        Raises:
+            SettingsError: it has no such profile, or cannot take a change.
+        """
         from pytest_simbench.simulator.registry import adapter
-        from pytest_simbench.simulator.settings import changed, profile
+        from pytest_simbench.simulator.settings import changed
+        from pytest_simbench.simulator.settings import profile as named
+
+        found = named(adapter(name).profiles, profile, name)
+        return changed(found, self.changes_of(name), name)
+
+    def _settings_problem(self, name: str, profiles: Sequence[str] = ()) -> str | None:
+        from pytest_simbench.simulator.errors import SettingsError
 
         try:
-            settings = profile(adapter(name).profiles, self.profile, name)
-            changed(settings, self.changes_of(name), name)
+            for profile in profiles or self.profiles:
+                self._settings(name, profile)
         except SettingsError as error:
             return str(error)
         return None
@@ -113,7 +148,11 @@ def select(config: pytest.Config) -> Selection:
 def _select(config: pytest.Config) -> Selection:
     from pytest_simbench.simulator.registry import adapter, check_names, known
 
-    _check_profile(options.value(config, "sim_profile"))
+    for name in options.value(config, "sim_profile"):
+        _check_profile(name)
+    sweep = options.value(config, "sim_sweep")
+    if not isinstance(sweep, bool | None) and (wrong := problem(sweep)):
+        raise pytest.UsageError(wrong)
     asked = options.value(config, "sim_name")
     names, builds = read_names([name for name in asked if name != "all"], config)
     names += releases_of(config)
@@ -153,20 +192,23 @@ def _select(config: pytest.Config) -> Selection:
         specs,
         _robot(options.value(config, "sim_robot")),
         cluster.nodes(config),
+        sweep,
     )
     for name in changes:
-        problem = selection._settings_problem(name)
-        if problem:
-            raise pytest.UsageError(problem)
+        if refused := selection._settings_problem(name):
+            raise pytest.UsageError(refused)
     for name in names:
         reason = selection.missing(name)
         if reason:
             raise pytest.UsageError(reason)
     if asked or names:
         return selection
-    return replace(
-        selection, simulators=tuple(n for n in selection.simulators if not selection.missing(n))
-    )
+    here = [
+        name
+        for name in selection.simulators
+        if not all(selection.missing(name, (profile,)) for profile in selection.profiles)
+    ]
+    return replace(selection, simulators=tuple(here))
 
 
 def _installs(config: pytest.Config) -> bool:
@@ -210,7 +252,7 @@ def _modes(config: pytest.Config) -> tuple[str, ...]:
 
 
 NOTHING = pytest.param(
-    ("none", "headless"),
+    Variant("none", "headless", ""),
     id="none",
     marks=[pytest.mark.skip(reason="no selected simulator fits the only_sim mark")],
 )
@@ -218,7 +260,7 @@ NOTHING = pytest.param(
 
 
 def parameters(metafunc: pytest.Metafunc, selection: Selection) -> list[Any]:
-    """Parameters `(simulator, mode)` of a test, with what its marks say of each.
+    """Variants to make a test for, with what its marks say of each.
 
     Raises:
         pytest.UsageError: a mark with an unknown simulator or capability.
@@ -227,9 +269,9 @@ def parameters(metafunc: pytest.Metafunc, selection: Selection) -> list[Any]:
     names = [name for name in selection.simulators if _wanted(node, name)]
     result = []
     for name in names:
-        for mode in selection.modes:
-            marks = _marks(node, name, mode, selection)
-            result.append(pytest.param((name, mode), id=selection.id_of(name, mode), marks=marks))
+        for variant in (v for mode in selection.modes for v in selection.variants(name, mode)):
+            marks = _marks(node, variant, selection)
+            result.append(pytest.param(variant, id=selection.id_of(variant), marks=marks))
     return result or [NOTHING]
 
 
@@ -247,12 +289,13 @@ def _among(asked: Sequence[str], name: str) -> bool:
     return any(covers(other, name) for other in asked)
 
 
-def _marks(node: Any, name: str, mode: str, selection: Selection) -> list[pytest.MarkDecorator]:
+def _marks(node: Any, variant: Variant, selection: Selection) -> list[pytest.MarkDecorator]:
     from pytest_simbench.simulator.info import Capability
     from pytest_simbench.simulator.registry import problem
 
+    name, mode = variant.simulator, variant.mode
     marks = []
-    reason = selection.missing(name)
+    reason = selection.missing(name, (variant.profile,))
     if reason:
         marks.append(pytest.mark.skip(reason=reason))
     if problem(name):

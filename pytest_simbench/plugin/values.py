@@ -191,13 +191,6 @@ class Choice(Kind):
         return texts[-1]
 
 
-class Word(Kind):
-    """A name."""
-
-    def read(self, texts: Sequence[str]) -> str:
-        return _word(texts[-1], texts[-1])
-
-
 def _word(text: str, whole: str) -> str:
     word = text.strip()
     if not word:
@@ -205,6 +198,30 @@ def _word(text: str, whole: str) -> str:
     if len(word) > LONGEST_WORD or not word.isprintable():
         raise BadValue(whole, f"a name has at most {LONGEST_WORD} printable characters")
     return word
+
+
+class Profiles(Kind):
+    """Names, separated by commas, each once; of several such lists the last one counts."""
+
+    def read(self, texts: Sequence[str]) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(_word(part, texts[-1]) for part in texts[-1].split(",")))
+
+
+class Steps(Kind):
+    """Time steps in seconds, separated by commas; no two that the milliseconds of an id do not tell
+    apart."""
+
+    def read(self, texts: Sequence[str]) -> tuple[float, ...]:
+        found: dict[str, float] = {}
+        for part in texts[-1].split(","):
+            try:
+                step = float(Number(1e-9, 1e3).read([part]))
+            except BadValue:
+                raise BadValue(texts[-1], "give seconds, separated by commas: 1e-4,1e-3") from None
+            if f"{step:.4g}" in found:
+                raise BadValue(texts[-1], f"{step:g} is given twice; give it once")
+            found[f"{step:.4g}"] = step
+        return tuple(sorted(found.values(), reverse=True))
 
 
 class Address(Kind):

@@ -12,6 +12,10 @@ from pytest_simbench.records import checked
 
 SCHEMA = 1
 
+OWN_TIMESTEP = "own_timestep"
+"""Of the details of a record of a sweep: the time step that its profile has [s], where its own is
+another one."""
+
 Status = Literal["ok", "failed", "interrupted"]
 
 
@@ -94,6 +98,11 @@ class Record:
     def label(self) -> str:
         """Simulator, mode and profile, as messages name them."""
         return f"{self.simulator} {self.mode} ({self.profile})"
+
+    @property
+    def swept(self) -> bool:
+        """Whether it was made at another time step than its profile's own."""
+        return OWN_TIMESTEP in self.details
 
     def cost(self, name: str) -> float | None:
         """One of `metrics.COSTS` by name, or None where the record does not hold it."""

@@ -215,6 +215,11 @@ def _name(key: tuple[str, str, int], every: set[tuple[str, str, int]]) -> str:
     return f"{test} ({task})" if number == 1 else f"{test} ({task} {number})"
 
 
+def step_text(seconds: float) -> str:
+    """A time step as ids and tables name it: `0.5ms`."""
+    return f"{1e3 * seconds:.4g}ms"
+
+
 def short(test: str) -> str:
     """A test's id without file and class."""
     return test.rpartition("::")[2]

@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
 
+from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.text import for_csv, for_terminal
-from pytest_simbench.report import history, markdown
+from pytest_simbench.report import history, markdown, sweep
 from pytest_simbench.report import outcome as outcome_of
 from pytest_simbench.report.badge import badge
 from pytest_simbench.report.figures import FiguresUnavailable, write_figures
@@ -26,7 +27,7 @@ from pytest_simbench.report.replay import REPLAY_NAME
 from pytest_simbench.report.replay.groups import Group, groups
 from pytest_simbench.report.sheet import sheet_name
 from pytest_simbench.report.sheet import sheets as sheets_of
-from pytest_simbench.report.summary import PHASES, TaskSummary, summarise
+from pytest_simbench.report.summary import PHASES, TaskSummary, at_own_steps, summarise
 from pytest_simbench.report.truth import others
 from pytest_simbench.tasks.metrics import COSTS
 
@@ -48,12 +49,14 @@ class Written:
         complete: whether every file was written; pictures that need matplotlib are not missed.
         summaries: what the report tells of each task.
         histories: of simulators of which there are several releases.
+        sweeps: laws over time steps.
     """
 
     problems: tuple[str, ...] = ()
     complete: bool = True
     summaries: tuple[TaskSummary, ...] = ()
     histories: tuple[AnyHistory, ...] = ()
+    sweeps: tuple[Swept, ...] = ()
 
 
 def write_report(
@@ -72,16 +75,16 @@ def write_report(
     reading = reading or folder.read()
     records = in_order(reading.records)
     summaries = summaries_of(reading)
-    histories = tuple(history.of_run(reading))
+    histories, sweeps = tuple(history.of_run(reading)), tuple(sweep.of_run(reading))
     written = write_files(
-        folder.path, summaries, records, comparison=comparison, histories=histories
+        folder.path, summaries, records, comparison=comparison, histories=histories, sweeps=sweeps
     )
-    return replace(written, summaries=tuple(summaries), histories=histories)
+    return replace(written, summaries=tuple(summaries), histories=histories, sweeps=sweeps)
 
 
 def summaries_of(reading: Reading) -> list[TaskSummary]:
     """What a run tells of each task."""
-    records = in_order(reading.records)
+    records = at_own_steps(in_order(reading.records))
     return with_wins(summarise(records, reading.metrics, reading.references), records)
 
 
@@ -98,6 +101,7 @@ def write_files(
     comparison: Compared | None = None,
     run: Path | None = None,
     histories: Sequence[AnyHistory] = (),
+    sweeps: Sequence[Swept] = (),
 ) -> Written:
     """Write all files; what cannot be written is told, and the rest is written all the same.
 
@@ -109,6 +113,7 @@ def write_files(
         comparison: with a baseline, where there is one.
         run: the run folder, where it is another: its results on repeatability are on the page.
         histories: of simulators, drawn too.
+        sweeps: laws over time steps, drawn too.
     """
     problems: list[str] = []
     failed: list[str] = []
@@ -119,20 +124,24 @@ def write_files(
         return Written((f"no report: {_unwritable(folder, error)}",), False)
     if figures:
         try:
-            pictures = write_figures(folder, others(summaries)) + history.write_pictures(
-                folder, histories
-            )
+            pictures = [
+                *write_figures(folder, others(summaries)),
+                *history.write_pictures(folder, histories),
+                *sweep.write_pictures(folder, sweeps),
+            ]
         except FiguresUnavailable as error:
             problems.append(str(error))
         except OSError as error:
             failed.append(f"pictures: {_unwritable(folder, error)}")
     told_of = {found.title: found.sentences() for found in histories}
-    text = markdown.render_run(summaries, [picture.name for picture in pictures], told_of)
+    names = [picture.name for picture in pictures]
+    text = markdown.render_run(summaries, names, told_of, sweeps)
     sheets, told = _sheets(run or folder, records) if figures else ({}, [])
     problems += told
     shown, replay, told = _replay(run or folder, records)
     problems += told
-    contents = {PAGE_NAME: page_of(run or folder, summaries, records, comparison, shown, sheets)}
+    page = page_of(run or folder, summaries, records, comparison, shown, sheets, sweeps)
+    contents = {PAGE_NAME: page}
     if replay:
         contents[REPLAY_NAME] = replay
     if records:  # else the run has results on repeatability alone

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.records.text import for_markdown
-from pytest_simbench.report import columns, truth
+from pytest_simbench.report import columns, sweep, truth
 from pytest_simbench.report.answer import sentences
 from pytest_simbench.report.grid import Column
 from pytest_simbench.report.summary import TaskSummary
@@ -15,6 +16,7 @@ def render_run(
     summaries: Sequence[TaskSummary],
     pictures: Sequence[str] = (),
     histories: Mapping[str, Sequence[str]] | None = None,
+    sweeps: Sequence[Swept] = (),
 ) -> str:
     """The whole report; ends with a newline.
 
@@ -22,10 +24,12 @@ def render_run(
         summaries: from `summary.summarise`.
         pictures: addresses of pictures to show at the end, relative to the report.
         histories: what changed over a simulator's releases, in sentences, by title.
+        sweeps: laws over time steps.
     """
-    if not summaries:
+    if not (summaries or sweeps):
         return "No repetition was recorded.\n"
     parts = [_truth(summaries)] if truth.laws(summaries) else []
+    parts += [_sweep(sweeps)] if sweeps else []
     parts += [render_task(summary) for summary in truth.others(summaries)]
     for title, found in (histories or {}).items():
         items = "\n".join(f"- {for_markdown(text)}" for text in found)
@@ -42,13 +46,26 @@ def render_run(
 
 def _truth(summaries: Sequence[TaskSummary]) -> str:
     """What simulators make of laws."""
-    parts = [f"## {truth.TITLE[0].upper()}{truth.TITLE[1:]}"]
+    parts = [f"## {_capital(truth.TITLE)}"]
     if told := truth.sentences(summaries):
         parts.append("\n".join(f"- {for_markdown(text)}" for text in told))
     parts += [table(truth.table(summaries)), for_markdown(truth.LEGEND)]
     for name, found in truth.details(summaries):
-        parts.append(f"### {for_markdown(name[0].upper() + name[1:])}\n\n{table(found)}")
+        parts.append(f"### {for_markdown(_capital(name))}\n\n{table(found)}")
     return "\n\n".join(parts)
+
+
+def _sweep(found: Sequence[Swept]) -> str:
+    """Laws over time steps."""
+    parts = [f"## {_capital(sweep.TITLE)}", table(sweep.table(found)), for_markdown(sweep.LEGEND)]
+    parts.append(for_markdown(sweep.READING))
+    for name, columns_ in sweep.details(found):
+        parts.append(f"### {for_markdown(_capital(name))}\n\n{table(columns_)}")
+    return "\n\n".join(parts)
+
+
+def _capital(text: str) -> str:
+    return text[0].upper() + text[1:]
 
 
 def render_task(summary: TaskSummary, level: int = 2) -> str:
@@ -59,7 +76,7 @@ def render_task(summary: TaskSummary, level: int = 2) -> str:
     tables = [*columns.details(summary), (columns.BY_PHASE, columns.by_phase(summary))]
     for name, found in tables:
         if found:
-            heading = for_markdown(name[0].upper() + name[1:])
+            heading = for_markdown(_capital(name))
             parts.append(f"{'#' * (level + 1)} {heading}\n\n{table(found)}")
     notes = columns.notes(summary)
     if notes:

@@ -137,6 +137,12 @@ class TaskSummary:
         return tuple(metric for metric in self.metrics if not metric.study)
 
 
+def at_own_steps(records: Iterable[Record]) -> list[Record]:
+    """The records without those of laws at other time steps than their profile's own, which have
+    tables of their own (`report.sweep`)."""
+    return [r for r in records if not (r.swept and PHENOMENON in r.settings)]
+
+
 def summarise(
     records: Iterable[Record],
     metrics: Mapping[str, Sequence[Metric]],

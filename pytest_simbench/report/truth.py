@@ -13,7 +13,7 @@ from pytest_simbench.report.answer import NAMED, short_labels
 from pytest_simbench.report.grid import Column, fill, render
 from pytest_simbench.report.summary import Row, TaskSummary
 from pytest_simbench.tasks.metrics import significant
-from pytest_simbench.tasks.phenomena import PHENOMENA
+from pytest_simbench.tasks.phenomena import ordered
 
 TITLE = "which simulator is right about what"
 
@@ -114,10 +114,7 @@ def _row(summary: TaskSummary, like: Row) -> Row | None:
 
 
 def _phenomena(summaries: Sequence[TaskSummary]) -> list[str]:
-    """Those that there are, in their order; one that is not known here comes last."""
-    there = dict.fromkeys(summary.phenomenon for summary in laws(summaries))
-    known = [name for name in PHENOMENA if name in there]
-    return [*known, *(name for name in there if name not in known)]
+    return ordered(summary.phenomenon for summary in laws(summaries))
 
 
 def _ratio(row: Row) -> float | None:

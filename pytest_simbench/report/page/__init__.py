@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from pytest_simbench.measure.gate import GateReport
+from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.replay.groups import Group
 from pytest_simbench.report.summary import TaskSummary
@@ -28,6 +29,7 @@ def page_of(
     comparison: Compared | None = None,
     replays: Sequence[Group] = (),
     sheets: Mapping[str, bytes] | None = None,
+    sweeps: Sequence[Swept] = (),
 ) -> str:
     """The page of a run, as HTML.
 
@@ -38,8 +40,9 @@ def page_of(
         comparison: with a baseline, where there is one.
         replays: what the replay beside the page shows.
         sheets: contact sheets (PNG), by the name of their task.
+        sweeps: laws over time steps.
     """
     from pytest_simbench.report.page.context import page
     from pytest_simbench.report.page.render import render
 
-    return render(page(folder, summaries, records, comparison, replays, sheets or {}))
+    return render(page(folder, summaries, records, comparison, replays, sheets or {}, sweeps))

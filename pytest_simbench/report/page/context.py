@@ -10,23 +10,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import series
+from pytest_simbench.records.series import series, step_text
 from pytest_simbench.records.text import for_terminal
-from pytest_simbench.report import columns, repeatability, truth
+from pytest_simbench.report import columns, repeatability, sweep, truth
 from pytest_simbench.report.answer import sentences
 from pytest_simbench.report.changes import DIFFERENT
 from pytest_simbench.report.changes import columns as change_columns
 from pytest_simbench.report.headline import headline
 from pytest_simbench.report.page import setup
 from pytest_simbench.report.page.cells import Of, Table, from_columns, labelled, of, study
-from pytest_simbench.report.page.pictures import Picture, pictures
+from pytest_simbench.report.page.pictures import Picture, of_sweeps, pictures
 from pytest_simbench.report.page.strips import Strip, strips
 from pytest_simbench.report.recorded import videos
 from pytest_simbench.report.replay.groups import Group, links
-from pytest_simbench.report.summary import TaskSummary
+from pytest_simbench.report.summary import TaskSummary, at_own_steps
 
 if TYPE_CHECKING:
     from pytest_simbench.measure.gate import GateReport
+    from pytest_simbench.measure.sweep import Swept
 
 TAIL = 30
 """Lines of a log that are shown."""
@@ -76,6 +77,15 @@ class Compared:
 
 
 @dataclass(frozen=True)
+class Sweep:
+    """Laws over time steps: the table of phenomena first, and pictures."""
+
+    tables: Sequence[Table]
+    pictures: Sequence[Picture]
+    reading: str
+
+
+@dataclass(frozen=True)
 class Page:
     """Everything. `filters` holds the choices by what they choose; of one there is none.
 
@@ -89,6 +99,7 @@ class Page:
     answer: Sequence[str]
     filters: Mapping[str, Sequence[str]]
     truth: Sequence[Table]
+    sweep: Sweep | None
     tasks: Sequence[TaskPart]
     repeatability: Sequence[Table]
     comparison: Compared | None
@@ -104,8 +115,10 @@ def page(
     comparison: tuple[str, GateReport] | None = None,
     replays: Sequence[Group] = (),
     sheets: Mapping[str, bytes] | None = None,
+    sweeps: Sequence[Swept] = (),
 ) -> Page:
     """The page of a run, see `page_of`."""
+    records = at_own_steps(records)
     replay, video = links(replays), videos(folder)
     numbers: dict[int, int] = {}
     repetitions: list[dict[str, Any]] = []
@@ -150,15 +163,18 @@ def page(
         )
     again, unreadable = _repeatability(folder)
     problems |= dict.fromkeys(unreadable)
+    swept, problem = _sweep(sweeps) if sweeps else (None, "")
+    problems |= dict.fromkeys(filter(None, [problem]))
     rows_of = [of(row) for summary in summaries for row in summary.rows]
     choices = {
         name: list(dict.fromkeys(getattr(row, name) for row in rows_of)) for name in Of._fields
     }
     return Page(
-        " and ".join(_subjects(summaries)) or "repeatability",
+        " and ".join(_subjects(summaries)) or ("time steps" if sweeps else "repeatability"),
         [*truth.sentences(summaries), *headline(truth.others(summaries))],
         {name: found for name, found in choices.items() if len(found) > 1},
         _truth(summaries),
+        swept,
         tasks,
         again,
         None if comparison is None else _compared(*comparison),
@@ -183,6 +199,15 @@ def _truth(summaries: Sequence[TaskSummary]) -> list[Table]:
         from_columns(name[0].upper() + name[1:], columns)
         for name, columns in truth.details(summaries)
     ]
+
+
+def _sweep(found: Sequence[Swept]) -> tuple[Sweep, str]:
+    """And why there are no pictures."""
+    shown = [(sweep.TITLE, sweep.table(found), sweep.LEGEND)]
+    shown += [(name, table, "") for name, table in sweep.details(found)]
+    tables = [from_columns(name[0].upper() + name[1:], table, note) for name, table, note in shown]
+    drawn, problem = of_sweeps(found)
+    return Sweep(tables, drawn, sweep.READING), problem
 
 
 def _tables(summary: TaskSummary) -> list[Table]:
@@ -271,9 +296,14 @@ def _repetition(record: Record, replay: str, video: str) -> dict[str, Any]:
 def command(record: Record) -> str:
     """What runs the same seed of the same test again; empty where its id is no plain one.
 
-    Settings that `--sim-set` changed are not in it.
+    Settings that `--sim-set` changed are not in it. A profile or a time step in the id is one of
+    several that the run had: a run of this one alone has none there.
     """
     file, _, name = record.test.partition("::")
+    step = record.settings.get("timestep")
+    test = record.test.replace(f"-{record.mode}-{record.profile}", f"-{record.mode}", 1)
+    if record.swept and isinstance(step, int | float):
+        test = test.replace(f"-dt={step_text(step)}", "", 1)
     fine = name and record.test.isprintable() and not file.startswith(("-", "/", "."))
     if not fine or ".." in file or not file.endswith(".py"):
         return ""
@@ -285,7 +315,8 @@ def command(record: Record) -> str:
         f"--sim-protocol={record.protocol}",
         f"--sim-jitter={record.jitter:g}",
         *["--sim-gui"] * (record.mode == "gui"),
+        *[f"--sim-set={record.simulator}.timestep={step!r}"] * record.swept,
     ]
     if not all(map(str.isprintable, options)):
         return ""
-    return shlex.join(["pytest", record.test, *options])
+    return shlex.join(["pytest", test, *options])

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 from xml.etree import ElementTree
 
+from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.records.names import digest
+from pytest_simbench.report import sweep
 from pytest_simbench.report.figures import FiguresUnavailable, draw, drawing
 from pytest_simbench.report.summary import TaskSummary
 
@@ -32,12 +37,32 @@ class Picture:
 
 def pictures(summary: TaskSummary) -> tuple[list[Picture], str]:
     """The pictures of a task; and a sentence where there are none and why."""
+    return _drawn(
+        (caption, (summary.task, name), partial(draw, summary, name, titled=False))
+        for name, caption in SHOWN
+    )
+
+
+def of_sweeps(found: Sequence[Swept]) -> tuple[list[Picture], str]:
+    """The pictures of laws over time steps; and a sentence where there are none and why."""
+    return _drawn(
+        (sweep.caption(of, over), ("sweep", of, over), partial(sweep.draw, found, of, over))
+        for of in sweep.phenomena(found)
+        for over in sweep.OVER
+    )
+
+
+def _drawn(
+    wanted: Iterable[tuple[str, tuple[str, ...], Callable[[], Any]]],
+) -> tuple[list[Picture], str]:
+    """Pictures by caption, name and what draws them; and a sentence where there are none and
+    why."""
     found = []
     try:
-        for name, caption in SHOWN:
+        for caption, name, draw_it in wanted:
             # Names inside a picture are made of this, so that no two pictures share any.
-            with drawing(svg_fonttype="none", svg_hashsalt=digest(summary.task, name)):
-                figure = draw(summary, name, titled=False)
+            with drawing(svg_fonttype="none", svg_hashsalt=digest(*name)):
+                figure = draw_it()
                 if figure is not None:
                     drawn = io.BytesIO()
                     figure.savefig(drawn, format="svg", transparent=True)

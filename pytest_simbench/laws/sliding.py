@@ -1,0 +1,161 @@
+"""Laws of sliding: how friction moves and stops what slides."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from pytest_simbench.client.world import World
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, watch
+from pytest_simbench.laws.drives import follow
+from pytest_simbench.laws.friction import SLAB, SLAB_AT, acceleration, slab_on
+from pytest_simbench.laws.sticking import Carried
+from pytest_simbench.scene import Box, Scene
+
+
+@dataclass(frozen=True)
+class SlideX(Law):
+    """Down a slope steeper than mu a slab accelerates by g (sin a - mu cos a) (Coulomb). Tolerance:
+    the speed is late by one step at either end of the time T over which it is taken, under the
+    largest of the forces: 2 g sin a dt / T."""
+
+    name = "slide_x"
+    phenomenon = "sliding"
+    quantity: ClassVar[str] = "acceleration"
+    unit: ClassVar[str] = "m/s^2"
+
+    direction: float = 0.0
+    slope: float = 0.75
+    friction: float = 0.5
+    seconds: float = 0.8
+
+    def build(self) -> Scene:
+        return slab_on(self.name, self.slope, self.direction, self.friction)
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        angle = math.atan(self.slope)
+        along = seen.bodies[:, 0, 7:9] @ [math.cos(self.direction), math.sin(self.direction)]
+        exact = GRAVITY * (math.sin(angle) - self.friction * math.cos(angle))
+        return acceleration(seen.dt, seen.t, along, 0.2, exact, GRAVITY * math.sin(angle))
+
+
+@dataclass(frozen=True)
+class SlideY(SlideX):
+    """The same in the direction y."""
+
+    name = "slide_y"
+    direction: float = math.pi / 2
+
+
+@dataclass(frozen=True)
+class SlideDiagonal(SlideX):
+    """The same along a diagonal, where a friction pyramid differs most from the cone."""
+
+    name = "slide_diagonal"
+    direction: float = math.pi / 4
+
+
+@dataclass(frozen=True)
+class SlideStraight(SlideX):
+    """A slab slides straight down, at 22.5 degrees to the axes too: friction is against the motion
+    (a pyramid's is not, and the slab veers). Tolerance: the speed aside is late by one step, as an
+    angle: g sin a dt / v."""
+
+    name = "slide_straight"
+    quantity: ClassVar[str] = "angle aside"
+    unit: ClassVar[str] = "deg"
+    direction: float = math.pi / 8
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        x, y = seen.bodies[-1, 0, 7:9]
+        off = math.degrees(math.atan2(y, x) - self.direction)
+        angle = math.atan(self.slope)
+        exact = GRAVITY * (math.sin(angle) - self.friction * math.cos(angle)) * float(seen.t[-1])
+        late = GRAVITY * math.sin(angle) * seen.dt + rounding(1.0, seen.steps)
+        return Reading(off, 0.0, math.degrees(late / exact))
+
+
+@dataclass(frozen=True)
+class StoppingDistance(Law):
+    """A slab that is given the speed v slides v^2 / (2 mu g). Tolerance: v dt."""
+
+    name = "stopping_distance"
+    phenomenon = "sliding"
+    quantity: ClassVar[str] = "way"
+    unit: ClassVar[str] = "m"
+
+    direction: float = 0.0
+    speed: float = 2.0
+    friction: float = 0.5
+
+    def build(self) -> Scene:
+        velocity = (
+            self.speed * math.cos(self.direction),
+            self.speed * math.sin(self.direction),
+            0.0,
+        )
+        slab = Box("slab", SLAB, SLAB_AT, 1.0, self.friction, linear_velocity=velocity)
+        return Scene(self.name, (slab,), ground_friction=self.friction)
+
+    def measure(self, world: World) -> Reading:
+        exact = self.speed**2 / (2 * self.friction * GRAVITY)
+        seen = watch(world, 1.5 * self.speed / (self.friction * GRAVITY))
+        way = float(np.hypot(*seen.bodies[-1, 0, :2]))
+        return Reading(way, exact, self.speed * seen.dt + rounding(1.0, seen.steps))
+
+
+@dataclass(frozen=True)
+class StoppingDistanceDiagonal(StoppingDistance):
+    """The same at 30 degrees to an axis. Tolerance as of `StoppingDistance`."""
+
+    name = "stopping_distance_oblique"
+    direction: float = math.pi / 6
+
+
+@dataclass(frozen=True)
+class Glide(Law):
+    """On ground without friction a slab keeps its speed (Newton's first law). Tolerance: rounding,
+    for every consistent method keeps a constant."""
+
+    name = "glide"
+    phenomenon = "sliding"
+    quantity: ClassVar[str] = "speed"
+    unit: ClassVar[str] = "m/s"
+
+    speed: float = 1.0
+    seconds: float = 1.0
+
+    def build(self) -> Scene:
+        slab = Box("slab", SLAB, SLAB_AT, 1.0, 0.0, linear_velocity=(self.speed, 0.0, 0.0))
+        return Scene(self.name, (slab,), ground_friction=0.0)
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        return Reading(
+            float(seen.bodies[-1, 0, 7]), self.speed, rounding(2 * self.speed, seen.steps)
+        )
+
+
+@dataclass(frozen=True)
+class Belt(Carried):
+    """On one that starts faster than mu g the box slips, and friction alone moves it: it goes with
+    a = mu g. Tolerance: its speed is late by one step at either end of the time T over which it is
+    taken: 2 mu g dt / T."""
+
+    name = "belt"
+    phenomenon = "sliding"
+    quantity: ClassVar[str] = "acceleration"
+    unit: ClassVar[str] = "m/s^2"
+
+    acceleration: float = 8.0
+    seconds: float = 0.4
+
+    def measure(self, world: World) -> Reading:
+        seen = follow(world, self.ride())
+        return acceleration(seen.dt, seen.t, seen.bodies[:, 0, 7], 0.1, self.friction * GRAVITY,
+                             self.friction * GRAVITY)  # fmt: skip

@@ -1,0 +1,141 @@
+"""Laws of sticking: what friction holds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from pytest_simbench.client.world import World
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, stillness, watch
+from pytest_simbench.laws.drives import STRONG, follow
+from pytest_simbench.laws.friction import (
+    BETWEEN,
+    SHARES,
+    SLAB,
+    WEDGE,
+    boundary,
+    slab_on,
+    slope_pose,
+)
+from pytest_simbench.laws.mechanisms import Part, mechanism
+from pytest_simbench.scene import Box, Pose, Scene, Trajectory
+
+
+@dataclass(frozen=True)
+class StickAngle(Law):
+    """A slab on a slope stays up to the angle atan mu and slides above it (Coulomb; Amontons): six
+    slopes, from 0.92 to 1.08 mu. It slides where it has gone half as far as the least steep one
+    that must. Tolerance: half of the gap between the slopes on either side, 0.02 mu; no step."""
+
+    name = "stick_angle_x"
+    phenomenon = "sticking"
+    quantity: ClassVar[str] = "tangent of the steepest slope that holds"
+    unit: ClassVar[str] = ""
+
+    direction: float = 0.0
+    friction: float = 0.5
+    seconds: float = 0.8
+
+    def build(self) -> Scene:
+        bodies = []
+        for k, share in enumerate(SHARES):
+            turn = slope_pose(share * self.friction, self.direction)
+            place = Pose((0.6 * (k % 2), 0.5 * (k - 2.5), 1.0), turn.quaternion)
+            on_top = place * Pose.at(0.0, 0.0, (WEDGE[2] + SLAB[2]) / 2)
+            bodies.append(Box(f"slope {k}", WEDGE, place, friction=self.friction))
+            bodies.append(Box(f"slab {k}", SLAB, on_top, 1.0, self.friction))
+        return Scene(self.name, tuple(bodies), ground_friction=self.friction)
+
+    def measure(self, world: World) -> Reading:
+        start = world.bodies[:, :3].copy()
+        world.wait(self.seconds)
+        moved = np.linalg.norm(world.bodies[:, :3] - start, axis=1)
+        steep = math.atan(self.friction)
+        pull = GRAVITY * math.cos(steep) * BETWEEN * self.friction
+        least = pull * world.time**2 / 4
+        slopes = [share * self.friction for share in SHARES]
+        found = boundary(slopes, [bool(way > least) for way in moved])
+        return Reading(found, self.friction, BETWEEN * self.friction)
+
+
+@dataclass(frozen=True)
+class StickAngleAcross(StickAngle):
+    """The same in the direction y."""
+
+    name = "stick_angle_y"
+    direction: float = math.pi / 2
+
+
+@dataclass(frozen=True)
+class StickAngleDiagonal(StickAngle):
+    """The same along a diagonal, where a friction pyramid holds up to sqrt(2) mu, or only up to
+    mu / sqrt(2)."""
+
+    name = "stick_angle_diagonal"
+    direction: float = math.pi / 4
+
+
+@dataclass(frozen=True)
+class Creep(Law):
+    """A slab on a slope of 0.8 mu stays where it is. Tolerance: an equilibrium, g dt^2; it is
+    looked at from 0.2 s on."""
+
+    name = "creep"
+    phenomenon = "sticking"
+    quantity: ClassVar[str] = "way in 1 s"
+    unit: ClassVar[str] = "m"
+
+    friction: float = 0.5
+    share: float = 0.8
+    direction: float = 0.4
+
+    def build(self) -> Scene:
+        return slab_on(self.name, self.share * self.friction, self.direction, self.friction)
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, 1.2)
+        way = seen.bodies[-1, 0, :2] - seen.at(0.2, seen.bodies[:, 0, :2])
+        allowed = stillness(seen.dt, 0.1)
+        return Reading(float(np.linalg.norm(way)), 0.0, allowed)
+
+
+@dataclass(frozen=True)
+class Carried(Law):
+    """A box on a carriage that starts with less than mu g goes with it: it stays where it lies on
+    the carriage. Tolerance: an equilibrium in the carriage's frame, g dt^2, and the carriage's
+    motion late by one step, a dt^2."""
+
+    name = "carried"
+    phenomenon = "sticking"
+    quantity: ClassVar[str] = "way on the carriage"
+    unit: ClassVar[str] = "m"
+
+    friction: float = 0.5
+    acceleration: float = 2.0
+    seconds: float = 0.5
+
+    def build(self) -> Scene:
+        deck = Part(
+            "carriage", (1.0, 0.0, 0.0), mass=5.0, inertia=(0.1,) * 3, slides=True,
+            shape=(2.0, 0.4, 0.1), stiffness=1e5, damping=2e3, effort=STRONG,
+        )  # fmt: skip
+        robot = mechanism("belt", deck, base=Pose.at(0.0, 0.0, 0.5), friction=self.friction)
+        box = Box("box", SLAB, Pose.at(0.0, 0.0, 0.55 + SLAB[2] / 2), 0.2, self.friction)
+        return Scene(self.name, (box,), robot, ground_friction=self.friction)
+
+    def ride(self) -> Trajectory:
+        """The carriage's set points, with the force that its mass asks for."""
+        time = np.linspace(0.0, self.seconds, 101)
+        a = self.acceleration
+        position, velocity = a * time**2 / 2, a * time
+        effort = np.full((101, 1), 5.0 * a)
+        return Trajectory(float(time[1]), position[:, None], velocity[:, None], effort)
+
+    def measure(self, world: World) -> Reading:
+        seen = follow(world, self.ride())
+        slid = float(seen.bodies[-1, 0, 0] - seen.joints[-1, 0, 0])
+        allowed = stillness(seen.dt, 1.0) + self.acceleration * seen.dt**2
+        return Reading(slid, 0.0, allowed)

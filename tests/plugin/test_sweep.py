@@ -1,0 +1,69 @@
+"""`--sim-sweep` and several profiles as users run them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+SUITE = Path(__file__).resolve().parents[2] / "suites" / "test_physics.py"
+
+
+def ids(folder: Path) -> list[str]:
+    lines = (folder / "records.jsonl").read_text().splitlines()
+    return [json.loads(line)["test"].partition("::")[2] for line in lines]
+
+
+def test_a_sweep_of_two_profiles_is_one_run_that_is_resumed_and_reported(
+    pytester: pytest.Pytester,
+) -> None:
+    """What cannot be done at a longer step is a finding, and no failed test."""
+    pytester.makepyfile(
+        test_physics=SUITE.read_text("utf-8"),
+        test_else="""
+        from pytest_simbench.laws import LAWS
+
+        class Refused(type(LAWS[0])):
+            name = "refused"
+
+            def measure(self, world):
+                found = super().measure(world)
+                if found.tolerance > 0.1:
+                    raise ValueError("no such step for me")
+                return found
+
+        def test_refused(repeat, sim_swept):
+            result = repeat(Refused())
+            assert len(result.failures) == (sim_swept and result.records[0].metrics == {})
+        """,
+    )
+    asked = ["--sim=mujoco", "-k", "free_fall or refused", "--reps=1", "--sim-output=out"]
+    asked.append("--sim-profile=default,tuned")
+    pytester.runpytest_subprocess(*asked).assert_outcomes(passed=4)
+    out = pytester.path / "out"
+    assert set(ids(out)) == {
+        "test_law[mujoco-headless-default-free_fall]", "test_law[mujoco-headless-free_fall]",
+        "test_refused[mujoco-headless-default]", "test_refused[mujoco-headless]",
+    }  # fmt: skip
+
+    asked += ["--sim-resume=out", "--sim-sweep=0.016,0.002,1e-3"]
+    result = pytester.runpytest_subprocess(*asked)
+    result.assert_outcomes(passed=2 * 2 * 3)
+    result.stdout.fnmatch_lines(
+        [
+            "mujoco (default) *2/2 *",
+            "mujoco (tuned) *2/2 *",
+            "*the same laws over time steps*",
+            "mujoco (default) *2/2 2ms *",
+            "mujoco (tuned) *2/2 2ms *",
+            "mujoco (*) fails refused at 16ms: *no such step for me*",
+        ]
+    )
+    assert len(ids(out)) == len(set(ids(out))) == 2 * 2 * 3
+    assert "test_law[mujoco-headless-default-dt=1ms-free_fall]" in ids(out)
+    text = (out / "report.md").read_text()
+    assert "free\\_fall | 1.00 [" in text
+    assert "no such step for me" in text
+    again = pytester.runpytest_subprocess("--sim-report", "out")
+    again.stdout.fnmatch_lines(["the same laws over time steps", "mujoco (tuned) *2/2 2ms *"])
