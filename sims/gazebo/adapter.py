@@ -15,7 +15,6 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from pytest_simbench.scene import FloatArray, Scene
-from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.simulator import (
     FOLLOWER,
     Deviation,
@@ -111,6 +110,16 @@ class Gazebo(Simulator):
             ),
             Deviation(
                 "",
+                "bullet-featherstone's friction goes by a body's own axes: where its z axis lies "
+                "in the contact, it is mu^(3/4) instead of mu",
+            ),
+            Deviation(
+                "",
+                "bullet-featherstone holds what turns on the ground, as SDF's torsional friction "
+                "of 1 asks; torsional_friction=0 lets it turn",
+            ),
+            Deviation(
+                "",
                 "shapes, friction and joints are read from the world that Gazebo's server writes; "
                 "its physics engine tells nobody what it has",
             ),
@@ -184,12 +193,7 @@ class Gazebo(Simulator):
         pass  # declared: prescribed bodies stand
 
     def push(self, wrenches: FloatArray) -> None:
-        vector3, turned = bindings().math.Vector3d, self._physics.turns_torques
-        turns = rotations(self.body_state()[:, 3:7]) if turned else None
-        for k, (row, link) in enumerate(zip(wrenches, self._free, strict=True)):
-            torque = row[3:] if turns is None else turns[k].T @ row[3:]
-            if row.any():
-                link.add_world_wrench(self.server.ecm, vector3(*row[:3]), vector3(*torque))
+        self._wrenches.push(wrenches, self.body_state())
 
     def step(self) -> None:
         if self._drives is not None:

@@ -76,7 +76,8 @@ class Physics:
         """What to write so that a pair of such surfaces has this coefficient.
 
         bullet-featherstone counts each surface's friction twice, and Bullet multiplies those of a
-        pair: the fourth root. dartsim takes the smaller one.
+        pair: the fourth root. The second count is along the body's own x and y only
+        (`SDFFeatures.cc`, `setAnisotropicFriction(mu, mu2, 1)`). dartsim takes the smaller one.
         """
         return coefficient**0.25 if self.engine == FEATHERSTONE else coefficient
 

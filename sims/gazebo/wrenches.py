@@ -1,5 +1,5 @@
-"""What the scene asks of free bodies and Gazebo's engines do not have: a velocity at the start and
-damping. Both are forces and torques, each for one step."""
+"""Forces and torques on free bodies, each for one step: those of the scene, and those that give
+what Gazebo's engines do not have, a velocity at the start and damping."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Wrenches:
     def __init__(
         self, ecm: Any, bodies: tuple[Body, ...], links: list[Any], timestep: float, turned: bool
     ) -> None:
-        self._ecm, self._timestep, self._turned = ecm, timestep, turned
+        self._ecm, self._timestep, self._turned, self._links = ecm, timestep, turned, links
         self.thrown = np.array([body.velocity for body in bodies]).reshape(-1, 6)
         self._damped = [
             (row, body, links[row], np.expm1(-timestep * np.repeat(body.damping, 3)))
@@ -51,6 +51,12 @@ class Wrenches:
             turn = rotation_matrix(states[row, 3:7])
             self._change(link, body, turn, lost * states[row, 7:])
 
+    def push(self, wrenches: FloatArray, states: FloatArray) -> None:
+        """The scene's forces and torques, (n_free, 6), for one step; states as of `act`."""
+        for row, wrench in enumerate(wrenches):
+            if wrench.any():
+                self._add(self._links[row], rotation_matrix(states[row, 3:7]), wrench)
+
     @property
     def damps(self) -> bool:
         """Whether any body is damped."""
@@ -62,9 +68,12 @@ class Wrenches:
         A force m v / h changes a velocity by v in a step of duration h. Gazebo's own velocity
         commands would hold on in all further steps.
         """
-        vector3, h = bindings().math.Vector3d, self._timestep
         inertia = turn @ np.diag(body.inertia()) @ turn.T
-        torque = inertia @ by[3:] / h
-        if self._turned:
-            torque = turn.T @ torque
-        link.add_world_wrench(self._ecm, vector3(*(body.mass / h * by[:3])), vector3(*torque))
+        wrench = np.concatenate([body.mass * by[:3], inertia @ by[3:]]) / self._timestep
+        self._add(link, turn, wrench)
+
+    def _add(self, link: Any, turn: FloatArray, wrench: FloatArray) -> None:
+        """A force and a torque in the world's axes [N, N m], (6,), for one step."""
+        vector3 = bindings().math.Vector3d
+        torque = turn.T @ wrench[3:] if self._turned else wrench[3:]
+        link.add_world_wrench(self._ecm, vector3(*wrench[:3]), vector3(*torque))
