@@ -24,7 +24,7 @@ LARGEST_LINE = 16 * 1024 * 1024
 """Bytes; a record has a few thousand, with a trace of every cube's poses some hundred thousand."""
 
 MUCH = 16 * 1024 * 1024
-"""Bytes of a file, some ten thousand records: from there on reading spares the garbage collector."""
+"""Bytes of a file, some ten thousand records: from there on the garbage collector is spared."""
 
 DAMAGED = "the line is damaged and left out: "
 
