@@ -1,7 +1,8 @@
 """Makes the tables of docs/truth.md from docs/data/truth.csv, which holds every law of every run,
 and from docs/data/sweep.csv, which holds laws over time steps.
 
-python docs/make_truth.py RUN...            reads run folders into truth.csv, then writes the tables
+python docs/make_truth.py RUN...            reads run folders into truth.csv, whose other lines
+                                            stay, then writes the tables
 python docs/make_truth.py --sweep RUN...    the same into sweep.csv, and draws its pictures
 python docs/make_truth.py                   writes the tables
 
@@ -44,13 +45,18 @@ BY_NAME = {law.name: law for law in LAWS}
 
 
 def read(folders: list[str], swept: bool = False) -> None:
-    """Run folders into the CSV; of a sweep into its own."""
-    with (SWEEP if swept else DATA).open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(HEADER + SWEPT * swept)
-        for record in (r for f in folders for r in RunFolder(Path(f)).read().records):
-            if PHENOMENON in record.settings and (swept or not record.swept):
-                writer.writerow(_line(record) + _of_sweep(record) * swept)
+    """Run folders into the CSV; of a sweep into its own. Lines that no folder has anew stay."""
+    path, header = SWEEP if swept else DATA, HEADER + SWEPT * swept
+    same = [header.index(name) for name in ("profile", "simulator", "law", *["timestep"] * swept)]
+    with path.open(newline="", encoding="utf-8") as file:
+        lines = list(csv.reader(file))[1:]
+    known = {tuple(line[k] for k in same): line for line in lines}
+    for record in (r for f in folders for r in RunFolder(Path(f)).read().records):
+        if PHENOMENON in record.settings and (swept or not record.swept):
+            line = [str(cell) for cell in _line(record) + _of_sweep(record) * swept]
+            known[tuple(line[k] for k in same)] = line
+    with path.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows([header, *known.values()])
 
 
 def _line(record: Record) -> list[object]:

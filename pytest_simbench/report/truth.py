@@ -21,6 +21,9 @@ CHEAPER = 0.5
 """Who costs at most so much of the next one is called the cheapest: times are of one run on a
 machine that may be busy."""
 
+LEAST_SHOWN = 0.001
+"""A smaller share of a tolerance is not told in digits."""
+
 LEGEND = (
     "7/8 12x: 7 of 8 laws are kept, and the worst is missed by 12 times its tolerance, which is "
     "what a time step may cost an integrator of the first order; fails: a repetition failed or its "
@@ -156,6 +159,8 @@ def _cell(ratios: Ratios) -> str:
 
 
 def _times(ratio: float) -> str:
+    if 0 < ratio < LEAST_SHOWN:
+        return f"<{LEAST_SHOWN:g}x"
     return "fails" if math.isinf(ratio) else f"{significant(ratio, 2)}x"
 
 

@@ -98,7 +98,7 @@ class ArmFollowing(Task):
     shares_worker: ClassVar[bool] = True
     references: ClassVar[Mapping[str, float]] = {"hand_error": 0.0, "rest_error": 0.0}
     commands: ClassVar[Mapping[str, tuple[Command, ...]]] = COMMANDS
-    start: ClassVar[Mapping[str, tuple[float, ...]]] = dict.fromkeys(COMMANDS, (0.0,) * 6)
+    initial: ClassVar[Mapping[str, tuple[float, ...]]] = dict.fromkeys(COMMANDS, (0.0,) * 6)
     """Joints before the first command, by experiment [degrees]."""
 
     runs: ArmRuns
@@ -148,7 +148,7 @@ class ArmFollowing(Task):
         at = np.median(run.cube[:QUIET], axis=0)
         lying = Pose.at(float(at[0]), float(at[1]), CUBE_SIZE / 2, yaw=yaw(at))
         box = Box(CUBE, (CUBE_SIZE,) * 3, lying, CUBE_MASS, self.friction, BLUE)
-        start = np.radians(self.start[run.experiment])
+        start = np.radians(self.initial[run.experiment])
         robot = replace(self._arm(start), friction=self.friction)
         return Scene("arm following", (box,), robot, ground_friction=self.friction)
 
@@ -184,7 +184,7 @@ class ArmFollowing(Task):
     def trajectory(self, experiment: str, duration: float) -> Trajectory:
         """What the drives are given, for so long [s]."""
         steps = math.ceil(duration / CONTROL_PERIOD) + 1
-        coarse = reference(self.start[experiment], self.commands[experiment], steps)
+        coarse = reference(self.initial[experiment], self.commands[experiment], steps)
         time = np.arange(0.0, duration + TICK / 2, TICK)
         knots = CONTROL_PERIOD * np.arange(steps + 1)
         path = np.stack([np.interp(time, knots, column) for column in coarse.T], axis=1)
@@ -217,7 +217,7 @@ class CorrectedArmFollowing(ArmFollowing):
     commands: ClassVar[Mapping[str, tuple[Command, ...]]] = {
         experiment: rows[1:] for experiment, rows in REACHED.items()
     }
-    start: ClassVar[Mapping[str, tuple[float, ...]]] = {
+    initial: ClassVar[Mapping[str, tuple[float, ...]]] = {
         experiment: rows[0].angles for experiment, rows in REACHED.items()
     }
 
