@@ -119,16 +119,19 @@ class ResultSet:
 
     def values(self, name: str) -> list[float]:
         """A metric's values, one for each ok repetition that has it, in their order."""
-        return [value for _, value in self._found(name)]
+        read = self._reader(name)
+        return [float(value) for record in self.ok if (value := read(record)) is not None]
 
     def by_seed(self, name: str) -> dict[int, float]:
         """A metric's values by seed, for pairing with another set; ok repetitions only."""
-        return {record.seed: value for record, value in self._found(name)}
+        read = self._reader(name)
+        return {r.seed: float(value) for r in self.ok if (value := read(r)) is not None}
 
-    def _found(self, name: str) -> list[tuple[Record, float]]:
-        own = self.metric(name).name in self.metrics
-        found = ((r, r.metrics.get(name) if own else r.cost(name)) for r in self.ok)
-        return [(record, float(value)) for record, value in found if value is not None]
+    def _reader(self, name: str) -> Callable[[Record], float | None]:
+        """What finds a metric's value in a record."""
+        if self.metric(name).name in self.metrics:
+            return lambda record: record.metrics.get(name)
+        return lambda record: record.cost(name)
 
     def interval(self, name: str, confidence: float = CONFIDENCE) -> Interval:
         """The interval of a metric's mean; without values its mean is nan and n is 0."""
