@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import importlib
+import contextlib
 import signal
-import sys
 from pathlib import Path
 
 # pytester takes out again what a test imports first; of matplotlib a part would then come twice.
@@ -20,15 +19,18 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter, registered
 
+with contextlib.suppress(ImportError):
+    # dask imports it. It takes from Python's own finder what lists packages, and adds a finder of
+    # its own. pytester takes this one out again when an inner run was the first to import it.
+    # Then nobody finds the plugin's entry point.
+    import importlib_metadata  # noqa: F401
+
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # So it is for what a script starts in the background, and for all that this starts in turn.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile("simbench-tests", deadline=None)  # speed is measured in benchmarks/
 settings.load_profile("simbench-tests")
-
-IMPORTED_FROM = tuple(sys.path)
-"""Where modules and the metadata of packages are looked for before any test runs."""
 
 ADAPTERS = {name: entry.value for name, entry in registered().items()}
 """Every registered adapter, as workers name it."""
@@ -83,11 +85,6 @@ def inner_runs(
     monkeypatch.setenv("PYTHONPATH", str(request.config.rootpath))
     for name in ("PYTEST_XDIST_WORKER", "PYTEST_XDIST_WORKER_COUNT", "PYTEST_XDIST_TESTRUNUID"):
         monkeypatch.delenv(name, raising=False)
-    # Once in a whole run, from some test on, an inner pytest no longer found the metadata of this
-    # package, and so none of its options. Where modules are looked for is each test's own affair.
-    importlib.invalidate_caches()
-    kept = [path for path in IMPORTED_FROM if path not in sys.path]
-    monkeypatch.setattr(sys, "path", [*sys.path, *kept])
     # matplotlib would look through all fonts in each test's new home: 5 to 10 s every time.
     monkeypatch.setenv("MPLCONFIGDIR", str(tmp_path_factory.getbasetemp() / "matplotlib"))
 

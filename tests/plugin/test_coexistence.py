@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
+from pytest_simbench import __version__
 from pytest_simbench.plugin.options import OPTIONS
 
 FLAGS = [flag for option in OPTIONS for flag in option.flags]
@@ -187,3 +189,17 @@ def test_an_unrelated_run_sees_nothing_of_us(pytester: pytest.Pytester) -> None:
     result.assert_outcomes(passed=1)
     assert "sim" not in result.stdout.str().replace("simbench", "").partition("collected")[2]
     assert not Path(pytester.path, ".simbench").exists()
+
+
+def test_an_inner_run_leaves_the_metadata_of_packages(pytester: pytest.Pytester) -> None:
+    """See `tests/conftest.py`: else all later inner runs of the process lack our options."""
+    pytester.makepyfile(
+        """
+        import pytest
+
+        def test_a_library_that_lists_packages_in_its_own_way():
+            pytest.importorskip("importlib_metadata")
+        """
+    )
+    assert pytester.inline_run("-p", "no:simbench").ret == 0
+    assert version("pytest-simbench") == __version__
