@@ -11,7 +11,7 @@ from pytest_simbench.scene import Scene
 
 TIMES = 1e4
 """What strikes such a body moves it by this part of its own change of velocity, for one step. With
-more, solvers lose digits: on 1e7 kg, MuJoCo's contacts of a cube of 0.2 kg jitter at 20 mm/s."""
+more, solvers lose digits: in one engine a cube of 0.2 kg jitters at 20 mm/s on a belt of 1e7 kg."""
 
 
 def heavy(scene: Scene) -> float:

@@ -12,7 +12,6 @@ What was learnt stands in docs/engines/dart.md.
 
 from __future__ import annotations
 
-import math
 import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
@@ -23,13 +22,8 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from pytest_simbench.scene import (
-    Body,
-    Box,
-    Capsule,
-    Cylinder,
     FloatArray,
     Scene,
-    Sphere,
     rotation_matrix,
 )
 from pytest_simbench.simulator import (
@@ -37,7 +31,6 @@ from pytest_simbench.simulator import (
     Capability,
     DataSeen,
     Deviation,
-    NotSupportedError,
     PreparedRobot,
     SeedsSeen,
     Seen,
@@ -47,6 +40,7 @@ from pytest_simbench.simulator import (
     lazy_import,
 )
 
+from .bodies import add_body, add_ground, set_surface
 from .readback import ReadBack
 
 dartpy = lazy_import("dartpy")
@@ -153,8 +147,8 @@ class DART(Simulator):
         self.scene = scene
         self.world = world = dartpy.simulation.World()
         self._set_options(world, scene)
-        self._ground = self._add_ground(scene.ground_friction, scene.ground_restitution)
-        self._bodies = {box.name: self._add_body(box) for box in scene.bodies}
+        self._ground = add_ground(world, scene.ground_friction, scene.ground_restitution)
+        self._bodies = {box.name: add_body(world, box) for box in scene.bodies}
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
         self._led = [self._bodies[box.name] for box in scene.prescribed_bodies]
         self._robot: Any = None
@@ -189,46 +183,6 @@ class DART(Simulator):
             options.maxSweeps, options.tolerance = s.sweeps, s.tolerance
             solver.setBoxedLcpSolver(constraint.NsgsFrictionSolver(options))
 
-    def _add_ground(self, friction: float, restitution: float) -> Any:
-        skeleton = dartpy.dynamics.Skeleton("ground")
-        _, body = skeleton.createWeldJointAndBodyNodePair()
-        shape = body.createShapeNode(dartpy.dynamics.PlaneShape([0.0, 0.0, 1.0], 0.0))
-        _set_surface(shape, friction, restitution)
-        skeleton.setMobile(False)
-        self.world.addSkeleton(skeleton)
-        return body
-
-    def _add_body(self, box: Body) -> Any:
-        dynamics = dartpy.dynamics
-        skeleton = dynamics.Skeleton(box.name)
-        place = dartpy.math.Isometry3()
-        place.set_translation(np.array(box.pose.position))
-        place.set_rotation(box.pose.rotation())
-        if box.fixed:
-            joint, body = skeleton.createWeldJointAndBodyNodePair()
-            joint.setTransformFromParentBodyNode(place)
-            skeleton.setMobile(False)
-        else:
-            joint, body = skeleton.createFreeJointAndBodyNodePair()
-            if box.prescribed:
-                joint.setActuatorType(dynamics.ActuatorType.VELOCITY)
-            else:
-                inertia = dynamics.Inertia()
-                inertia.setMass(box.mass)
-                inertia.setMoment(np.diag(box.inertia()))
-                body.setInertia(inertia)
-            joint.setPositions(dynamics.FreeJoint.convertToPositions(place))
-            damping = [*(box.angular_damping * box.inertia()), *[box.linear_damping * box.mass] * 3]
-            for k, value in enumerate(damping):
-                joint.setDampingCoefficient(k, value)
-            joint.setLinearVelocity(np.array(box.linear_velocity))
-            joint.setAngularVelocity(np.array(box.angular_velocity))
-        shape = body.createShapeNode(_shape(box))
-        shape.createVisualAspect().setColor(list(box.colour))
-        _set_surface(shape, box.friction, box.restitution)
-        self.world.addSkeleton(skeleton)
-        return body
-
     def _load_robot(self, prepared: PreparedRobot) -> None:
         robot, dynamics, utils = prepared.robot, dartpy.dynamics, dartpy.utils
         loader = utils.DartLoader()
@@ -242,7 +196,7 @@ class DART(Simulator):
         for body in skeleton.getBodyNodes():
             for shape in body.getShapeNodes():
                 if shape.hasCollisionAspect():
-                    _set_surface(shape, robot.friction)
+                    set_surface(shape, robot.friction)
         followers = robot.gripper.joints[1:]
         for drive in robot.joints:
             joint = skeleton.getJoint(drive.name)
@@ -370,30 +324,6 @@ class DART(Simulator):
 
     def close(self) -> None:
         self._viewer = self._node = None
-
-
-def _shape(body: Body) -> Any:
-    match body:
-        case Box():
-            return dartpy.dynamics.BoxShape(np.array(body.size))
-        case Sphere():
-            return dartpy.dynamics.SphereShape(body.radius)
-        case Cylinder():
-            return dartpy.dynamics.CylinderShape(body.radius, body.length)
-        case Capsule():
-            return dartpy.dynamics.CapsuleShape(body.radius, body.length)
-    raise NotSupportedError(f"dart has no {type(body).__name__}")
-
-
-def _set_surface(shape: Any, friction: float, restitution: float = 0.0) -> None:
-    """Friction and restitution of a shape; of a pair, DART takes the smaller friction, and the
-    product of both restitutions."""
-    if not shape.hasCollisionAspect():
-        shape.createCollisionAspect()
-    if not shape.hasDynamicsAspect():
-        shape.createDynamicsAspect()
-    shape.getDynamicsAspect().setFrictionCoeff(friction)
-    shape.getDynamicsAspect().setRestitutionCoeff(math.sqrt(restitution))
 
 
 def _with_mimic(prepared: PreparedRobot) -> str:

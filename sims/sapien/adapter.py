@@ -19,7 +19,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Scene, Sphere
+from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
     DataSeen,
@@ -33,14 +33,12 @@ from pytest_simbench.simulator import (
     lazy_import,
 )
 
-from .drawing import UPRIGHT, Drawing, facing_up, to_sapien
+from .bodies import ROBOT, WORLD, add_body, add_ground
+from .drawing import Drawing
 from .readback import ReadBack
 
 sapien = lazy_import("sapien")
 physx = lazy_import("sapien.physx")
-
-ROBOT, WORLD = 1, 2
-"""Collision groups: the robot's links touch everything but each other."""
 
 PACKED = [4, 5, 6, 0, 1, 2, 3, *range(7, 13)]
 """Columns of `body_state` in the rows that SAPIEN packs: quaternion first. These rows, one for each
@@ -184,8 +182,9 @@ class SAPIEN(Simulator):
         self._system = physx.PhysxCpuSystem()
         self._system.timestep = self.settings.timestep
         self._world = sapien.Scene([self._system])
-        self._ground = self._add_ground(scene.ground_friction, scene.ground_restitution)
-        self._bodies = {box.name: self._add_body(box) for box in scene.bodies}
+        self._ground = add_ground(self._world, scene.ground_friction, scene.ground_restitution)
+        damping = self.settings.angular_damping
+        self._bodies = {box.name: add_body(self._world, box, damping) for box in scene.bodies}
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
         self._led = [self._bodies[box.name] for box in scene.prescribed_bodies]
         packed = self._system.rigid_dynamic_components
@@ -211,35 +210,6 @@ class SAPIEN(Simulator):
         )
         physx.set_body_config(s.position_iterations, s.velocity_iterations, s.sleep_threshold)
         physx.set_shape_config(s.contact_offset, 0.0)
-
-    def _add_ground(self, friction: float, restitution: float) -> Any:
-        builder = self._world.create_actor_builder()
-        material = physx.PhysxMaterial(friction, friction, restitution)
-        builder.add_plane_collision(facing_up(), material)
-        builder.collision_groups = [WORLD, WORLD | ROBOT, 0, 0]
-        entity = builder.build_static("ground")
-        return entity.find_component_by_type(physx.PhysxRigidStaticComponent)
-
-    def _add_body(self, box: Body) -> Any:
-        builder = self._world.create_actor_builder()
-        material = physx.PhysxMaterial(box.friction, box.friction, box.restitution)
-        _add_shape(builder, box, material)
-        builder.collision_groups = [WORLD, WORLD | ROBOT, 0, 0]
-        builder.initial_pose = sapien.Pose(box.pose.position, box.pose.quaternion)
-        if box.fixed:
-            entity = builder.build_static(box.name)
-            return entity.find_component_by_type(physx.PhysxRigidStaticComponent)
-        if box.prescribed:
-            entity = builder.build_kinematic(box.name)
-            return entity.find_component_by_type(physx.PhysxRigidDynamicComponent)
-        builder.set_mass_and_inertia(box.mass, sapien.Pose(), box.inertia())
-        entity = builder.build(box.name)
-        body = entity.find_component_by_type(physx.PhysxRigidDynamicComponent)
-        body.angular_damping = self.settings.angular_damping
-        if box.damping.any():
-            body.linear_damping, body.angular_damping = box.damping
-        body.linear_velocity, body.angular_velocity = box.linear_velocity, box.angular_velocity
-        return body
 
     def _load_robot(self, prepared: PreparedRobot) -> None:
         robot = prepared.robot
@@ -390,22 +360,6 @@ class SAPIEN(Simulator):
         for name in list(vars(self)):
             if name.startswith("_"):
                 delattr(self, name)
-
-
-def _add_shape(builder: Any, body: Body, material: Any) -> None:
-    """The collision shape of a body. Cylinders and capsules of SAPIEN lie along x."""
-    match body:
-        case Box():
-            half = [edge / 2 for edge in body.size]
-            builder.add_box_collision(half_size=half, material=material)
-        case Sphere():
-            builder.add_sphere_collision(radius=body.radius, material=material)
-        case Cylinder():
-            upright = to_sapien(UPRIGHT)
-            builder.add_cylinder_collision(upright, body.radius, body.length / 2, material)
-        case Capsule():
-            upright = to_sapien(UPRIGHT)
-            builder.add_capsule_collision(upright, body.radius, body.length / 2, material)
 
 
 def _drop_visuals(path: Path) -> None:

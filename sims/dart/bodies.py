@@ -1,0 +1,81 @@
+"""The ground and the bodies of a scene in DART's world."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import Body, Box, Capsule, Cylinder, Sphere
+from pytest_simbench.simulator import NotSupportedError, lazy_import
+
+dartpy = lazy_import("dartpy")
+
+
+def add_ground(world: Any, friction: float, restitution: float) -> Any:
+    """The body of the plane z = 0, made in the world."""
+    skeleton = dartpy.dynamics.Skeleton("ground")
+    _, body = skeleton.createWeldJointAndBodyNodePair()
+    shape = body.createShapeNode(dartpy.dynamics.PlaneShape([0.0, 0.0, 1.0], 0.0))
+    set_surface(shape, friction, restitution)
+    skeleton.setMobile(False)
+    world.addSkeleton(skeleton)
+    return body
+
+
+def add_body(world: Any, box: Body) -> Any:
+    """The body of a skeleton of its own, made in the world."""
+    dynamics = dartpy.dynamics
+    skeleton = dynamics.Skeleton(box.name)
+    place = dartpy.math.Isometry3()
+    place.set_translation(np.array(box.pose.position))
+    place.set_rotation(box.pose.rotation())
+    if box.fixed:
+        joint, body = skeleton.createWeldJointAndBodyNodePair()
+        joint.setTransformFromParentBodyNode(place)
+        skeleton.setMobile(False)
+    else:
+        joint, body = skeleton.createFreeJointAndBodyNodePair()
+        if box.prescribed:
+            joint.setActuatorType(dynamics.ActuatorType.VELOCITY)
+        else:
+            inertia = dynamics.Inertia()
+            inertia.setMass(box.mass)
+            inertia.setMoment(np.diag(box.inertia()))
+            body.setInertia(inertia)
+        joint.setPositions(dynamics.FreeJoint.convertToPositions(place))
+        damping = [*(box.angular_damping * box.inertia()), *[box.linear_damping * box.mass] * 3]
+        for k, value in enumerate(damping):
+            joint.setDampingCoefficient(k, value)
+        joint.setLinearVelocity(np.array(box.linear_velocity))
+        joint.setAngularVelocity(np.array(box.angular_velocity))
+    shape = body.createShapeNode(_shape(box))
+    shape.createVisualAspect().setColor(list(box.colour))
+    set_surface(shape, box.friction, box.restitution)
+    world.addSkeleton(skeleton)
+    return body
+
+
+def _shape(body: Body) -> Any:
+    match body:
+        case Box():
+            return dartpy.dynamics.BoxShape(np.array(body.size))
+        case Sphere():
+            return dartpy.dynamics.SphereShape(body.radius)
+        case Cylinder():
+            return dartpy.dynamics.CylinderShape(body.radius, body.length)
+        case Capsule():
+            return dartpy.dynamics.CapsuleShape(body.radius, body.length)
+    raise NotSupportedError(f"dart has no {type(body).__name__}")
+
+
+def set_surface(shape: Any, friction: float, restitution: float = 0.0) -> None:
+    """Friction and restitution of a shape; of a pair, DART takes the smaller friction, and the
+    product of both restitutions."""
+    if not shape.hasCollisionAspect():
+        shape.createCollisionAspect()
+    if not shape.hasDynamicsAspect():
+        shape.createDynamicsAspect()
+    shape.getDynamicsAspect().setFrictionCoeff(friction)
+    shape.getDynamicsAspect().setRestitutionCoeff(math.sqrt(restitution))

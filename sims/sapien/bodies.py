@@ -1,0 +1,65 @@
+"""The ground and the bodies of a scene in SAPIEN's world."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pytest_simbench.scene import Body, Box, Capsule, Cylinder, Sphere
+from pytest_simbench.simulator import lazy_import
+
+from .drawing import UPRIGHT, facing_up, to_sapien
+
+sapien = lazy_import("sapien")
+physx = lazy_import("sapien.physx")
+
+ROBOT, WORLD = 1, 2
+"""Collision groups: the robot's links touch everything but each other."""
+
+
+def add_ground(world: Any, friction: float, restitution: float) -> Any:
+    """The component of the plane z = 0, made in the world."""
+    builder = world.create_actor_builder()
+    material = physx.PhysxMaterial(friction, friction, restitution)
+    builder.add_plane_collision(facing_up(), material)
+    builder.collision_groups = [WORLD, WORLD | ROBOT, 0, 0]
+    entity = builder.build_static("ground")
+    return entity.find_component_by_type(physx.PhysxRigidStaticComponent)
+
+
+def add_body(world: Any, box: Body, angular_damping: float) -> Any:
+    """The component of a body, made in the world; `angular_damping` [1/s] where it has none."""
+    builder = world.create_actor_builder()
+    material = physx.PhysxMaterial(box.friction, box.friction, box.restitution)
+    _add_shape(builder, box, material)
+    builder.collision_groups = [WORLD, WORLD | ROBOT, 0, 0]
+    builder.initial_pose = sapien.Pose(box.pose.position, box.pose.quaternion)
+    if box.fixed:
+        entity = builder.build_static(box.name)
+        return entity.find_component_by_type(physx.PhysxRigidStaticComponent)
+    if box.prescribed:
+        entity = builder.build_kinematic(box.name)
+        return entity.find_component_by_type(physx.PhysxRigidDynamicComponent)
+    builder.set_mass_and_inertia(box.mass, sapien.Pose(), box.inertia())
+    entity = builder.build(box.name)
+    body = entity.find_component_by_type(physx.PhysxRigidDynamicComponent)
+    body.angular_damping = angular_damping
+    if box.damping.any():
+        body.linear_damping, body.angular_damping = box.damping
+    body.linear_velocity, body.angular_velocity = box.linear_velocity, box.angular_velocity
+    return body
+
+
+def _add_shape(builder: Any, body: Body, material: Any) -> None:
+    """The collision shape of a body. Cylinders and capsules of SAPIEN lie along x."""
+    match body:
+        case Box():
+            half = [edge / 2 for edge in body.size]
+            builder.add_box_collision(half_size=half, material=material)
+        case Sphere():
+            builder.add_sphere_collision(radius=body.radius, material=material)
+        case Cylinder():
+            upright = to_sapien(UPRIGHT)
+            builder.add_cylinder_collision(upright, body.radius, body.length / 2, material)
+        case Capsule():
+            upright = to_sapien(UPRIGHT)
+            builder.add_capsule_collision(upright, body.radius, body.length / 2, material)
