@@ -19,6 +19,20 @@ def folder(config: pytest.Config) -> Path:
     return Path(given) if given else default_folder()
 
 
+def check(config: pytest.Config) -> None:
+    """Complain of a folder that somebody named and that is not there: else its tests are skipped.
+
+    Raises:
+        pytest.UsageError: no such folder.
+    """
+    given = folder(config)
+    if options.given(config, "sim_data") and not given.is_dir():
+        raise pytest.UsageError(
+            f"--sim-data: {for_terminal(str(given))} is no folder; name the one that holds the "
+            "data sets, or bring them there with --sim-download NAME"
+        )
+
+
 def read_or_skip(config: pytest.Config, name: str) -> Any:
     """A data set; without it the test is skipped, with a broken one or a wrong name it fails."""
     from pytest_simbench.data import DataError, DataMissing, read

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench.plugin import cluster, options, recording
+from pytest_simbench.plugin import cluster, data, options, recording
 
 if TYPE_CHECKING:
     from pytest_simbench.plugin.compare import Comparison
@@ -87,8 +87,9 @@ class SimSession:
             _ = self.selection
 
     def start(self) -> None:
-        """Complain of a bad baseline, limit, threshold or run folder before anything runs."""
+        """Complain of a bad baseline, limit, threshold or folder before anything runs."""
         config = self.config
+        data.check(config)
         if options.given(config, "sim_threshold"):
             from pytest_simbench.plugin.thresholds import bad_value
 

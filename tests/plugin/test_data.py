@@ -55,3 +55,10 @@ def test_an_unknown_download_lists_what_there_is(pytester: pytest.Pytester) -> N
     result = pytester.runpytest_subprocess("--sim-download", "nosuch")
     assert result.ret == 4
     result.stderr.fnmatch_lines(["*no data set 'nosuch'; choose from cube_tosses*"])
+
+
+def test_a_folder_that_is_not_there_hides_no_test(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(TEST.format(name="cube_tosses"))
+    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-data=hree")
+    assert result.ret == 4
+    result.stderr.fnmatch_lines(["*--sim-data: hree is no folder; name the one that holds*"])
