@@ -43,6 +43,7 @@ from .engine import (
     tensors_in,
 )
 from .readback import ReadBack
+from .releases import OLDEST, centre_of_mass, contact_parameters, of_collider
 from .world import (
     LEAST_FRICTION,
     GenesisSettings,
@@ -71,7 +72,7 @@ class Genesis(Simulator):
         licence="Apache-2.0",
         engine="Genesis",
         tested_version="1.2.3",
-        oldest_version="1.2.3",
+        oldest_version=OLDEST,
         capabilities=frozenset(
             {
                 Capability.WINDOW,
@@ -91,7 +92,7 @@ class Genesis(Simulator):
         costly_start=True,
         compile_timeout=1800.0,
         requirements=("torch==2.13.0", "genesis-world==1.2.3"),
-        companions={"1.2": ("torch==2.13.0", "numpy")},
+        companions={"1.0": ("torch==2.13.0", "numpy")},
         caches={"QD_OFFLINE_CACHE_FILE_PATH": "quadrants", "GS_CACHE_FILE_PATH": "genesis"},
         install_size_mb=3700,
         language="Python (Quadrants)",
@@ -170,7 +171,7 @@ class Genesis(Simulator):
     def _set_contacts(self, scene: Scene) -> None:
         """Impedance of contacts, and frictions that a material refuses."""
         solver, geoms = self.solver, self.solver.geoms
-        parameters = np.array([geom.sol_params.cpu().numpy() for geom in geoms])
+        parameters = np.array([contact_parameters(geom) for geom in geoms])
         if (parameters[:, 2:4] != self.settings.impedance).any():
             parameters[:, 2:4] = self.settings.impedance
             for geom, values in zip(geoms, parameters, strict=True):
@@ -183,7 +184,7 @@ class Genesis(Simulator):
                 stiffness, damping = direct(min(restitution, MOST_BOUNCE), substep)
                 ratio = -damping / (2 * math.sqrt(-stiffness))
                 for geom in entity.geoms:
-                    values = geom.sol_params.cpu().numpy().copy()
+                    values = contact_parameters(geom)
                     values[:2] = -2 / damping, ratio  # time constant, damping ratio
                     geom.set_sol_params(values)
         frictions = {self._boxes[box.name]: box.friction for box in scene.bodies}
@@ -244,8 +245,8 @@ class Genesis(Simulator):
     def push(self, wrenches: FloatArray) -> None:
         force, torque = np.hsplit(wrenches, 2)
         solver = self.solver
-        solver.apply_links_external_force(force, self._free, ref="link_com")
-        solver.apply_links_external_torque(torque, self._free, ref="link_com")
+        solver.apply_links_external_force(force, self._free, ref=centre_of_mass())
+        solver.apply_links_external_torque(torque, self._free, ref=centre_of_mass())
 
     def lead(self, before: FloatArray, after: FloatArray) -> None:
         for link, row in zip(self._led, before, strict=True):
@@ -265,7 +266,7 @@ class Genesis(Simulator):
         state = np.empty((len(self._free), 13))
         if self._free:
             state[:, :7] = self._poses(self._free)
-            state[:, 7:10] = numbers(self.solver.get_links_vel(self._free, ref="link_com"))
+            state[:, 7:10] = numbers(self.solver.get_links_vel(self._free, ref=centre_of_mass()))
             state[:, 10:] = numbers(self.solver.get_links_ang(self._free))
         return state
 
@@ -304,13 +305,13 @@ class Genesis(Simulator):
         for part in (
             solver.dyn_state,
             solver.rigid_info,
-            solver.collider._collider_state,
+            of_collider(solver.collider, "collider_state"),
             solver.constraint_solver.constraint_state,
         ):
             yield from tensors_in(part)
 
     def contact_count(self) -> int:
-        return int(array_of(self.solver.collider._collider_state.n_contacts)[0])
+        return int(array_of(of_collider(self.solver.collider, "collider_state").n_contacts)[0])
 
     def render(self, width: int, height: int) -> NDArray[np.uint8]:
         if self._camera is None or self._camera.res != (width, height):

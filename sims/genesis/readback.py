@@ -20,6 +20,7 @@ from pytest_simbench.simulator.shapes import (
 
 from ..mujoco.readback import bounce
 from .engine import array_of, numbers
+from .releases import centre_of_mass, of_collider
 
 genesis = lazy_import("genesis")
 
@@ -54,7 +55,7 @@ class ReadBack:
         self.scene, self.prepared = scene, prepared
         self.info = solver.dyn_info
         self._arrays: dict[str, Any] = {}
-        self._pairs = array_of(solver.collider._collider_info.collision_pair_idx)
+        self._pairs = array_of(of_collider(solver.collider, "collider_info").collision_pair_idx)
 
     def all(self) -> dict[str, Any]:
         """Every quantity that Genesis tells, by its name."""
@@ -153,7 +154,7 @@ class ReadBack:
         }
 
     def _velocity(self, link: Any) -> FloatArray:
-        linear = numbers(self.solver.get_links_vel([link.idx], ref="link_com"))
+        linear = numbers(self.solver.get_links_vel([link.idx], ref=centre_of_mass()))
         return np.ravel(np.concatenate([linear, numbers(self.solver.get_links_ang([link.idx]))]))
 
     def _damping(self, link: Any) -> FloatArray:
