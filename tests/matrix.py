@@ -20,6 +20,7 @@ import sys
 import tempfile
 import zipfile
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -230,28 +231,33 @@ def check(python: Path, step: Step) -> str:
     return "" if not wrong else f"{'; '.join(wrong)}\n{text[-3000:]}"
 
 
+def failures(place: Place, wheel: Path, folder: Path) -> int:
+    """How many commands did not do in an environment what they should; each is told."""
+    python, failed = make(place, wheel, folder), 0
+    for step in steps(place):
+        problem = check(python, step)
+        failed += bool(problem)
+        command = " ".join(("pytest", *step.arguments))
+        print(f"{place.name}: {command}: {problem or 'ok'}", flush=True)
+    return failed
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])  # type: ignore[union-attr]
     parser.add_argument("--all", action="store_true", help="every environment, not only the newest")
     parser.add_argument("--folder", type=Path, help="keeps the environments")
     parser.add_argument("--only", help="just the environment of this name")
     given = parser.parse_args(arguments)
-    failed = 0
     with tempfile.TemporaryDirectory() as temporary:
         folder = (given.folder or Path(temporary)).absolute()
         built, copy = Path(temporary, "built"), Path(temporary, "source")
         hidden = shutil.ignore_patterns(".*", "build", "*.egg-info")  # an old build would stay in
         shutil.copytree(HERE, copy, ignore=hidden)
         wheel = build(copy, built)
-        for place in EVERY if given.all or given.only else QUICK:
-            if given.only not in (None, place.name):
-                continue
-            python = make(place, wheel, folder)
-            for step in steps(place):
-                problem = check(python, step)
-                failed += bool(problem)
-                command = " ".join(("pytest", *step.arguments))
-                print(f"{place.name}: {command}: {problem or 'ok'}", flush=True)
+        known = EVERY if given.all or given.only else QUICK
+        places = [place for place in known if given.only in (None, place.name)]
+        with ThreadPoolExecutor(2) as both:  # half of the time goes into downloads
+            failed = sum(both.map(lambda place: failures(place, wheel, folder), places))
     print(f"{failed} commands failed" if failed else "all commands did what they should")
     return min(failed, 1)
 
