@@ -6,6 +6,7 @@ Gazebo comes from no registry that CI reaches: where it is not installed, what n
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import xml.etree.ElementTree as ET
@@ -152,11 +153,22 @@ def test_a_server_that_is_stopped() -> None:
         assert not process.alive
 
 
+def test_a_lone_body_slides_alike_on_each_side(worlds: Worlds) -> None:
+    """It stands, or lies with its z axis along the way or across it: it loses mu g in all three."""
+    half, mu = math.sqrt(0.5), 0.2
+    for turn in ((1.0, 0.0, 0.0, 0.0), (half, half, 0.0, 0.0), (half, 0.0, half, 0.0)):
+        pose = Pose((0.0, 0.0, 0.025), turn)
+        cube = replace(CUBE, pose=pose, friction=mu, linear_velocity=(1.0, 0.0, 0.0))
+        world = worlds.load(Scene("sliding", (cube,), ground_friction=mu))
+        world.wait(0.3)
+        assert world.bodies[0, 7] == pytest.approx(1 - 0.3 * mu * 9.80665, abs=0.01)
+
+
 def test_a_spin_on_the_ground(worlds: Worlds) -> None:
-    """SDF's default holds a ball that spins on the spot; 0 lets it spin on."""
+    """SDF's default holds a ball that spins on the spot; that of `tuned`, 0, lets it spin on."""
     ball = Sphere("ball", 0.03, Pose.at(0.0, 0.0, 0.03), 0.1, angular_velocity=(0.0, 0.0, 6.0))
     spins = []
-    for changes in ({}, {"torsional_friction": 0.0}):
+    for changes in ({"torsional_friction": 1.0}, {}):
         world = worlds.load(Scene("spinning", (ball,)), **changes)
         world.wait(0.1)
         spins.append(float(world.bodies[0, 12]))
