@@ -9,9 +9,12 @@ from __future__ import annotations
 import math
 import os
 import signal
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -58,6 +61,60 @@ def test_no_release_is_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bindings, "RELEASES", {"7": ("json", "gz.no_such_module")})
     with pytest.raises(UnavailableError, match="no release of gz-sim .*: 7: json, gz.no_such_"):
         bindings.bindings.__wrapped__()
+
+
+STAND_INS = """
+import sys
+from pytest_simbench.sims.gazebo.adapter import Gazebo
+from pytest_simbench.sims.gazebo.bindings import bindings
+from pytest_simbench.worker.server import _import_engine
+for folder in sys.argv[1:]:
+    sys.path[:] = [folder]
+    for name in [name for name in sys.modules if name.partition(".")[0] == "gz"]:
+        del sys.modules[name]
+    bindings.cache_clear()
+    _import_engine(Gazebo.info)
+    found = bindings()
+    assert [name for name in sys.modules if name[:6] == "gz.sim"] == [found.sim.__name__]
+    print(found.math.__name__, found.transport.__name__, found.sim.__name__)
+"""
+
+RELEASES = {
+    "math7 transport13 sim8 common5 msgs10": "gz.math7 gz.transport13 gz.sim8",
+    "math8 transport14 sim9 common6 msgs11": "gz.math8 gz.transport14 gz.sim9",
+    "math transport sim common msgs": "gz.math gz.transport gz.sim",
+    "math transport sim math8 transport14 sim9": "gz.math8 gz.transport14 gz.sim9",
+    "math7 transport13 math8 transport14 sim9": "gz.math8 gz.transport14 gz.sim9",
+    "math7 transport13 sim math transport": "gz.math gz.transport gz.sim",
+}
+"""What is there of the package gz, and what is to be taken of it: all of one release, the oldest
+that is whole. Names are those of gz-sim 8.14.0, 9.5.0 and 10.4.0."""
+
+
+def test_the_modules_are_all_of_one_release(tmp_path: Path) -> None:
+    """With stand-ins. Two simulators in one process would register the same messages twice."""
+    folders = []
+    for number, names in enumerate(RELEASES):
+        folder = tmp_path / str(number) / "gz"
+        folder.mkdir(parents=True)
+        for name in names.split():
+            (folder / f"{name}.py").touch()
+        folders.append(str(folder.parent))
+    done = subprocess.run(
+        [sys.executable, "-c", STAND_INS, *folders], capture_output=True, text=True, check=False
+    )
+    assert done.stdout.splitlines() == list(RELEASES.values()), done.stderr
+
+
+def test_the_release_is_read_off_the_librarys_file() -> None:
+    for line, release in (
+        ("7f1-7f2 r-xp 0 08:01 9  /usr/lib/x86_64-linux-gnu/libgz-sim8.so.8.14.0", "8.14.0"),
+        ("7f1-7f2 r-xp 0 08:01 9  /usr/lib/x86_64-linux-gnu/libgz-sim.so.10.4.0", "10.4.0"),
+        ("7f1-7f2 r-xp 0 08:01 9  /opt/lib/libgz-sim8.so.8.14.0 (deleted)", "8.14.0"),
+        ("7f1-7f2 r-xp 0 08:01 9  /opt/lib/libgz-sim8-physics-system.so.8.14.0", None),
+    ):
+        found = bindings.LIBRARY.search(line)
+        assert (found and found[1]) == release
 
 
 def test_the_world_is_that_of_the_engine() -> None:
