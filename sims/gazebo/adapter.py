@@ -17,6 +17,7 @@ import numpy as np
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import (
     FOLLOWER,
+    Capability,
     Deviation,
     PreparedRobot,
     SeedsSeen,
@@ -30,6 +31,7 @@ from .drives import Drives
 from .readback import ReadBack
 from .sdf import Physics, is_lone, robot_model, world_text
 from .server import Server, new_name
+from .window import Window
 from .wrenches import Wrenches
 
 PACKAGES = ("python3-numpy", "gz-harmonic")
@@ -77,7 +79,7 @@ class Gazebo(Simulator):
         engine="DART, Bullet",
         language="C++",
         tested_version="8.14.0",
-        capabilities=frozenset(),
+        capabilities=frozenset({Capability.WINDOW}),
         deviations=(
             Deviation("joint/*/armature", "Gazebo has no rotor inertia"),
             Deviation(
@@ -147,6 +149,7 @@ class Gazebo(Simulator):
         ),
     }
     settings: GazeboSettings
+    _window: Window | None = None
 
     def load(self, scene: Scene) -> None:
         s = self.settings
@@ -156,9 +159,11 @@ class Gazebo(Simulator):
         )
         self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         name = new_name()
-        text = world_text(scene, self.prepared, self._physics, name)
+        text = world_text(scene, self.prepared, self._physics, name, self.gui)
         self.server = server = Server(text, name)
         server.reset()
+        if self.gui:
+            self._window = Window(library_version(), self.info.install)
         sim, ecm = bindings().sim, server.ecm
         self._free = [
             sim.Link(self._model(body.name).link_by_name(ecm, "link")) for body in scene.free_bodies
@@ -233,6 +238,10 @@ class Gazebo(Simulator):
 
     def joint_state(self) -> FloatArray:
         return np.empty((2, 0)) if self._drives is None else self._drives.state()
+
+    def close(self) -> None:
+        if self._window is not None:
+            self._window.close()
 
     def versions(self) -> dict[str, str]:
         bindings()

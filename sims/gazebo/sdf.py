@@ -25,6 +25,8 @@ from pytest_simbench.simulator import NotSupportedError, PreparedRobot
 from pytest_simbench.simulator.kinematics import link_poses
 from pytest_simbench.simulator.urdf import MovingJoint, Shape
 
+from .drawn import add_drawing
+
 VERSION = "1.11"
 """Of SDF; gz-sim 8 reads none newer."""
 
@@ -101,8 +103,10 @@ class Physics:
         return "ode/mu", "ode/mu2"
 
 
-def world_text(scene: Scene, prepared: PreparedRobot | None, physics: Physics, name: str) -> str:
-    """The world as SDF text, called `name`."""
+def world_text(
+    scene: Scene, prepared: PreparedRobot | None, physics: Physics, name: str, drawn: bool = False
+) -> str:
+    """The world as SDF text, called `name`; `drawn` if it has a window."""
     root = ET.Element("sdf", version=VERSION)
     world = ET.SubElement(root, "world", name=name)
     _add_physics(world, physics)
@@ -112,6 +116,8 @@ def world_text(scene: Scene, prepared: PreparedRobot | None, physics: Physics, n
         _add_body(world, body, physics)
     if prepared is not None:
         _add_robot(world, scene, prepared, physics)
+    if drawn:
+        add_drawing(world, scene)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode")
 

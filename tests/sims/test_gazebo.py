@@ -11,6 +11,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from dataclasses import replace
@@ -21,13 +22,16 @@ import pytest
 from pytest_simbench.sims.gazebo import bindings, messages
 from pytest_simbench.sims.gazebo.adapter import Gazebo
 from pytest_simbench.sims.gazebo.sdf import Physics, robot_model, world_text
+from pytest_simbench.sims.gazebo.window import Window
 
 from pytest_simbench.client.errors import EngineFailed, WorkerExited, WorkerHung
+from pytest_simbench.client.world import World
 from pytest_simbench.scene import Box, Pose, Scene, Sphere
 from pytest_simbench.simulator import PreparedRobot, UnavailableError
 from pytest_simbench.simulator.parity import compare
 from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.tasks import Jitter, Stacking
+from pytest_simbench.testing import Subject
 
 from .coverage import uncovered
 from .gazebo_faults import FAULTS, FaultyGazebo
@@ -208,6 +212,103 @@ def test_a_server_that_is_stopped() -> None:
         with pytest.raises(WorkerHung, match="no sign of life for 3 s and was killed; raise --sim"):
             world.wait(5.0)
         assert not process.alive
+
+
+STAND_IN = """#!/bin/sh
+trap 'echo ended >> {record}; exit 0' TERM
+echo "$@" > {record}; echo "$GZ_PARTITION" >> {record}
+{then}
+"""
+
+WAITS = "while true; do sleep 0.05; done"
+
+
+@pytest.fixture
+def record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """What a stand-in for the program `gz` was called with, was told, and whether it ended."""
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    stand_in(tmp_path / "record", WAITS)
+    return tmp_path / "record"
+
+
+def stand_in(record: Path, then: str) -> None:
+    program = record.with_name("gz")
+    program.write_text(STAND_IN.format(record=record, then=then))
+    program.chmod(0o755)
+
+
+def lines(record: Path) -> list[str]:
+    """Of what it has written, the first two at least."""
+    until = time.monotonic() + 20.0
+    while time.monotonic() < until:
+        if record.exists() and len(found := record.read_text().splitlines()) > 1:
+            return found
+        time.sleep(0.02)
+    raise TimeoutError("the stand-in was not called")
+
+
+def test_a_window_is_opened_and_closed(record: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the server's partition, with the server's release."""
+    monkeypatch.setenv("GZ_PARTITION", "ours")
+    window = Window("8.14.0", "install it", start=0.5)
+    assert lines(record)[:2] == ["sim -g --force-version 8.14.0", "ours"]
+    window.close()
+    assert lines(record)[2:] == ["ended"]
+    assert window.program.ended() == "exited with status 0"
+
+
+def test_a_window_that_cannot_be_opened(record: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without its libraries, without the program: the test is skipped, and says what installs it.
+    One that the user closes ends nothing."""
+    stand_in(record, "echo 'no display' >&2; exit 1")
+    with pytest.raises(UnavailableError, match="exited with status 1 .*: no display; install it$"):
+        Window("", "install it", start=20.0)
+    assert lines(record)[0] == "sim -g"
+    stand_in(record, WAITS)
+    window = Window("", "install it", start=0.5)
+    window.program.kill()
+    window.close()
+    monkeypatch.setenv("PATH", str(record))
+    with pytest.raises(UnavailableError, match="gz, which is not on the PATH; install it$"):
+        Window("", "install it")
+
+
+def test_what_is_drawn_is_what_collides() -> None:
+    """In the scene's colours, and only where there is a window."""
+    assert SCENE.robot is not None
+    prepared = PreparedRobot(SCENE.robot)
+    physics = Physics("dartsim", 0.001, "ode", "dantzig")
+    plain = ET.fromstring(world_text(SCENE, prepared, physics, "w"))
+    world = ET.fromstring(world_text(SCENE, prepared, physics, "w", drawn=True)).find("world")
+    assert world is not None
+    assert plain.find("world/model/link/visual") is None
+    assert plain.find("world/plugin[2]") is None
+    names = [plugin.get("name", "") for plugin in world.findall("plugin")]
+    assert names == ["gz::sim::systems::Physics", "gz::sim::systems::SceneBroadcaster"]
+    solids, drawn = (
+        [
+            [ET.tostring(part).strip() for part in shape if part.tag in ("pose", "geometry")]
+            for shape in world.findall(f"model/link/{kind}")
+            if shape.find("geometry/plane") is None
+        ]
+        for kind in ("collision", "visual")
+    )
+    assert drawn == solids
+    assert len(drawn) > 30
+    red = world.findtext("model[@name='cube_05']/link/visual/material/diffuse")
+    assert red == " ".join(str(float(value)) for value in SCENE.body("cube_05").colour)
+
+
+def test_a_window_sees_its_server_and_no_other(record: Path) -> None:
+    """The stand-in is told the partition of the worker that has opened it."""
+    with Worlds(FaultyGazebo) as worlds:
+        Subject(FaultyGazebo).construct(worlds.worker, gui=True)
+        world = World(worlds.worker, Scene("one", (CUBE,)))
+        partition = lines(record)[1]
+        assert partition.startswith(f"simbench-{worlds.worker.pid}-")
+        world.wait(0.1)
+        assert world.bodies[0, 2] == pytest.approx(0.025, abs=1e-3)
+    assert lines(record)[2:] == ["ended"]
 
 
 def test_a_lone_body_slides_alike_on_each_side(worlds: Worlds) -> None:
