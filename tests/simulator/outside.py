@@ -44,7 +44,6 @@ class Outside(ExternalSimulator):
         name: OutsideSettings(**asdict(settings)) for name, settings in MuJoCo.profiles.items()
     }
     settings: OutsideSettings
-    start_limit: ClassVar[float] = 20.0
     _connection: Connection | None = None
 
     def command_line(self) -> Sequence[str]:

@@ -97,7 +97,8 @@ def test_a_program_keeps_the_contract(check: ConformanceTest) -> None:
 )
 def test_a_program_that_does_not_start(fault: str, message: str) -> None:
     simulator = Outside(replace(Outside.profiles["tuned"], fault=fault))
-    simulator.start_limit = 2.0 if fault == "hangs" else PATIENCE  # type: ignore[misc]
+    if fault == "hangs":
+        simulator.start_limit = 2.0  # type: ignore[misc]
     with pytest.raises(SimulatorError, match=f"MuJoCo's program {message}"):
         simulator.load(FALLING)
     assert simulator.program is not None
