@@ -38,7 +38,7 @@ class Clocks:
         simulated: [s].
         wall: seconds in the stepping loop, without log, window, pacing and control [s].
         waited: how much of that the thread waited for a processor that others had [s].
-        cpu: CPU seconds of the whole process in that time [s].
+        cpu: CPU seconds in that time of this process, and of one that simulates for it [s].
     """
 
     steps: int = 0
@@ -140,7 +140,7 @@ class Stepper:
         step, command, clock = simulator.step, simulator.command, self._clock
         totals, keep_up = self.clocks, self.control.keep_up
         act = self.acting.steps() if self.acting is not None else None
-        cpu_began = time.process_time()
+        cpu_began = self._cpu()
         began, waited = clock()
         beat = resumed = began
         for k in range(1, steps + 1):
@@ -156,7 +156,7 @@ class Stepper:
             stopped, waited_now = clock()
             totals.wall += stopped - resumed
             totals.waited += waited_now - waited
-            totals.cpu += time.process_time() - cpu_began
+            totals.cpu += self._cpu() - cpu_began
             if logs:
                 log.sample(simulator)
             if k % check_every == 0:
@@ -176,12 +176,16 @@ class Stepper:
                     time.sleep(ahead)
             # The CPU time of an engine with threads, the wall time of a busy machine: the less.
             keep_up(min(totals.wall, totals.cpu))
-            cpu_began = time.process_time()
+            cpu_began = self._cpu()
             resumed, waited = clock()
         totals.steps += steps
         totals.simulated += steps * timestep
         self._check_finite()
         return log.arrays() if log.times else {}
+
+    def _cpu(self) -> float:
+        """CPU time so far of all that simulates [s]."""
+        return time.process_time() + self.simulator.other_cpu()
 
     def _check_finite(self, log: Log | None = None) -> None:
         """Look at the present state, or at the log's last sample where that is it."""

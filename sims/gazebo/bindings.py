@@ -17,13 +17,13 @@ RELEASES: dict[str, tuple[str, str, str]] = {
     "9 (Ionic)": ("gz.math8", "gz.transport14", "gz.sim9"),
     "10 (Jetty)": ("gz.math", "gz.transport", "gz.sim"),
 }
-"""Modules of each release of gz-sim, in the order in which they must be imported: the others return
-types of the first one."""
+"""Modules of each release of gz-sim, as its and its libraries' python/CMakeLists.txt name them
+(read at the tags gz-sim8_8.14.0, gz-sim9_9.5.0, gz-sim10_10.4.0). Those of 10 are 11's too."""
 
 MODULES = tuple("|".join(names) for names in zip(*RELEASES.values(), strict=True))
 """What must be importable, for `SimulatorInfo.modules`."""
 
-LIBRARY = re.compile(r"/libgz-sim\d*\.so\.(\d+\.\d+\.\d+)$")
+LIBRARY = re.compile(r"/libgz-sim\d*\.so\.(\d+\.\d+\.\d+)")
 """File of gz-sim's own library. Its Python package has no metadata that tells a version."""
 
 

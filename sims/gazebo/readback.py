@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 from functools import cached_property
+from itertools import product
 from typing import Any
 from urllib.parse import unquote, urlparse
 
@@ -117,16 +118,30 @@ class ReadBack:
         return found
 
     def _surfaces(self, element: ET.Element) -> dict[str, Any]:
-        """Friction and restitution of a link's shapes."""
-        frictions, bounces = [], []
-        for collision in element.findall("collision"):
-            for name in self.physics.friction_names:
-                frictions.append(number(collision, f"surface/friction/{name}", 1.0))
-            bounces.append(number(collision, "surface/bounce/restitution_coefficient", 0.0) ** 2)
-        if not frictions:
+        """Friction and restitution of a link's shapes, in a pair with others like it; of a lone
+        body and the ground, of that pair."""
+        collisions = element.findall("collision")
+        if not collisions:
             return {}
-        friction = np.array([self.physics.friction_of(value) for value in frictions])
+        pairs = [(value, value) for value in self._frictions(element)]
+        if self.physics.lone:
+            (body,) = self.scene.bodies
+            ground, other = map(self._element, ("ground", f"body/{body.name}"))
+            pairs = list(product(self._frictions(ground), self._frictions(other)))
+        bounces = [
+            number(collision, "surface/bounce/restitution_coefficient", 0.0) ** 2
+            for collision in collisions
+        ]
+        friction = [self.physics.friction_of(*pair) for pair in pairs]
         return {"friction": one_value(friction), "restitution": one_value(bounces)}
+
+    def _frictions(self, element: ET.Element) -> list[float]:
+        """What a link's shapes have as friction."""
+        return [
+            number(collision, f"surface/friction/{name}", 1.0)
+            for collision in element.findall("collision")
+            for name in self.physics.friction_names
+        ]
 
     def _joint(self, prefix: str, name: str, index: int, drives: Drives) -> dict[str, Any]:
         joint, zero = self._joints[name], float(drives.zeros[index])

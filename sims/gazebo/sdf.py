@@ -25,6 +25,8 @@ from pytest_simbench.simulator import NotSupportedError, PreparedRobot
 from pytest_simbench.simulator.kinematics import link_poses
 from pytest_simbench.simulator.urdf import MovingJoint, Shape
 
+from .drawn import add_drawing
+
 VERSION = "1.11"
 """Of SDF; gz-sim 8 reads none newer."""
 
@@ -41,6 +43,7 @@ class Physics:
         detector: collision detector of dartsim.
         solver: of dartsim.
         torsional_friction: of bullet-featherstone, for each surface [m].
+        lone: whether the world is one free body on the ground and nothing else.
     """
 
     engine: str
@@ -48,6 +51,7 @@ class Physics:
     detector: str
     solver: str
     torsional_friction: float = 1.0
+    lone: bool = False
 
     @property
     def coupled(self) -> bool:
@@ -72,18 +76,24 @@ class Physics:
         """The limit for which `effort` wrote this."""
         return written * 1e-3 / self.timestep if self.engine == FEATHERSTONE else written
 
-    def friction(self, coefficient: float) -> float:
+    def friction(self, coefficient: float, ground: bool = False) -> float:
         """What to write so that a pair of such surfaces has this coefficient.
 
         bullet-featherstone counts each surface's friction twice, and Bullet multiplies those of a
         pair: the fourth root. The second count is along the body's own x and y only
-        (`SDFFeatures.cc`, `setAnisotropicFriction(mu, mu2, 1)`). dartsim takes the smaller one.
+        (`SDFFeatures.cc`, `setAnisotropicFriction(mu, mu2, 1)`), so only 1 is the same along all
+        axes. A lone body has 1, and the ground, whose z axis is always the contact's normal, the
+        square root. dartsim takes the smaller one.
         """
-        return coefficient**0.25 if self.engine == FEATHERSTONE else coefficient
+        if self.engine != FEATHERSTONE:
+            return coefficient
+        if self.lone:
+            return math.sqrt(coefficient) if ground else 1.0
+        return coefficient**0.25
 
-    def friction_of(self, written: float) -> float:
-        """The coefficient that `friction` has written."""
-        return written**4 if self.engine == FEATHERSTONE else written
+    def friction_of(self, written: float, other: float) -> float:
+        """The coefficient of a pair of surfaces for which these were written."""
+        return (written * other) ** 2 if self.engine == FEATHERSTONE else min(written, other)
 
     @property
     def friction_names(self) -> tuple[str, str]:
@@ -93,8 +103,10 @@ class Physics:
         return "ode/mu", "ode/mu2"
 
 
-def world_text(scene: Scene, prepared: PreparedRobot | None, physics: Physics, name: str) -> str:
-    """The world as SDF text, called `name`."""
+def world_text(
+    scene: Scene, prepared: PreparedRobot | None, physics: Physics, name: str, drawn: bool = False
+) -> str:
+    """The world as SDF text, called `name`; `drawn` if it has a window."""
     root = ET.Element("sdf", version=VERSION)
     world = ET.SubElement(root, "world", name=name)
     _add_physics(world, physics)
@@ -104,8 +116,18 @@ def world_text(scene: Scene, prepared: PreparedRobot | None, physics: Physics, n
         _add_body(world, body, physics)
     if prepared is not None:
         _add_robot(world, scene, prepared, physics)
+    if drawn:
+        add_drawing(world, scene)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode")
+
+
+def is_lone(scene: Scene) -> bool:
+    """Whether a world is one free body on the ground, of one friction, and nothing else."""
+    if scene.robot is not None or len(scene.bodies) != 1:
+        return False
+    (body,) = scene.bodies
+    return body.mass > 0 and body.friction == scene.ground_friction
 
 
 def robot_model(scene: Scene) -> str:
@@ -133,7 +155,8 @@ def _add_ground(world: ET.Element, scene: Scene, physics: Physics) -> None:
     link = _add_static(world, "ground", Pose())
     collision = ET.SubElement(link, "collision", name="0")
     _text(ET.SubElement(ET.SubElement(collision, "geometry"), "plane"), "normal", "0 0 1")
-    _add_surface(collision, scene.ground_friction, physics, scene.ground_restitution)
+    mu = physics.friction(scene.ground_friction, ground=True)
+    _add_surface(collision, mu, physics, scene.ground_restitution)
 
 
 def _add_body(world: ET.Element, body: Body, physics: Physics) -> None:
@@ -147,7 +170,7 @@ def _add_body(world: ET.Element, body: Body, physics: Physics) -> None:
         _add_inertial(link, body.mass, Pose(), [i, 0.0, 0.0, j, 0.0, k])
     collision = ET.SubElement(link, "collision", name="0")
     _add_solid(ET.SubElement(collision, "geometry"), body)
-    _add_surface(collision, body.friction, physics, body.restitution)
+    _add_surface(collision, physics.friction(body.friction), physics, body.restitution)
 
 
 def _add_solid(geometry: ET.Element, body: Body) -> None:
@@ -232,21 +255,21 @@ def _add_shapes(
             _text(ET.SubElement(geometry, "box"), "size", _spaced(shape.size))
         else:
             _text(ET.SubElement(geometry, "mesh"), "uri", shape.mesh or "")
-        _add_surface(element, friction, physics)
+        _add_surface(element, physics.friction(friction), physics)
 
 
 def _add_surface(
-    collision: ET.Element, friction: float, physics: Physics, restitution: float = 0.0
+    collision: ET.Element, mu: float, physics: Physics, restitution: float = 0.0
 ) -> None:
-    """Friction and restitution; of a pair both engines take the product of the restitutions."""
+    """Friction, as `Physics.friction` gives it, and restitution: of a pair both engines take the
+    product of the restitutions."""
     surface = ET.SubElement(collision, "surface")
     bounce = ET.SubElement(surface, "bounce")
     _text(bounce, "restitution_coefficient", repr(math.sqrt(restitution)))
     element = ET.SubElement(surface, "friction")
-    mu = repr(physics.friction(friction))
     own = ET.SubElement(element, physics.friction_names[0].partition("/")[0])
     for name in physics.friction_names:
-        _text(own, name.partition("/")[2], mu)
+        _text(own, name.partition("/")[2], repr(mu))
     if physics.engine == FEATHERSTONE:  # dartsim only warns that it has none
         torsional = ET.SubElement(element, "torsional")
         _text(torsional, "coefficient", repr(physics.torsional_friction))

@@ -6,24 +6,32 @@ Gazebo comes from no registry that CI reaches: where it is not installed, what n
 
 from __future__ import annotations
 
+import math
 import os
 import signal
+import subprocess
+import sys
+import time
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from pytest_simbench.sims.gazebo import bindings, messages
 from pytest_simbench.sims.gazebo.adapter import Gazebo
 from pytest_simbench.sims.gazebo.sdf import Physics, robot_model, world_text
+from pytest_simbench.sims.gazebo.window import Window
 
 from pytest_simbench.client.errors import EngineFailed, WorkerExited, WorkerHung
+from pytest_simbench.client.world import World
 from pytest_simbench.scene import Box, Pose, Scene, Sphere
 from pytest_simbench.simulator import PreparedRobot, UnavailableError
 from pytest_simbench.simulator.parity import compare
 from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.tasks import Jitter, Stacking
+from pytest_simbench.testing import Subject
 
 from .coverage import uncovered
 from .gazebo_faults import FAULTS, FaultyGazebo
@@ -57,6 +65,60 @@ def test_no_release_is_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bindings, "RELEASES", {"7": ("json", "gz.no_such_module")})
     with pytest.raises(UnavailableError, match="no release of gz-sim .*: 7: json, gz.no_such_"):
         bindings.bindings.__wrapped__()
+
+
+STAND_INS = """
+import sys
+from pytest_simbench.sims.gazebo.adapter import Gazebo
+from pytest_simbench.sims.gazebo.bindings import bindings
+from pytest_simbench.worker.server import _import_engine
+for folder in sys.argv[1:]:
+    sys.path[:] = [folder]
+    for name in [name for name in sys.modules if name.partition(".")[0] == "gz"]:
+        del sys.modules[name]
+    bindings.cache_clear()
+    _import_engine(Gazebo.info)
+    found = bindings()
+    assert [name for name in sys.modules if name[:6] == "gz.sim"] == [found.sim.__name__]
+    print(found.math.__name__, found.transport.__name__, found.sim.__name__)
+"""
+
+RELEASES = {
+    "math7 transport13 sim8 common5 msgs10": "gz.math7 gz.transport13 gz.sim8",
+    "math8 transport14 sim9 common6 msgs11": "gz.math8 gz.transport14 gz.sim9",
+    "math transport sim common msgs": "gz.math gz.transport gz.sim",
+    "math transport sim math8 transport14 sim9": "gz.math8 gz.transport14 gz.sim9",
+    "math7 transport13 math8 transport14 sim9": "gz.math8 gz.transport14 gz.sim9",
+    "math7 transport13 sim math transport": "gz.math gz.transport gz.sim",
+}
+"""What is there of the package gz, and what is to be taken of it: all of one release, the oldest
+that is whole. Names are those of gz-sim 8.14.0, 9.5.0 and 10.4.0."""
+
+
+def test_the_modules_are_all_of_one_release(tmp_path: Path) -> None:
+    """With stand-ins. Two simulators in one process would register the same messages twice."""
+    folders = []
+    for number, names in enumerate(RELEASES):
+        folder = tmp_path / str(number) / "gz"
+        folder.mkdir(parents=True)
+        for name in names.split():
+            (folder / f"{name}.py").touch()
+        folders.append(str(folder.parent))
+    done = subprocess.run(
+        [sys.executable, "-c", STAND_INS, *folders], capture_output=True, text=True, check=False
+    )
+    assert done.stdout.splitlines() == list(RELEASES.values()), done.stderr
+
+
+def test_the_release_is_read_off_the_librarys_file() -> None:
+    for line, release in (
+        ("7f1-7f2 r-xp 0 08:01 9  /usr/lib/x86_64-linux-gnu/libgz-sim8.so.8.14.0", "8.14.0"),
+        ("7f1-7f2 r-xp 0 08:01 9  /usr/lib/x86_64-linux-gnu/libgz-sim.so.10.4.0", "10.4.0"),
+        ("7f1-7f2 r-xp 0 08:01 9  /opt/lib/libgz-sim8.so.8.14.0 (deleted)", "8.14.0"),
+        ("7f1-7f2 r-xp 0 08:01 9  /opt/lib/libgz-sim8-physics-system.so.8.14.0", None),
+    ):
+        found = bindings.LIBRARY.search(line)
+        assert (found and found[1]) == release
 
 
 def test_the_world_is_that_of_the_engine() -> None:
@@ -152,11 +214,119 @@ def test_a_server_that_is_stopped() -> None:
         assert not process.alive
 
 
+STAND_IN = """#!/bin/sh
+trap 'echo ended >> {record}; exit 0' TERM
+echo "$@" > {record}; echo "$GZ_PARTITION" >> {record}
+{then}
+"""
+
+WAITS = "while true; do sleep 0.05; done"
+
+
+@pytest.fixture
+def record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """What a stand-in for the program `gz` was called with, was told, and whether it ended."""
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    stand_in(tmp_path / "record", WAITS)
+    return tmp_path / "record"
+
+
+def stand_in(record: Path, then: str) -> None:
+    program = record.with_name("gz")
+    program.write_text(STAND_IN.format(record=record, then=then))
+    program.chmod(0o755)
+
+
+def lines(record: Path) -> list[str]:
+    """Of what it has written, the first two at least."""
+    until = time.monotonic() + 20.0
+    while time.monotonic() < until:
+        if record.exists() and len(found := record.read_text().splitlines()) > 1:
+            return found
+        time.sleep(0.02)
+    raise TimeoutError("the stand-in was not called")
+
+
+def test_a_window_is_opened_and_closed(record: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the server's partition, with the server's release."""
+    monkeypatch.setenv("GZ_PARTITION", "ours")
+    window = Window("8.14.0", "install it", start=0.5)
+    assert lines(record)[:2] == ["sim -g --force-version 8.14.0", "ours"]
+    window.close()
+    assert lines(record)[2:] == ["ended"]
+    assert window.program.ended() == "exited with status 0"
+
+
+def test_a_window_that_cannot_be_opened(record: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without its libraries, without the program: the test is skipped, and says what installs it.
+    One that the user closes ends nothing."""
+    stand_in(record, "echo 'no display' >&2; exit 1")
+    with pytest.raises(UnavailableError, match="exited with status 1 .*: no display; install it$"):
+        Window("", "install it", start=20.0)
+    assert lines(record)[0] == "sim -g"
+    stand_in(record, WAITS)
+    window = Window("", "install it", start=0.5)
+    window.program.kill()
+    window.close()
+    monkeypatch.setenv("PATH", str(record))
+    with pytest.raises(UnavailableError, match="gz, which is not on the PATH; install it$"):
+        Window("", "install it")
+
+
+def test_what_is_drawn_is_what_collides() -> None:
+    """In the scene's colours, and only where there is a window."""
+    assert SCENE.robot is not None
+    prepared = PreparedRobot(SCENE.robot)
+    physics = Physics("dartsim", 0.001, "ode", "dantzig")
+    plain = ET.fromstring(world_text(SCENE, prepared, physics, "w"))
+    world = ET.fromstring(world_text(SCENE, prepared, physics, "w", drawn=True)).find("world")
+    assert world is not None
+    assert plain.find("world/model/link/visual") is None
+    assert plain.find("world/plugin[2]") is None
+    names = [plugin.get("name", "") for plugin in world.findall("plugin")]
+    assert names == ["gz::sim::systems::Physics", "gz::sim::systems::SceneBroadcaster"]
+    solids, drawn = (
+        [
+            [ET.tostring(part).strip() for part in shape if part.tag in ("pose", "geometry")]
+            for shape in world.findall(f"model/link/{kind}")
+            if shape.find("geometry/plane") is None
+        ]
+        for kind in ("collision", "visual")
+    )
+    assert drawn == solids
+    assert len(drawn) > 30
+    red = world.findtext("model[@name='cube_05']/link/visual/material/diffuse")
+    assert red == " ".join(str(float(value)) for value in SCENE.body("cube_05").colour)
+
+
+def test_a_window_sees_its_server_and_no_other(record: Path) -> None:
+    """The stand-in is told the partition of the worker that has opened it."""
+    with Worlds(FaultyGazebo) as worlds:
+        Subject(FaultyGazebo).construct(worlds.worker, gui=True)
+        world = World(worlds.worker, Scene("one", (CUBE,)))
+        partition = lines(record)[1]
+        assert partition.startswith(f"simbench-{worlds.worker.pid}-")
+        world.wait(0.1)
+        assert world.bodies[0, 2] == pytest.approx(0.025, abs=1e-3)
+    assert lines(record)[2:] == ["ended"]
+
+
+def test_a_lone_body_slides_alike_on_each_side(worlds: Worlds) -> None:
+    """It stands, or lies with its z axis along the way or across it: it loses mu g in all three."""
+    half, mu = math.sqrt(0.5), 0.2
+    for turn in ((1.0, 0.0, 0.0, 0.0), (half, half, 0.0, 0.0), (half, 0.0, half, 0.0)):
+        pose = Pose((0.0, 0.0, 0.025), turn)
+        cube = replace(CUBE, pose=pose, friction=mu, linear_velocity=(1.0, 0.0, 0.0))
+        world = worlds.load(Scene("sliding", (cube,), ground_friction=mu))
+        world.wait(0.3)
+        assert world.bodies[0, 7] == pytest.approx(1 - 0.3 * mu * 9.80665, abs=0.01)
+
+
 def test_a_spin_on_the_ground(worlds: Worlds) -> None:
-    """SDF's default holds a ball that spins on the spot; 0 lets it spin on."""
+    """SDF's default holds a ball that spins on the spot; that of `tuned`, 0, lets it spin on."""
     ball = Sphere("ball", 0.03, Pose.at(0.0, 0.0, 0.03), 0.1, angular_velocity=(0.0, 0.0, 6.0))
     spins = []
-    for changes in ({}, {"torsional_friction": 0.0}):
+    for changes in ({"torsional_friction": 1.0}, {}):
         world = worlds.load(Scene("spinning", (ball,)), **changes)
         world.wait(0.1)
         spins.append(float(world.bodies[0, 12]))

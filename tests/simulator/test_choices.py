@@ -23,6 +23,9 @@ from pytest_simbench.simulator.registry import adapter, registered
 from tests.report.samples import METRICS, record
 from tests.tiny import Falling
 
+TASKS = ("stacking", "throwing", "pushing", "pushing_curve")
+"""On whose seeds settings were chosen."""
+
 SEEN = (SeedsSeen("throwing", 2022, 2041), SeedsSeen("stacking", 100, 100))
 
 
@@ -118,7 +121,7 @@ def test_every_adapter_speaks_of_profiles_that_it_has(name: str) -> None:
     cls = adapter(name)
     assert cls.chosen_on.keys() <= cls.profiles.keys()
     for seen in (seen for all_seen in cls.chosen_on.values() for seen in all_seen):
-        assert isinstance(seen, DataSeen) or seen.task in ("stacking", "throwing")
+        assert isinstance(seen, DataSeen) or seen.task in TASKS
         assert 0 <= seen.first <= seen.last
 
 
