@@ -26,7 +26,17 @@ from pytest_simbench.simulator.shapes import (
 from .axes import Axis
 from .contacts import Part
 from .drives import Drives
-from .library import HI_STOP, LO_STOP, MOST_FORCE, SOFTNESS, Mesh, damping, library, pose_of
+from .library import (
+    HI_STOP,
+    LO_STOP,
+    MOST_FORCE,
+    SOFTNESS,
+    Convex,
+    Mesh,
+    damping,
+    library,
+    pose_of,
+)
 
 ode = lazy_import("ode")
 
@@ -90,13 +100,13 @@ class ReadBack:
         """Pose, shapes, surface and inertia of a body or link."""
         frame = self._frame(part)
         found: dict[str, Any] = {f"{prefix}/pose": frame.as_array()}
-        meshes = [self._measured(geom, frame) for geom in part.geoms if isinstance(geom, Mesh)]
+        meshes = [self._measured(geom, frame) for geom in part.geoms if isinstance(geom, _FACETED)]
         boxes = [
             reach(placed(box_corners(geom.getLengths()), frame.inverse() * pose_of(geom)))
             for geom in part.geoms
             if isinstance(geom, ode.GeomBox)
         ]
-        others = (geom for geom in part.geoms if not isinstance(geom, Mesh | ode.GeomBox))
+        others = (geom for geom in part.geoms if not isinstance(geom, (*_FACETED, ode.GeomBox)))
         rounds = [_round(geom, frame.inverse() * pose_of(geom)) for geom in others]
         found |= outlines(prefix, boxes, meshes, rounds)
         if part.geoms:
@@ -124,12 +134,13 @@ class ReadBack:
             f"{prefix}/damping": damping(part.body) / self.timestep,
         }
 
-    def _measured(self, mesh: Mesh, frame: Pose) -> FloatArray:
+    def _measured(self, mesh: Mesh | Convex, frame: Pose) -> FloatArray:
         """The reach of a mesh in a frame: how far a plane stands off when it just touches."""
         origin, reaches = np.asarray(frame.position), []
         for direction in DIRECTIONS @ frame.rotation().T:
             normal, offset = -direction, origin @ direction
-            offset -= 10.0  # far inside: every corner is below such a plane
+            if isinstance(mesh, Mesh):  # from outside: every corner is below such a plane
+                offset -= 10.0  # a hull touches none of those, and its frame is within
             while True:
                 self.probe.setParams(tuple(normal), -offset)
                 depths = [c.getContactGeomParams()[2] for c in ode.collide(mesh, self.probe)]
@@ -172,6 +183,9 @@ class ReadBack:
         if kind == "ground":
             return self.ground
         return self.bodies[rest] if kind == "body" else self.links[rest]
+
+
+_FACETED = (Mesh, Convex)
 
 
 def _collide(x: int, y: int) -> bool:

@@ -18,6 +18,7 @@ from pytest_simbench.scene import (
     Body,
     Box,
     Capsule,
+    ConvexMesh,
     Cylinder,
     FloatArray,
     Joint,
@@ -33,6 +34,7 @@ from . import usd_text as usd
 GROUND, ROOT = "/World/ground", "/World/root_joint"
 
 _COLLIDER = ("PhysicsCollisionAPI", "PhysxCollisionAPI", "MaterialBindingAPI")
+_HULL = (*_COLLIDER, "PhysicsMeshCollisionAPI")
 _BODY = ("PhysicsRigidBodyAPI", "PhysxRigidBodyAPI", "PhysicsMassAPI")
 
 
@@ -131,8 +133,9 @@ class Stage:
     def _body(self, index: int, box: Body) -> str:
         """A rigid body; kinematic where it has no mass: PhysX reports nothing of static ones."""
         kind, size = _solid(box)
+        schemas = _COLLIDER if kind != "Mesh" else _HULL
         shape = usd.prim(
-            kind, "shape", _COLLIDER, [*size, *self._surface(box.friction, box.restitution)]
+            kind, "shape", schemas, [*size, *self._surface(box.friction, box.restitution)]
         )
         lines = [*usd.placed(box.pose), *self._rigid(box)]
         if not box.mass:
@@ -191,14 +194,8 @@ class Stage:
             return usd.prim("Cube", name, _COLLIDER, [*usd.cube(shape.size, shape.pose), *surface])
         triangles = usd.read_stl(Path(str(shape.mesh)))
         corners, faces = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-        lines = [
-            *usd.placed(shape.pose),
-            'uniform token physics:approximation = "convexHull"',
-            f"point3f[] points = [{', '.join(usd.numbers(point) for point in corners)}]",
-            f"int[] faceVertexCounts = [{', '.join(['3'] * len(triangles))}]",
-            f"int[] faceVertexIndices = [{', '.join(str(i) for i in faces.ravel())}]",
-        ]
-        return usd.prim("Mesh", name, (*_COLLIDER, "PhysicsMeshCollisionAPI"), [*lines, *surface])
+        lines = [*usd.placed(shape.pose), *usd.hull(corners, faces.reshape(-1, 3))]
+        return usd.prim("Mesh", name, _HULL, [*lines, *surface])
 
 
 def _solid(body: Body) -> tuple[str, list[str]]:
@@ -212,6 +209,8 @@ def _solid(body: Body) -> tuple[str, list[str]]:
             radius, length = float(body.radius), float(body.length)
             lines = [f"double radius = {radius!r}", f"double height = {length!r}"]
             return type(body).__name__, [*lines, 'uniform token axis = "Z"']
+        case ConvexMesh():
+            return "Mesh", usd.hull(body.hull.points, np.array(body.hull.triangles))
     raise NotSupportedError(f"ovphysx has no {type(body).__name__}")
 
 
