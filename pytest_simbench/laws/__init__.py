@@ -30,6 +30,7 @@ from pytest_simbench.laws.drives import (
     StepResponse,
     Tracking,
 )
+from pytest_simbench.laws.forces import RestForce, TowerForce
 from pytest_simbench.laws.free import (
     DampedFall,
     FallSpeed,
@@ -93,7 +94,8 @@ LAWS: tuple[Law, ...] = (
     SlideX(), SlideY(), SlideDiagonal(), SlideStraight(), StoppingDistance(),
     StoppingDistanceDiagonal(), Glide(), Belt(), BeltSpeed(),
     Pivot(), RollingSphere(), RollingCylinder(), SlipToRoll(), SpinToRoll(), BallOnBelt(),
-    RestDepth(), Tower(), HeavyOnTop(), Overhang(), TippingEdge(), TippingSlope(),
+    RestDepth(), RestForce(), Tower(), TowerForce(), HeavyOnTop(), Overhang(), TippingEdge(),
+    TippingSlope(),
     GripHolds(), GripSlips(), GripSlipsDiagonally(),
     PendulumPeriod(), CompoundPendulum(), PendulumEnergy(), DoublePendulum(),
     DoublePendulumEnergy(), SwingingSlider(), SphericalPendulum(), StepResponse(),

@@ -144,6 +144,9 @@ FAULTS: dict[str, Fault] = {
     "slide_straight": turned,
     **dict.fromkeys(("stopping_distance", "stopping_distance_oblique"), rougher(1.2)),
     "pivot": heavier,
+    **dict.fromkeys(
+        ("rest_force", "tower_force"), bodies(lambda body: replace(body, mass=1.1 * body.mass))
+    ),
     "rest_depth": moved(z=1e-3),
     "tower": moved(z=1e-3, which="cube 4"),
     **dict.fromkeys(("heavy_on_top", "overhang"), moved(z=1e-3, which="cube 3")),
