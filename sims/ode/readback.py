@@ -24,7 +24,7 @@ from pytest_simbench.simulator.shapes import (
 )
 
 from .axes import Axis
-from .contacts import Part
+from .contacts import Contacts, Part
 from .drives import Drives
 from .library import (
     HI_STOP,
@@ -50,6 +50,7 @@ class ReadBack:
         ground, bodies, links: the parts of the world.
         axes: its joints.
         drives: the motors, or None.
+        contacts: whose joints hold nothing.
         scene, prepared: names of what was built; no value is taken from them.
     """
 
@@ -62,11 +63,13 @@ class ReadBack:
         links: Mapping[str, Part],
         axes: Mapping[str, Axis],
         drives: Drives | None,
+        contacts: Contacts,
         scene: Scene,
         prepared: PreparedRobot | None,
     ) -> None:
         self.world, self.timestep, self.ground = world, timestep, ground
         self.bodies, self.links, self.axes, self.drives = bodies, links, axes, drives
+        self.contacts = contacts
         self.scene, self.prepared = scene, prepared
         self.probe = ode.GeomPlane(None, (0.0, 0.0, 1.0), 0.0)
 
@@ -86,7 +89,8 @@ class ReadBack:
                 velocity = [*part.body.getLinearVel(), *part.body.getAngularVel()]
                 reported[f"body/{name}/velocity"] = velocity
             free = part.body is not None and not part.body.isKinematic()
-            reported[f"body/{name}/dynamic"] = float(free and part.body.getNumJoints() == 0)
+            held = free and part.body.getNumJoints() > self.contacts.on(part.body)
+            reported[f"body/{name}/dynamic"] = float(free and not held)
         for name, part in self.links.items():
             reported |= self._part(f"link/{name}", part)
         if self.prepared is not None and self.drives is not None:

@@ -18,7 +18,7 @@ not quite that of the uninterrupted run.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -108,7 +108,13 @@ class OvPhysX(Simulator):
         language="C++",
         tested_version="0.7.0.74035321",
         oldest_version="0.7.0.74035321",  # older ones tell no joint before the first step
-        capabilities=frozenset({Capability.DETERMINISTIC, Capability.SAVE_RESTORE}),
+        capabilities=frozenset(
+            {
+                Capability.DETERMINISTIC,
+                Capability.SAVE_RESTORE,
+                Capability.CONTACT_FORCES,
+            }
+        ),
         deviations=(
             Deviation("timestep", "an argument of each step, which PhysX does not report"),
             Deviation("gravity", "PhysX reports no gravity through this package"),
@@ -298,6 +304,17 @@ class OvPhysX(Simulator):
 
     def read_back(self) -> dict[str, Any]:
         return read_back(self.session, self.scene, self.prepared, self._unit, self._placed)
+
+    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        names = {usd.GROUND: "ground"}
+        names |= {usd.body_path(i): f"body/{body.name}" for i, body in enumerate(self.scene.bodies)}
+        for i, name in enumerate(self.prepared.links if self.prepared is not None else ()):
+            names[usd.link_path(i)] = f"link/{name}"
+        for (first, second), points in self.session.contacts().items():
+            for impulse, place in points:
+                force = np.asarray(impulse, dtype=float) / self.settings.timestep
+                wrench = np.concatenate([force, np.cross(place, force)])
+                yield names[first], names[second], wrench
 
     def save(self) -> _Saved:
         values = {}

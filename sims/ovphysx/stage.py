@@ -35,7 +35,8 @@ GROUND, ROOT = "/World/ground", "/World/root_joint"
 
 _COLLIDER = ("PhysicsCollisionAPI", "PhysxCollisionAPI", "MaterialBindingAPI")
 _HULL = (*_COLLIDER, "PhysicsMeshCollisionAPI")
-_BODY = ("PhysicsRigidBodyAPI", "PhysxRigidBodyAPI", "PhysicsMassAPI")
+_BODY = ("PhysicsRigidBodyAPI", "PhysxRigidBodyAPI", "PhysicsMassAPI", "PhysxContactReportAPI")
+_REPORT = "float physxContactReport:threshold = 0"
 
 
 def body_path(index: int) -> str:
@@ -137,7 +138,7 @@ class Stage:
         shape = usd.prim(
             kind, "shape", schemas, [*size, *self._surface(box.friction, box.restitution)]
         )
-        lines = [*usd.placed(box.pose), *self._rigid(box)]
+        lines = [*usd.placed(box.pose), *self._rigid(box), _REPORT]
         if not box.mass:
             lines.append("bool physics:kinematicEnabled = true")
         else:
@@ -181,7 +182,7 @@ class Stage:
         return prims
 
     def _link(self, index: int, link: Link, pose: Pose, friction: float) -> str:
-        lines = [*usd.placed(pose), *self._lines["physxRigidBody"]]
+        lines = [*usd.placed(pose), *self._lines["physxRigidBody"], _REPORT]
         if link.mass > 0:
             lines += usd.mass_lines(link.mass, link.centre, link.inertia)
         shapes = [self._shape(i, shape, friction) for i, shape in enumerate(link.shapes)]
