@@ -59,6 +59,7 @@ from pytest_simbench.laws.joints import (
     SphericalPendulum,
     SwingingSlider,
 )
+from pytest_simbench.laws.meshes import MeshTwin, RimlessWheel
 from pytest_simbench.laws.rolling import (
     FreeCylinder,
     RollingCylinder,
@@ -92,8 +93,9 @@ LAWS: tuple[Law, ...] = (
     BounceHeight(), BounceRatio(), ElasticChain(), ObliqueBounce(), ObliqueBounceStick(),
     StickAngle(), StickAngleAcross(), StickAngleDiagonal(), Creep(), Carried(),
     SlideX(), SlideY(), SlideDiagonal(), SlideStraight(), StoppingDistance(),
-    StoppingDistanceDiagonal(), Glide(), Belt(), BeltSpeed(),
+    StoppingDistanceDiagonal(), Glide(), Belt(), BeltSpeed(), MeshTwin(),
     Pivot(), RollingSphere(), RollingCylinder(), SlipToRoll(), SpinToRoll(), BallOnBelt(),
+    RimlessWheel(),
     RestDepth(), RestForce(), Tower(), TowerForce(), HeavyOnTop(), Overhang(), TippingEdge(),
     TippingSlope(),
     GripHolds(), GripSlips(), GripSlipsDiagonally(),
