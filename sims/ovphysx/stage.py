@@ -35,7 +35,7 @@ GROUND, ROOT = "/World/ground", "/World/root_joint"
 
 _COLLIDER = ("PhysicsCollisionAPI", "PhysxCollisionAPI", "MaterialBindingAPI")
 _HULL = (*_COLLIDER, "PhysicsMeshCollisionAPI")
-_BODY = ("PhysicsRigidBodyAPI", "PhysxRigidBodyAPI", "PhysicsMassAPI", "PhysxContactReportAPI")
+_BODY = ("PhysicsRigidBodyAPI", "PhysxRigidBodyAPI", "PhysicsMassAPI")
 _REPORT = "float physxContactReport:threshold = 0"
 
 
@@ -52,6 +52,12 @@ def link_path(index: int) -> str:
 def joint_path(index: int) -> str:
     """Prim of the robot's joint of that index."""
     return f"/World/joint_{index}"
+
+
+def reports_contacts(scene: Scene) -> bool:
+    """Whether PhysX is asked to report the contacts of bodies: not where there is a robot. In the
+    scene of stacking, reports are a third and more of the stepping."""
+    return scene.robot is None
 
 
 class Stage:
@@ -134,11 +140,14 @@ class Stage:
     def _body(self, index: int, box: Body) -> str:
         """A rigid body; kinematic where it has no mass: PhysX reports nothing of static ones."""
         kind, size = _solid(box)
-        schemas = _COLLIDER if kind != "Mesh" else _HULL
+        collider = _COLLIDER if kind != "Mesh" else _HULL
         shape = usd.prim(
-            kind, "shape", schemas, [*size, *self._surface(box.friction, box.restitution)]
+            kind, "shape", collider, [*size, *self._surface(box.friction, box.restitution)]
         )
-        lines = [*usd.placed(box.pose), *self._rigid(box), _REPORT]
+        lines = [*usd.placed(box.pose), *self._rigid(box)]
+        schemas: tuple[str, ...] = _BODY
+        if reports_contacts(self.scene):
+            schemas, lines = (*_BODY, "PhysxContactReportAPI"), [*lines, _REPORT]
         if not box.mass:
             lines.append("bool physics:kinematicEnabled = true")
         else:
@@ -146,7 +155,7 @@ class Stage:
             spin = np.degrees(box.angular_velocity)
             lines.append(f"vector3f physics:velocity = {usd.numbers(box.linear_velocity)}")
             lines.append(f"vector3f physics:angularVelocity = {usd.numbers(spin)}")
-        return usd.prim("Xform", f"body_{index}", _BODY, lines, [shape])
+        return usd.prim("Xform", f"body_{index}", schemas, lines, [shape])
 
     def _rigid(self, body: Body) -> list[str]:
         """The engine's settings of a body, and its own damping where it has one."""
@@ -182,7 +191,7 @@ class Stage:
         return prims
 
     def _link(self, index: int, link: Link, pose: Pose, friction: float) -> str:
-        lines = [*usd.placed(pose), *self._lines["physxRigidBody"], _REPORT]
+        lines = [*usd.placed(pose), *self._lines["physxRigidBody"]]
         if link.mass > 0:
             lines += usd.mass_lines(link.mass, link.centre, link.inertia)
         shapes = [self._shape(i, shape, friction) for i, shape in enumerate(link.shapes)]
