@@ -23,7 +23,12 @@ ANY = 1e12
 """No law is missed by so many tolerances: nothing fails for it."""
 
 
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+def asked(law):
+    marks = [pytest.mark.needs(*law.needs)] if law.needs else []
+    return pytest.param(law, id=law.name, marks=marks)
+
+
+@pytest.mark.parametrize("law", map(asked, LAWS))
 def test_law(repeat, threshold, sim_swept, law):
     limit = threshold("ratio", ANY)
     result = repeat(law)

@@ -30,6 +30,7 @@ from pytest_simbench.laws.drives import (
     StepResponse,
     Tracking,
 )
+from pytest_simbench.laws.forces import RestForce, TowerForce
 from pytest_simbench.laws.free import (
     DampedFall,
     FallSpeed,
@@ -58,6 +59,7 @@ from pytest_simbench.laws.joints import (
     SphericalPendulum,
     SwingingSlider,
 )
+from pytest_simbench.laws.meshes import MeshTwin, RimlessWheel
 from pytest_simbench.laws.rolling import (
     FreeCylinder,
     RollingCylinder,
@@ -91,9 +93,11 @@ LAWS: tuple[Law, ...] = (
     BounceHeight(), BounceRatio(), ElasticChain(), ObliqueBounce(), ObliqueBounceStick(),
     StickAngle(), StickAngleAcross(), StickAngleDiagonal(), Creep(), Carried(),
     SlideX(), SlideY(), SlideDiagonal(), SlideStraight(), StoppingDistance(),
-    StoppingDistanceDiagonal(), Glide(), Belt(), BeltSpeed(),
+    StoppingDistanceDiagonal(), Glide(), Belt(), BeltSpeed(), MeshTwin(),
     Pivot(), RollingSphere(), RollingCylinder(), SlipToRoll(), SpinToRoll(), BallOnBelt(),
-    RestDepth(), Tower(), HeavyOnTop(), Overhang(), TippingEdge(), TippingSlope(),
+    RimlessWheel(),
+    RestDepth(), RestForce(), Tower(), TowerForce(), HeavyOnTop(), Overhang(), TippingEdge(),
+    TippingSlope(),
     GripHolds(), GripSlips(), GripSlipsDiagonally(),
     PendulumPeriod(), CompoundPendulum(), PendulumEnergy(), DoublePendulum(),
     DoublePendulumEnergy(), SwingingSlider(), SphericalPendulum(), StepResponse(),

@@ -23,6 +23,7 @@ import numpy as np
 
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task
 from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.phenomena import PHENOMENON
@@ -94,6 +95,7 @@ class Law(Task):
         phenomenon: one of `tasks.phenomena.PHENOMENA`.
         quantity: what is measured, for instance "height fallen".
         unit: of it.
+        needs: what a simulator must be able to do; others are skipped, with the reason.
     """
 
     study_timeout: ClassVar[float] = 300.0
@@ -103,6 +105,7 @@ class Law(Task):
     phenomenon: ClassVar[str]
     quantity: ClassVar[str]
     unit: ClassVar[str]
+    needs: ClassVar[tuple[Capability, ...]] = ()
 
     @property
     def metrics(self) -> tuple[Metric, ...]:

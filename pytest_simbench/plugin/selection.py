@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -290,7 +290,6 @@ def _among(asked: Sequence[str], name: str) -> bool:
 
 
 def _marks(node: Any, variant: Variant, selection: Selection) -> list[pytest.MarkDecorator]:
-    from pytest_simbench.simulator.info import Capability
     from pytest_simbench.simulator.registry import problem
 
     name, mode = variant.simulator, variant.mode
@@ -309,6 +308,14 @@ def _marks(node: Any, variant: Variant, selection: Selection) -> list[pytest.Mar
     for mark in node.iter_markers("xfail_sim"):
         if _among(_names(mark, node), name):
             marks.append(pytest.mark.xfail(reason=mark.kwargs.get("reason", "")))
+    return [*marks, *_needs(node, name)]
+
+
+def _needs(node: Any, name: str) -> list[pytest.MarkDecorator]:
+    """Skips for what a node's `needs` marks ask for and a simulator has not."""
+    from pytest_simbench.simulator.info import Capability
+
+    marks = []
     for mark in node.iter_markers("needs"):
         _check_keywords(mark, node)
         if not mark.args:
@@ -320,9 +327,24 @@ def _marks(node: Any, variant: Variant, selection: Selection) -> list[pytest.Mar
                 raise pytest.UsageError(
                     f"{node.nodeid}: needs({capability!r}): choose from {', '.join(Capability)}"
                 )
-            if capability not in info.capabilities:
+            if capability not in _info(name).capabilities:
                 marks.append(pytest.mark.skip(reason=f"{name} has no {capability}"))
     return marks
+
+
+def skip_what_parameters_need(items: Iterable[pytest.Item]) -> None:
+    """Apply `needs` marks of a test's other parameters, as of one law of many: `parameters` cannot
+    see them yet."""
+    from pytest_simbench.simulator.registry import problem
+
+    for item in items:
+        chosen = getattr(item, "callspec", None)
+        variant = chosen.params.get("sim_case") if chosen is not None else None
+        if not isinstance(variant, Variant) or variant in NOTHING.values:
+            continue
+        if any(item.iter_markers("needs")) and not problem(variant.simulator):
+            for mark in _needs(item, variant.simulator):
+                item.add_marker(mark)
 
 
 def _names(mark: pytest.Mark, node: Any) -> list[str]:

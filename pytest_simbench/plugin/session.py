@@ -127,6 +127,11 @@ class SimSession:
         """Complain of marks, and have pytest-benchmark take the workers' seconds."""
         if self.problems:
             raise pytest.UsageError("\n".join(dict.fromkeys(self.problems)))
+        ours = [item for item in items if "sim_case" in fixtures_of(item)]
+        if ours:
+            from pytest_simbench.plugin.selection import skip_what_parameters_need
+
+            skip_what_parameters_need(ours)
         timed = [item for item in items if "simbench_rounds" in fixtures_of(item)]
         if timed:
             from pytest_simbench.plugin.benchmark import time_by_workers

@@ -76,6 +76,12 @@ class Messages:
         colour: Sequence[float],
     ) -> Any:  # fmt: skip
         """A marker: a solid at its pose in a frame, with which it moves."""
+        if solid.kind == "mesh":
+            vertices, triangles = solid.mesh
+            corners = np.array(vertices)[np.array(triangles).ravel()]
+            return self.triangles(
+                nanoseconds, frame, namespace, number, solid.pose, corners, colour
+            )
         kind = getattr(self.store.types["visualization_msgs/msg/Marker"], SOLIDS[solid.kind])
         place = (nanoseconds, frame, namespace, number, solid.pose)
         return self._marker(*place, kind, solid.extents, colour, NO_CORNERS)

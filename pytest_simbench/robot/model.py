@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from pytest_simbench.scene import Body, Box, FloatArray, MotionLimits, Pose, Robot, Vector3
+from pytest_simbench.scene import Body, Box, FloatArray, MotionLimits, Pose, Robot
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.robot_check import check_robot
 
@@ -45,7 +45,7 @@ class RobotModel:
         self.tool = self.pin.getFrameId(robot.tool_frame)
         self.base = pin.SE3(robot.base.matrix())
         self.pin.armature = robot.column("armature")
-        self._loaded: dict[tuple[type[Body], float, Vector3], pin.Model] = {}
+        self._loaded: dict[tuple[object, ...], pin.Model] = {}
         self.effort_limits = robot.column("effort_limit")[: self.arm]
         self._fingers = np.array([joint.initial_position for joint in robot.joints[self.arm :]])
 
@@ -135,7 +135,7 @@ class RobotModel:
 
     def _carrying(self, body: Body) -> pin.Model:
         """The model with a body fixed in the hand."""
-        key = type(body), body.mass, body.extents
+        key = type(body), body.mass, body.extents, *body.inertia().tolist()
         if key not in self._loaded:
             model = self.pin.copy()
             tool = model.frames[self.tool]

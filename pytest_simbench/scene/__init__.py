@@ -1,8 +1,9 @@
 """The declarative world: bodies, robot, gravity, friction, gains; frozen, in SI units."""
 
-from pytest_simbench.scene.bodies import Box, Capsule, Cylinder, Sphere, penetration
+from pytest_simbench.scene.bodies import Box, Capsule, ConvexMesh, Cylinder, Sphere, penetration
 from pytest_simbench.scene.body import Body, Solid
 from pytest_simbench.scene.checks import SceneError
+from pytest_simbench.scene.polytope import Polytope, principal
 from pytest_simbench.scene.pose import FloatArray, Pose, Quaternion, Vector3, rotation_matrix
 from pytest_simbench.scene.robot import Gripper, Joint, MotionLimits, Robot
 from pytest_simbench.scene.scene import STANDARD_GRAVITY, Scene
@@ -14,11 +15,13 @@ __all__ = [
     "Body",
     "Box",
     "Capsule",
+    "ConvexMesh",
     "Cylinder",
     "FloatArray",
     "Gripper",
     "Joint",
     "MotionLimits",
+    "Polytope",
     "Pose",
     "Quaternion",
     "Robot",
@@ -30,5 +33,6 @@ __all__ = [
     "Vector3",
     "Wrench",
     "penetration",
+    "principal",
     "rotation_matrix",
 ]

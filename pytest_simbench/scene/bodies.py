@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from pytest_simbench.scene.body import WOOD, Body, Colour, Solid
-from pytest_simbench.scene.checks import check_number, check_numbers
-from pytest_simbench.scene.overlap import Hull, distance, overlaps
+from pytest_simbench.scene.checks import SceneError, check_number, check_numbers
+from pytest_simbench.scene.overlap import Corners, Hull, distance, overlaps, parted
+from pytest_simbench.scene.polytope import EVEN, MOST, Polytope, polytope
 from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
 
 
@@ -187,19 +189,108 @@ class Capsule(_Tube, kind="capsule"):
         return Hull(np.array([0.0, 0.0, self.length / 2])), self.radius
 
 
+@dataclass(frozen=True)
+class ConvexMesh(Body, kind="convex_mesh"):
+    """A body with flat faces, the convex hull of its vertices: a wedge, a prism, a rock.
+
+    Its frame is that in which it turns most simply: the origin is its centre of mass, and its axes
+    are the principal axes of inertia, as engines, and `moments`, have it. `scene.principal` makes
+    such vertices, and the pose of their frame, of any points.
+
+    Attributes:
+        vertices: its corners in its frame [m], 4 to `polytope.MOST`, in any order.
+    """
+
+    name: str
+    vertices: tuple[Vector3, ...]
+    pose: Pose
+    mass: float = 0.0
+    friction: float = 1.0
+    colour: Colour = WOOD
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        own = f"of {self.name!r}"
+        if not isinstance(self.vertices, tuple) or not 4 <= len(self.vertices) <= MOST:
+            raise SceneError(f"the vertices {own} must be a tuple of 4 to {MOST} corners [m]")
+        for vertex in self.vertices:
+            check_numbers(vertex, 3, f"a vertex [m] {own}")
+        try:
+            hull = self.hull
+        except SceneError as error:
+            raise SceneError(f"{self.name!r}: {error}") from None
+        inside = set(range(len(self.vertices))) - set(hull.corners)
+        if inside:
+            raise SceneError(
+                f"vertex {self.vertices[min(inside)]} {own} is no corner of the convex hull of all "
+                "of them; leave it out, or have `principal` leave it out"
+            )
+        if np.abs(hull.centroid).max() > EVEN * hull.size:
+            raise SceneError(
+                f"the vertices {own} have their centre of mass at {hull.centroid.tolist()} [m], "
+                "which must be the origin: move them there (`principal` does)"
+            )
+        if not hull.aligned:
+            raise SceneError(
+                f"the axes {own} are not its principal axes of inertia: turn its vertices to them "
+                "(`principal` does)"
+            )
+
+    @property
+    def hull(self) -> Polytope:
+        """Faces and triangles between its vertices."""
+        return polytope(self.vertices)
+
+    @property
+    def extents(self) -> Vector3:
+        x, y, z = (2 * np.abs(self.vertices).max(axis=0)).tolist()
+        return (x, y, z)
+
+    @property
+    def volume(self) -> float:
+        return self.hull.volume
+
+    def even_inertia(self) -> FloatArray:
+        """The sum over tetrahedra, see `Polytope.inertia`."""
+        return np.asarray(self.mass * np.diag(self.hull.inertia))
+
+    def solids(self) -> list[Solid]:
+        return [Solid("mesh", self.extents, mesh=(self.vertices, tuple(self.hull.triangles)))]
+
+    def core(self, share: float) -> tuple[Corners, float]:
+        return Corners(np.array(self.vertices)), 0.0
+
+    def to_wire(self) -> dict[str, Any]:
+        vertices = [list(vertex) for vertex in self.vertices]
+        return {"kind": "convex_mesh", "vertices": vertices, **super().to_wire()}
+
+
 def penetration(a: Body, b: Body, share: float = 0.1) -> float:
     """How deep two bodies overlap [m]; 0 or less when they are apart or touch.
 
-    Exact for two boxes, and among spheres and capsules. A box or cylinder beside one of these, and
-    two cylinders, count as if their edges were rounded by `share` of their shortest half edge: two
-    bodies that do not overlap are never said to. The depth is then at most those radii.
+    Exact among boxes and meshes, and among spheres and capsules. A box or cylinder beside one of
+    these, and two cylinders, count as if their edges were rounded by `share` of their shortest half
+    edge: two bodies that do not overlap are never said to. The depth is then at most those radii.
     """
     offset = np.subtract(b.pose.position, a.pose.position)
     half_a, half_b = np.asarray(a.extents) / 2, np.asarray(b.extents) / 2
     if np.linalg.norm(offset) > np.linalg.norm(half_a) + np.linalg.norm(half_b):
         return 0.0
     turn_a, turn_b = a.pose.rotation(), b.pose.rotation()
+    flat_a, flat_b = _flat(a), _flat(b)
+    if (isinstance(a, ConvexMesh) or isinstance(b, ConvexMesh)) and flat_a and flat_b:
+        return parted(offset, turn_a, flat_a, turn_b, flat_b)
     if not (isinstance(a, Box) and isinstance(b, Box)):
         (core_a, depth_a), (core_b, depth_b) = a.core(share), b.core(share)
         return depth_a + depth_b - distance(offset, core_a, turn_a, core_b, turn_b)
     return float(overlaps(offset[None], turn_a[None], half_a[None], turn_b[None], half_b[None])[0])
+
+
+def _flat(body: Body) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Corners, normals of faces and directions of edges of a body that has only flat faces."""
+    if isinstance(body, ConvexMesh):
+        return body.hull.points, body.hull.normals, body.hull.edges
+    if isinstance(body, Box):
+        corners = np.array(list(product((-0.5, 0.5), repeat=3))) * body.size
+        return corners, np.eye(3), np.eye(3)
+    return None

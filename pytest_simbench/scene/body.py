@@ -15,7 +15,7 @@ from pytest_simbench.scene.checks import (
     check_numbers,
     check_pose,
 )
-from pytest_simbench.scene.overlap import Hull
+from pytest_simbench.scene.overlap import Core
 from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
 from pytest_simbench.scene.wrench import Wrench
 
@@ -31,14 +31,17 @@ class Solid:
     """A simple solid that a body is drawn with.
 
     Attributes:
-        kind: `box`, `ball`, or `tube`, a cylinder along its z axis.
+        kind: `box`, `ball`, `tube`, a cylinder along its z axis, or `mesh`.
         extents: its edges, or those of the box around it [m].
         pose: of its centre in the body's frame.
+        mesh: its corners [m], and the numbers of those of each triangle, counter-clockwise from
+            outside; of a mesh alone.
     """
 
-    kind: Literal["box", "ball", "tube"]
+    kind: Literal["box", "ball", "tube", "mesh"]
     extents: Vector3
     pose: Pose = field(default_factory=Pose)
+    mesh: tuple[tuple[Vector3, ...], tuple[tuple[int, int, int], ...]] = ((), ())
 
 
 class _Placed(ABC):
@@ -92,10 +95,13 @@ class Body(_Placed):
     kinds: ClassVar[dict[str, type[Body]]] = {}
     """Every kind of body, by what `to_wire` calls it."""
 
+    kind: ClassVar[str] = ""
+    """What `to_wire` calls it."""
+
     def __init_subclass__(cls, kind: str = "", **others: Any) -> None:
         super().__init_subclass__(**others)
         if kind:
-            Body.kinds[kind] = cls
+            Body.kinds[kind], cls.kind = cls, kind
 
     def __post_init__(self) -> None:
         check_name(self.name, "a body")
@@ -144,7 +150,7 @@ class Body(_Placed):
     @property
     @abstractmethod
     def extents(self) -> Vector3:
-        """Edges of the smallest box along the body's axes that it fits into [m]."""
+        """Edges of the smallest box about its centre, along its axes, that it fits into [m]."""
 
     @property
     @abstractmethod
@@ -164,12 +170,12 @@ class Body(_Placed):
         """What the body is drawn with."""
 
     @abstractmethod
-    def core(self, share: float) -> tuple[Hull, float]:
+    def core(self, share: float) -> tuple[Core, float]:
         """What is left when the body loses a layer, and how thick that is [m].
 
         Of what has edges the layer is `share` of half its shortest edge, and the core with a layer
         around it is the body with its edges rounded. Of spheres and capsules it is the radius, and
-        they are whole again.
+        they are whole again. A mesh loses nothing.
         """
 
     def reach(self, directions: FloatArray) -> FloatArray:
@@ -212,11 +218,14 @@ class Body(_Placed):
     @classmethod
     def from_wire(cls, data: dict[str, Any]) -> Body:
         """The body of `to_wire`, of its own kind."""
-        values: dict[str, Any] = {
-            name: tuple(v) if isinstance(v, list) else v for name, v in data.items()
-        }
+        values: dict[str, Any] = {name: _frozen(value) for name, value in data.items()}
         values["pose"] = Pose.from_wire(data["pose"])
         values["wrenches"] = tuple(map(Wrench.from_wire, data.get("wrenches", ())))
         kind: Any = cls.kinds[values.pop("kind", "box")]
         made: Body = kind(**values)
         return made
+
+
+def _frozen(value: Any) -> Any:
+    """The value, its lists as tuples."""
+    return tuple(map(_frozen, value)) if isinstance(value, list) else value

@@ -55,6 +55,24 @@ def overlaps(
     return depth
 
 
+Flat = tuple[FloatArray, FloatArray, FloatArray]
+"""Of a body with flat faces alone: corners [m], normals of faces and directions of edges."""
+
+
+def parted(offset: FloatArray, turn_a: FloatArray, a: Flat, turn_b: FloatArray, b: Flat) -> float:
+    """The same as `overlaps` of one pair of bodies with flat faces: their axes are the normals of
+    both and the products of their edges."""
+    points_a, normals_a, edges_a = (rows @ turn_a.T for rows in a)
+    points_b, normals_b, edges_b = (rows @ turn_b.T for rows in b)
+    crosses = np.cross(edges_a[:, None], edges_b[None]).reshape(-1, 3)
+    lengths = np.linalg.norm(crosses, axis=1)
+    crosses = crosses[lengths > PARALLEL] / lengths[lengths > PARALLEL, None]
+    axes = np.concatenate([normals_a, normals_b, crosses])
+    on_a, on_b = points_a @ axes.T, (points_b + offset) @ axes.T
+    depths = np.minimum(on_a.max(axis=0) - on_b.min(axis=0), on_b.max(axis=0) - on_a.min(axis=0))
+    return float(depths.min())
+
+
 @dataclass(frozen=True)
 class Hull:
     """A box of half edges `half` [m], (3,), widened by a disc of radius `disc` [m] about z."""
@@ -76,11 +94,29 @@ class Hull:
         return point
 
 
+@dataclass(frozen=True)
+class Corners:
+    """The convex hull of points (n, 3) [m]."""
+
+    points: FloatArray
+
+    def reach(self, directions: FloatArray) -> FloatArray:
+        """How far it reaches from the origin in directions (n, 3) [m], (n,)."""
+        return np.asarray((directions @ self.points.T).max(axis=1))
+
+    def farthest(self, direction: FloatArray) -> FloatArray:
+        """Its point that lies farthest in a direction (3,)."""
+        return np.asarray(self.points[int(np.argmax(self.points @ direction))])
+
+
+Core = Hull | Corners
+"""What `distance` knows: it tells how far it reaches."""
+
 STEPS, CLOSE = 64, 1e-9
 """The most of a search for a distance, and where it ends [m]."""
 
 
-def distance(offset: FloatArray, a: Hull, turn_a: FloatArray, b: Hull, turn_b: FloatArray) -> float:
+def distance(offset: FloatArray, a: Core, turn_a: FloatArray, b: Core, turn_b: FloatArray) -> float:
     """How far two hulls are apart [m], 0 where they overlap: the algorithm of Gilbert, Johnson and
     Keerthi (1988), which finds the point of their Minkowski difference nearest to the origin.
 

@@ -28,6 +28,20 @@ def rotation_matrix(quaternion: Sequence[float] | FloatArray) -> FloatArray:
     )
 
 
+def quaternion_of(rotation: FloatArray) -> FloatArray:
+    """Quaternion w, x, y, z of a rotation matrix: the eigenvector of Bar-Itzhack's matrix."""
+    r = rotation
+    k = np.array(
+        [
+            [r[0, 0] + r[1, 1] + r[2, 2], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
+            [r[2, 1] - r[1, 2], r[0, 0] - r[1, 1] - r[2, 2], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]],
+            [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2], r[1, 2] + r[2, 1]],
+            [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1]],
+        ]
+    )
+    return np.asarray(np.linalg.eigh(k)[1][:, -1])
+
+
 def quaternion_product(a: Sequence[float], b: Sequence[float]) -> Quaternion:
     """Hamilton product of two quaternions w, x, y, z: first rotate by `b`, then by `a`."""
     aw, ax, ay, az = a

@@ -108,8 +108,8 @@ class Scene:
 
     @property
     def words(self) -> frozenset[str]:
-        """What is in it: `box`, `sphere`, `cylinder`, `capsule`, `restitution`, `damping`,
-        `wrench`, `prescribed`."""
+        """What is in it: `box`, `sphere`, `cylinder`, `capsule`, `convex_mesh`, `restitution`,
+        `damping`, `wrench`, `prescribed`."""
         bodies = self.bodies
         found = {
             "restitution": self.ground_restitution or any(body.restitution for body in bodies),
@@ -117,7 +117,7 @@ class Scene:
             "wrench": any(body.wrenches for body in bodies),
             "prescribed": bool(self.prescribed_bodies),
         }
-        kinds = {type(body).__name__.lower() for body in bodies}
+        kinds = {body.kind for body in bodies}
         return frozenset(kinds | {word for word, there in found.items() if there})
 
     def body(self, name: str) -> Body:

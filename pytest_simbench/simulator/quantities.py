@@ -44,7 +44,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import Box, FloatArray, Robot, Scene
+from pytest_simbench.scene import Box, ConvexMesh, FloatArray, Robot, Scene
 from pytest_simbench.simulator.kinematics import link_poses, motion_subspace
 from pytest_simbench.simulator.settings import Settings
 from pytest_simbench.simulator.shapes import DIRECTIONS, outlines, reach, shape_points
@@ -70,10 +70,10 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
             margin=0.0,
             dynamic=float(body.mass > 0),
         )
-        boxes: list[FloatArray] = []
-        rounds: list[FloatArray] = []
-        (boxes if isinstance(body, Box) else rounds).append(body.reach(DIRECTIONS))
-        quantities |= outlines(f"body/{body.name}", boxes, [], rounds)
+        kinds: tuple[list[FloatArray], ...] = ([], [], [])
+        flat = {Box.kind: 0, ConvexMesh.kind: 1}
+        kinds[flat.get(body.kind, 2)].append(body.reach(DIRECTIONS))
+        quantities |= outlines(f"body/{body.name}", *kinds)
         if body.mass:
             inertia = np.diag(body.inertia())
             quantities |= _inertial(f"body/{body.name}", body.mass, np.zeros(3), inertia)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.scene import FloatArray, Polytope, Pose
 from pytest_simbench.simulator.errors import DescriptionError
 from pytest_simbench.simulator.urdf import Shape
 
@@ -98,6 +98,14 @@ def shape_points(shape: Shape) -> FloatArray:
     """Corners of a box or a mesh in the frame of its link, (n, 3) [m]."""
     corners = box_corners(shape.size) if shape.size else mesh_points(shape.mesh or "")
     return placed(corners, shape.pose)
+
+
+def write_obj(path: Path, mesh: Polytope) -> Path:
+    """Write a hull as an OBJ file, for engines that take meshes from files alone; the path."""
+    corners = [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.points.tolist()]
+    sides = [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.triangles]
+    path.write_text("\n".join([*corners, *sides, ""]), encoding="utf-8")
+    return path
 
 
 def mesh_points(path: str) -> FloatArray:

@@ -14,7 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import Box, Capsule, Cylinder, Pose, Robot, Scene, Sphere
+from pytest_simbench.scene import (
+    Box,
+    Capsule,
+    ConvexMesh,
+    Cylinder,
+    Pose,
+    Robot,
+    Scene,
+    Sphere,
+)
 from pytest_simbench.simulator.shapes import mesh_points
 from pytest_simbench.testing import scenes
 
@@ -46,6 +55,10 @@ LYING = Pose((0.7, -0.1, 0.42), (math.cos(0.3), math.sin(0.3), 0.0, 0.0)) * Pose
 """Of the true scene's can, which falls: it lies across, and is turned about the x axis."""
 
 
+LEANING = Pose((0.6, 0.25, 0.4), (math.cos(0.4), 0.6 * math.sin(0.4), 0.8 * math.sin(0.4), 0.0))
+"""Of the true scene's wedge, which falls."""
+
+
 def true_scene() -> Scene:
     """The Panda in front of a table with a brick that starts up and a cube: odd sizes and
     velocities, tilted gravity."""
@@ -75,6 +88,7 @@ def true_scene() -> Scene:
             ),
             Cylinder("can", 0.033, 0.11, LYING, 0.3, 0.7),
             Capsule("pill", 0.02, 0.06, Pose.at(0.8, -0.2, 0.36, yaw=0.3), 0.08, 0.7),
+            ConvexMesh("wedge", scenes.wedge(), LEANING, 0.15, 0.7),
             Box(
                 "belt",
                 (0.5, 0.2, 0.1),
@@ -298,6 +312,23 @@ FAULTS: dict[str, Fault] = {
     ),
     "pill_length": Fault(
         "the pill is 2 mm longer", "body/pill/rounds", of_body("pill", length=0.062)
+    ),
+    "wedge_corners": Fault(
+        "the wedge is 2 mm longer",
+        "body/wedge/meshes",
+        of_body("wedge", vertices=scenes.wedge(length=0.102)),
+    ),
+    "wedge_inertia": Fault(
+        "the wedge is 2 mm wider, and its inertia with it",
+        "body/wedge/inertia",
+        of_body("wedge", vertices=scenes.wedge(width=0.052)),
+    ),
+    "wedge_is_a_box": Fault(
+        "the wedge is the box around it",
+        "body/wedge/meshes",
+        lambda scene, _: scene.with_body(
+            Box("wedge", scene.body("wedge").extents, LEANING, 0.15, 0.7)
+        ),
     ),
     "restitution": Fault(
         "the ball bounces less", "body/ball/restitution", of_body("ball", restitution=0.55)

@@ -153,6 +153,23 @@ def rounds_rest(subject: Subject) -> None:
 
 
 @check()
+def meshes_rest_and_slide(subject: Subject) -> None:
+    """Meshes stand and slide as boxes do. A wedge on the ground, and two blocks and a box upon each
+    other, stay for 1 s, each within 1 mm for each body below it. A slab with mu = 0.5 and 1 m/s
+    stops after v^2 / (2 mu g), within 10 %."""
+    scene = scenes.meshes()
+    rows = subject.motion(scene, 1.0, 0.1).bodies
+    for level, (body, row) in enumerate(zip(scene.free_bodies, rows[-1], strict=True)):
+        away = row[:3] - body.pose.position
+        limit = 1e-3 * max(1, level - 1)
+        if body.name == "slab":
+            away[0] -= 1 / (2 * body.friction * GRAVITY)
+            limit = 0.1 / (2 * body.friction * GRAVITY)
+        far = float(np.abs(away).max())
+        require_close(f"distance of the {body.name} from its place", far, 0.0, limit, "m")
+
+
+@check()
 def bounces_as_restitution_says(subject: Subject) -> None:
     """A ball that strikes the plane at 3.2 m/s leaves it with 0.6 of that, within 5 %."""
     rows = subject.motion(scenes.bouncing(), 0.15, subject.timestep).bodies[:, 0]

@@ -12,6 +12,7 @@ from pytest_simbench.scene import (
     STANDARD_GRAVITY,
     Box,
     Capsule,
+    ConvexMesh,
     Cylinder,
     Pose,
     Robot,
@@ -24,6 +25,8 @@ from pytest_simbench.scene import (
 GRAVITY = -STANDARD_GRAVITY[2]
 EDGE, MASS = 0.05, 0.1
 """The cube of the tasks [m], [kg]."""
+
+Vertices = tuple[Vector3, ...]
 
 RADIUS = 0.03
 """Of round bodies [m]."""
@@ -138,6 +141,38 @@ def standing() -> Scene:
             Capsule("pill", RADIUS, 2 * RADIUS, lying, MASS),
         ),
     )
+
+
+def wedge(length: float = 0.1, width: float = 0.05, height: float = 0.04) -> Vertices:
+    """Corners of a wedge about its centre [m]: on its lower face, whose height above the ground is
+    a third of its own, it stands as a box does."""
+    ends = [(-length / 2, -height / 3), (length / 2, -height / 3), (0.0, 2 * height / 3)]
+    return tuple((x, y, z) for x, z in ends for y in (-width / 2, width / 2))
+
+
+def block(size: Vector3) -> Vertices:
+    """Corners of a box about its centre [m]."""
+    x, y, z = (edge / 2 for edge in size)
+    return tuple((a, b, c) for a in (-x, x) for b in (-y, y) for c in (-z, z))
+
+
+def meshes() -> Scene:
+    """Meshes: a slab that slides off at 1 m/s, a wedge at rest, and a box on a block on a block."""
+    slab = ConvexMesh(
+        "slab",
+        block((0.1, 0.1, 0.02)),
+        Pose.at(0.0, 0.0, 0.01),
+        MASS,
+        0.5,
+        linear_velocity=(1.0, 0.0, 0.0),
+    )
+    lying = ConvexMesh("wedge", wedge(), Pose.at(0.0, 0.3, 0.04 / 3), MASS, 0.5)
+    cubes = [
+        ConvexMesh(name, block((EDGE,) * 3), Pose.at(0.4, 0.3, EDGE * (level + 0.5)), MASS, 0.5)
+        for level, name in enumerate(("low", "high"))
+    ]
+    top = cube("top", Pose.at(0.4, 0.3, 2.5 * EDGE), friction=0.5)
+    return Scene("meshes", (slab, lying, *cubes, top), ground_friction=0.5)
 
 
 def tower() -> Scene:

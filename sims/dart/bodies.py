@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+import tempfile
+import xml.etree.ElementTree as ET
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import Body, Box, Capsule, Cylinder, Sphere
+from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, Sphere
 from pytest_simbench.simulator import NotSupportedError, lazy_import
+from pytest_simbench.simulator.shapes import write_obj
 
 dartpy = lazy_import("dartpy")
 
@@ -67,7 +71,21 @@ def _shape(body: Body) -> Any:
             return dartpy.dynamics.CylinderShape(body.radius, body.length)
         case Capsule():
             return dartpy.dynamics.CapsuleShape(body.radius, body.length)
+        case ConvexMesh():
+            return _mesh(body)
     raise NotSupportedError(f"dart has no {type(body).__name__}")
+
+
+def _mesh(body: ConvexMesh) -> Any:
+    """The shape of a mesh. dartpy makes one only of a file that a URDF names."""
+    with tempfile.TemporaryDirectory() as folder:
+        mesh = write_obj(Path(folder) / "mesh.obj", body.hull)
+        root = ET.Element("robot", name="mesh")
+        shape = ET.SubElement(ET.SubElement(root, "link", name="mesh"), "collision")
+        ET.SubElement(ET.SubElement(shape, "geometry"), "mesh", filename=str(mesh))
+        ET.ElementTree(root).write(f"{folder}/mesh.urdf")
+        skeleton = dartpy.utils.DartLoader().parseSkeleton(f"{folder}/mesh.urdf")
+    return skeleton.getBodyNode(0).getShapeNode(0).getShape()
 
 
 def set_surface(shape: Any, friction: float, restitution: float = 0.0) -> None:

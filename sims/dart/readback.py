@@ -209,5 +209,7 @@ def _facing(direction: FloatArray, origin: FloatArray) -> Any:
     x /= np.linalg.norm(x)
     pose = dartpy.math.Isometry3()
     pose.set_rotation(np.column_stack([x, np.cross(direction, x), direction]))
-    pose.set_translation(origin + direction * (_AWAY + _PROBE / 2))
+    # Just opposite a corner of a cube, FCL (GJK) takes its middle for the nearest point.
+    aside = 0.137 * x + 0.211 * np.cross(direction, x)
+    pose.set_translation(origin + direction * (_AWAY + _PROBE / 2) + aside)
     return pose

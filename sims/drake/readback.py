@@ -86,9 +86,11 @@ class ReadBack:
             kinds.setdefault(kind, []).append(self._reach(made, frame))
         boxes, spheres = kinds.pop(geometry.Box, []), kinds.pop(geometry.Sphere, [])
         rounds = [*kinds.pop(geometry.Cylinder, []), *kinds.pop(geometry.Capsule, [])]
-        if not boxes:
+        meshes = list(chain(*kinds.values()))
+        if not (boxes or meshes):
             rounds, spheres = [*rounds, *spheres], []
-        found |= outlines(prefix, _merged(boxes, spheres), chain(*kinds.values()), rounds)
+        boxes, meshes = _merged(boxes, meshes, spheres)
+        found |= outlines(prefix, boxes, meshes, rounds)
         if shapes:
             found[f"{prefix}/friction"] = self._friction(owner)
             found[f"{prefix}/margin"] = self._margin(owner)
@@ -172,13 +174,17 @@ class ReadBack:
         return reported
 
 
-def _merged(boxes: Sequence[FloatArray], spheres: Sequence[FloatArray]) -> list[FloatArray]:
-    """Reaches of the boxes, each sphere made one with the box that it sticks out of least."""
-    merged = list(boxes)
+def _merged(
+    boxes: Sequence[FloatArray], meshes: Sequence[FloatArray], spheres: Sequence[FloatArray]
+) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Reaches of boxes and meshes, each sphere made one with what it sticks out of least; a box,
+    where there are any: meshes of links have no spheres."""
+    own = list(boxes or meshes)
+    merged = list(own)
     for sphere in spheres:  # which the adapter adds, see `world`
-        k = int(np.argmin([np.max(sphere - box) for box in boxes]))
+        k = int(np.argmin([np.max(sphere - shape) for shape in own]))
         merged[k] = np.maximum(merged[k], sphere)
-    return merged
+    return (merged, list(meshes)) if boxes else ([], merged)
 
 
 def _axis(joint: Any) -> FloatArray:

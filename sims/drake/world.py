@@ -7,7 +7,17 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Pose, Scene, Sphere
+from pytest_simbench.scene import (
+    Body,
+    Box,
+    Capsule,
+    ConvexMesh,
+    Cylinder,
+    FloatArray,
+    Pose,
+    Scene,
+    Sphere,
+)
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, Settings, heavy, lazy_import
 from pytest_simbench.simulator.shapes import mesh_points
 from pytest_simbench.simulator.urdf import Link, Shape
@@ -27,6 +37,9 @@ trees = lazy_import("pydrake.multibody.tree")
 
 GREY = (0.5, 0.5, 0.5, 1.0)
 LIGHT = (0.85, 0.85, 0.85, 1.0)
+
+VERTEX_RADIUS = 1e-6
+"""Of the spheres at the vertices of free meshes [m]: they stick out by no more than that."""
 
 
 @dataclass(frozen=True)
@@ -165,9 +178,10 @@ class World:
         elif part.prescribed:
             body, pose = self._add_heavy(part), Pose()
         else:
-            inertia = getattr(trees.SpatialInertia, weighted)(part.mass, *arguments)
-            if part.moments is not None:
-                central = trees.RotationalInertia(*part.moments)
+            if part.moments is None and weighted:
+                inertia = getattr(trees.SpatialInertia, weighted)(part.mass, *arguments)
+            else:
+                central = trees.RotationalInertia(*part.inertia())
                 inertia = trees.SpatialInertia.MakeFromCentralInertia(
                     part.mass, np.zeros(3), central
                 )
@@ -178,6 +192,10 @@ class World:
         core = solid
         if isinstance(part, Box) and part.mass and self.settings.corner_radius:
             core = self._add_corners(body, part)
+        if isinstance(part, ConvexMesh) and part.mass and self.settings.corner_radius:
+            self._add_spheres(
+                body, part.name, np.array(part.vertices), VERTEX_RADIUS, part.friction
+            )
         self._add_shape(body, part.name, "box", core, pose, part.friction)
         self._add_picture(body, part.name, solid, pose, part.colour)
         return body
@@ -268,7 +286,8 @@ class World:
 
 
 def _solid(body: Body) -> tuple[Any, str, tuple[Any, ...]]:
-    """Drake's shape of a body, and what makes its inertia of a mass and which arguments."""
+    """Drake's shape of a body, and what makes its inertia of a mass, if anything, and which
+    arguments."""
     upright = np.array([0.0, 0.0, 1.0])
     match body:
         case Box():
@@ -281,6 +300,8 @@ def _solid(body: Body) -> tuple[Any, str, tuple[Any, ...]]:
         case Capsule():
             size = body.radius, body.length
             return geometry.Capsule(*size), "SolidCapsuleWithMass", (*size, upright)
+        case ConvexMesh():
+            return geometry.Convex(points=np.array(body.vertices).T, label=body.name), "", ()
     raise NotSupportedError(f"drake has no {type(body).__name__}")
 
 

@@ -10,11 +10,13 @@ import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 from pytest_simbench.scene import (
     Body,
     Box,
     Capsule,
+    ConvexMesh,
     Cylinder,
     FloatArray,
     Pose,
@@ -23,6 +25,7 @@ from pytest_simbench.scene import (
 )
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot
 from pytest_simbench.simulator.kinematics import link_poses
+from pytest_simbench.simulator.shapes import write_obj
 from pytest_simbench.simulator.urdf import MovingJoint, Shape
 
 from .drawn import add_drawing
@@ -104,16 +107,22 @@ class Physics:
 
 
 def world_text(
-    scene: Scene, prepared: PreparedRobot | None, physics: Physics, name: str, drawn: bool = False
+    scene: Scene,
+    prepared: PreparedRobot | None,
+    physics: Physics,
+    name: str,
+    folder: Path,
+    drawn: bool = False,
 ) -> str:
-    """The world as SDF text, called `name`; `drawn` if it has a window."""
+    """The world as SDF text, called `name`; `drawn` if it has a window. Meshes of bodies go into
+    files in the folder, which must stay as long as the world."""
     root = ET.Element("sdf", version=VERSION)
     world = ET.SubElement(root, "world", name=name)
     _add_physics(world, physics)
     _text(world, "gravity", _spaced(scene.gravity))
     _add_ground(world, scene, physics)
     for body in scene.bodies:
-        _add_body(world, body, physics)
+        _add_body(world, body, physics, folder)
     if prepared is not None:
         _add_robot(world, scene, prepared, physics)
     if drawn:
@@ -159,7 +168,7 @@ def _add_ground(world: ET.Element, scene: Scene, physics: Physics) -> None:
     _add_surface(collision, mu, physics, scene.ground_restitution)
 
 
-def _add_body(world: ET.Element, body: Body, physics: Physics) -> None:
+def _add_body(world: ET.Element, body: Body, physics: Physics, folder: Path) -> None:
     if not body.mass:  # fixed, or prescribed, which Gazebo has not
         link = _add_static(world, body.name, body.pose)
     else:
@@ -169,11 +178,11 @@ def _add_body(world: ET.Element, body: Body, physics: Physics) -> None:
         i, j, k = body.inertia()
         _add_inertial(link, body.mass, Pose(), [i, 0.0, 0.0, j, 0.0, k])
     collision = ET.SubElement(link, "collision", name="0")
-    _add_solid(ET.SubElement(collision, "geometry"), body)
+    _add_solid(ET.SubElement(collision, "geometry"), body, folder)
     _add_surface(collision, physics.friction(body.friction), physics, body.restitution)
 
 
-def _add_solid(geometry: ET.Element, body: Body) -> None:
+def _add_solid(geometry: ET.Element, body: Body, folder: Path) -> None:
     """The shape of a body; those of SDF are along z."""
     match body:
         case Box():
@@ -184,6 +193,10 @@ def _add_solid(geometry: ET.Element, body: Body) -> None:
             element = ET.SubElement(geometry, type(body).__name__.lower())
             _text(element, "radius", repr(float(body.radius)))
             _text(element, "length", repr(float(body.length)))
+        case ConvexMesh():
+            element = ET.SubElement(geometry, "mesh", optimization="convex_hull")
+            number = sum(1 for _ in folder.iterdir())  # names may hold what paths may not
+            _text(element, "uri", str(write_obj(folder / f"mesh_{number}.obj", body.hull)))
         case _:
             raise NotSupportedError(f"gazebo has no {type(body).__name__}")
 

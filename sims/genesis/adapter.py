@@ -80,6 +80,7 @@ class Genesis(Simulator):
                 Capability.SAVE_RESTORE,
                 Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
+                Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -142,6 +143,7 @@ class Genesis(Simulator):
         self.step()
         self.body_state()
         self.read_back()
+        list(self.contact_forces())
         self.restore(self.save())
         self.close()
         genesis.destroy()
@@ -312,6 +314,18 @@ class Genesis(Simulator):
 
     def contact_count(self) -> int:
         return int(array_of(of_collider(self.solver.collider, "collider_state").n_contacts)[0])
+
+    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        names = {self._ground.links[0].idx: "ground"}
+        names |= {box.links[0].idx: f"body/{name}" for name, box in self._boxes.items()}
+        if self.prepared is not None:
+            links = self.prepared.links
+            names |= {self._robot.get_link(name).idx: f"link/{name}" for name in links}
+        found = self.solver.collider.get_contacts(as_tensor=True, to_torch=False)
+        pairs = zip(found["link_a"], found["link_b"], strict=True)
+        for (a, b), place, force in zip(pairs, found["position"], found["force"], strict=True):
+            wrench = np.concatenate([force, np.cross(place, force)]).astype(float)
+            yield names[int(b)], names[int(a)], wrench  # the force is on b
 
     def render(self, width: int, height: int) -> NDArray[np.uint8]:
         if self._camera is None or self._camera.res != (width, height):

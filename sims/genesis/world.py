@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import tempfile
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from math import degrees
+from pathlib import Path
 from typing import Any, Literal
 
-from pytest_simbench.scene import Body, Box, Capsule, Cylinder, Scene, Sphere
+from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, Scene, Sphere
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, Settings, lazy_import
+from pytest_simbench.simulator.shapes import write_obj
 from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
 
 genesis = lazy_import("genesis")
@@ -95,14 +98,15 @@ def add_body(world: Any, body: Body, most: float) -> Any:
     stuff = {"gravity_compensation": 1.0} if body.prescribed else {}
     if body.prescribed:
         body = body.changed(prescribed=False, mass=most, moments=(most,) * 3)
-    uneven = body.moments is not None
+    uneven = body.moments is not None or isinstance(body, ConvexMesh)
     density = None if body.fixed or uneven else body.mass / body.volume
     surface = genesis.surfaces.Default(color=body.colour)
-    return world.add_entity(
-        _described(body) if uneven else _morph(body),
-        material=material(body.friction, density, **stuff),
-        surface=surface,
-    )
+    with tempfile.TemporaryDirectory() as folder:  # of a mesh, which Genesis takes from a file
+        return world.add_entity(
+            _described(body, Path(folder)) if uneven else _morph(body),
+            material=material(body.friction, density, **stuff),
+            surface=surface,
+        )
 
 
 def _morph(body: Body) -> Any:
@@ -129,17 +133,20 @@ def _morph(body: Body) -> Any:
     raise NotSupportedError(f"genesis has no {type(body).__name__}")
 
 
-def _described(body: Body) -> Any:
-    """A body with moments of inertia of its own, by a URDF: other morphs know a density."""
+def _described(body: Body, folder: Path) -> Any:
+    """A body with moments of inertia of its own, by a URDF: other morphs know a density. Files go
+    into the folder."""
     root = ET.Element("robot", name=body.name)
     link = ET.SubElement(root, "link", name=body.name)
-    inertial = ET.SubElement(link, "inertial")
-    ET.SubElement(inertial, "origin", xyz="0 0 0", rpy="0 0 0")  # else it takes the shape's moments
-    ET.SubElement(inertial, "mass", value=repr(float(body.mass)))
-    xx, yy, zz = (repr(float(moment)) for moment in body.inertia())
-    ET.SubElement(inertial, "inertia", ixx=xx, iyy=yy, izz=zz, ixy="0", ixz="0", iyz="0")
+    if body.mass:
+        inertial = ET.SubElement(link, "inertial")
+        # without an origin it takes the shape's moments
+        ET.SubElement(inertial, "origin", xyz="0 0 0", rpy="0 0 0")
+        ET.SubElement(inertial, "mass", value=repr(float(body.mass)))
+        xx, yy, zz = (repr(float(moment)) for moment in body.inertia())
+        ET.SubElement(inertial, "inertia", ixx=xx, iyy=yy, izz=zz, ixy="0", ixz="0", iyz="0")
     for kind in ("visual", "collision"):
-        _shape(ET.SubElement(ET.SubElement(link, kind), "geometry"), body)
+        _shape(ET.SubElement(ET.SubElement(link, kind), "geometry"), body, folder)
     return genesis.morphs.URDF(
         file=ET.tostring(root, encoding="unicode"),
         pos=body.pose.position,
@@ -150,8 +157,8 @@ def _described(body: Body) -> Any:
     )
 
 
-def _shape(geometry: ET.Element, body: Body) -> None:
-    """A body's shape in a URDF."""
+def _shape(geometry: ET.Element, body: Body, folder: Path) -> None:
+    """A body's shape in a URDF; files go into the folder."""
     match body:
         case Box():
             ET.SubElement(geometry, "box", size=" ".join(repr(float(edge)) for edge in body.size))
@@ -160,6 +167,9 @@ def _shape(geometry: ET.Element, body: Body) -> None:
         case Cylinder():
             size = {"radius": repr(float(body.radius)), "length": repr(float(body.length))}
             ET.SubElement(geometry, "cylinder", size)
+        case ConvexMesh():
+            mesh = write_obj(folder / "mesh.obj", body.hull)
+            ET.SubElement(geometry, "mesh", filename=str(mesh))
         case _:
             raise NotSupportedError(
                 f"genesis takes no moments of inertia of a {type(body).__name__}"

@@ -9,14 +9,23 @@ What was learnt stands in docs/engines/mujoco.md.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Scene, Sphere, Vector3
+from pytest_simbench.scene import (
+    Body,
+    Box,
+    Capsule,
+    ConvexMesh,
+    Cylinder,
+    FloatArray,
+    Scene,
+    Sphere,
+)
 from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.simulator import (
     Capability,
@@ -222,14 +231,21 @@ class MuJoCo(Simulator):
             name=part.name, pos=part.pose.position, quat=part.pose.quaternion
         )
         kind, size = _geom(part)
+        mesh = {}
+        if isinstance(part, ConvexMesh):
+            spec.add_mesh(name=f"{part.name}/mesh", uservert=np.ravel(part.vertices))
+            mesh = {"meshname": f"{part.name}/mesh"}
         geom = body.add_geom(
             name=part.name,
             type=getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"),
-            size=[*size, 0.0, 0.0][:3],
+            size=[*size, 0.0, 0.0, 0.0][:3],
             rgba=part.colour,
+            **mesh,
         )
         self._set_surface(geom, part.friction, part.restitution, WORLD, WORLD | ROBOT)
-        if not isinstance(part, Box):  # their contacts neither roll nor spin with friction
+        if not isinstance(
+            part, Box | ConvexMesh
+        ):  # their contacts neither roll nor spin with friction
             geom.condim, geom.priority = 3, 1
         if part.prescribed:
             geom.contype, geom.conaffinity = LED, ROBOT
@@ -239,8 +255,8 @@ class MuJoCo(Simulator):
         elif not part.fixed:
             geom.conaffinity |= LED
             geom.mass = part.mass
-            if part.moments is not None:
-                _set_inertia(body, part.mass, part.moments)
+            if part.moments is not None or mesh:
+                _set_inertia(body, part.mass, part.inertia().tolist())
             body.add_freejoint(name=f"{part.name}/free")
 
     def read_back(self) -> dict[str, Any]:
@@ -353,10 +369,12 @@ def _geom(body: Body) -> tuple[str, list[float]]:
             return "CYLINDER", [body.radius, body.length / 2]
         case Capsule():
             return "CAPSULE", [body.radius, body.length / 2]
+        case ConvexMesh():
+            return "MESH", []
     raise NotSupportedError(f"mujoco has no {type(body).__name__}")
 
 
-def _set_inertia(body: Any, mass: float, moments: Vector3) -> None:
+def _set_inertia(body: Any, mass: float, moments: Sequence[float]) -> None:
     """About its origin, along its axes."""
     body.mass, body.inertia, body.explicitinertial = mass, moments, True
     body.ipos, body.iquat = [0, 0, 0], [1, 0, 0, 0]

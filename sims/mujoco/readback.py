@@ -84,7 +84,7 @@ class ReadBack:
     def _box(self, prefix: str, geom: int) -> dict[str, Any]:
         """A box, whose frame is its shape's: a fixed one may have no body of its own."""
         model, body = self.model, int(self.model.geom_bodyid[geom])
-        place, turn = self.data.geom_xpos[geom], self.data.geom_xmat[geom].reshape(3, 3)
+        place, turn = self._frame(geom)
         light = self.model.body_mass[body] < heavy(self.scene)  # else it moves as prescribed
         free = light and self._can_move(body)
         found = self._surface(prefix, [geom], place, turn)
@@ -99,6 +99,18 @@ class ReadBack:
                 passive[3:].max() / model.body_inertia[body].max(),
             ]
         return found
+
+    def _frame(self, geom: int) -> tuple[FloatArray, FloatArray]:
+        """Place and turn of a body's frame: its shape's, but for a mesh, whose corners MuJoCo moves
+        to their centre and principal axes, and tells by how much."""
+        model = self.model
+        place, turn = self.data.geom_xpos[geom], self.data.geom_xmat[geom].reshape(3, 3)
+        if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH:
+            return place, turn
+        mesh, own = model.geom_dataid[geom], np.empty(9)
+        mujoco.mju_quat2Mat(own, model.mesh_quat[mesh])
+        turn = turn @ own.reshape(3, 3).T
+        return place - turn @ model.mesh_pos[mesh], turn
 
     def _link(self, prefix: str, body: int) -> dict[str, Any]:
         place, turn = self.data.xpos[body], self.data.xmat[body].reshape(3, 3)

@@ -7,7 +7,17 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pytest_simbench.scene import Body, Box, Capsule, Cylinder, Joint, Pose, Scene, Sphere
+from pytest_simbench.scene import (
+    Body,
+    Box,
+    Capsule,
+    ConvexMesh,
+    Cylinder,
+    Joint,
+    Pose,
+    Scene,
+    Sphere,
+)
 from pytest_simbench.simulator import PreparedRobot, Settings, heavy, lazy_import
 
 newton = lazy_import("newton")
@@ -56,7 +66,9 @@ def build_model(scene: Scene, prepared: PreparedRobot | None, settings: NewtonSe
     # What MuJoCo needs of a contact beyond Newton's own parameters.
     model.mujoco.condim.fill_(settings.condim)
     for body in scene.bodies:
-        if not isinstance(body, Box):  # their contacts neither roll nor spin with friction
+        if not isinstance(
+            body, Box | ConvexMesh
+        ):  # their contacts neither roll nor spin with friction
             shape = model.shape_label.index(body.name)
             model.mujoco.condim.numpy()[shape] = 3
             model.mujoco.geom_priority.numpy()[shape] = 1
@@ -114,10 +126,10 @@ def _add_body(builder: Any, part: Body, surface: Any, most: float) -> None:
         inertial: dict[str, Any] = {}
         if part.prescribed:
             inertial = {"mass": most, "inertia": wp.mat33(most * np.eye(3))}
-        elif part.moments is None:
+        elif part.moments is None and not isinstance(part, ConvexMesh):
             surface.density = part.mass / part.volume
         else:
-            inertial = {"mass": part.mass, "inertia": wp.mat33(np.diag(part.moments))}
+            inertial = {"mass": part.mass, "inertia": wp.mat33(np.diag(part.inertia()))}
         body, pose = builder.add_body(xform=pose, label=part.name, **inertial), None
         start = builder.joint_qd_start[builder.joint_child.index(body)]
         builder.joint_qd[start : start + 6] = map(float, part.velocity)
@@ -136,6 +148,10 @@ def _add_body(builder: Any, part: Body, surface: Any, most: float) -> None:
             builder.add_shape_capsule(
                 body, radius=part.radius, half_height=part.length / 2, **given
             )
+        case ConvexMesh():
+            corners = np.array(part.vertices, dtype=np.float32)
+            mesh = newton.Mesh(corners, np.ravel(part.hull.triangles), compute_inertia=False)
+            builder.add_shape_convex_hull(body, mesh=mesh, **given)
 
 
 def _transform(pose: Pose) -> Any:

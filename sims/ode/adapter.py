@@ -8,7 +8,7 @@ What was learnt stands in docs/engines/ode.md.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -125,12 +125,14 @@ class ODE(Simulator):
             {
                 Capability.SAVE_RESTORE,
                 Capability.CONTACT_COUNT,
+                Capability.CONTACT_FORCES,
                 Capability.DETERMINISTIC,
             }
         ),
         deviations=(
             Deviation("joint/*/friction", "ODE's joints have no friction"),
             Deviation("body/*/margin link/*/margin", "ODE's shapes have no margin"),
+            Deviation("", "what sleeps has no contacts, and so no forces"),
             Deviation("", "a joint that turns by more than 360 degrees has no stops"),
             Deviation(
                 "",
@@ -212,6 +214,7 @@ class ODE(Simulator):
             self._links,
             self._axes,
             self._drives,
+            self.contacts,
             self.scene,
             self.prepared,
         ).all()
@@ -239,7 +242,6 @@ class ODE(Simulator):
             self._drives.act()
         self.contacts.make()
         self._advance(self.settings.timestep)
-        self.contacts.clear()
         self._steps += 1
 
     @property
@@ -267,6 +269,7 @@ class ODE(Simulator):
 
     def restore(self, state: State) -> None:
         self._steps = state.steps
+        self.contacts.clear()
         self.contacts.settle()  # else the order of contacts is that of what went before
         for name, rotation in zip(self._names, state.rotations, strict=True):
             turn(name, *rotation)
@@ -283,7 +286,14 @@ class ODE(Simulator):
         library().dRandSetSeed(state.seed)
 
     def contact_count(self) -> int:
-        return self.contacts.count
+        return len(self.contacts.made)
+
+    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        names = {id(self._ground.surface): "ground"}
+        for kind, parts in (("body", self._bodies), ("link", self._links)):
+            names |= {id(part.surface): f"{kind}/{name}" for name, part in parts.items()}
+        for first, second, wrench in self.contacts.forces():
+            yield names[id(first)], names[id(second)], wrench
 
     def versions(self) -> dict[str, str]:
         number = library_path().partition(".so.")[2]

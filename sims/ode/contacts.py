@@ -6,10 +6,14 @@ It calls back for each pair, here into Python. What this costs stands in docs/en
 from __future__ import annotations
 
 import math
+import weakref
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from pytest_simbench.scene import Pose
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.simulator import lazy_import
 
 from .library import library
@@ -91,21 +95,25 @@ class Contacts:
 
     Attributes:
         space: that all geoms are in.
-        count: of the joints in the last step.
+        made: the joints of the last step, each with both surfaces; they stay until the next one, so
+            that their forces can be asked for.
     """
 
     def __init__(self, world: Any, erp: float, cfm: float, most: int, along: bool) -> None:
         self.world, self.erp, self.cfm, self.most, self.along = world, erp, cfm, most, along
-        self.space, self.count = ode.SimpleSpace(), 0
+        self.space = ode.SimpleSpace()
+        self.made: list[tuple[Any, Surface, Surface]] = []
         self._group = ode.JointGroup()
+        # Not left to Python, which destroys worlds and joints in any order.
+        weakref.finalize(self, _empty, self._group, self.made)
         self._soft = (erp, cfm) != (world.getERP(), world.getCFM())
         soft = ode.ContactSoftERP | ode.ContactSoftCFM if self._soft else 0
         self._mode, self._bouncy = ode.ContactApprox1 | soft, ode.ContactBounce
         self._collide, self._joint = ode.collide, ode.ContactJoint
 
     def make(self) -> None:
-        """Find what touches and make joints of it."""
-        self.count = 0
+        """Find what touches and make joints of it, in place of those before."""
+        self.clear()
         self.space.collide(None, self._near)
 
     def settle(self) -> None:
@@ -114,8 +122,22 @@ class Contacts:
         self.space.collide(None, _nothing)
 
     def clear(self) -> None:
-        """Take the joints away, after the step."""
-        self._group.empty()
+        """Take the joints away."""
+        _empty(self._group, self.made)
+
+    def on(self, body: Any) -> int:
+        """How many of the joints a body has."""
+        return sum(body in (first.body, second.body) for _, first, second in self.made)
+
+    def forces(self) -> Iterator[tuple[Surface, Surface, FloatArray]]:
+        """Both surfaces of each joint, and the wrench of the second on the first in the last step,
+        about the world's origin [N, N m], (6,)."""
+        for joint, first, second in self.made:
+            if first.body is None:  # ODE's first body is one that can move
+                first, second = second, first
+            force, torque = map(np.array, joint.getFeedback()[:2])  # about its centre
+            torque = torque + np.cross(first.body.getPosition(), force)
+            yield first, second, np.concatenate([force, torque])
 
     def _near(self, _: Any, first: Any, second: Any) -> None:
         a, b = first.attribs["surface"], second.attribs["surface"]
@@ -142,8 +164,18 @@ class Contacts:
             if self._soft:
                 contact.setSoftERP(self.erp)
                 contact.setSoftCFM(self.cfm)
-            joint(world, group, contact).attach(one, other)
-        self.count += len(contacts)
+            made = joint(world, group, contact)
+            made.attach(one, other)
+            made.setFeedback(True)
+            self.made.append((made, a, b))
+
+
+def _empty(group: Any, joints: list[tuple[Any, Surface, Surface]]) -> None:
+    """Destroy the joints of a group; pyode crashes on one that is still asked for its forces."""
+    for joint, *_ in joints:
+        joint.setFeedback(False)
+    joints.clear()
+    group.empty()
 
 
 def _nothing(_: Any, first: Any, second: Any) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.scene import FloatArray, Polytope, Pose
 from pytest_simbench.simulator import lazy_import
 
 ode = lazy_import("ode")
@@ -54,6 +54,7 @@ _FUNCTIONS: dict[str, tuple[Any, Sequence[Any]]] = {
     ),
     "dGeomTriMeshDataDestroy": (None, [_ID]),
     "dCreateTriMesh": (_ID, [_ID, _ID, _ID, _ID, _ID]),
+    "dCreateConvex": (_ID, [_ID, _ID, ctypes.c_uint, _ID, ctypes.c_uint, _ID]),
     "dBodyGetQuaternion": (_ID, [_ID]),
     "dBodyGetRotation": (_ID, [_ID]),
     "dBodyGetLinearDamping": (_REAL, [_ID]),
@@ -94,8 +95,53 @@ def library_path() -> str:
     raise RuntimeError("pyode has loaded no library of ODE")
 
 
-class Mesh:
-    """A triangle mesh, usable where pyode takes a geom.
+class _Own:
+    """A geom that pyode does not know, usable where it takes one of its own."""
+
+    def __init__(self, space: Any, geom: int) -> None:
+        self._library, self._space, self._geom = library(), space, geom
+        self.attribs: dict[str, Any] = {}  # as pyode's geoms have
+        ode._geom_c2py_lut[geom] = self
+
+    def __del__(self) -> None:
+        if getattr(self, "_geom", None):
+            self._library.dGeomDestroy(self._geom)
+
+    def _id(self) -> int:
+        return int(self._geom)
+
+    def setBody(self, body: Any) -> None:
+        self._library.dGeomSetBody(self._geom, body_id(body))
+
+
+class Convex(_Own):
+    """The convex hull of some corners, about whose origin a body turns.
+
+    Args:
+        space: of pyode, which the geom is put into.
+        hull: its faces.
+    """
+
+    def __init__(self, space: Any, hull: Polytope) -> None:
+        depths = (hull.points @ hull.normals.T).max(axis=0)
+        rings = [number for face in hull.faces for number in (len(face), *face)]
+        # ODE does not copy them.
+        self._planes: FloatArray = np.ascontiguousarray(np.column_stack([hull.normals, depths]))
+        self._corners: FloatArray = np.ascontiguousarray(hull.points)
+        self._rings: NDArray[np.uint32] = np.array(rings, dtype=np.uint32)
+        made = library().dCreateConvex(
+            space._id(),
+            self._planes.ctypes.data,
+            len(self._planes),
+            self._corners.ctypes.data,
+            len(self._corners),
+            self._rings.ctypes.data,
+        )
+        super().__init__(space, made)
+
+
+class Mesh(_Own):
+    """A triangle mesh.
 
     Args:
         space: of pyode, which the geom is put into.
@@ -103,14 +149,12 @@ class Mesh:
     """
 
     def __init__(self, space: Any, triangles: FloatArray) -> None:
-        self._library, self._space = library(), space
-        self.attribs: dict[str, Any] = {}  # as pyode's geoms have
         corners, numbers = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
         # ODE does not copy them.
         self._corners: FloatArray = np.ascontiguousarray(corners, dtype=np.float64)
         self._numbers: NDArray[np.uint32] = np.ascontiguousarray(numbers.ravel(), dtype=np.uint32)
-        self._data = self._library.dGeomTriMeshDataCreate()
-        self._library.dGeomTriMeshDataBuildDouble(
+        self._data = library().dGeomTriMeshDataCreate()
+        library().dGeomTriMeshDataBuildDouble(
             self._data,
             self._corners.ctypes.data,
             self._corners.strides[0],
@@ -119,19 +163,12 @@ class Mesh:
             len(self._numbers),
             3 * self._numbers.itemsize,
         )
-        self._geom = self._library.dCreateTriMesh(space._id(), self._data, None, None, None)
-        ode._geom_c2py_lut[self._geom] = self
+        super().__init__(space, library().dCreateTriMesh(space._id(), self._data, None, None, None))
 
     def __del__(self) -> None:
+        super().__del__()
         if getattr(self, "_geom", None):
-            self._library.dGeomDestroy(self._geom)
             self._library.dGeomTriMeshDataDestroy(self._data)
-
-    def _id(self) -> int:
-        return int(self._geom)
-
-    def setBody(self, body: Any) -> None:
-        self._library.dGeomSetBody(self._geom, body_id(body))
 
 
 def body_id(body: Any) -> int:

@@ -24,9 +24,19 @@ from pytest_simbench.simulator.shapes import (
 )
 
 from .axes import Axis
-from .contacts import Part
+from .contacts import Contacts, Part
 from .drives import Drives
-from .library import HI_STOP, LO_STOP, MOST_FORCE, SOFTNESS, Mesh, damping, library, pose_of
+from .library import (
+    HI_STOP,
+    LO_STOP,
+    MOST_FORCE,
+    SOFTNESS,
+    Convex,
+    Mesh,
+    damping,
+    library,
+    pose_of,
+)
 
 ode = lazy_import("ode")
 
@@ -40,6 +50,7 @@ class ReadBack:
         ground, bodies, links: the parts of the world.
         axes: its joints.
         drives: the motors, or None.
+        contacts: whose joints hold nothing.
         scene, prepared: names of what was built; no value is taken from them.
     """
 
@@ -52,11 +63,13 @@ class ReadBack:
         links: Mapping[str, Part],
         axes: Mapping[str, Axis],
         drives: Drives | None,
+        contacts: Contacts,
         scene: Scene,
         prepared: PreparedRobot | None,
     ) -> None:
         self.world, self.timestep, self.ground = world, timestep, ground
         self.bodies, self.links, self.axes, self.drives = bodies, links, axes, drives
+        self.contacts = contacts
         self.scene, self.prepared = scene, prepared
         self.probe = ode.GeomPlane(None, (0.0, 0.0, 1.0), 0.0)
 
@@ -76,7 +89,8 @@ class ReadBack:
                 velocity = [*part.body.getLinearVel(), *part.body.getAngularVel()]
                 reported[f"body/{name}/velocity"] = velocity
             free = part.body is not None and not part.body.isKinematic()
-            reported[f"body/{name}/dynamic"] = float(free and part.body.getNumJoints() == 0)
+            held = free and part.body.getNumJoints() > self.contacts.on(part.body)
+            reported[f"body/{name}/dynamic"] = float(free and not held)
         for name, part in self.links.items():
             reported |= self._part(f"link/{name}", part)
         if self.prepared is not None and self.drives is not None:
@@ -90,13 +104,13 @@ class ReadBack:
         """Pose, shapes, surface and inertia of a body or link."""
         frame = self._frame(part)
         found: dict[str, Any] = {f"{prefix}/pose": frame.as_array()}
-        meshes = [self._measured(geom, frame) for geom in part.geoms if isinstance(geom, Mesh)]
+        meshes = [self._measured(geom, frame) for geom in part.geoms if isinstance(geom, _FACETED)]
         boxes = [
             reach(placed(box_corners(geom.getLengths()), frame.inverse() * pose_of(geom)))
             for geom in part.geoms
             if isinstance(geom, ode.GeomBox)
         ]
-        others = (geom for geom in part.geoms if not isinstance(geom, Mesh | ode.GeomBox))
+        others = (geom for geom in part.geoms if not isinstance(geom, (*_FACETED, ode.GeomBox)))
         rounds = [_round(geom, frame.inverse() * pose_of(geom)) for geom in others]
         found |= outlines(prefix, boxes, meshes, rounds)
         if part.geoms:
@@ -124,12 +138,13 @@ class ReadBack:
             f"{prefix}/damping": damping(part.body) / self.timestep,
         }
 
-    def _measured(self, mesh: Mesh, frame: Pose) -> FloatArray:
+    def _measured(self, mesh: Mesh | Convex, frame: Pose) -> FloatArray:
         """The reach of a mesh in a frame: how far a plane stands off when it just touches."""
         origin, reaches = np.asarray(frame.position), []
         for direction in DIRECTIONS @ frame.rotation().T:
             normal, offset = -direction, origin @ direction
-            offset -= 10.0  # far inside: every corner is below such a plane
+            if isinstance(mesh, Mesh):  # from outside: every corner is below such a plane
+                offset -= 10.0  # a hull touches none of those, and its frame is within
             while True:
                 self.probe.setParams(tuple(normal), -offset)
                 depths = [c.getContactGeomParams()[2] for c in ode.collide(mesh, self.probe)]
@@ -172,6 +187,9 @@ class ReadBack:
         if kind == "ground":
             return self.ground
         return self.bodies[rest] if kind == "body" else self.links[rest]
+
+
+_FACETED = (Mesh, Convex)
 
 
 def _collide(x: int, y: int) -> bool:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Pose, Sphere
+from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, FloatArray, Pose, Sphere
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, lazy_import
 from pytest_simbench.simulator.kinematics import link_poses, motion_subspace
 from pytest_simbench.simulator.mesh_check import TRIANGLE
@@ -22,7 +22,7 @@ from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
 
 from .axes import Axis
 from .contacts import BASE, FIXED, FREE, GROUND, LINK, Part, Surface
-from .library import HI_STOP, LO_STOP, Mesh, place, set_damping
+from .library import HI_STOP, LO_STOP, Convex, Mesh, place, set_damping
 
 ode = lazy_import("ode")
 
@@ -64,6 +64,8 @@ def _solid(space: Any, body: Body) -> Any:
             return ode.GeomCylinder(space, body.radius, body.length)
         case Capsule():
             return ode.GeomCapsule(space, body.radius, body.length)
+        case ConvexMesh():
+            return Convex(space, body.hull)
     raise NotSupportedError(f"ode has no {type(body).__name__}")
 
 

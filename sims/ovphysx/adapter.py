@@ -18,7 +18,7 @@ not quite that of the uninterrupted run.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -30,6 +30,7 @@ from pytest_simbench.simulator import (
     Capability,
     DataSeen,
     Deviation,
+    NotSupportedError,
     PreparedRobot,
     SeedsSeen,
     Seen,
@@ -108,7 +109,13 @@ class OvPhysX(Simulator):
         language="C++",
         tested_version="0.7.0.74035321",
         oldest_version="0.7.0.74035321",  # older ones tell no joint before the first step
-        capabilities=frozenset({Capability.DETERMINISTIC, Capability.SAVE_RESTORE}),
+        capabilities=frozenset(
+            {
+                Capability.DETERMINISTIC,
+                Capability.SAVE_RESTORE,
+                Capability.CONTACT_FORCES,
+            }
+        ),
         deviations=(
             Deviation("timestep", "an argument of each step, which PhysX does not report"),
             Deviation("gravity", "PhysX reports no gravity through this package"),
@@ -116,6 +123,10 @@ class OvPhysX(Simulator):
                 "ground/friction ground/restitution", "PhysX reports no material of a static plane"
             ),
             Deviation("gripper/coupled", "PhysX reports no mimic joints"),
+            Deviation(
+                "",
+                "contact forces are told in scenes without a robot alone: reports are slow",
+            ),
             Deviation("body/*/damping link/*/damping", "PhysX reports no damping of bodies"),
             Deviation("body/*/dynamic", "PhysX does not report which bodies are kinematic"),
             Deviation("body/*/touches link/*/touches", "PhysX does not report collision groups"),
@@ -131,7 +142,7 @@ class OvPhysX(Simulator):
                 within=4e-3,
             ),
             Deviation(
-                "body/*/rounds",
+                "body/*/rounds body/*/meshes",
                 "measured by sweeping a box, which PhysX rounds; the cylinders differ",
                 within=3e-4,
             ),
@@ -298,6 +309,17 @@ class OvPhysX(Simulator):
 
     def read_back(self) -> dict[str, Any]:
         return read_back(self.session, self.scene, self.prepared, self._unit, self._placed)
+
+    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        if not usd.reports_contacts(self.scene):
+            raise NotSupportedError("ovphysx tells contact forces in scenes without a robot alone")
+        names = {usd.GROUND: "ground"}
+        names |= {usd.body_path(i): f"body/{body.name}" for i, body in enumerate(self.scene.bodies)}
+        for (first, second), points in self.session.contacts().items():
+            for impulse, place in points:
+                force = np.asarray(impulse, dtype=float) / self.settings.timestep
+                wrench = np.concatenate([force, np.cross(place, force)])
+                yield names[first], names[second], wrench
 
     def save(self) -> _Saved:
         values = {}

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import Box, FloatArray, Pose, Scene
+from pytest_simbench.scene import Box, ConvexMesh, FloatArray, Pose, Scene
 from pytest_simbench.simulator import PreparedRobot, one_value
 from pytest_simbench.simulator.shapes import box_corners, outlines, reach
 
@@ -60,7 +60,9 @@ def read_back(
         if isinstance(box, Box):  # rays tell the size of a box more exactly
             outline = outlines(prefix, [reach(box_corners(session.size(shape, pose)))], [])
         else:
-            outline = outlines(prefix, [], [], [session.reach(shape, pose, Pose())])
+            swept = [session.reach(shape, pose, Pose())]
+            mesh = isinstance(box, ConvexMesh)
+            outline = outlines(prefix, [], swept if mesh else [], [] if mesh else swept)
         reported |= _part(values, path, prefix) | outline
         if box.mass:
             reported |= _inertial(values, path, prefix)

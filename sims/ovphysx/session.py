@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import tempfile
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,17 @@ REACH = 5.0
 
 _SPAN, _FLAT = 1.0, 0.05
 """Half edges of the flat box that measures a link, and from how far away it does [m]."""
+
+_EVENTS = (
+    "contactEventOtherBody",
+    "contactEventSensorSide",
+    *(
+        f"contactEvent{kind}{what}"
+        for kind in ("Point", "Anchor")
+        for what in ("Count", "Position", "Impulse")
+    ),
+)
+"""Of each contact: whom a prim touches, and impulses along the normal and of friction."""
 
 _registered = False
 
@@ -86,6 +97,26 @@ class Session:
                 rows = columns if group.is_array else columns[0]
                 name = result.dictionary.token_to_string(group.attribute)
                 found[name].update(zip(paths, rows, strict=True))
+        return found
+
+    def contacts(self) -> dict[tuple[str, str], list[tuple[FloatArray, FloatArray]]]:
+        """What two prims do to each other in the last step: an impulse [N s] on the first of a pair
+        and where it acts [m], for each point of contact and each anchor of friction."""
+        found: dict[tuple[str, str], list[tuple[FloatArray, FloatArray]]] = {}
+        target = ovphysx_types.SimObjectType.CONTACT_SENSOR
+        scope = ovphysx_types.ObjectScope.ALL
+        values: dict[str, dict[str, Any]] = {name: {} for name in _EVENTS}
+        with self.physx.read_sync(target, list(_EVENTS), scope=scope) as result:
+            for group in result.groups:
+                paths = result.dictionary.get_path_strings(group.prim_list)
+                arrays = [np.array(tensor.numpy()) for tensor in group.tensors]
+                name = result.dictionary.token_to_string(group.attribute)
+                values[name].update(zip(paths, arrays, strict=True))
+            for sensor, others in values["contactEventOtherBody"].items():
+                told = {name: array[sensor] for name, array in values.items() if sensor in array}
+                for pair, points in _events(sensor, others, told, result.dictionary):
+                    if pair[::-1] not in found:  # else it was told by the other one
+                        found.setdefault(pair, []).extend(points)
         return found
 
     def write(self, kind: str, attribute: str, values: Mapping[str, Any]) -> None:
@@ -167,6 +198,24 @@ class Session:
         with self.physx.read_sync(target, ["dofJointPath"], scope=scope) as result:
             handles = np.array(result.groups[0].tensors[0].numpy(), dtype=np.uint64).ravel()
             return [result.dictionary.path_to_string(int(handle)) for handle in handles]
+
+
+def _events(
+    sensor: str, others: Any, told: Mapping[str, Any], dictionary: Any
+) -> Iterator[tuple[tuple[str, str], list[tuple[FloatArray, FloatArray]]]]:
+    """The pairs that a prim is in, with impulses on it and their places."""
+    starts = {"Point": 0, "Anchor": 0}
+    sides = np.ravel(told["contactEventSensorSide"])
+    for k, handle in enumerate(np.ravel(others)):
+        points: list[tuple[FloatArray, FloatArray]] = []
+        for kind, start in starts.items():
+            count = int(np.ravel(told[f"contactEvent{kind}Count"])[k])
+            rows = slice(start, start + count)
+            starts[kind] = start + count
+            if count:  # impulses are those on the pair's first body
+                impulses = told[f"contactEvent{kind}Impulse"][rows] * (1 - 2 * int(sides[k]))
+                points += zip(impulses, told[f"contactEvent{kind}Position"][rows], strict=True)
+        yield (sensor, dictionary.path_to_string(int(handle))), points
 
 
 def _register_schemas() -> None:

@@ -18,6 +18,7 @@ from pytest_simbench.scene import (
     Body,
     Box,
     Capsule,
+    ConvexMesh,
     Cylinder,
     FloatArray,
     Joint,
@@ -33,7 +34,9 @@ from . import usd_text as usd
 GROUND, ROOT = "/World/ground", "/World/root_joint"
 
 _COLLIDER = ("PhysicsCollisionAPI", "PhysxCollisionAPI", "MaterialBindingAPI")
+_HULL = (*_COLLIDER, "PhysicsMeshCollisionAPI")
 _BODY = ("PhysicsRigidBodyAPI", "PhysxRigidBodyAPI", "PhysicsMassAPI")
+_REPORT = "float physxContactReport:threshold = 0"
 
 
 def body_path(index: int) -> str:
@@ -49,6 +52,12 @@ def link_path(index: int) -> str:
 def joint_path(index: int) -> str:
     """Prim of the robot's joint of that index."""
     return f"/World/joint_{index}"
+
+
+def reports_contacts(scene: Scene) -> bool:
+    """Whether PhysX is asked to report the contacts of bodies: not where there is a robot. In the
+    scene of stacking, reports are a third and more of the stepping."""
+    return scene.robot is None
 
 
 class Stage:
@@ -131,10 +140,14 @@ class Stage:
     def _body(self, index: int, box: Body) -> str:
         """A rigid body; kinematic where it has no mass: PhysX reports nothing of static ones."""
         kind, size = _solid(box)
+        collider = _COLLIDER if kind != "Mesh" else _HULL
         shape = usd.prim(
-            kind, "shape", _COLLIDER, [*size, *self._surface(box.friction, box.restitution)]
+            kind, "shape", collider, [*size, *self._surface(box.friction, box.restitution)]
         )
         lines = [*usd.placed(box.pose), *self._rigid(box)]
+        schemas: tuple[str, ...] = _BODY
+        if reports_contacts(self.scene):
+            schemas, lines = (*_BODY, "PhysxContactReportAPI"), [*lines, _REPORT]
         if not box.mass:
             lines.append("bool physics:kinematicEnabled = true")
         else:
@@ -142,7 +155,7 @@ class Stage:
             spin = np.degrees(box.angular_velocity)
             lines.append(f"vector3f physics:velocity = {usd.numbers(box.linear_velocity)}")
             lines.append(f"vector3f physics:angularVelocity = {usd.numbers(spin)}")
-        return usd.prim("Xform", f"body_{index}", _BODY, lines, [shape])
+        return usd.prim("Xform", f"body_{index}", schemas, lines, [shape])
 
     def _rigid(self, body: Body) -> list[str]:
         """The engine's settings of a body, and its own damping where it has one."""
@@ -191,14 +204,8 @@ class Stage:
             return usd.prim("Cube", name, _COLLIDER, [*usd.cube(shape.size, shape.pose), *surface])
         triangles = usd.read_stl(Path(str(shape.mesh)))
         corners, faces = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-        lines = [
-            *usd.placed(shape.pose),
-            'uniform token physics:approximation = "convexHull"',
-            f"point3f[] points = [{', '.join(usd.numbers(point) for point in corners)}]",
-            f"int[] faceVertexCounts = [{', '.join(['3'] * len(triangles))}]",
-            f"int[] faceVertexIndices = [{', '.join(str(i) for i in faces.ravel())}]",
-        ]
-        return usd.prim("Mesh", name, (*_COLLIDER, "PhysicsMeshCollisionAPI"), [*lines, *surface])
+        lines = [*usd.placed(shape.pose), *usd.hull(corners, faces.reshape(-1, 3))]
+        return usd.prim("Mesh", name, _HULL, [*lines, *surface])
 
 
 def _solid(body: Body) -> tuple[str, list[str]]:
@@ -212,6 +219,8 @@ def _solid(body: Body) -> tuple[str, list[str]]:
             radius, length = float(body.radius), float(body.length)
             lines = [f"double radius = {radius!r}", f"double height = {length!r}"]
             return type(body).__name__, [*lines, 'uniform token axis = "Z"']
+        case ConvexMesh():
+            return "Mesh", usd.hull(body.hull.points, np.array(body.hull.triangles))
     raise NotSupportedError(f"ovphysx has no {type(body).__name__}")
 
 

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.scene.pose import quaternion_of
 
 
 def read_stl(path: Path) -> FloatArray:
@@ -56,20 +58,6 @@ def mass_lines(mass: float, centre: FloatArray, inertia: FloatArray) -> list[str
     ]
 
 
-def quaternion_of(rotation: FloatArray) -> FloatArray:
-    """Quaternion w, x, y, z of a rotation matrix: the eigenvector of Bar-Itzhack's matrix."""
-    r = rotation
-    k = np.array(
-        [
-            [r[0, 0] + r[1, 1] + r[2, 2], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
-            [r[2, 1] - r[1, 2], r[0, 0] - r[1, 1] - r[2, 2], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]],
-            [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2], r[1, 2] + r[2, 1]],
-            [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1]],
-        ]
-    )
-    return np.asarray(np.linalg.eigh(k)[1][:, -1])
-
-
 def placed(pose: Pose) -> list[str]:
     """Lines that put a prim at a pose in its parent's frame; USD writes quaternions w first."""
     return [
@@ -87,6 +75,21 @@ def cube(size: Sequence[float], pose: Pose | None = None) -> list[str]:
         *placed(pose or Pose())[:2],
         f"float3 xformOp:scale = {numbers(size)}",
         f"uniform token[] xformOpOrder = {order}",
+    ]
+
+
+def hull(corners: FloatArray, triangles: NDArray[np.int_]) -> list[str]:
+    """Lines of a Mesh prim that stands for its convex hull.
+
+    Args:
+        corners: (n, 3) [m].
+        triangles: their numbers, (m, 3).
+    """
+    return [
+        'uniform token physics:approximation = "convexHull"',
+        f"point3f[] points = [{', '.join(numbers(point) for point in corners)}]",
+        f"int[] faceVertexCounts = [{', '.join(['3'] * len(triangles))}]",
+        f"int[] faceVertexIndices = [{', '.join(str(i) for i in triangles.ravel())}]",
     ]
 
 

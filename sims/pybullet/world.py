@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import Body, Box, Capsule, Cylinder, FloatArray, Sphere
+from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, FloatArray, Sphere
 from pytest_simbench.simulator import NotSupportedError, Settings, lazy_import
 
 pybullet = lazy_import("pybullet")
@@ -62,9 +62,11 @@ def add_body(client: int, box: Body, settings: PyBulletSettings, most: float) ->
     """A body; Bullet's number of it. A prescribed one weighs `most` [kg]."""
     c = client
     kind, size, length = _shape(box)
-    lengths = {} if length is None else {"height": length}
+    lengths: dict[str, Any] = {} if length is None else {"height": length}
     shape = pybullet.createCollisionShape(kind, **size, **lengths, physicsClientId=c)
     lengths = {} if length is None else {"length": length}
+    if isinstance(box, ConvexMesh):
+        lengths = {"indices": np.ravel(box.hull.triangles).tolist()}
     picture = pybullet.createVisualShape(
         kind, **size, **lengths, rgbaColor=box.colour, physicsClientId=c
     )
@@ -78,6 +80,8 @@ def add_body(client: int, box: Body, settings: PyBulletSettings, most: float) ->
     if box.moments is not None or box.prescribed or not isinstance(box, Box):
         inertia = [most] * 3 if box.prescribed else list(box.inertia())
         pybullet.changeDynamics(body, -1, localInertiaDiagonal=inertia, physicsClientId=c)
+    if isinstance(box, ConvexMesh):  # it rests on a layer of 1 mm by default
+        pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=c)
     if box.velocity.any():  # setting none changes the last bits of what follows
         pybullet.resetBaseVelocity(
             body, box.linear_velocity, box.angular_velocity, physicsClientId=c
@@ -142,4 +146,6 @@ def _shape(body: Body) -> tuple[int, dict[str, Any], float | None]:
             return pybullet.GEOM_CYLINDER, {"radius": body.radius}, body.length
         case Capsule():
             return pybullet.GEOM_CAPSULE, {"radius": body.radius}, body.length
+        case ConvexMesh():
+            return pybullet.GEOM_MESH, {"vertices": body.vertices}, None
     raise NotSupportedError(f"pybullet has no {type(body).__name__}")

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from pytest_simbench.scene import Body, Box, Capsule, Cylinder, Sphere
+import numpy as np
+
+from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, Sphere
 from pytest_simbench.simulator import lazy_import
 
 from .drawing import UPRIGHT, facing_up, to_sapien
@@ -35,13 +37,18 @@ def add_body(world: Any, box: Body, angular_damping: float) -> Any:
     builder.initial_pose = sapien.Pose(box.pose.position, box.pose.quaternion)
     if box.fixed:
         entity = builder.build_static(box.name)
-        return entity.find_component_by_type(physx.PhysxRigidStaticComponent)
-    if box.prescribed:
+        body = entity.find_component_by_type(physx.PhysxRigidStaticComponent)
+    elif box.prescribed:
         entity = builder.build_kinematic(box.name)
-        return entity.find_component_by_type(physx.PhysxRigidDynamicComponent)
-    builder.set_mass_and_inertia(box.mass, sapien.Pose(), box.inertia())
-    entity = builder.build(box.name)
-    body = entity.find_component_by_type(physx.PhysxRigidDynamicComponent)
+        body = entity.find_component_by_type(physx.PhysxRigidDynamicComponent)
+    else:
+        builder.set_mass_and_inertia(box.mass, sapien.Pose(), box.inertia())
+        entity = builder.build(box.name)
+        body = entity.find_component_by_type(physx.PhysxRigidDynamicComponent)
+    if isinstance(box, ConvexMesh):
+        body.attach(_mesh(box, material, builder.collision_groups))
+    if not box.mass:
+        return body
     body.angular_damping = angular_damping
     if box.damping.any():
         body.linear_damping, body.angular_damping = box.damping
@@ -63,3 +70,11 @@ def _add_shape(builder: Any, body: Body, material: Any) -> None:
         case Capsule():
             upright = to_sapien(UPRIGHT)
             builder.add_capsule_collision(upright, body.radius, body.length / 2, material)
+
+
+def _mesh(body: ConvexMesh, material: Any, groups: list[int]) -> Any:
+    """The shape of a mesh, which SAPIEN's builder takes from a file alone."""
+    corners = np.array(body.vertices, dtype=np.float32)
+    shape = physx.PhysxCollisionShapeConvexMesh(corners, np.ones(3, dtype=np.float32), material)
+    shape.set_collision_groups(groups)
+    return shape

@@ -95,6 +95,8 @@ class Drawing:
             shape = rendering.RenderShapeBox(half, material)
         elif solid.kind == "ball":
             shape = rendering.RenderShapeSphere(x, material)
+        elif solid.kind == "mesh":
+            shape = _triangles(solid, material)
         else:
             shape, pose = rendering.RenderShapeCylinder(x, z, material), pose * UPRIGHT
         shape.local_pose = to_sapien(pose)
@@ -144,6 +146,22 @@ class Drawing:
         self._viewer = self._camera = None
         if self._layout is not None:
             self._layout.cleanup()
+
+
+def _triangles(solid: Solid, material: Any) -> Any:
+    """Each triangle with corners of its own, so that the edges between flat faces are sharp."""
+    vertices, triangles = (np.array(rows) for rows in solid.mesh)
+    corners = vertices[triangles].reshape(-1, 3).astype(np.float32)
+    sides = corners.reshape(-1, 3, 3)
+    normals = np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return rendering.RenderShapeTriangleMesh(
+        corners,
+        np.arange(len(corners), dtype=np.uint32).reshape(-1, 3),
+        np.repeat(normals, 3, axis=0).astype(np.float32),
+        np.zeros((len(corners), 2), dtype=np.float32),
+        material,
+    )
 
 
 def facing_up() -> Any:

@@ -144,6 +144,13 @@ FAULTS: dict[str, Fault] = {
     "slide_straight": turned,
     **dict.fromkeys(("stopping_distance", "stopping_distance_oblique"), rougher(1.2)),
     "pivot": heavier,
+    **dict.fromkeys(
+        ("rest_force", "tower_force"), bodies(lambda body: replace(body, mass=1.1 * body.mass))
+    ),
+    "rimless_wheel": bodies(
+        lambda body: replace(body, moments=tuple((3 * body.inertia()).tolist()))
+    ),
+    "mesh_twin": bodies(lambda body: replace(body, linear_velocity=(1.1, 0.0, 0.0)), "mesh"),
     "rest_depth": moved(z=1e-3),
     "tower": moved(z=1e-3, which="cube 4"),
     **dict.fromkeys(("heavy_on_top", "overhang"), moved(z=1e-3, which="cube 3")),

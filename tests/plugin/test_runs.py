@@ -72,10 +72,14 @@ def test_marks(pytester: pytest.Pytester) -> None:
         @pytest.mark.needs("gpu")
         def test_needs(sim_name):
             raise AssertionError
+
+        @pytest.mark.parametrize("case", [pytest.param(1, marks=pytest.mark.needs("gpu")), 2])
+        def test_a_parameter_needs(sim_name, case):
+            assert case == 2
         """
     )
     result = pytester.runpytest_subprocess("--sim=mujoco,pybullet", "-rs")
-    result.assert_outcomes(passed=3, skipped=3, xfailed=1)
+    result.assert_outcomes(passed=5, skipped=5, xfailed=1)
     result.stdout.fnmatch_lines(["*pybullet has no gpu*"])
 
 

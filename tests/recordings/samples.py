@@ -1,4 +1,4 @@
-"""A short motion of the Panda and two cubes, beside a table and a capsule."""
+"""A short motion of the Panda and two cubes, beside a table, a capsule and a wedge."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from pytest_simbench.client.world import Motion
 from pytest_simbench.recordings.trace import Trace
 from pytest_simbench.robot.panda import READY, panda
-from pytest_simbench.scene import Body, Box, Capsule, Pose, Scene
+from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Pose, Scene
+from pytest_simbench.testing.scenes import wedge
 
 RED, BLUE = (0.9, 0.1, 0.1, 1.0), (0.1, 0.1, 0.9, 1.0)
 SAMPLES = 12
@@ -21,6 +22,7 @@ def scene(*, robot: bool = True) -> Scene:
         Box("table", (0.2, 0.2, 0.1), Pose.at(0.5, 0.0, 0.05)),
         Box("blue", (0.05,) * 3, Pose.at(0.5, 0.3, 0.025), 0.1, colour=BLUE),
         Capsule("pill", 0.02, 0.06, Pose.at(0.7, -0.3, 0.05)),
+        ConvexMesh("wedge", wedge(), Pose.at(0.4, -0.3, 0.05)),
     ]
     return Scene("sample", tuple(cubes), panda() if robot else None)
 

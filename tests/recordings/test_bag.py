@@ -131,7 +131,7 @@ def test_every_shape_has_a_marker_in_a_frame_that_there_is(tmp_path: Path) -> No
     }
     assert {marker.header.frame_id for marker in markers} <= frames
     assert len({(marker.ns, marker.id) for marker in markers}) == len(markers)
-    triangles = [m for m in markers if m.type == m.TRIANGLE_LIST]
+    triangles = [m for m in markers if m.type == m.TRIANGLE_LIST and m.ns == "robot"]
     assert kept.figure is not None
     assert sum(len(m.points) for m in triangles) == 3 * sum(
         len(m.faces) for m in kept.figure.meshes
@@ -140,6 +140,9 @@ def test_every_shape_has_a_marker_in_a_frame_that_there_is(tmp_path: Path) -> No
     assert [m.type for m in pill] == [pill[0].CYLINDER, pill[0].SPHERE, pill[0].SPHERE]
     assert [m.scale.z for m in pill] == [0.06, 0.04, 0.04]
     assert [m.pose.position.z for m in pill] == [0.0, -0.03, 0.03]
+    (flat,) = [m for m in markers if m.header.frame_id == "bodies/wedge"]
+    assert (flat.type, flat.ns, len(flat.points)) == (flat.TRIANGLE_LIST, "bodies", 3 * 8)
+    assert max(point.z for point in flat.points) == pytest.approx(2 / 3 * 0.04)
     red = next(m for m in markers if m.header.frame_id == "bodies/red")
     assert (red.scale.x, red.color.r, red.color.b) == pytest.approx((0.05, 0.9, 0.1))
 

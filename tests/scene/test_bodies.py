@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
+from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,13 +16,17 @@ from pytest_simbench.scene import (
     Body,
     Box,
     Capsule,
+    ConvexMesh,
     Cylinder,
     Pose,
     SceneError,
     Sphere,
     Vector3,
     penetration,
+    principal,
 )
+
+SIGNS = list(product((-1.0, 1.0), repeat=3))
 
 UNIT = Box("unit", (1.0, 1.0, 1.0), Pose())
 
@@ -163,3 +170,68 @@ def test_moments_of_its_own_travel_and_must_be_possible() -> None:
     assert "moments" not in Box("a", (1.0, 1.0, 1.0), Pose(), 1.0).to_wire()
     with pytest.raises(SceneError, match="none is larger than the other two"):
         Box("a", (1.0, 1.0, 1.0), Pose(), 1.0, moments=(0.1, 0.2, 0.4))
+
+
+SIZE = (0.3, 0.5, 0.2)
+CORNERS = [tuple(s * e / 2 for s, e in zip(signs, SIZE, strict=True)) for signs in SIGNS]
+
+
+def as_mesh(pose: Pose = Pose(), **values: Any) -> ConvexMesh:  # noqa: B008 - it never changes
+    return ConvexMesh("mesh", tuple(CORNERS), pose, **values)
+
+
+def test_a_mesh_with_a_boxs_corners_is_that_box() -> None:
+    box, mesh = Box("box", SIZE, Pose(), 2.0), as_mesh(mass=2.0)
+    assert mesh.volume == pytest.approx(box.volume)
+    assert mesh.extents == pytest.approx(box.extents)
+    assert np.allclose(mesh.inertia(), box.inertia())
+    directions = np.random.default_rng(0).normal(size=(9, 3))
+    assert np.allclose(mesh.reach(directions), box.reach(directions))
+    assert Body.from_wire(json.loads(json.dumps(mesh.to_wire()))) == mesh
+
+
+@given(st.tuples(*[st.floats(-0.5, 0.5)] * 3), st.tuples(*[st.floats(-1.0, 1.0)] * 4))
+def test_meshes_overlap_as_boxes_do(at: Vector3, turn: tuple[float, ...]) -> None:
+    """With a box, with a mesh, and either way round."""
+    quaternion = np.add(turn, [1.5, 0.0, 0.0, 0.0])
+    place = Pose.from_array([*at, *quaternion / np.linalg.norm(quaternion)])
+    box, other = Box("box", SIZE, Pose()), Box("other", SIZE, place)
+    depth = penetration(box, other)
+    for pair in ((box, as_mesh(place)), (as_mesh(), other), (as_mesh(place), as_mesh())):
+        assert max(penetration(*pair), 0.0) == pytest.approx(max(depth, 0.0), abs=1e-9)
+
+
+def test_how_deep_round_bodies_are_in_a_mesh() -> None:
+    ball, can = Sphere("ball", 0.1, Pose.at(0.0, 0.0, 0.15)), Cylinder("can", 0.1, 0.4, Pose())
+    assert penetration(as_mesh(), ball) == pytest.approx(0.05)
+    assert penetration(as_mesh(), ball.moved_to(Pose.at(0.0, 0.0, 0.21))) == pytest.approx(-0.01)
+    assert penetration(can.moved_to(Pose.at(0.0, 0.0, 0.295)), as_mesh()) == pytest.approx(0.005)
+    assert penetration(can.moved_to(Pose.at(0.0, 0.0, 0.31)), as_mesh()) < 0
+
+
+@pytest.mark.parametrize(
+    ("vertices", "told"),
+    [
+        (CORNERS[:3], "tuple of 4 to 64"),
+        ([*CORNERS, (0.0, 0.0, 0.1)], r"\(0.0, 0.0, 0.1\) of 'mesh' is no corner"),
+        ([(x + 0.1, y, z) for x, y, z in CORNERS], "centre of mass at .* must be the origin"),
+        ([(x + 0.1 * y, y, z) for x, y, z in CORNERS], "not its principal axes"),
+        ([(x, y, 0.0) for x, y, z in CORNERS], "'mesh': .* one plane"),
+        ([(x, y, math.nan) for x, y, z in CORNERS], "must be a number"),
+        ([(x, y) for x, y, z in CORNERS], "must be 3 numbers"),
+    ],
+)
+def test_a_mesh_that_is_none(vertices: list[Any], told: str) -> None:
+    with pytest.raises(SceneError, match=told):
+        ConvexMesh("mesh", tuple(vertices), Pose())
+
+
+def test_principal_makes_a_mesh_of_any_corners() -> None:
+    """A wedge stands where its points were: its reach along x from there."""
+    points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.5)]
+    wedge = [(x, y, z) for x, _, z in points for y in (0.0, 0.4)]
+    vertices, frame = principal(wedge)
+    mesh = ConvexMesh("wedge", vertices, frame, 1.0)
+    assert mesh.volume == pytest.approx(0.1)
+    right = mesh.reach((frame.rotation().T @ [1.0, 0.0, 0.0])[None])[0] + frame.position[0]
+    assert right == pytest.approx(1.0)

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.scene import Pose
+from pytest_simbench.scene.pose import quaternion_of
 
 numbers = st.floats(-10, 10, allow_nan=False)
 
@@ -49,3 +50,9 @@ def test_tilt_is_the_angle_to_the_nearest_face(tilt: float, quarter: int) -> Non
     angle = tilt + quarter * math.pi / 2
     pose = Pose(quaternion=(math.cos(angle / 2), math.sin(angle / 2), 0.0, 0.0))
     assert pose.tilt() == pytest.approx(tilt, abs=1e-6)
+
+
+@given(poses())
+def test_the_quaternion_of_a_matrix_undoes_it(a: Pose) -> None:
+    found = Pose(quaternion=tuple(quaternion_of(a.rotation())))
+    assert np.allclose(found.rotation(), a.rotation(), atol=1e-9)

@@ -22,9 +22,8 @@ def uncovered(
 ) -> set[str]:
     """Patterns of what is reported, but neither changed by the kit's faults nor by `planted`.
 
-    No body has a mesh and no link is round, so none is asked for.
+    No link is round, so none is asked for.
     """
     kit = {fault.quantity for fault in FAULTS.values()}
     found = {pattern(quantity) for quantity in [*kit, *planted]}
-    none = {"body/*/meshes", "link/*/rounds"}
-    return {pattern(q) for q in reported} - found - set(impossible) - none
+    return {pattern(q) for q in reported} - found - set(impossible) - {"link/*/rounds"}

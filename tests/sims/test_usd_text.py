@@ -14,7 +14,6 @@ from pytest_simbench.sims.ovphysx.usd_text import (
     attributes,
     mass_lines,
     prim,
-    quaternion_of,
     read_stl,
     turn_from_x,
 )
@@ -36,12 +35,6 @@ def test_turn_from_x_brings_x_to_the_axis(axis: tuple[float, float, float]) -> N
 def test_turn_from_x_to_an_axis_of_the_frame(axis: tuple[float, float, float]) -> None:
     turned = rotation_matrix(turn_from_x(np.array(axis, dtype=float))) @ [1.0, 0.0, 0.0]
     np.testing.assert_allclose(turned, axis, atol=1e-15)
-
-
-@given(quaternion=quaternions)
-def test_quaternion_of_undoes_rotation_matrix(quaternion: tuple[float, ...]) -> None:
-    rotation = rotation_matrix(quaternion)
-    np.testing.assert_allclose(rotation_matrix(quaternion_of(rotation)), rotation, atol=1e-9)
 
 
 def written(lines: list[str], name: str) -> FloatArray:

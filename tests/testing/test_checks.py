@@ -32,6 +32,7 @@ FAULTS: list[tuple[type[Simulator], str]] = [
     (wrong.Shaking, "tower_stands"),
     (wrong.HalfFriction, "slides_above_mu"),
     (wrong.HalfFriction, "slides_alike_diagonally"),
+    (wrong.HalfFriction, "meshes_rest_and_slide"),
     (wrong_robots.SlipperyHand, "sticks_below_mu"),
     (wrong.AngularDamping, "cube_spins_on"),
     (wrong.WrongMass, "collision_keeps_momentum"),

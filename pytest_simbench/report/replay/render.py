@@ -22,7 +22,7 @@ from pytest_simbench.recordings.trace import Trace, TraceError
 from pytest_simbench.records.text import in_one_line
 from pytest_simbench.report.replay.groups import Group
 from pytest_simbench.report.replay.motion import SCALE, packed
-from pytest_simbench.scene import Body, Box, Pose
+from pytest_simbench.scene import Body, Box, Pose, Solid
 
 INSTALL = "no replay in 3-D: pip install 'pytest-simbench[replay]'"
 
@@ -69,7 +69,7 @@ def replay_of(shown: Sequence[Group]) -> tuple[str, int, list[str]]:
                     "samples": len(trace.time),
                     "phases": [[time, in_one_line(name)] for time, name in trace.phases],
                     "joints": list(trace.joint_names),
-                    "boxes": [_body(body) for body in trace.boxes],
+                    "boxes": [meshes.body(body) for body in trace.boxes],
                     "free": len(trace.free),
                     "figure": meshes.figure(trace.figure),
                 }
@@ -87,7 +87,7 @@ def replay_of(shown: Sequence[Group]) -> tuple[str, int, list[str]]:
 
 
 class _Meshes:
-    """The meshes of all robots, each once."""
+    """The meshes of all robots and bodies, each once."""
 
     def __init__(self) -> None:
         self._found: dict[bytes, int] = {}
@@ -114,6 +114,20 @@ class _Meshes:
                 for part in figure.parts
             ],
         }
+
+    def body(self, body: Body) -> dict[str, Any]:
+        """What the player needs of a body: the size of a box, or the solids of another."""
+        told = {"colour": body.colour, "pose": list(_array(body.pose))}
+        if isinstance(body, Box):
+            return {"size": body.size, **told}
+        return {"solids": [self._solid(solid) for solid in body.solids()], **told}
+
+    def _solid(self, solid: Solid) -> dict[str, Any]:
+        pose = _array(solid.pose)
+        if solid.kind == "mesh":
+            mesh = Mesh(*(np.array(rows) for rows in solid.mesh))
+            return {"mesh": self._number(mesh), "pose": pose}
+        return {"kind": solid.kind, "size": solid.extents, "pose": pose}
 
     def _number(self, mesh: Mesh) -> int:
         key = hashlib.sha256(mesh.triangles.tobytes()).digest()
@@ -145,18 +159,6 @@ class _Meshes:
             )
             scene.add_geometry(triangles, node_name=f"mesh_{k}", geom_name=f"mesh_{k}")
         return str(scene_to_html(scene))
-
-
-def _body(body: Body) -> dict[str, Any]:
-    """What the player needs of a body: the size of a box, or the solids of another."""
-    told = {"colour": body.colour, "pose": list(_array(body.pose))}
-    if isinstance(body, Box):
-        return {"size": body.size, **told}
-    solids = [
-        {"kind": solid.kind, "size": solid.extents, "pose": _array(solid.pose)}
-        for solid in body.solids()
-    ]
-    return {"solids": solids, **told}
 
 
 def _array(pose: Pose) -> list[float]:

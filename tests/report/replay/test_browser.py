@@ -188,9 +188,10 @@ def test_links_and_cubes_are_where_the_trace_has_them(replay: Path, opened: Open
             there = np.reshape(matrix, (4, 4)).T  # three.js keeps columns
             there[:3, :3] /= np.linalg.norm(there[:3, :3], axis=0)  # a cube's size
             np.testing.assert_allclose(there, Pose.from_array(pose).matrix(), atol=1e-3)
-    height = """() => new THREE.Box3().setFromObject(
-      scene.getObjectByName("tile").getObjectByName("body 3")).getSize(new THREE.Vector3()).z"""
-    assert page.evaluate(height) == pytest.approx(0.1, abs=1e-3)  # a capsule, of three solids
+    height = """(name) => new THREE.Box3().setFromObject(
+      scene.getObjectByName("tile").getObjectByName(name)).getSize(new THREE.Vector3()).z"""
+    assert page.evaluate(height, "body 3") == pytest.approx(0.1, abs=1e-3)  # three solids
+    assert page.evaluate(height, "body 4") == pytest.approx(0.04, abs=1e-3)  # a mesh
 
 
 def test_hostile_names_stay_text(tmp_path: Path, opened: Opened) -> None:
