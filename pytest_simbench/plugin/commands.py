@@ -67,10 +67,12 @@ def _robots(config: pytest.Config) -> int:
 
 def _robot_line(robot: Robot) -> str:
     """Name, size and hand of a robot, and what it cannot do."""
+    from pytest_simbench.robot.model import RobotModel
     from pytest_simbench.tasks import Pushing, Stacking, Throwing
 
     arm, fingers = len(robot.arm_joints), len(robot.gripper.joints)
-    hand = f"{fingers} fingers that open to {robot.gripper.opened:g} m"
+    many = "one jaw that opens" if fingers == 1 else f"{fingers} fingers that open"
+    hand = f"{many} to {robot.gripper.opened:g} {RobotModel(robot).finger_unit}"
     x, y, z = robot.base.position
     line = (
         f"{robot.name}: {arm} arm joints, {hand if fingers else 'a hand that only touches'}, "

@@ -140,7 +140,7 @@ def test_what_a_robot_or_a_task_cannot_do(pytester: pytest.Pytester) -> None:
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        ("ur7", "*--robot=ur7: unknown robot 'ur7'; choose from panda, ur10, ur5, xarm7*"),
+        ("ur7", "*--robot=ur7: unknown robot 'ur7'; choose from panda, so101, ur10, ur5, xarm7*"),
         ("none.toml", "*--robot=none.toml: cannot read the robot file none.toml: No such file*"),
         ("bad.toml", "*--robot=bad.toml: bad.toml, [[]arm[]]: stiffness: -1 is no number of at*"),
     ],
@@ -160,6 +160,9 @@ def test_the_list_of_robots(pytester: pytest.Pytester) -> None:
     result.stdout.fnmatch_lines(
         [
             "panda: 7 arm joints, 2 fingers that open to 0.035 m, base at (0, 0, 0)",
+            "so101: 5 arm joints, one jaw that opens to 1 rad, base at (0, 0, 0)",
+            "    no stacking: robot 'so101' has no hand with two parallel fingers to grasp a cube",
+            "    no throwing: robot 'so101' has no *",
             "ur5: 6 arm joints, 2 fingers*",
             "small: 3 arm joints, 2 fingers that open to 0.04 m, base at (0.1, 0, 0.2)",
             "    no stacking: robot 'small' cannot handle a cube at (0.20, -0.30, 0.33): it is *",
