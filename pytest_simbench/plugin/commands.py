@@ -52,7 +52,7 @@ def _robots(config: pytest.Config) -> int:
     from pytest_simbench.robot.errors import RobotError
     from pytest_simbench.robot.registry import known, known_robot
 
-    chosen = session_of(config).selection.robot
+    chosen = session_of(config).selection.robots.values()
     broken = False
     for name in known():
         try:
@@ -60,8 +60,9 @@ def _robots(config: pytest.Config) -> int:
         except RobotError as error:
             broken = True
             print(for_terminal(f"{name}: BROKEN: {error}"))
-    if chosen is not None and chosen.name not in known():
-        print(for_terminal(_robot_line(chosen)))
+    for robot in chosen:
+        if robot is not None and robot.name not in known():
+            print(for_terminal(_robot_line(robot)))
     return int(broken)
 
 

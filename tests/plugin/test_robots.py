@@ -137,6 +137,42 @@ def test_what_a_robot_or_a_task_cannot_do(pytester: pytest.Pytester) -> None:
     assert "robot" not in records("out")[0]  # the towers know no robot
 
 
+def test_every_robot(pytester: pytest.Pytester) -> None:
+    """What a robot cannot do is a skip with the reason, since nobody named it. A task without a
+    robot runs once. A test that takes a robot gets each, with a simulator and without."""
+    pytester.makepyfile(
+        HOLDING,
+        test_more="""
+            import pytest
+            from pytest_simbench.tasks import LeaningTowers, Stacking
+
+            def test_small(repeat, robot, sim_name):
+                if robot.name != "so101":
+                    pytest.skip("another time")
+                repeat(Stacking())
+
+            def test_without_a_robot(repeat):
+                repeat(LeaningTowers(margins=(0.01,), levels=1, settle=0.01))
+
+            def test_fixture(robot, request):
+                assert robot.name in request.node.name
+        """,
+    )
+    result = run(pytester, "--reps=1", "--robot=all", "--sim-output=out", "-rs", "-v")
+    result.assert_outcomes(passed=5 + 1 + 5, skipped=5 + 4)
+    names = ["panda", "so101", "ur10", "ur5", "xarm7"]
+    found = [record["test"] for record in records("out") if record["task"] == "holding"]
+    assert found == [
+        f"test_every_robot.py::test_holding[mujoco-headless{'-' * bool(i) + name * bool(i)}]"
+        for i, name in enumerate(names)
+    ]
+    text = result.stdout.str()
+    for name in names:
+        assert f"test_fixture[{name}]" in text
+    assert "--robot=all: robot 'so101' has no hand with two parallel fingers" in text
+    assert "--robot=all: the task 'leaning towers' has no robot, and ran once" in text
+
+
 @pytest.mark.parametrize(
     ("value", "message"),
     [
