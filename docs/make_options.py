@@ -19,6 +19,7 @@ INTERNAL = (
     "simbench_case",
     "simbench_case_here",
     "simbench_handle",
+    "simbench_robot",
     "benchmark_rounds",
     "no_rounds",
 )

@@ -31,10 +31,21 @@ def checked_task(value: Any, fixture: str) -> Task:
     _refuse(f"{fixture}({shown(repr(value))}) takes a task, for instance {fixture}(Throwing())")
 
 
-def can_do(experiment: Experiment) -> Experiment:
-    """An experiment whose robot can do the task; else the test fails before anything runs."""
-    if problem := experiment.problem():
+def can_do(experiment: Experiment, skips: bool) -> Experiment:
+    """An experiment whose robot can do the task; else the test fails before anything runs.
+
+    Args:
+        experiment: in question.
+        skips: the test is skipped instead, since nobody named the robot (`--robot=all`); so is that
+            of a task without a robot, but for the first robot's.
+    """
+    problem = experiment.problem()
+    if skips and problem:
+        pytest.skip(f"--robot=all: {problem}")
+    if problem:
         _refuse(f"--robot: {problem}")
+    if skips and experiment.case.robot is not None and experiment.robot is None:
+        pytest.skip(f"--robot=all: the task {experiment.task.name!r} has no robot, and ran once")
     return experiment
 
 

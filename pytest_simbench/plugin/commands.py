@@ -52,7 +52,7 @@ def _robots(config: pytest.Config) -> int:
     from pytest_simbench.robot.errors import RobotError
     from pytest_simbench.robot.registry import known, known_robot
 
-    chosen = session_of(config).selection.robot
+    chosen = session_of(config).selection.robots.values()
     broken = False
     for name in known():
         try:
@@ -60,17 +60,20 @@ def _robots(config: pytest.Config) -> int:
         except RobotError as error:
             broken = True
             print(for_terminal(f"{name}: BROKEN: {error}"))
-    if chosen is not None and chosen.name not in known():
-        print(for_terminal(_robot_line(chosen)))
+    for robot in chosen:
+        if robot is not None and robot.name not in known():
+            print(for_terminal(_robot_line(robot)))
     return int(broken)
 
 
 def _robot_line(robot: Robot) -> str:
     """Name, size and hand of a robot, and what it cannot do."""
+    from pytest_simbench.robot.model import RobotModel
     from pytest_simbench.tasks import Pushing, Stacking, Throwing
 
     arm, fingers = len(robot.arm_joints), len(robot.gripper.joints)
-    hand = f"{fingers} fingers that open to {robot.gripper.opened:g} m"
+    many = "one jaw that opens" if fingers == 1 else f"{fingers} fingers that open"
+    hand = f"{many} to {robot.gripper.opened:g} {RobotModel(robot).finger_unit}"
     x, y, z = robot.base.position
     line = (
         f"{robot.name}: {arm} arm joints, {hand if fingers else 'a hand that only touches'}, "

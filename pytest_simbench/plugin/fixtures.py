@@ -119,7 +119,7 @@ def _case(config: pytest.Config, variant: Variant, test: str, **more: Any) -> Ca
         folder=this.use(),
         changes={**settings, **chosen.changes_of(name), **variant.changes},
         spec=chosen.specs.get(name),
-        robot=chosen.robot,
+        robot=chosen.robots[variant.robot],
         display=_display(this) if mode == "gui" and not elsewhere else None,
         protocol=PROTOCOLS[options.value(config, "sim_protocol")],
         trace=recording.trace_mode(config),
@@ -205,7 +205,9 @@ def replay(request: pytest.FixtureRequest, simbench_case_here: Case) -> Callable
     from pytest_simbench.plugin.repeatability import ReplayFixture
 
     jobs = options.value(request.config, "sim_jobs")
-    run = ReplayFixture(simbench_case_here, session_of(request.config).run.displays, jobs)
+    session = session_of(request.config)
+    skips = session.selection.every_robot
+    run = ReplayFixture(simbench_case_here, session.run.displays, jobs, skips)
     return lambda task, **more: run(arguments.checked_task(task, "replay"), **more)
 
 
@@ -228,7 +230,7 @@ def perturb(
 
     def perturb_task(task: Task) -> Perturber:
         experiment = Experiment(simbench_case_here, arguments.checked_task(task, "perturb"))
-        arguments.can_do(experiment)
+        arguments.can_do(experiment, session_of(request.config).selection.every_robot)
         return Perturber(Episodes(experiment, handle), strict)
 
     with closing(own):
@@ -259,11 +261,18 @@ def data_set(request: pytest.FixtureRequest) -> Callable[[str], Any]:
 
 
 @pytest.fixture(scope="session")
-def robot(request: pytest.FixtureRequest) -> Robot:
+def robot(simbench_robot: Robot) -> Robot:
     """The robot of `--robot`, the Panda by default: `Scene("s", (), robot)`."""
+    return simbench_robot
+
+
+@pytest.fixture(scope="session")
+def simbench_robot(request: pytest.FixtureRequest) -> Robot:
+    """The test's robot, whatever is named `robot` here."""
     from pytest_simbench.robot.panda import panda
 
-    return session_of(request.config).selection.robot or panda()
+    robots = session_of(request.config).selection.robots
+    return robots[getattr(request, "param", next(iter(robots)))] or panda()
 
 
 @pytest.fixture(scope="session")

@@ -78,6 +78,8 @@ def pytest_cmdline_main(config: pytest.Config) -> int | None:
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "sim_case" in metafunc.fixturenames:
         session_of(metafunc.config).parametrize(metafunc)
+    elif "simbench_robot" in metafunc.fixturenames:
+        session_of(metafunc.config).parametrize_robot(metafunc)
 
 
 @pytest.hookimpl(tryfirst=True)  # before -k and -m leave out tests

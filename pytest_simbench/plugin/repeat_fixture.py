@@ -20,6 +20,7 @@ from pytest_simbench.plugin.arguments import can_do
 from pytest_simbench.plugin.benchmark import give_rounds
 from pytest_simbench.plugin.resume import NotResumed
 from pytest_simbench.plugin.selection import number_mark
+from pytest_simbench.plugin.session import session_of
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.text import in_one_line
@@ -49,7 +50,8 @@ class RepeatFixture:
     def __call__(self, task: Task) -> ResultSet:
         """Run a task's repetitions, as many as options and marks say."""
         wanted = options.repetitions(self.node.config)
-        experiment = can_do(Experiment(self.case, task))
+        skips = session_of(self.node.config).selection.every_robot
+        experiment = can_do(Experiment(self.case, task), skips)
         experiment = experiment.in_case(attempt=self.run.begin(experiment))
         with _refusals_fail_the_test():
             found = self.run.take(experiment, wanted if isinstance(wanted, int) else None)

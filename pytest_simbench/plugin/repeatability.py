@@ -44,12 +44,14 @@ class ReplayFixture:
         case: simulator and settings.
         displays: for a window, if the case has none.
         jobs: how many workers may run side by side.
+        skips: skip what the robot cannot do (`can_do`).
     """
 
-    def __init__(self, case: Case, displays: Displays, jobs: int) -> None:
+    def __init__(self, case: Case, displays: Displays, jobs: int, skips: bool) -> None:
         self.case = case
         self.displays = displays
         self.jobs = jobs
+        self.skips = skips
 
     def __call__(self, task: Task, **options: Any) -> Replay:
         """Run the first seed of a task, and again in every way."""
@@ -59,7 +61,7 @@ class ReplayFixture:
             def handle(case: Case) -> SimulatorHandle:
                 return stack.enter_context(closing(SimulatorHandle(case)))
 
-            episodes = Episodes(can_do(Experiment(case, task)), handle(case))
+            episodes = Episodes(can_do(Experiment(case, task), self.skips), handle(case))
             result = replay(
                 episodes,
                 claims=Capability.DETERMINISTIC in info.capabilities,

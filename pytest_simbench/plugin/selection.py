@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -36,7 +36,7 @@ class Selection:
         changes: simulator name to changed settings, as texts; those of a bare name hold for all
             of its versions.
         pythons, specs: simulator name to interpreter or execnet specification.
-        robot: that does the tasks; None for the tasks' own, the Panda.
+        robots: that do the tasks, by name; "" for the tasks' own, the Panda.
         nodes: of the cluster that carries repetitions out; none for this machine.
         sweep: time steps to make each test for [s]; True for those around each profile's own, None
             for these alone.
@@ -49,16 +49,25 @@ class Selection:
     changes: dict[str, dict[str, str]] = field(default_factory=dict)
     pythons: dict[str, str] = field(default_factory=dict)
     specs: dict[str, str] = field(default_factory=dict)
-    robot: Robot | None = None
+    robots: Mapping[str, Robot | None] = field(default_factory=lambda: {"": None})
     nodes: tuple[Node, ...] = ()
     sweep: bool | tuple[float, ...] | None = None
 
+    @property
+    def every_robot(self) -> bool:
+        """Whether what a robot cannot do is no error: nobody asked for it by name."""
+        return len(self.robots) > 1
+
     def id_of(self, variant: Variant) -> str:
         """Of the parameter of a test; the default robot adds nothing."""
-        return variant.id_with(self.robot.name if self.robot else "", len(self.profiles))
+        return variant.id_with(len(self.profiles))
 
     def variants(self, name: str, mode: str) -> list[Variant]:
         """What a test is made for, of one simulator and mode."""
+        found = self._of_one_robot(name, mode)
+        return [variant._replace(robot=robot) for robot in self.robots for variant in found]
+
+    def _of_one_robot(self, name: str, mode: str) -> list[Variant]:
         from pytest_simbench.simulator.registry import problem
 
         found = []
@@ -190,7 +199,7 @@ def _select(config: pytest.Config) -> Selection:
         changes,
         {**builds, **pythons},
         specs,
-        _robot(options.value(config, "sim_robot")),
+        _robots(options.value(config, "sim_robot")),
         cluster.nodes(config),
         sweep,
     )
@@ -219,17 +228,21 @@ def _installs(config: pytest.Config) -> bool:
     return here and any(options.value(config, name) for name in asked)
 
 
-def _robot(text: str | None) -> Robot | None:
-    """The robot of that name or file; None for the one that the tasks have anyway."""
-    if text is None:
-        return None
-    from pytest_simbench.robot.errors import RobotError
-    from pytest_simbench.robot.registry import DEFAULT, find
+EVERY = "all"
+"""Every built-in robot, as the value of `--robot`."""
 
-    if text == DEFAULT:
-        return None
+
+def _robots(text: str | None) -> Mapping[str, Robot | None]:
+    """The robots of that name or file; "" for the one that the tasks have anyway."""
+    if text is None:
+        return {"": None}
+    from pytest_simbench.robot.errors import RobotError
+    from pytest_simbench.robot.registry import BUILT_IN, DEFAULT, find
+
+    names = BUILT_IN if text == EVERY else [text]
     try:
-        return find(text)
+        found = [None if name == DEFAULT else find(name) for name in names]
+        return {"" if robot is None else robot.name: robot for robot in found}
     except RobotError as error:
         raise pytest.UsageError(f"--robot={shown(text)}: {error}") from None
 

@@ -121,7 +121,23 @@ class SimSession:
                 raise
             self.problems.append(str(error))
             chosen = [NOTHING]
-        metafunc.parametrize("sim_case", chosen, indirect=True, scope="session")
+        names = ["sim_case"]
+        if "simbench_robot" in metafunc.fixturenames and self.selection.every_robot:
+            names.append("simbench_robot")
+            chosen = [
+                pytest.param(*case.values, case.values[0].robot, id=case.id, marks=case.marks)
+                for case in chosen
+            ]
+        metafunc.parametrize(names, chosen, indirect=True, scope="session")
+
+    def parametrize_robot(self, metafunc: pytest.Metafunc) -> None:
+        """Make a test of each robot, if there are several; it takes no simulator."""
+        robots = self.selection.robots
+        if self.selection.every_robot:
+            ids = [name or "panda" for name in robots]
+            metafunc.parametrize(
+                "simbench_robot", list(robots), ids=ids, indirect=True, scope="session"
+            )
 
     def check_collected(self, items: list[pytest.Item]) -> None:
         """Complain of marks, and have pytest-benchmark take the workers' seconds."""

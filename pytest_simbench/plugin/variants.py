@@ -1,7 +1,8 @@
-"""What a test is made for: a simulator in a mode, at a settings profile, at a time step.
+"""What a test is made for: a simulator in a mode, at a settings profile, at a time step, with a
+robot.
 
-A profile and a step that a run has anyway add nothing to a test's id, so that the same test keeps
-its name in a run of one profile, in one of two, and in a sweep."""
+A profile, a step and a robot that a run has anyway add nothing to a test's id, so that the same
+test keeps its name in a run of one profile, in one of two, and in a sweep."""
 
 from __future__ import annotations
 
@@ -28,6 +29,7 @@ class Variant(NamedTuple):
         simulator, mode, profile: as in `Case`.
         timestep: of a sweep [s]; None for the profile's own.
         own_timestep: the profile's own [s], where `timestep` is another.
+        robot: its name; empty for the tasks' own.
     """
 
     simulator: str
@@ -35,6 +37,7 @@ class Variant(NamedTuple):
     profile: str
     timestep: float | None = None
     own_timestep: float | None = None
+    robot: str = ""
 
     @property
     def swept(self) -> bool:
@@ -46,16 +49,11 @@ class Variant(NamedTuple):
         """The settings that it changes."""
         return {} if self.timestep is None else {"timestep": self.timestep}
 
-    def id_with(self, robot: str, profiles: int) -> str:
-        """Its part of a test's id.
-
-        Args:
-            robot: its name; empty for the tasks' own.
-            profiles: how many the run has.
-        """
+    def id_with(self, profiles: int) -> str:
+        """Its part of a test's id, in a run of so many profiles."""
         profile = self.profile if profiles > 1 and self.profile != USUAL else ""
         step = "" if self.timestep is None else f"dt={step_text(self.timestep)}"
-        return "-".join(filter(None, [self.simulator, self.mode, robot, profile, step]))
+        return "-".join(filter(None, [self.simulator, self.mode, self.robot, profile, step]))
 
 
 def variants(

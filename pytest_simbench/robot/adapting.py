@@ -19,6 +19,10 @@ TURNS = 2 * math.pi
 """How far a joint that turns without end may go to each side, where no limits stand beside it
 [rad]: one turn, as the makers of such arms write it."""
 
+FRAME_MASS = 1e-6
+"""A link without shapes that weighs no more than this marks a frame [kg]: onshape-to-robot, which
+many small arms come from, gives its frames 1e-9 kg and no inertia."""
+
 TOOL_LINK, TOOL_JOINT = "tool_centre_point", "joint_of_the_tool_centre_point"
 
 
@@ -37,6 +41,29 @@ def bound_joints(robot: ET.Element) -> bool:
         if "lower" not in limit.attrib and "upper" not in limit.attrib:
             limit.attrib.update(lower=repr(-TURNS), upper=repr(TURNS))
     return bool(endless)
+
+
+def free_frames(robot: ET.Element) -> bool:
+    """Take the mass from links that only mark a frame: a body of no inertia has none.
+
+    Returns:
+        Whether there were any.
+    """
+    found = False
+    for link in robot.findall("link"):
+        masses = link.findall("inertial/mass")
+        if link.find("collision") is None and any(map(_negligible, masses)):
+            for inertial in link.findall("inertial"):
+                link.remove(inertial)
+            found = True
+    return found
+
+
+def _negligible(mass: ET.Element) -> bool:
+    try:
+        return 0.0 < float(mass.get("value", "")) <= FRAME_MASS
+    except ValueError:
+        return False  # `Description` says so
 
 
 def lock_joints(robot: ET.Element, positions: Mapping[str, float]) -> None:

@@ -34,7 +34,7 @@ class PlanningScene:
     against the world.
 
     Attributes:
-        opening: position of each finger that is assumed in every check [m].
+        opening: position of each finger that is assumed in every check [m, or rad].
         held: name of the cube in the hand, or None.
     """
 

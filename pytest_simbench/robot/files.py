@@ -16,9 +16,16 @@ from typing import NamedTuple
 import numpy as np
 
 from pytest_simbench.robot import panda
-from pytest_simbench.robot.adapting import TOOL_LINK, add_tool, bound_joints, lock_joints
+from pytest_simbench.robot.adapting import (
+    TOOL_LINK,
+    add_tool,
+    bound_joints,
+    free_frames,
+    lock_joints,
+)
 from pytest_simbench.robot.collision import PlanningScene
 from pytest_simbench.robot.errors import RobotError
+from pytest_simbench.robot.hulls import with_hulls
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.mounting import mounted, pairs_not_checked
 from pytest_simbench.robot.table import Table
@@ -39,6 +46,9 @@ LARGEST_FILE = 2**20
 
 SMALLEST = 1e-6
 """What must be above zero is at least this."""
+
+FEWEST_CORNERS = 50
+"""Of a mesh's hull. With fewer a ball of 5 cm radius stands back by more than 4 mm."""
 
 JERK = 100.0
 """Jerk limit where a file has none, as a multiple of the acceleration limit [1/s]: the
@@ -96,8 +106,13 @@ class _Reader:
         self._locked, self._changed = table.numbers("locked"), False
         description = Description(self.urdf, self.packages, self._adapt)
         self.moving = _moving(description.joints)
-        if self._changed:
+        corners = table.number("hull_corners", 0.0, least=0.0)
+        if corners and (corners < FEWEST_CORNERS or corners != int(corners)):
+            raise table.error("hull_corners", f"give a whole number of at least {FEWEST_CORNERS}")
+        if self._changed or corners:
             kept = content(description, self.name)
+            if corners:
+                kept = with_hulls(kept, int(corners))
             self.urdf, self.packages = str(keep(kept["urdf"], kept["meshes"])), {}
 
     def read(self) -> Robot:
@@ -132,7 +147,8 @@ class _Reader:
 
     def _adapt(self, urdf: ET.Element) -> None:
         """Make of the user's URDF what tasks can use."""
-        self._changed = bound_joints(urdf) or bool(self._locked)
+        changes = [bound_joints(urdf), free_frames(urdf), bool(self._locked)]
+        self._changed = any(changes)
         _check_moving(self.table, "locked", self._locked, _moving(urdf.findall("joint")))
         lock_joints(urdf, self._locked)
 
@@ -283,11 +299,12 @@ def _standing(robot: Robot) -> Robot:
 
 def levers_of(model: RobotModel) -> tuple[float, ...]:
     """How far the fingertips can be from each arm joint's axis at most [m]: the lengths from joint
-    to joint up to the tool frame, and the opening of the hand."""
+    to joint up to the tool frame, and the opening of the hand, which for a jaw that turns is the
+    arc of its tip."""
     offsets = [
         float(np.linalg.norm(model.pin.jointPlacements[joint].translation))
         for joint in range(1, model.arm + 1)
     ]
     tool = float(np.linalg.norm(model.pin.frames[model.tool].placement.translation))
-    rest = tool + model.robot.gripper.opened
+    rest = tool + model.robot.gripper.opened * model.finger_lever
     return tuple(sum(offsets[joint + 1 :]) + rest for joint in range(model.arm))

@@ -64,10 +64,35 @@ class RobotModel:
         return self.robot.limits
 
     @property
+    def reach(self) -> float:
+        """How far the tool can be from the axis of the first joint at most [m]: the lengths from
+        joint to joint, and to the tool frame."""
+        ends = [self.pin.jointPlacements[joint] for joint in range(2, self.arm + 1)]
+        ends.append(self.pin.frames[self.tool].placement)
+        return sum(float(np.linalg.norm(end.translation)) for end in ends)
+
+    @property
     def has_parallel_fingers(self) -> bool:
         """Whether the hand is two fingers that slide."""
         kinds = [joint.shortname() for joint in list(self.pin.joints)[self.arm + 1 :]]
         return len(kinds) == 2 and all(kind.startswith("JointModelP") for kind in kinds)
+
+    @property
+    def finger_unit(self) -> str:
+        """Of the fingers' positions: "m" where they slide, "rad" where one turns."""
+        joints = list(self.pin.joints)[self.arm + 1 :]
+        slide = all(joint.shortname().startswith("JointModelP") for joint in joints)
+        return "m" if slide else "rad"
+
+    @property
+    def finger_lever(self) -> float:
+        """How far a fingertip moves for 1 of its joint's position: 1 [m/m] for fingers that slide;
+        for those that turn, from the axis of the first to the tool centre point [m/rad]."""
+        if self.finger_unit == "m":
+            return 1.0
+        axis = self.pin.jointPlacements[self.arm + 1].translation
+        tip = self.pin.frames[self.tool].placement.translation
+        return float(np.linalg.norm(tip - axis))
 
     def full(self, arm: FloatArray) -> FloatArray:
         """Arm joints (arm,) with the fingers at their start appended, (n_joints,)."""

@@ -151,7 +151,7 @@ class MotionPlanner:
     def move_fingers(
         self, arm: FloatArray, opening: float, target: float, hold: float
     ) -> Trajectory:
-        """Fingers from `opening` to `target` [m] at their speed, then `hold` [s] more."""
+        """Fingers from `opening` to `target` [m, or rad] at their speed, then `hold` [s] more."""
         steps = int(np.ceil(abs(target - opening) / self.limits.finger_speed / TICK))
         rows = steps + int(np.ceil(hold / TICK)) + 1
         ramp = np.interp(np.arange(rows), [0, max(1, steps)], [opening, target])

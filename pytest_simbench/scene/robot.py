@@ -59,10 +59,11 @@ class Gripper:
 
     Attributes:
         joints: names of its finger joints, coupled and commanded together.
-        opened: position of each finger, open [m].
-        closed: position commanded to grasp, beyond the object's surface [m].
-        squeeze: the force each finger then presses with [N]: its effort limit. The commanded
-            position lies so deep that the drive saturates, and every engine squeezes alike.
+        opened: position of each finger, open [m]; of a jaw that turns [rad].
+        closed: position commanded to grasp, beyond the object's surface [m], or [rad].
+        squeeze: the force each finger then presses with [N], of a jaw that turns the torque [N m]:
+            its effort limit. The commanded position lies so deep that the drive saturates, and
+            every engine squeezes alike.
     """
 
     joints: tuple[str, ...]
@@ -100,7 +101,7 @@ class MotionLimits:
         jerk: [rad/s^3].
         levers: distance of the fingertips from each arm joint's axis [m]: a turn of joint i by dq
             moves them about levers[i] dq. Collisions are checked by it.
-        finger_speed: of each finger [m/s].
+        finger_speed: of each finger [m/s]; of a jaw that turns [rad/s].
     """
 
     velocity: tuple[float, ...]

@@ -77,7 +77,7 @@ class Manipulator:
     Attributes:
         world: the simulated world.
         arm: commanded arm joints, (arm,) [rad].
-        fingers: commanded finger position [m].
+        fingers: commanded finger position [m], of a jaw that turns [rad].
         held: name of the cube in the hand, or None.
     """
 

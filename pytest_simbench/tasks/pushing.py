@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -21,8 +21,9 @@ from pytest_simbench.robot.errors import PlanningError, Unreachable
 from pytest_simbench.robot.kinematics import inverse_kinematics, tool_over, tool_path
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import panda
-from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene
+from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene, Vector3
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, distance, generators
+from pytest_simbench.tasks.layout import scale_of
 from pytest_simbench.tasks.manipulator import APPROACH, Manipulator
 from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.moments import Moment
@@ -66,10 +67,11 @@ class Pushing(Task):
     """Push a block.
 
     Attributes:
-        length: of the way of the block's centre [m].
+        length: of the way of the block's centre [m]. This, like all lengths here, is that of an arm
+            of full reach; a smaller one has a smaller scene (`scale`).
         turn: by which the block's heading turns on the way, evenly [rad]; 0: a straight line.
-        tool_speed: mean speed of the hand [m/s]. At 0.05 a block that is let go slides on by
-            0.25 mm (v^2 / 2 mu g), so the push is quasi-static.
+        tool_speed: mean speed of the hand [m/s], scaled as the lengths are. At 0.05 a block that is
+            let go slides on by 0.25 mm (v^2 / 2 mu g), so the push is quasi-static.
         settle: from the end of the push to the count [s].
         robot: that pushes; None: the Panda.
     """
@@ -91,6 +93,31 @@ class Pushing(Task):
         return replace(self.robot or panda(), friction=FRICTION)
 
     @property
+    def scale(self) -> float:
+        """All lengths and the speed over those of an arm of full reach: 0.5 for the SO-101."""
+        return scale_of(self.arm)
+
+    @property
+    def way(self) -> float:
+        """How far the block's centre goes [m]."""
+        return self.length * self.scale
+
+    @property
+    def block(self) -> Vector3:
+        """Edges of the block [m]."""
+        x, y, z = BLOCK_SIZE
+        return x * self.scale, y * self.scale, z * self.scale
+
+    @property
+    def begin(self) -> Pose:
+        """Of the block."""
+        return Pose.at(*(self.scale * part for part in START.position))
+
+    def parameters(self) -> dict[str, Any]:
+        told = super().parameters()
+        return told if self.scale == 1.0 else told | {"task.scale": self.scale}
+
+    @property
     def metrics(self) -> tuple[Metric, ...]:
         return (
             Metric("position_error", "position error", unit="m", better="lower", least=0,
@@ -107,7 +134,7 @@ class Pushing(Task):
     @property
     def references(self) -> Mapping[str, float]:  # type: ignore[override]
         """Of quasi-static theory, where it keeps the block at rest against the hand."""
-        if abs(self.turn) * self.sharpest > self.length:
+        if abs(self.turn) * self.sharpest > self.way:
             return {}
         return {"position_error": 0.0, "heading_error": 0.0, "path_error": 0.0}
 
@@ -115,31 +142,33 @@ class Pushing(Task):
     def sharpest(self) -> float:
         """Radius of the sharpest curve round which the hand can push the block [m]."""
         _, width = _front(self.arm)
-        return smallest_turning_radius(BLOCK_SIZE[0], BLOCK_SIZE[1], width)
+        return smallest_turning_radius(self.block[0], self.block[1], width)
 
     def smoke(self) -> Pushing:
         return replace(self, length=self.length / 4, turn=self.turn / 4)
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
-        pose = jitter.disturbed(START, generators(seed)[0])
-        block = Box("block", BLOCK_SIZE, pose, BLOCK_MASS, FRICTION, RED)
+        pose = jitter.disturbed(self.begin, generators(seed)[0])
+        block = Box("block", self.block, pose, BLOCK_MASS * self.scale**3, FRICTION, RED)
         return Scene("pushing", (block,), self.arm, ground_friction=FRICTION)
 
     def at(self, way: float) -> Pose:
         """The block when its centre has gone so far along its way [m]; before the start, which is
         at 0, the way is straight."""
         if way <= 0.0 or self.turn == 0.0:
-            return START.translated(x=way)
-        radius, angle = self.length / self.turn, way / self.length * self.turn
-        moved = START.translated(x=radius * math.sin(angle), y=radius * (1 - math.cos(angle)))
+            return self.begin.translated(x=way)
+        radius, angle = self.way / self.turn, way / self.way * self.turn
+        moved = self.begin.translated(x=radius * math.sin(angle), y=radius * (1 - math.cos(angle)))
         return moved * Pose.at(0.0, 0.0, 0.0, yaw=angle)
 
     def tools(self) -> list[Pose]:
         """Tool poses of the push, from behind the block to the end of its way."""
         depth, _ = _front(self.arm)
-        behind = Pose.at(-BLOCK_SIZE[0] / 2 - depth, 0.0, TOOL_HEIGHT - START.position[2])
+        height = TOOL_HEIGHT * self.scale
+        behind = Pose.at(-self.block[0] / 2 - depth, 0.0, height - self.begin.position[2])
+        gap = GAP * self.scale
         steps = math.ceil((GAP + self.length) / SPACING)
-        ways = np.linspace(-GAP, self.length, steps + 1)
+        ways = np.linspace(-gap, self.way, steps + 1)
         return [tool_over(self.at(float(way)) * behind, self._heading(float(way))) for way in ways]
 
     def problem(self) -> str | None:
@@ -150,7 +179,7 @@ class Pushing(Task):
         first, *others = self.tools()
         try:
             above = inverse_kinematics(
-                model, first.translated(z=APPROACH), home, np.random.default_rng(0)
+                model, first.translated(z=APPROACH * self.scale), home, np.random.default_rng(0)
             )
             tool_path(model, inverse_kinematics(model, first, above), others)
         except Unreachable as error:
@@ -168,11 +197,15 @@ class Pushing(Task):
         try:
             with world.phase("approach"):
                 hand.close_hand()
-                hand.go_to_pose(first.translated(z=APPROACH), speed=hand.speeds.free)
+                above = first.translated(z=APPROACH * self.scale)
+                hand.go_to_pose(above, speed=hand.speeds.free)
                 hand.move_straight(first, speed=hand.speeds.contact)
             with world.phase("push"):
                 pushed = hand.move_along(
-                    others, tool_speed=self.tool_speed, ignored=("block",), log_period=SAMPLING
+                    others,
+                    tool_speed=self.tool_speed * self.scale,
+                    ignored=("block",),
+                    log_period=SAMPLING,
                 )
         except PlanningError as error:
             details["failed_push"] = str(error)
@@ -184,11 +217,11 @@ class Pushing(Task):
     def _score(
         self, end: Pose, pushed: Motion | None, count: Count, details: dict[str, object]
     ) -> Outcome:
-        goal = self.at(self.length)
+        goal = self.at(self.way)
         error = distance(end, goal)
         rows = np.empty((0, 13)) if pushed is None else pushed.bodies[:, 0]
         tilt = max(_tilt(pose) for pose in (end, *map(Pose.from_array, rows)))
-        count(int(error < GAP), 1)
+        count(int(error < GAP * self.scale), 1)
         return Outcome(
             {
                 "position_error": error,
@@ -200,11 +233,11 @@ class Pushing(Task):
         )
 
     def _heading(self, way: float) -> float:
-        return max(0.0, way) / self.length * self.turn
+        return max(0.0, way) / self.way * self.turn
 
     def _off_the_way(self, positions: FloatArray) -> float:
         """Largest distance on the ground from the way [m]."""
-        ways = np.linspace(0.0, self.length, 1 + math.ceil(self.length / 1e-4))  # to 0.05 mm
+        ways = np.linspace(0.0, self.way, 1 + math.ceil(self.way / 1e-4))  # to 0.05 mm
         points = np.array([self.at(float(way)).position[:2] for way in ways])
         gaps = np.linalg.norm(positions[:, None, :2] - points[None], axis=2)
         return float(gaps.min(axis=1).max())
@@ -227,7 +260,7 @@ class CurvePushing(Pushing):
 def _front(robot: Robot) -> tuple[float, float]:
     """Of the closed hand where it can touch the block."""
     planning = PlanningScene(RobotModel(robot), Scene("front", (), robot))
-    return planning.front(BLOCK_SIZE[2] - TOOL_HEIGHT)
+    return planning.front((BLOCK_SIZE[2] - TOOL_HEIGHT) * scale_of(robot))
 
 
 def _tilt(pose: Pose) -> float:

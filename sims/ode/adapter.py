@@ -303,5 +303,5 @@ class ODE(Simulator):
 def _check_hand(scene: Scene) -> None:
     """Refuse a hand before anything is built: what ODE frees half built crashes."""
     fingers = 0 if scene.robot is None else len(scene.robot.gripper.joints)
-    if fingers not in (0, 2):
-        raise NotSupportedError(f"ode couples two fingers; the robot's hand has {fingers}")
+    if fingers not in (0, 1, 2):
+        raise NotSupportedError(f"ode couples two fingers at most; the robot's hand has {fingers}")

@@ -120,7 +120,8 @@ def test_a_robot_of_unknown_files_needs_a_word(
     path = write_example(case, "robot", scene, TAPE)
     assert main([str(path)]) == 2
     assert (
-        "robot 'mine' is not known here (known: panda, ur10, ur5, xarm7)" in capsys.readouterr().err
+        "robot 'mine' is not known here (known: panda, so101, ur10, ur5, xarm7)"
+        in capsys.readouterr().err
     )
     assert read_example(path, tmp_path, trust_robot=True).scene == scene
     assert replay_command(path, case, scene).endswith(f"{path.name} --trust-robot")

@@ -137,10 +137,46 @@ def test_what_a_robot_or_a_task_cannot_do(pytester: pytest.Pytester) -> None:
     assert "robot" not in records("out")[0]  # the towers know no robot
 
 
+def test_every_robot(pytester: pytest.Pytester) -> None:
+    """What a robot cannot do is a skip with the reason, since nobody named it. A task without a
+    robot runs once. A test that takes a robot gets each, with a simulator and without."""
+    pytester.makepyfile(
+        HOLDING,
+        test_more="""
+            import pytest
+            from pytest_simbench.tasks import LeaningTowers, Stacking
+
+            def test_small(repeat, robot, sim_name):
+                if robot.name != "so101":
+                    pytest.skip("another time")
+                repeat(Stacking())
+
+            def test_without_a_robot(repeat):
+                repeat(LeaningTowers(margins=(0.01,), levels=1, settle=0.01))
+
+            def test_fixture(robot, request):
+                assert robot.name in request.node.name
+        """,
+    )
+    result = run(pytester, "--reps=1", "--robot=all", "--sim-output=out", "-rs", "-v")
+    result.assert_outcomes(passed=5 + 1 + 5, skipped=5 + 4)
+    names = ["panda", "so101", "ur10", "ur5", "xarm7"]
+    found = [record["test"] for record in records("out") if record["task"] == "holding"]
+    assert found == [
+        f"test_every_robot.py::test_holding[mujoco-headless{'-' * bool(i) + name * bool(i)}]"
+        for i, name in enumerate(names)
+    ]
+    text = result.stdout.str()
+    for name in names:
+        assert f"test_fixture[{name}]" in text
+    assert "--robot=all: robot 'so101' has no hand with two parallel fingers" in text
+    assert "--robot=all: the task 'leaning towers' has no robot, and ran once" in text
+
+
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        ("ur7", "*--robot=ur7: unknown robot 'ur7'; choose from panda, ur10, ur5, xarm7*"),
+        ("ur7", "*--robot=ur7: unknown robot 'ur7'; choose from panda, so101, ur10, ur5, xarm7*"),
         ("none.toml", "*--robot=none.toml: cannot read the robot file none.toml: No such file*"),
         ("bad.toml", "*--robot=bad.toml: bad.toml, [[]arm[]]: stiffness: -1 is no number of at*"),
     ],
@@ -160,6 +196,9 @@ def test_the_list_of_robots(pytester: pytest.Pytester) -> None:
     result.stdout.fnmatch_lines(
         [
             "panda: 7 arm joints, 2 fingers that open to 0.035 m, base at (0, 0, 0)",
+            "so101: 5 arm joints, one jaw that opens to 1 rad, base at (0, 0, 0)",
+            "    no stacking: robot 'so101' has no hand with two parallel fingers to grasp a cube",
+            "    no throwing: robot 'so101' has no *",
             "ur5: 6 arm joints, 2 fingers*",
             "small: 3 arm joints, 2 fingers that open to 0.04 m, base at (0.1, 0, 0.2)",
             "    no stacking: robot 'small' cannot handle a cube at (0.20, -0.30, 0.33): it is *",

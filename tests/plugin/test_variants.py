@@ -13,12 +13,12 @@ from pytest_simbench.simulator.settings import LARGEST_TIMESTEP, SHORTEST_TIMEST
 
 
 def test_what_is_usual_adds_nothing_to_an_id() -> None:
-    assert Variant("mujoco", "headless", "tuned").id_with("", 1) == "mujoco-headless"
-    assert Variant("mujoco", "headless", "default").id_with("", 1) == "mujoco-headless"
-    assert Variant("mujoco", "headless", "tuned").id_with("", 2) == "mujoco-headless"
-    assert Variant("mujoco", "headless", "default").id_with("", 2) == "mujoco-headless-default"
-    swept = Variant("mujoco", "gui", "real", 1 / 1920, 1 / 240)
-    assert swept.id_with("ur5", 2) == "mujoco-gui-ur5-real-dt=0.5208ms"
+    assert Variant("mujoco", "headless", "tuned").id_with(1) == "mujoco-headless"
+    assert Variant("mujoco", "headless", "default").id_with(1) == "mujoco-headless"
+    assert Variant("mujoco", "headless", "tuned").id_with(2) == "mujoco-headless"
+    assert Variant("mujoco", "headless", "default").id_with(2) == "mujoco-headless-default"
+    swept = Variant("mujoco", "gui", "real", 1 / 1920, 1 / 240, "ur5")
+    assert swept.id_with(2) == "mujoco-gui-ur5-real-dt=0.5208ms"
 
 
 def test_the_profiles_own_step_is_the_test_that_there_is_anyway() -> None:

@@ -38,7 +38,7 @@ def test_the_tables_are_up_to_date() -> None:
 def test_the_tables_of_pushing_are_up_to_date() -> None:
     told = "run `python docs/make_pushing.py`"
     assert make_pushing.PAGE.read_text("utf-8") == make_pushing.page(), told
-    assert make_pushing.page().count("| ODE |") == 4  # tuned, default, UR5, xArm 7
+    assert make_pushing.page().count("| ODE |") == 5  # tuned, default, UR5, xArm 7, SO-101
 
 
 def test_the_tables_of_laws_are_up_to_date() -> None:

@@ -52,6 +52,19 @@ def test_locked_joints_stand_where_the_moving_ones_would(
         assert np.allclose(found.homogeneous, expected.homogeneous, atol=1e-9)
 
 
+def test_a_link_that_only_marks_a_frame_has_no_mass(tmp_path: Path) -> None:
+    """As onshape-to-robot writes it: a billionth of a kilogram, and no inertia. A body of that kind
+    is refused all the same."""
+    nothing = """<inertial><mass value="1e-9"/>
+      <inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial>"""
+    urdf = URDF.replace('<link name="grip"/>', f'<link name="grip">{nothing}</link>')
+    told, plain = (RobotModel(read_robot(small_arm(tmp_path, TOML, text))) for text in (urdf, URDF))
+    assert told.pin.inertias[told.arm].mass == plain.pin.inertias[plain.arm].mass
+    shape = '<collision><geometry><box size="1 1 1"/></geometry></collision>'
+    with pytest.raises(RobotError, match="'grip' has the principal moments 0, 0, 0"):
+        read_robot(small_arm(tmp_path, TOML, urdf.replace(nothing, nothing + shape)))
+
+
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=8)
 @given(angle=st.floats(-2.5, 2.5), seed=st.integers(0, 99))
 def test_a_locked_turning_joint_stands_at_its_angle(

@@ -19,6 +19,7 @@ from pytest_simbench.robot.kinematics import (
 )
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import panda
+from pytest_simbench.robot.registry import find
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks.stacking import GRID, TABLE_TOP, TOWERS
 
@@ -45,6 +46,26 @@ def test_forward_kinematics_inverts_it(shares: list[float]) -> None:
     assert np.allclose(MODEL.tool_pose(found).matrix(), target.matrix(), atol=1e-5)
     assert (found >= MODEL.lower).all()
     assert (found <= MODEL.upper).all()
+
+
+@pytest.mark.parametrize("yaw", [-0.5, 0.0, 0.7, 2.0])
+def test_five_joints_point_a_tool_down_with_any_yaw(yaw: float) -> None:
+    """Its description is written with 6 digits, so the arm of the SO-101 tilts by 1e-5 rad."""
+    robot = find("so101")
+    model = RobotModel(robot)
+    tool = tool_over(Pose.at(0.2, 0.05, 0.03), yaw)
+    near = robot.column("initial_position")[: model.arm]
+    found = model.tool_pose(inverse_kinematics(model, tool, near, np.random.default_rng(0)))
+    assert found.position == pytest.approx(tool.position, abs=1e-6)
+    assert np.allclose(found.matrix(), tool.matrix(), atol=1e-4)
+
+
+def test_five_joints_cannot_turn_a_tool_as_they_like() -> None:
+    """Sideways out of the upright plane of the arm."""
+    model = RobotModel(find("so101"))
+    sideways = tool_over(Pose.at(0.2, 0.0, 0.1), 0.0) * Pose(quaternion=(0.9, 0.19**0.5, 0, 0))
+    with pytest.raises(Unreachable):
+        inverse_kinematics(model, sideways, np.zeros(5), np.random.default_rng(0), restarts=3)
 
 
 def test_out_of_reach_says_where(ready: FloatArray) -> None:

@@ -49,7 +49,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.mark.usefixtures("package")
 def test_a_package_registers_a_robot() -> None:
-    assert registry.known()[:4] == ["panda", "ur10", "ur5", "xarm7"]
+    assert registry.known()[:5] == ["panda", "so101", "ur10", "ur5", "xarm7"]
     assert "mine" in registry.known()
     assert registry.find("mine").name == "mine"
 

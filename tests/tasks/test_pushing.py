@@ -156,7 +156,7 @@ def test_the_jitter_disturbs_the_block() -> None:
     assert LINE.scene(7, EXACT).free_bodies[0].pose == START
 
 
-@pytest.mark.parametrize("name", ["panda", "ur5", "ur10", "xarm7"])
+@pytest.mark.parametrize("name", ["panda", "ur5", "ur10", "xarm7", "so101"])
 def test_a_built_in_robot_can_do_it(name: str) -> None:
     robot = find(name)
     assert CURVE.on(robot).problem() is None
@@ -169,6 +169,37 @@ def test_an_arm_takes_an_elbow_that_is_free() -> None:
     outcome, _ = perform(task, seed=3, jitter=EXACT, process=PushedProcess())
     assert "failed_push" not in outcome.details
     assert outcome.metrics["position_error"] == pytest.approx(0.0, abs=2e-4)
+
+
+def test_a_small_arm_has_a_scene_of_its_size() -> None:
+    """Half of all lengths for the SO-101, at the same density; nothing of the others changes."""
+    for name in ("panda", "ur5", "ur10", "xarm7"):
+        task = CURVE.on(find(name))
+        assert "task.scale" not in task.parameters()
+        assert task.scene(1, EXACT).free_bodies == CURVE.scene(1, EXACT).free_bodies
+    small = CURVE.on(find("so101"))
+    assert small.parameters()["task.scale"] == 0.5
+    (block,) = small.scene(1, EXACT).free_bodies
+    (large,) = CURVE.scene(1, EXACT).free_bodies
+    assert block.extents == pytest.approx(np.array(large.extents) / 2)
+    assert block.pose.position == pytest.approx(np.array(large.pose.position) / 2)
+    assert block.mass == pytest.approx(large.mass / 8)
+    end, full = small.at(small.way), CURVE.at(CURVE.way)
+    assert end.position == pytest.approx(np.array(full.position) / 2)
+    assert end.yaw == pytest.approx(full.yaw)
+    assert small.sharpest < small.way / small.turn  # so theory holds, and zero errors are right
+    assert small.references
+
+
+def test_the_smallest_arm_pushes_too(case: Case) -> None:
+    """One jaw that turns, five joints: the block goes where it should, within its jitter."""
+    case = replace(case_of(case, "mujoco"), robot=find("so101"))
+    record, error = Repetition(Experiment(case, LINE), 1).run()
+    assert error is None
+    assert "failed_push" not in record.details
+    assert record.metrics["position_error"] is not None
+    assert record.metrics["position_error"] < 0.0025
+    assert record.metrics["tipped"] == 0.0
 
 
 def test_what_a_robot_cannot_do_is_a_sentence(tmp_path: Path) -> None:
