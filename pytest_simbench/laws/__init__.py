@@ -58,6 +58,7 @@ from pytest_simbench.laws.joints import (
     PendulumPeriod,
     SphericalPendulum,
     SwingingSlider,
+    TwoPendulums,
 )
 from pytest_simbench.laws.meshes import MeshTwin, RimlessWheel
 from pytest_simbench.laws.rolling import (
@@ -99,7 +100,7 @@ LAWS: tuple[Law, ...] = (
     RestDepth(), RestForce(), Tower(), TowerForce(), HeavyOnTop(), Overhang(), TippingEdge(),
     TippingSlope(),
     GripHolds(), GripSlips(), GripSlipsDiagonally(),
-    PendulumPeriod(), CompoundPendulum(), PendulumEnergy(), DoublePendulum(),
+    PendulumPeriod(), CompoundPendulum(), TwoPendulums(), PendulumEnergy(), DoublePendulum(),
     DoublePendulumEnergy(), SwingingSlider(), SphericalPendulum(), StepResponse(),
     SpringAndDamper(), EffortLimit(), Tracking(), Sag(), FeedForward(),
     PushForce(), PushStraight(), PushTips(),

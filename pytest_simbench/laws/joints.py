@@ -19,7 +19,7 @@ from pytest_simbench.laws.base import (
     rounding,
     watch,
 )
-from pytest_simbench.laws.mechanisms import INERTIA_OF_A_POINT, Part, mechanism
+from pytest_simbench.laws.mechanisms import INERTIA_OF_A_POINT, MOUNT, Part, mechanism
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Scene, Vector3
 
 Y: Vector3 = (0.0, 1.0, 0.0)
@@ -123,6 +123,19 @@ class _Energy(_Passive):
         return float(np.abs(power).max())
 
 
+def _period(length: float, angle: float, mass: float, inertia: float) -> float:
+    """Of a pendulum let go at an angle [rad], see `PendulumPeriod` [s].
+
+    Args:
+        length: of its centre of mass from the hinge [m].
+        angle: at which it is let go [rad].
+        mass: [kg].
+        inertia: about the centre of mass [kg m^2].
+    """
+    slow = math.sqrt((mass * length**2 + inertia) / (mass * GRAVITY * length))
+    return 4 * slow * float(ellipk(math.sin(angle / 2) ** 2))
+
+
 @dataclass(frozen=True)
 class PendulumPeriod(_Passive):
     """A pendulum that is let go at the angle a swings with the period T = 4 sqrt(I / m g l)
@@ -142,9 +155,7 @@ class PendulumPeriod(_Passive):
 
     @property
     def period(self) -> float:
-        inertia = self.length**2 + INERTIA_OF_A_POINT
-        slow = math.sqrt(inertia / (GRAVITY * self.length))
-        return 4 * slow * float(ellipk(math.sin(self.angle / 2) ** 2))
+        return _period(self.length, self.angle, 1.0, INERTIA_OF_A_POINT)
 
     def measure(self, world: World) -> Reading:
         seen = watch(world, self.seconds)
@@ -172,8 +183,51 @@ class CompoundPendulum(PendulumPeriod):
 
     @property
     def period(self) -> float:
-        slow = math.sqrt((self.length**2 + self.inertia) / (GRAVITY * self.length))
-        return 4 * slow * float(ellipk(math.sin(self.angle / 2) ** 2))
+        return _period(self.length, self.angle, 1.0, self.inertia)
+
+
+@dataclass(frozen=True)
+class TwoPendulums(_Passive):
+    """Two pendulums that hang on one fixed mount do not know of each other (Newton: what cannot
+    move transmits no motion): each swings with its own period, that of `PendulumPeriod`, whatever
+    the other's length, mass and swing. Tolerance as there."""
+
+    name = "two_pendulums"
+    quantity: ClassVar[str] = "larger error of the two periods"
+    unit: ClassVar[str] = "s"
+
+    lengths: tuple[float, float] = (0.5, 0.2)
+    angles: tuple[float, float] = (1.0, -1.5)
+    masses: tuple[float, float] = (1.0, 5.0)
+    apart: float = 1.5
+    seconds: float = 3.6
+
+    def parts(self) -> tuple[Part, ...]:
+        made = []
+        for k, length in enumerate(self.lengths):
+            made.append(
+                Part(
+                    f"swing {k}",
+                    Y,
+                    (0.0, k * self.apart, 0.0),
+                    centre=(0.0, 0.0, -length),
+                    mass=self.masses[k],
+                    start=self.angles[k],
+                    on=MOUNT,
+                )
+            )
+        return tuple(made)
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        errors = []
+        for k, (length, angle, mass) in enumerate(
+            zip(self.lengths, self.angles, self.masses, strict=True)
+        ):
+            found = seen.crossings(seen.joints[:, 0, k])
+            period = float(found[1] - found[0]) if len(found) > 1 else self.seconds
+            errors.append(abs(period - _period(length, angle, mass, INERTIA_OF_A_POINT)))
+        return Reading(max(errors), 0.0, 2 * seen.dt)
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 from pytest_simbench.scene import Body, Box, Pose, Robot, Scene
+from pytest_simbench.simulator.robot_files import keep
 
 Fault = Callable[[Scene], Scene]
 
@@ -118,6 +120,20 @@ def acting(**values: Any) -> Fault:
     return bodies(change)
 
 
+def hung_on(part: str, joint: str) -> Fault:
+    """A joint of a mechanism hangs on another part, at the same place."""
+
+    def change(scene: Scene) -> Scene:
+        assert scene.robot is not None
+        xml = ET.parse(scene.robot.urdf)
+        for element in xml.iterfind(f"joint[@name='{joint}']/parent"):
+            element.set("link", f"{part} link")
+        urdf = str(keep(ET.tostring(xml.getroot(), encoding="unicode"), {}))
+        return replace(scene, robot=replace(scene.robot, urdf=urdf))
+
+    return change
+
+
 FAULTS: dict[str, Fault] = {
     **dict.fromkeys(("free_fall", "fall_speed", "oblique_gravity", "projectile"), heavier),
     "damped_fall": bodies(lambda body: replace(body, linear_damping=2 * body.linear_damping)),
@@ -166,6 +182,7 @@ FAULTS: dict[str, Fault] = {
         heavier,
     ),
     **dict.fromkeys(("step_response", "spring_damper", "sag"), drives(stiffness=1.5)),
+    "two_pendulums": hung_on("swing 0", "swing 1"),  # a chain in place of two
     "double_pendulum_energy": lambda scene: heavier(heavier(heavier(scene))),
     "effort_limit": drives(effort_limit=1.5),
     "tracking": drives(stiffness=0.01),
