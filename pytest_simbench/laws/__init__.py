@@ -60,6 +60,7 @@ from pytest_simbench.laws.joints import (
     SwingingSlider,
     TwoPendulums,
 )
+from pytest_simbench.laws.loops import FourBarClosure, FourBarSwing
 from pytest_simbench.laws.meshes import MeshTwin, RimlessWheel
 from pytest_simbench.laws.rolling import (
     FreeCylinder,
@@ -103,6 +104,7 @@ LAWS: tuple[Law, ...] = (
     PendulumPeriod(), CompoundPendulum(), TwoPendulums(), PendulumEnergy(), DoublePendulum(),
     DoublePendulumEnergy(), SwingingSlider(), SphericalPendulum(), StepResponse(),
     SpringAndDamper(), EffortLimit(), Tracking(), Sag(), FeedForward(),
+    FourBarClosure(), FourBarSwing(),
     PushForce(), PushStraight(), PushTips(),
 )  # fmt: skip
 """All of them, by phenomenon."""

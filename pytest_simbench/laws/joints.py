@@ -25,7 +25,7 @@ from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Scene, Ve
 Y: Vector3 = (0.0, 1.0, 0.0)
 
 
-class _Passive(Law):
+class Passive(Law):
     """A mechanism without drives that falls under gravity."""
 
     phenomenon = "joints"
@@ -47,7 +47,7 @@ class _Passive(Law):
 
         robot = self.build().robot
         assert robot is not None
-        model, n = _model(robot, self.gravity), len(robot.joints)
+        model, n = model_of(robot, self.gravity), len(robot.joints)
         data, no_effort = model.createData(), np.zeros(n)
 
         def change(_: float, state: FloatArray) -> FloatArray:
@@ -68,14 +68,14 @@ class _Passive(Law):
 
         robot = self.build().robot
         assert robot is not None
-        model = _model(robot, self.gravity)
+        model = model_of(robot, self.gravity)
         data = model.createData()
         kinetic = [pin.computeKineticEnergy(model, data, q, v) for q, v in seen.joints]
         potential = [pin.computePotentialEnergy(model, data, q) for q, _ in seen.joints]
         return np.array(kinetic), np.array(potential)
 
 
-def _model(robot: Robot, gravity: Vector3):  # type: ignore[no-untyped-def]  # Pinocchio has no types
+def model_of(robot: Robot, gravity: Vector3):  # type: ignore[no-untyped-def]  # Pinocchio has no types
     from pytest_simbench.robot.model import RobotModel
 
     model = RobotModel(robot).pin
@@ -83,7 +83,7 @@ def _model(robot: Robot, gravity: Vector3):  # type: ignore[no-untyped-def]  # P
     return model
 
 
-class _Motion(_Passive):
+class Motion(Passive):
     """Where the joints are after a time, by the equations of motion."""
 
     quantity: ClassVar[str] = "largest distance of a joint from its place"
@@ -98,7 +98,7 @@ class _Motion(_Passive):
         return Reading(off, 0.0, late * seen.dt + rounding(float(np.abs(q).max()), seen.steps))
 
 
-class _Energy(_Passive):
+class _Energy(Passive):
     """The energy stays what it was."""
 
     quantity: ClassVar[str] = "largest change of the energy"
@@ -137,7 +137,7 @@ def _period(length: float, angle: float, mass: float, inertia: float) -> float:
 
 
 @dataclass(frozen=True)
-class PendulumPeriod(_Passive):
+class PendulumPeriod(Passive):
     """A pendulum that is let go at the angle a swings with the period T = 4 sqrt(I / m g l)
     K(sin^2(a / 2)), K the complete elliptic integral of the first kind (Landau, Lifshitz,
     Mechanics, section 11). Tolerance: late by one step, at each end of the period."""
@@ -187,7 +187,7 @@ class CompoundPendulum(PendulumPeriod):
 
 
 @dataclass(frozen=True)
-class TwoPendulums(_Passive):
+class TwoPendulums(Passive):
     """Two pendulums that hang on one fixed mount do not know of each other (Newton: what cannot
     move transmits no motion): each swings with its own period, that of `PendulumPeriod`, whatever
     the other's length, mass and swing. Tolerance as there."""
@@ -246,7 +246,7 @@ class PendulumEnergy(_Energy):
 
 
 @dataclass(frozen=True)
-class DoublePendulum(_Motion):
+class DoublePendulum(Motion):
     """Two pendulums, one hung on the other (Lagrange), against the equations of motion. Tolerance:
     late by one step, and a velocity that is late by one step all the time: |v| dt + |a| t dt."""
 
@@ -279,7 +279,7 @@ class DoublePendulumEnergy(_Energy):
 
 
 @dataclass(frozen=True)
-class SwingingSlider(_Motion):
+class SwingingSlider(Motion):
     """A mass slides without friction along a rod that swings: Coriolis force, centrifugal force and
     gravity, r'' = r q'^2 + g cos q, (I + m r^2) q'' = -m g r sin q - 2 m r r' q'. Tolerance as of
     `DoublePendulum`."""
@@ -294,7 +294,7 @@ class SwingingSlider(_Motion):
 
 
 @dataclass(frozen=True)
-class SphericalPendulum(_Motion):
+class SphericalPendulum(Motion):
     """A bob on two crossed hinges that moves out of their planes: gyroscopic terms of three
     dimensions, against the equations of motion. Tolerance as of `DoublePendulum`."""
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pytest_simbench.scene import Gripper, Joint, Pose, Robot, Vector3
+from pytest_simbench.scene import Closure, Gripper, Joint, Pose, Robot, Vector3
 from pytest_simbench.simulator.robot_files import keep
 
 WIDEST = 6.0
@@ -72,7 +72,13 @@ class Part:
         return Joint(self.name, self.stiffness, self.damping, self.effort, 0.0, self.start)
 
 
-def mechanism(name: str, *parts: Part, base: Pose | None = None, friction: float = 1.0) -> Robot:
+def mechanism(
+    name: str,
+    *parts: Part,
+    base: Pose | None = None,
+    friction: float = 1.0,
+    closures: tuple[Closure, ...] = (),
+) -> Robot:
     """Parts that hang on each other, and the first on the mount, fixed in the world at `base`.
 
     Raises:
@@ -114,6 +120,7 @@ def mechanism(name: str, *parts: Part, base: Pose | None = None, friction: float
         tool_frame=above,
         base=base or Pose.at(0.0, 0.0, 2.0),
         friction=friction,
+        closures=closures,
     )
 
 

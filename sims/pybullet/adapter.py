@@ -32,8 +32,10 @@ from pytest_simbench.simulator import (
     heavy,
     lazy_import,
 )
+from pytest_simbench.simulator.loops import reduced
 from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
 
+from .loops import close_loop
 from .readback import ReadBack
 from .world import ROBOT, PyBulletSettings, add_body, set_surface
 
@@ -63,6 +65,7 @@ class PyBullet(Simulator):
                 Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
+                Capability.LOOPS,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -170,6 +173,7 @@ class PyBullet(Simulator):
         self.prepared = None
         self._robot = -1
         self._couplings: list[int] = []
+        self._closures: list[int] = []
         self._joints: list[int] = []
         self._links: dict[str, int] = {}
         if scene.robot is not None:
@@ -208,6 +212,9 @@ class PyBullet(Simulator):
         self._couplings = [
             self._couple(index[first], index[second]) for first, second in robot.gripper.couplings
         ]
+        self._closures = [
+            close_loop(c, self._robot, self._links, closure) for closure in reduced(prepared)
+        ]
         n = len(self._joints)
         self._forces = list(robot.column("effort_limit"))
         self._gains = ([self.settings.position_gain] * n, [self.settings.velocity_gain] * n)
@@ -241,6 +248,7 @@ class PyBullet(Simulator):
             self._links,
             self._joints,
             self._couplings,
+            self._closures,
             self.prepared,
         ).all()
 

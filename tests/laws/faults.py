@@ -134,6 +134,12 @@ def hung_on(part: str, joint: str) -> Fault:
     return change
 
 
+def left_open(scene: Scene) -> Scene:
+    """Loops are not closed."""
+    assert scene.robot is not None
+    return replace(scene, robot=replace(scene.robot, closures=()))
+
+
 FAULTS: dict[str, Fault] = {
     **dict.fromkeys(("free_fall", "fall_speed", "oblique_gravity", "projectile"), heavier),
     "damped_fall": bodies(lambda body: replace(body, linear_damping=2 * body.linear_damping)),
@@ -186,6 +192,8 @@ FAULTS: dict[str, Fault] = {
     "double_pendulum_energy": lambda scene: heavier(heavier(heavier(scene))),
     "effort_limit": drives(effort_limit=1.5),
     "tracking": drives(stiffness=0.01),
+    "four_bar_closure": left_open,
+    "four_bar_swing": heavier,
     "push_force": rougher(1.5),
     "push_straight": moved(y=0.02),
     "push_tips": rougher(1.3),
