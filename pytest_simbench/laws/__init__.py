@@ -40,7 +40,9 @@ from pytest_simbench.laws.free import (
     Projectile,
     Spin,
     TumbleEnergy,
+    TumbleEnergyDrift,
     TumbleMomentum,
+    TumbleMomentumDrift,
 )
 from pytest_simbench.laws.hands import (
     GripHolds,
@@ -55,6 +57,7 @@ from pytest_simbench.laws.joints import (
     DoublePendulum,
     DoublePendulumEnergy,
     PendulumEnergy,
+    PendulumEnergyDrift,
     PendulumPeriod,
     SphericalPendulum,
     SwingingSlider,
@@ -90,7 +93,8 @@ from pytest_simbench.laws.wrenches import AxialForce, AxialTorque
 
 LAWS: tuple[Law, ...] = (
     FreeFall(), FallSpeed(), DampedFall(), ObliqueGravity(), Projectile(), Spin(), FreeTop(),
-    FreeCylinder(), TumbleEnergy(), TumbleMomentum(), AxialForce(), AxialTorque(),
+    FreeCylinder(), TumbleEnergy(), TumbleMomentum(),
+    TumbleEnergyDrift(), TumbleMomentumDrift(), AxialForce(), AxialTorque(),
     LandingTime(), DeadLanding(), DeadCollision(), CollisionMomentum(),
     BounceHeight(), BounceRatio(), ElasticChain(), ObliqueBounce(), ObliqueBounceStick(),
     StickAngle(), StickAngleAcross(), StickAngleDiagonal(), Creep(), Carried(),
@@ -101,7 +105,8 @@ LAWS: tuple[Law, ...] = (
     RestDepth(), RestForce(), Tower(), TowerForce(), HeavyOnTop(), Overhang(), TippingEdge(),
     TippingSlope(),
     GripHolds(), GripSlips(), GripSlipsDiagonally(),
-    PendulumPeriod(), CompoundPendulum(), TwoPendulums(), PendulumEnergy(), DoublePendulum(),
+    PendulumPeriod(), CompoundPendulum(), TwoPendulums(), PendulumEnergy(),
+    PendulumEnergyDrift(), DoublePendulum(),
     DoublePendulumEnergy(), SwingingSlider(), SphericalPendulum(), StepResponse(),
     SpringAndDamper(), EffortLimit(), Tracking(), Sag(), FeedForward(),
     FourBarClosure(), FourBarSwing(),

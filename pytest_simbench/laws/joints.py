@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -243,6 +243,20 @@ class PendulumEnergy(_Energy):
 
     def parts(self) -> tuple[Part, ...]:
         return (Part("swing", Y, centre=(0.0, 0.0, -0.1), start=1.5),)
+
+
+@dataclass(frozen=True)
+class PendulumEnergyDrift(PendulumEnergy):
+    """Over 100 periods the energy of that pendulum stays what it was, too. Tolerance as of
+    `PendulumEnergy`, whatever the number of periods: what a symplectic method is off by swings with
+    the pendulum and does not add up. Only rounding does. The protocol `smoke` takes 4 periods."""
+
+    name = "pendulum_energy_drift"
+
+    seconds: float = 100 * _period(0.1, 1.5, 1.0, INERTIA_OF_A_POINT)
+
+    def smoke(self) -> PendulumEnergyDrift:
+        return replace(self, seconds=self.seconds / 25)
 
 
 @dataclass(frozen=True)

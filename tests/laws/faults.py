@@ -148,6 +148,10 @@ FAULTS: dict[str, Fault] = {
     **dict.fromkeys(("spin", "glide"), faster(1.1)),
     "free_top": sized(0.2, 0.2, 0.4),
     **dict.fromkeys(("tumble_energy", "tumble_momentum"), sized(0.3, 0.1, 0.02)),
+    **dict.fromkeys(
+        ("tumble_energy_drift", "tumble_momentum_drift"),
+        bodies(lambda body: replace(body, angular_damping=0.01)),
+    ),
     "axial_force": acting(force=(10.0, 0.0, 0.0)),  # doubled
     "axial_torque": acting(end=9.0),  # it never ends
     "belt_speed": faster(0.9),
@@ -183,7 +187,7 @@ FAULTS: dict[str, Fault] = {
     **dict.fromkeys(
         (
             "pendulum_period", "compound_pendulum", "pendulum_energy", "double_pendulum",
-            "swinging_slider", "spherical_pendulum", "feed_forward",
+            "swinging_slider", "spherical_pendulum", "feed_forward", "pendulum_energy_drift",
         ),
         heavier,
     ),
