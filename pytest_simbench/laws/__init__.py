@@ -63,6 +63,7 @@ from pytest_simbench.laws.joints import (
     SwingingSlider,
     TwoPendulums,
 )
+from pytest_simbench.laws.loads import PendulumForce, PendulumTorque
 from pytest_simbench.laws.loops import FourBarClosure, FourBarSwing
 from pytest_simbench.laws.meshes import MeshTwin, RimlessWheel
 from pytest_simbench.laws.rolling import (
@@ -109,7 +110,7 @@ LAWS: tuple[Law, ...] = (
     PendulumEnergyDrift(), DoublePendulum(),
     DoublePendulumEnergy(), SwingingSlider(), SphericalPendulum(), StepResponse(),
     SpringAndDamper(), EffortLimit(), Tracking(), Sag(), FeedForward(),
-    FourBarClosure(), FourBarSwing(),
+    FourBarClosure(), FourBarSwing(), PendulumForce(), PendulumTorque(),
     PushForce(), PushStraight(), PushTips(),
 )  # fmt: skip
 """All of them, by phenomenon."""

@@ -24,6 +24,8 @@ class Capability(StrEnum):
     CONTACT_FORCES = "contact_forces"
     LOOPS = "loops"
     """Links may close loops, see `scene.Closure`."""
+    JOINT_WRENCHES = "joint_wrenches"
+    """It tells what each joint transmits."""
     DETERMINISTIC = "deterministic"
     GPU = "gpu"
 

@@ -197,6 +197,9 @@ class Server:
             total[pair] = total.get(pair, 0.0) + sign * np.asarray(wrench, dtype=float)
         return [(*pair, wrench) for pair, wrench in total.items()]
 
+    def do_joint_wrenches(self) -> Any:
+        return np.asarray(self._constructed().joint_wrenches(), dtype=float)
+
     def do_render(self, width: int, height: int) -> Any:
         return self._constructed().render(width, height)
 

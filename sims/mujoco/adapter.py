@@ -49,7 +49,7 @@ from .heavy import leave_out
 from .loops import close_loops
 from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack
-from .touching import contact_forces
+from .touching import contact_forces, joint_wrenches
 
 mujoco = lazy_import("mujoco")
 
@@ -109,6 +109,7 @@ class MuJoCo(Simulator):
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
                 Capability.LOOPS,
+                Capability.JOINT_WRENCHES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -319,6 +320,9 @@ class MuJoCo(Simulator):
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
         return contact_forces(self.model, self.data, self._numbers())
+
+    def joint_wrenches(self) -> FloatArray:
+        return joint_wrenches(self.model, self.data, self._numbers())
 
     def contact_count(self) -> int:
         return int(self.data.ncon)

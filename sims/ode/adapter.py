@@ -128,6 +128,7 @@ class ODE(Simulator):
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
                 Capability.LOOPS,
+                Capability.JOINT_WRENCHES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -292,6 +293,14 @@ class ODE(Simulator):
         if self._drives is not None and state.commanded is not None:
             self._drives.command(*state.commanded)
         library().dRandSetSeed(state.seed)
+
+    def joint_wrenches(self) -> FloatArray:
+        if self.prepared is None:
+            return np.empty((0, 6))
+        frames = {joint.name: self._links[joint.child].frame for joint in self.prepared.joints}
+        dt = self.settings.timestep
+        names = self.prepared.robot.joint_names
+        return np.array([self._axes[name].wrench(frames[name], dt) for name in names])
 
     def contact_count(self) -> int:
         return len(self.contacts.made)
