@@ -197,7 +197,7 @@ FAULTS: dict[str, Fault] = {
     "effort_limit": drives(effort_limit=1.5),
     "tracking": drives(stiffness=0.01),
     "four_bar_closure": left_open,
-    "four_bar_swing": heavier,
+    **dict.fromkeys(("four_bar_swing", "pendulum_force", "pendulum_torque"), heavier),
     "push_force": rougher(1.5),
     "push_straight": moved(y=0.02),
     "push_tips": rougher(1.3),
