@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, rounding, watch
+from pytest_simbench.laws.base import GRAVITY, LONG, Law, Reading, Watched, rounding, watch
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Vector3
 
 FREE = "free motion"
@@ -307,6 +307,7 @@ class _TumbleDrift(_Tumble):
     in a minute, at any usual step, and nothing could be asked of it."""
 
     omega: ClassVar[Vector3] = (2 / 120, 2.0, 2 / 120)
+    study_timeout: ClassVar[float] = LONG
 
     def rates(self) -> tuple[FloatArray, FloatArray]:
         """Angular velocity and acceleration in the body's frame, exactly, at even times, (n, 3)."""

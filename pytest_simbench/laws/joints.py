@@ -13,6 +13,7 @@ from scipy.special import ellipk
 from pytest_simbench.client.world import World
 from pytest_simbench.laws.base import (
     GRAVITY,
+    LONG,
     Law,
     Reading,
     Watched,
@@ -252,6 +253,7 @@ class PendulumEnergyDrift(PendulumEnergy):
     the pendulum and does not add up. Only rounding does. The protocol `smoke` takes 4 periods."""
 
     name = "pendulum_energy_drift"
+    study_timeout: ClassVar[float] = LONG
 
     seconds: float = 100 * _period(0.1, 1.5, 1.0, INERTIA_OF_A_POINT)
 

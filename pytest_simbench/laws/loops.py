@@ -25,6 +25,9 @@ crank turns round and no posture is dead (Grashof 1883)."""
 THIN = 1e-4
 """Moment of inertia of a rod about its own axis [kg m^2]; engines refuse 0."""
 
+LOOKS = 250
+"""At how many times, about, a loop is looked at."""
+
 H = 1e-4
 """Step of central differences in the crank's angle [rad]: off by H^2, a part in 1e8, and rounded to
 a part in 1e12, which the integrator below does not see."""
@@ -132,7 +135,8 @@ class FourBarClosure(_FourBar):
         assert robot is not None
         prepared = PreparedRobot(robot)
         (hinge,) = reduced(prepared)
-        pairs = (ends(prepared, hinge, q) for q in seen.joints[:, 0])
+        some = seen.joints[:: max(1, seen.steps // LOOKS), 0]
+        pairs = (ends(prepared, hinge, q) for q in some)
         worst = max(float(np.linalg.norm(first - second)) for first, second in pairs)
         _, v, _ = self.exact(self.seconds)
         fastest = CRANK * float(np.abs(v[:, 0]).max())
