@@ -225,6 +225,16 @@ class World:
             found[first, second], found[second, first] = wrench, -wrench
         return found
 
+    def joint_wrenches(self) -> FloatArray:
+        """What each joint transmitted in the last step, (n_joints, 6).
+
+        The wrench of the link above on the link below, of constraint and drive together: force [N],
+        and torque about the origin of the link below [N m], which is where the joint is; both in
+        the world frame.
+        """
+        wrenches: FloatArray = self.process.request("joint_wrenches")
+        return wrenches
+
     def render(self, width: int = 640, height: int = 480) -> NDArray[np.uint8]:
         """An offscreen picture, (height, width, 3)."""
         picture: NDArray[np.uint8] = self.process.request("render", width=width, height=height)

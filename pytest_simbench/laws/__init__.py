@@ -40,7 +40,9 @@ from pytest_simbench.laws.free import (
     Projectile,
     Spin,
     TumbleEnergy,
+    TumbleEnergyDrift,
     TumbleMomentum,
+    TumbleMomentumDrift,
 )
 from pytest_simbench.laws.hands import (
     GripHolds,
@@ -55,10 +57,14 @@ from pytest_simbench.laws.joints import (
     DoublePendulum,
     DoublePendulumEnergy,
     PendulumEnergy,
+    PendulumEnergyDrift,
     PendulumPeriod,
     SphericalPendulum,
     SwingingSlider,
+    TwoPendulums,
 )
+from pytest_simbench.laws.loads import PendulumForce, PendulumTorque
+from pytest_simbench.laws.loops import FourBarClosure, FourBarSwing
 from pytest_simbench.laws.meshes import MeshTwin, RimlessWheel
 from pytest_simbench.laws.rolling import (
     FreeCylinder,
@@ -88,7 +94,8 @@ from pytest_simbench.laws.wrenches import AxialForce, AxialTorque
 
 LAWS: tuple[Law, ...] = (
     FreeFall(), FallSpeed(), DampedFall(), ObliqueGravity(), Projectile(), Spin(), FreeTop(),
-    FreeCylinder(), TumbleEnergy(), TumbleMomentum(), AxialForce(), AxialTorque(),
+    FreeCylinder(), TumbleEnergy(), TumbleMomentum(),
+    TumbleEnergyDrift(), TumbleMomentumDrift(), AxialForce(), AxialTorque(),
     LandingTime(), DeadLanding(), DeadCollision(), CollisionMomentum(),
     BounceHeight(), BounceRatio(), ElasticChain(), ObliqueBounce(), ObliqueBounceStick(),
     StickAngle(), StickAngleAcross(), StickAngleDiagonal(), Creep(), Carried(),
@@ -99,9 +106,11 @@ LAWS: tuple[Law, ...] = (
     RestDepth(), RestForce(), Tower(), TowerForce(), HeavyOnTop(), Overhang(), TippingEdge(),
     TippingSlope(),
     GripHolds(), GripSlips(), GripSlipsDiagonally(),
-    PendulumPeriod(), CompoundPendulum(), PendulumEnergy(), DoublePendulum(),
+    PendulumPeriod(), CompoundPendulum(), TwoPendulums(), PendulumEnergy(),
+    PendulumEnergyDrift(), DoublePendulum(),
     DoublePendulumEnergy(), SwingingSlider(), SphericalPendulum(), StepResponse(),
     SpringAndDamper(), EffortLimit(), Tracking(), Sag(), FeedForward(),
+    FourBarClosure(), FourBarSwing(), PendulumForce(), PendulumTorque(),
     PushForce(), PushStraight(), PushTips(),
 )  # fmt: skip
 """All of them, by phenomenon."""

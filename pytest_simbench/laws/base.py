@@ -31,6 +31,10 @@ from pytest_simbench.tasks.phenomena import PHENOMENON
 GRAVITY = 9.80665
 """[m/s^2] (ISO 80000-3)."""
 
+LONG = 1200.0
+"""Time-out of a law over a minute or more of simulated time [s]: an engine that takes 1 s for each
+takes 4 at a step four times smaller, on a machine that does more than this."""
+
 LAW = "law"
 """Key of a record's details that holds what was read, see `Law.perform`."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, watch
+from pytest_simbench.laws.base import GRAVITY, LONG, Law, Reading, Watched, rounding, watch
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Vector3
 
 FREE = "free motion"
@@ -299,6 +299,78 @@ class TumbleMomentum(_Tumble):
         fastest = float(np.linalg.norm(self.omega))
         allowed = self.late(seen.dt, self.seconds) + fastest * seen.dt + rounding(2.0, seen.steps)
         return Reading(100 * worst, 0.0, 100 * allowed)
+
+
+class _TumbleDrift(_Tumble):
+    """The same for a minute, three times slower: 6 turns over. A first-order method adds to energy
+    and momentum in each step, and does not take it back: at 6 rad/s it may lose all that there is
+    in a minute, at any usual step, and nothing could be asked of it."""
+
+    omega: ClassVar[Vector3] = (2 / 120, 2.0, 2 / 120)
+    study_timeout: ClassVar[float] = LONG
+
+    def rates(self) -> tuple[FloatArray, FloatArray]:
+        """Angular velocity and acceleration in the body's frame, exactly, at even times, (n, 3)."""
+        omega, _ = self.fastest(self.seconds)
+        i = self.inertia
+        return omega, np.asarray(np.cross(i * omega, omega) / i)
+
+    def spun(self, seen: Watched) -> FloatArray:
+        """Angular velocity in the body's frame as it was seen, (n, 3)."""
+        rows = seen.bodies[:, 0]
+        return np.asarray(_rotation(rows[:, 3:7]).inv().apply(rows[:, 10:]))
+
+
+@dataclass(frozen=True)
+class TumbleEnergyDrift(_TumbleDrift):
+    """A body that turns over for a minute keeps its rotational energy E = w I w / 2 (Euler's
+    equations I w' = I w x w: w I w' = 0). Tolerance: explicit Euler adds w' I w' dt^2 / 2 to it in
+    each step, implicit Euler takes as much away; late by one step is twice that, dt times the sum
+    of w' I w' over the time, as a share of E. The protocol `smoke` takes 3 s."""
+
+    name = "tumble_energy_drift"
+    quantity: ClassVar[str] = "change of the energy"
+    unit: ClassVar[str] = "%"
+
+    seconds: float = 60.0
+
+    def smoke(self) -> TumbleEnergyDrift:
+        return replace(self, seconds=3.0)
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        start = float(self.inertia @ np.square(self.omega)) / 2
+        found = np.square(self.spun(seen)) @ self.inertia / 2
+        _, rate = self.rates()
+        share = float((np.square(rate) @ self.inertia).mean()) * self.seconds / start
+        allowed = share * seen.dt + rounding(2.0, seen.steps)
+        return Reading(100 * float(np.abs(found / start - 1).max()), 0.0, 100 * allowed)
+
+
+@dataclass(frozen=True)
+class TumbleMomentumDrift(_TumbleDrift):
+    """It keeps the size of its angular momentum I w (Euler: I w (I w)' = 0). Tolerance: explicit
+    Euler adds |I w'|^2 dt^2 to its square in each step, implicit Euler takes as much away, a half
+    of that to its size; late by one step is twice that, dt times the sum of |I w'|^2 over the time,
+    as a share of |I w|^2. The protocol `smoke` takes 3 s."""
+
+    name = "tumble_momentum_drift"
+    quantity: ClassVar[str] = "change of the angular momentum's size"
+    unit: ClassVar[str] = "%"
+
+    seconds: float = 60.0
+
+    def smoke(self) -> TumbleMomentumDrift:
+        return replace(self, seconds=3.0)
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        start = float(np.linalg.norm(self.inertia * self.omega))
+        found = np.linalg.norm(self.inertia * self.spun(seen), axis=1)
+        _, rate = self.rates()
+        share = float(np.square(self.inertia * rate).sum(axis=1).mean()) * self.seconds / start**2
+        allowed = share * seen.dt + rounding(2.0, seen.steps)
+        return Reading(100 * float(np.abs(found / start - 1).max()), 0.0, 100 * allowed)
 
 
 def _rotation(quaternion: FloatArray) -> Rotation:

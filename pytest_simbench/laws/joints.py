@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -13,19 +13,20 @@ from scipy.special import ellipk
 from pytest_simbench.client.world import World
 from pytest_simbench.laws.base import (
     GRAVITY,
+    LONG,
     Law,
     Reading,
     Watched,
     rounding,
     watch,
 )
-from pytest_simbench.laws.mechanisms import INERTIA_OF_A_POINT, Part, mechanism
+from pytest_simbench.laws.mechanisms import INERTIA_OF_A_POINT, MOUNT, Part, mechanism
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Scene, Vector3
 
 Y: Vector3 = (0.0, 1.0, 0.0)
 
 
-class _Passive(Law):
+class Passive(Law):
     """A mechanism without drives that falls under gravity."""
 
     phenomenon = "joints"
@@ -47,7 +48,7 @@ class _Passive(Law):
 
         robot = self.build().robot
         assert robot is not None
-        model, n = _model(robot, self.gravity), len(robot.joints)
+        model, n = model_of(robot, self.gravity), len(robot.joints)
         data, no_effort = model.createData(), np.zeros(n)
 
         def change(_: float, state: FloatArray) -> FloatArray:
@@ -68,14 +69,14 @@ class _Passive(Law):
 
         robot = self.build().robot
         assert robot is not None
-        model = _model(robot, self.gravity)
+        model = model_of(robot, self.gravity)
         data = model.createData()
         kinetic = [pin.computeKineticEnergy(model, data, q, v) for q, v in seen.joints]
         potential = [pin.computePotentialEnergy(model, data, q) for q, _ in seen.joints]
         return np.array(kinetic), np.array(potential)
 
 
-def _model(robot: Robot, gravity: Vector3):  # type: ignore[no-untyped-def]  # Pinocchio has no types
+def model_of(robot: Robot, gravity: Vector3):  # type: ignore[no-untyped-def]  # Pinocchio has no types
     from pytest_simbench.robot.model import RobotModel
 
     model = RobotModel(robot).pin
@@ -83,7 +84,7 @@ def _model(robot: Robot, gravity: Vector3):  # type: ignore[no-untyped-def]  # P
     return model
 
 
-class _Motion(_Passive):
+class Motion(Passive):
     """Where the joints are after a time, by the equations of motion."""
 
     quantity: ClassVar[str] = "largest distance of a joint from its place"
@@ -98,7 +99,7 @@ class _Motion(_Passive):
         return Reading(off, 0.0, late * seen.dt + rounding(float(np.abs(q).max()), seen.steps))
 
 
-class _Energy(_Passive):
+class _Energy(Passive):
     """The energy stays what it was."""
 
     quantity: ClassVar[str] = "largest change of the energy"
@@ -123,8 +124,21 @@ class _Energy(_Passive):
         return float(np.abs(power).max())
 
 
+def _period(length: float, angle: float, mass: float, inertia: float) -> float:
+    """Of a pendulum let go at an angle [rad], see `PendulumPeriod` [s].
+
+    Args:
+        length: of its centre of mass from the hinge [m].
+        angle: at which it is let go [rad].
+        mass: [kg].
+        inertia: about the centre of mass [kg m^2].
+    """
+    slow = math.sqrt((mass * length**2 + inertia) / (mass * GRAVITY * length))
+    return 4 * slow * float(ellipk(math.sin(angle / 2) ** 2))
+
+
 @dataclass(frozen=True)
-class PendulumPeriod(_Passive):
+class PendulumPeriod(Passive):
     """A pendulum that is let go at the angle a swings with the period T = 4 sqrt(I / m g l)
     K(sin^2(a / 2)), K the complete elliptic integral of the first kind (Landau, Lifshitz,
     Mechanics, section 11). Tolerance: late by one step, at each end of the period."""
@@ -142,9 +156,7 @@ class PendulumPeriod(_Passive):
 
     @property
     def period(self) -> float:
-        inertia = self.length**2 + INERTIA_OF_A_POINT
-        slow = math.sqrt(inertia / (GRAVITY * self.length))
-        return 4 * slow * float(ellipk(math.sin(self.angle / 2) ** 2))
+        return _period(self.length, self.angle, 1.0, INERTIA_OF_A_POINT)
 
     def measure(self, world: World) -> Reading:
         seen = watch(world, self.seconds)
@@ -172,8 +184,51 @@ class CompoundPendulum(PendulumPeriod):
 
     @property
     def period(self) -> float:
-        slow = math.sqrt((self.length**2 + self.inertia) / (GRAVITY * self.length))
-        return 4 * slow * float(ellipk(math.sin(self.angle / 2) ** 2))
+        return _period(self.length, self.angle, 1.0, self.inertia)
+
+
+@dataclass(frozen=True)
+class TwoPendulums(Passive):
+    """Two pendulums that hang on one fixed mount do not know of each other (Newton: what cannot
+    move transmits no motion): each swings with its own period, that of `PendulumPeriod`, whatever
+    the other's length, mass and swing. Tolerance as there."""
+
+    name = "two_pendulums"
+    quantity: ClassVar[str] = "larger error of the two periods"
+    unit: ClassVar[str] = "s"
+
+    lengths: tuple[float, float] = (0.5, 0.2)
+    angles: tuple[float, float] = (1.0, -1.5)
+    masses: tuple[float, float] = (1.0, 5.0)
+    apart: float = 1.5
+    seconds: float = 3.6
+
+    def parts(self) -> tuple[Part, ...]:
+        made = []
+        for k, length in enumerate(self.lengths):
+            made.append(
+                Part(
+                    f"swing {k}",
+                    Y,
+                    (0.0, k * self.apart, 0.0),
+                    centre=(0.0, 0.0, -length),
+                    mass=self.masses[k],
+                    start=self.angles[k],
+                    on=MOUNT,
+                )
+            )
+        return tuple(made)
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        errors = []
+        for k, (length, angle, mass) in enumerate(
+            zip(self.lengths, self.angles, self.masses, strict=True)
+        ):
+            found = seen.crossings(seen.joints[:, 0, k])
+            period = float(found[1] - found[0]) if len(found) > 1 else self.seconds
+            errors.append(abs(period - _period(length, angle, mass, INERTIA_OF_A_POINT)))
+        return Reading(max(errors), 0.0, 2 * seen.dt)
 
 
 @dataclass(frozen=True)
@@ -192,7 +247,22 @@ class PendulumEnergy(_Energy):
 
 
 @dataclass(frozen=True)
-class DoublePendulum(_Motion):
+class PendulumEnergyDrift(PendulumEnergy):
+    """Over 100 periods the energy of that pendulum stays what it was, too. Tolerance as of
+    `PendulumEnergy`, whatever the number of periods: what a symplectic method is off by swings with
+    the pendulum and does not add up. Only rounding does. The protocol `smoke` takes 4 periods."""
+
+    name = "pendulum_energy_drift"
+    study_timeout: ClassVar[float] = LONG
+
+    seconds: float = 100 * _period(0.1, 1.5, 1.0, INERTIA_OF_A_POINT)
+
+    def smoke(self) -> PendulumEnergyDrift:
+        return replace(self, seconds=self.seconds / 25)
+
+
+@dataclass(frozen=True)
+class DoublePendulum(Motion):
     """Two pendulums, one hung on the other (Lagrange), against the equations of motion. Tolerance:
     late by one step, and a velocity that is late by one step all the time: |v| dt + |a| t dt."""
 
@@ -225,7 +295,7 @@ class DoublePendulumEnergy(_Energy):
 
 
 @dataclass(frozen=True)
-class SwingingSlider(_Motion):
+class SwingingSlider(Motion):
     """A mass slides without friction along a rod that swings: Coriolis force, centrifugal force and
     gravity, r'' = r q'^2 + g cos q, (I + m r^2) q'' = -m g r sin q - 2 m r r' q'. Tolerance as of
     `DoublePendulum`."""
@@ -240,7 +310,7 @@ class SwingingSlider(_Motion):
 
 
 @dataclass(frozen=True)
-class SphericalPendulum(_Motion):
+class SphericalPendulum(Motion):
     """A bob on two crossed hinges that moves out of their planes: gyroscopic terms of three
     dimensions, against the equations of motion. Tolerance as of `DoublePendulum`."""
 

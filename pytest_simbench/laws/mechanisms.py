@@ -1,10 +1,14 @@
-"""Small mechanisms of rods and sliders, as robots without a hand."""
+"""Small mechanisms of rods and sliders, as robots without a hand.
+
+They are trees: each part hangs on another one, or on the mount, which is fixed in the world. So one
+mount carries several mechanisms that do not know of each other.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pytest_simbench.scene import Gripper, Joint, Pose, Robot, Vector3
+from pytest_simbench.scene import Closure, Gripper, Joint, Pose, Robot, Vector3
 from pytest_simbench.simulator.robot_files import keep
 
 WIDEST = 6.0
@@ -18,6 +22,9 @@ FREE = 1e-6
 than a millionth of all that acts here. Of 0, engines that divide by a stiffness make no number, and
 others no drive; one whose drives are no springs needs the small effort."""
 
+MOUNT = "mount"
+"""The part that is fixed in the world."""
+
 INERTIA_OF_A_POINT = 1e-4
 """Principal moments of a bob [kg m^2], m r^2 = 1 kg (1 cm)^2: engines refuse a point, which has
 none. The laws take it into account."""
@@ -29,7 +36,7 @@ class Part:
 
     Attributes:
         name: of the joint; the link is `NAME link`.
-        axis: of the joint, in the frame of the part before it.
+        axis: of the joint, in the frame of the part that it hangs on.
         offset: of the joint, there [m].
         centre: of mass, from the joint [m].
         mass: [kg].
@@ -39,6 +46,7 @@ class Part:
         stiffness, damping: of its drive, see `scene.Joint`; 0: the joint is free.
         effort: of its drive, at most [N m or N].
         shape: edges of a box about the centre of mass that collides [m]; None: nothing does.
+        on: name of the part that it hangs on, or `MOUNT`; None: on the one before it.
     """
 
     name: str
@@ -53,32 +61,54 @@ class Part:
     damping: float = 0.0
     effort: float = FREE
     shape: Vector3 | None = None
+    on: str | None = None
+
+    @property
+    def link(self) -> str:
+        return f"{self.name} link"
 
     @property
     def drive(self) -> Joint:
         return Joint(self.name, self.stiffness, self.damping, self.effort, 0.0, self.start)
 
 
-def mechanism(name: str, *parts: Part, base: Pose | None = None, friction: float = 1.0) -> Robot:
-    """A chain of parts that hangs on a link fixed in the world, at `base`."""
-    links = ['<link name="mount"/>']
+def mechanism(
+    name: str,
+    *parts: Part,
+    base: Pose | None = None,
+    friction: float = 1.0,
+    closures: tuple[Closure, ...] = (),
+) -> Robot:
+    """Parts that hang on each other, and the first on the mount, fixed in the world at `base`.
+
+    Raises:
+        ValueError: a part hangs on one that does not come before it.
+    """
+    links = [f'<link name="{MOUNT}"/>']
     joints = []
-    above = "mount"
+    places = {MOUNT: MOUNT}
+    above = MOUNT
     for part in parts:
+        if part.on is not None:
+            if part.on not in places:
+                raise ValueError(
+                    f"part {part.name!r} hangs on {part.on!r}; choose from {', '.join(places)}"
+                )
+            above = places[part.on]
         x, y, z = part.inertia
         kind, far = ("prismatic", FARTHEST) if part.slides else ("revolute", WIDEST)
         links.append(
-            f'<link name="{part.name} link"><inertial><origin xyz="{_spaced(part.centre)}"/>'
+            f'<link name="{part.link}"><inertial><origin xyz="{_spaced(part.centre)}"/>'
             f'<mass value="{part.mass!r}"/><inertia ixx="{x!r}" iyy="{y!r}" izz="{z!r}" '
             f'ixy="0" ixz="0" iyz="0"/></inertial>{_collision(part)}</link>'
         )
         joints.append(
             f'<joint name="{part.name}" type="{kind}"><parent link="{above}"/>'
-            f'<child link="{part.name} link"/><origin xyz="{_spaced(part.offset)}"/>'
+            f'<child link="{part.link}"/><origin xyz="{_spaced(part.offset)}"/>'
             f'<axis xyz="{_spaced(part.axis)}"/><limit lower="{-far!r}" upper="{far!r}" '
             f'effort="{part.effort!r}" velocity="1000"/></joint>'
         )
-        above = f"{part.name} link"
+        above = places[part.name] = part.link
     text = f'<robot name="{name}">\n' + "\n".join([*links, *joints]) + "\n</robot>\n"
     return Robot(
         name=name,
@@ -90,6 +120,7 @@ def mechanism(name: str, *parts: Part, base: Pose | None = None, friction: float
         tool_frame=above,
         base=base or Pose.at(0.0, 0.0, 2.0),
         friction=friction,
+        closures=closures,
     )
 
 

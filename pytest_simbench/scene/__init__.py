@@ -5,7 +5,7 @@ from pytest_simbench.scene.body import Body, Solid
 from pytest_simbench.scene.checks import SceneError
 from pytest_simbench.scene.polytope import Polytope, principal
 from pytest_simbench.scene.pose import FloatArray, Pose, Quaternion, Vector3, rotation_matrix
-from pytest_simbench.scene.robot import Gripper, Joint, MotionLimits, Robot
+from pytest_simbench.scene.robot import Closure, Gripper, Joint, MotionLimits, Robot
 from pytest_simbench.scene.scene import STANDARD_GRAVITY, Scene
 from pytest_simbench.scene.trajectory import Trajectory
 from pytest_simbench.scene.wrench import Wrench
@@ -15,6 +15,7 @@ __all__ = [
     "Body",
     "Box",
     "Capsule",
+    "Closure",
     "ConvexMesh",
     "Cylinder",
     "FloatArray",

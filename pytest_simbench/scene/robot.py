@@ -16,7 +16,7 @@ from pytest_simbench.scene.checks import (
     check_numbers,
     check_pose,
 )
-from pytest_simbench.scene.pose import FloatArray, Pose
+from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
 
 
 @dataclass(frozen=True)
@@ -92,6 +92,42 @@ class Gripper:
 
 
 @dataclass(frozen=True)
+class Closure:
+    """What closes a loop of links, which no tree of joints has: a point of one link is held at a
+    point of another, and both turn freely about it (a ball and its socket).
+
+    Attributes:
+        first, second: links of the robot's URDF.
+        first_point, second_point: the points, each in the frame of its link [m].
+
+    Raises:
+        SceneError: a link that is held at itself, or a number that is none.
+    """
+
+    first: str
+    second: str
+    first_point: Vector3 = (0.0, 0.0, 0.0)
+    second_point: Vector3 = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name in (self.first, self.second):
+            check_name(name, "a link of a closure")
+        if self.first == self.second:
+            raise SceneError(f"a closure holds link {self.first!r} at itself")
+        for point in (self.first_point, self.second_point):
+            check_numbers(point, 3, f"a point [m] of the closure of {self.first!r}")
+
+    def to_wire(self) -> dict[str, Any]:
+        points = {"first_point": self.first_point, "second_point": self.second_point}
+        return {**vars(self), **{key: list(point) for key, point in points.items()}}
+
+    @classmethod
+    def from_wire(cls, data: dict[str, Any]) -> Closure:
+        points = {key: tuple(data[key]) for key in ("first_point", "second_point")}
+        return cls(**{**data, **points})
+
+
+@dataclass(frozen=True)
 class MotionLimits:
     """How the arm may be moved: what motions are planned within. No simulator is told.
 
@@ -149,6 +185,7 @@ class Robot:
             simulators are not told, and a robot that came over the wire has none.
         swing: arm joints before and after a throw, each (n_arm,) [rad]; None where none is known.
             It stays on this side too.
+        closures: what closes loops of its links; only for engines with the capability `loops`.
     """
 
     name: str
@@ -162,6 +199,7 @@ class Robot:
     friction: float = 1.0
     limits: MotionLimits | None = field(default=None, compare=False)
     swing: tuple[tuple[float, ...], tuple[float, ...]] | None = field(default=None, compare=False)
+    closures: tuple[Closure, ...] = ()
 
     def __post_init__(self) -> None:
         check_name(self.name, "a robot")
@@ -207,9 +245,12 @@ class Robot:
         return np.array([getattr(joint, attribute) for joint in self.joints], dtype=float)
 
     def to_wire(self) -> dict[str, Any]:
+        """As plain data; a robot without loops names none, as before robots could have some."""
         told = {key: value for key, value in self.__dict__.items() if key not in ON_THIS_SIDE}
+        closures = [closure.to_wire() for closure in told.pop("closures")]
         return {
             **told,
+            **({"closures": closures} if closures else {}),
             "packages": dict(self.packages),
             "joints": [joint.to_wire() for joint in self.joints],
             "gripper": self.gripper.to_wire(),
@@ -224,5 +265,6 @@ class Robot:
                 "joints": tuple(Joint(**joint) for joint in data["joints"]),
                 "gripper": Gripper.from_wire(data["gripper"]),
                 "base": Pose.from_wire(data["base"]),
+                "closures": tuple(map(Closure.from_wire, data.get("closures", ()))),
             }
         )

@@ -109,13 +109,14 @@ class Scene:
     @property
     def words(self) -> frozenset[str]:
         """What is in it: `box`, `sphere`, `cylinder`, `capsule`, `convex_mesh`, `restitution`,
-        `damping`, `wrench`, `prescribed`."""
+        `damping`, `wrench`, `prescribed`, `loop`."""
         bodies = self.bodies
         found = {
             "restitution": self.ground_restitution or any(body.restitution for body in bodies),
             "damping": any(body.damping.any() for body in bodies),
             "wrench": any(body.wrenches for body in bodies),
             "prescribed": bool(self.prescribed_bodies),
+            "loop": self.robot is not None and bool(self.robot.closures),
         }
         kinds = {body.kind for body in bodies}
         return frozenset(kinds | {word for word, there in found.items() if there})

@@ -129,6 +129,15 @@ class Simulator(ABC):
         """
         raise self._missing("contact forces")
 
+    def joint_wrenches(self) -> FloatArray:
+        """What each joint transmitted in the last step, (n_joints, 6).
+
+        The wrench of the link above on the link below, of constraint and drive together: force [N],
+        and torque about the origin of the link below [N m], which is where the joint is; both in
+        the world frame. So of a rod of mass m that hangs at rest, it is m g upward.
+        """
+        raise self._missing("joint wrenches")
+
     def render(self, width: int, height: int) -> NDArray[np.uint8]:
         """A picture of the world without a window, (height, width, 3), RGB; from where
         `simulator.view` says, so that those of two engines can be compared."""

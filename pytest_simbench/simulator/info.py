@@ -22,6 +22,10 @@ class Capability(StrEnum):
     """A restored run equals, bit for bit, the one that was neither saved nor restored."""
     CONTACT_COUNT = "contact_count"
     CONTACT_FORCES = "contact_forces"
+    LOOPS = "loops"
+    """Links may close loops, see `scene.Closure`."""
+    JOINT_WRENCHES = "joint_wrenches"
+    """It tells what each joint transmits."""
     DETERMINISTIC = "deterministic"
     GPU = "gpu"
 

@@ -8,6 +8,7 @@
         and of a link that moves {mass, com, inertia, damping, gravity}
     joint/NAME/{axis, limits, effort_limit, stiffness, damping, friction, armature,
         initial_position}
+    closure/NUMBER/points
 
 Links are those of the prepared robot (`simulator.urdf`), in which fixed joints are merged; its base
 is the link `base`, whose frame is the world's.
@@ -33,6 +34,8 @@ is the link `base`, whose frame is the world's.
   link's frame, (6,).
 - damping of a joint: of its drive and all else that resists in proportion to velocity; friction:
   what resists its motion beside that [N m, N], 0.
+- points: of a closure of the robot, by its number from 0 on: those that are held together, each in
+  its link's frame, (2, 3) [m].
 - coupled: 1 if the fingers are.
 """
 
@@ -46,6 +49,7 @@ import numpy as np
 
 from pytest_simbench.scene import Box, ConvexMesh, FloatArray, Robot, Scene
 from pytest_simbench.simulator.kinematics import link_poses, motion_subspace
+from pytest_simbench.simulator.loops import reduced
 from pytest_simbench.simulator.settings import Settings
 from pytest_simbench.simulator.shapes import DIRECTIONS, outlines, reach, shape_points
 from pytest_simbench.simulator.urdf import PreparedRobot
@@ -113,6 +117,9 @@ def _robot_quantities(robot: Robot, prepared: PreparedRobot) -> dict[str, Any]:
             armature=joint.armature,
             initial_position=joint.initial_position,
         )
+    for k, closure in enumerate(reduced(prepared)):
+        points = np.array([closure.first_point, closure.second_point])
+        quantities[f"closure/{k}/points"] = points
     poses = link_poses(prepared, {joint.name: joint.initial_position for joint in robot.joints})
     moving = {link.name for link in prepared.moving_links}
     for link in prepared.links.values():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pytest_simbench.scene import Robot, Scene, SceneError
 from pytest_simbench.simulator.errors import DescriptionError
+from pytest_simbench.simulator.loops import reduced
 from pytest_simbench.simulator.urdf import ROOT, PreparedRobot
 from pytest_simbench.simulator.xml_file import read_xml
 
@@ -14,7 +15,7 @@ def check_robot(robot: Robot) -> None:
     Raises:
         DescriptionError: what is wrong, where, and what to do.
     """
-    PreparedRobot(robot)
+    reduced(PreparedRobot(robot))
     if not robot.srdf:
         return
     srdf = read_xml(robot.srdf, "the list of link pairs")

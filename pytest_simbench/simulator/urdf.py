@@ -79,6 +79,7 @@ class PreparedRobot:
         links: all links by name.
         limits: lower and upper position of each joint [rad or m], (2,).
         velocity_limits: of each joint [rad/s or m/s].
+        places: where each link of the file is: the link that it became part of, and its pose there.
 
     Raises:
         DescriptionError: the file cannot be read or used (see `urdf_check`), or does not fit the
@@ -95,6 +96,7 @@ class PreparedRobot:
         self.joints: list[MovingJoint] = []
         self.limits: dict[str, FloatArray] = {}
         self.velocity_limits: dict[str, float] = {}
+        self.places: dict[str, tuple[str, Pose]] = {}
         self.links[self.root].absorb(raw[root], robot.base)
         self._descend(root, self.root, robot.base, joints, raw)
         self._check_drives(raw)
@@ -135,6 +137,7 @@ class PreparedRobot:
         self, name: str, into: str, pose: Pose, joints: list[ET.Element], raw: dict[str, Link]
     ) -> None:
         """Attach what hangs on raw link `name`, which sits at `pose` in reduced link `into`."""
+        self.places[name] = into, pose
         for joint in joints:
             if _parent(joint) != name:
                 continue

@@ -13,9 +13,11 @@ PHENOMENA = (
     "stacking",
     "grasping",
     "joints",
+    "mechanisms",
     "pushing",
 )
-"""In the order of tables; `joints` with their drives."""
+"""In the order of tables; `joints` with their drives, `mechanisms` what not every simulator can be
+asked: loops of links, and what a joint transmits."""
 
 PHENOMENON = "task.phenomenon"
 """Where a record's settings say that it is of a law, and of which phenomenon."""

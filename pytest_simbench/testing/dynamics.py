@@ -1,4 +1,5 @@
-"""Checks of the arm's own dynamics: inertia, gravity torque and effort limit of every joint."""
+"""Checks of the arm's own dynamics: inertia, gravity torque and effort limit of every joint, what
+joints transmit; and of loops."""
 
 from __future__ import annotations
 
@@ -7,12 +8,21 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.laws.loops import FourBarSwing
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Pose, Robot, Trajectory
-from pytest_simbench.simulator import PreparedRobot
+from pytest_simbench.simulator import Capability, PreparedRobot
+from pytest_simbench.simulator.kinematics import link_poses
+from pytest_simbench.simulator.loops import ends, reduced
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
-from pytest_simbench.testing.drives import gravity_effort, has_armature, joint_momentum, model_of
-from pytest_simbench.testing.subject import Subject, require, require_close
+from pytest_simbench.testing.drives import (
+    gravity_effort,
+    has_armature,
+    hold_command,
+    joint_momentum,
+    model_of,
+)
+from pytest_simbench.testing.subject import Subject, logged, require, require_close
 
 _FALL = 0.2
 """For how long the limp arm falls [s]."""
@@ -146,3 +156,60 @@ def joints_stop_at_their_limits(subject: Subject) -> None:
             world.wait(0.3)
             for joint, value, stop in zip(robot.arm_joints, world.joints[0], end, strict=False):
                 require_close(f"{joint.name} at its {name} limit", value, stop, 0.1, "rad")
+
+
+@check(Capability.LOOPS)
+def loops_stay_closed(subject: Subject) -> None:
+    """A four-bar linkage that is let go swings (0.1 rad in 0.5 s) with its loop closed: the ends
+    that are held together are where each other is, within a step's way at 2 m/s and 1 mm."""
+    scene = FourBarSwing().build()
+    assert scene.robot is not None
+    prepared = PreparedRobot(scene.robot)
+    (closure,) = reduced(prepared)
+    with subject.world(scene) as world:
+        paths = logged(world.wait(0.5, log_period=0.02)).joints[:, 0]
+    gaps = [np.linalg.norm(np.subtract(*ends(prepared, closure, q))) for q in paths]
+    limit = 2.0 * subject.timestep + 1e-3
+    require_close("opening of the loop", float(max(gaps)), 0.0, limit, "m")
+    moved = float(np.abs(paths[:, 0] - paths[0, 0]).max())
+    require(moved > 0.1, f"the crank of a four-bar linkage moved by {moved:.3g} rad only")
+
+
+@check(Capability.JOINT_WRENCHES)
+def joint_loads_are_told(subject: Subject) -> None:
+    """Each joint of an arm that stands still carries what hangs on it: the weight, upward, and the
+    torque of that weight about the joint, each within 2 % of the largest."""
+    robot = scenes.at_random(scenes.arm(), np.random.default_rng(5))
+    scene = scenes.arm_alone(robot, name="loaded arm")
+    with subject.world(scene) as world:
+        world.follow(hold_command(scene, subject.timestep))
+        world.wait(0.5)
+        told, positions = world.joint_wrenches(), world.joints[0]
+    law = _loads(PreparedRobot(robot), positions)
+    arm = len(robot.arm_joints)
+    require(told.shape == law.shape, f"joint wrenches are {told.shape}, not {law.shape}")
+    for which, what, unit in ((slice(0, 3), "force", "N"), (slice(3, 6), "torque", "N m")):
+        limit = 0.02 * float(np.abs(law[:arm, which]).max())
+        for joint, row, right in zip(robot.arm_joints, told[:, which], law[:, which], strict=False):
+            off = float(np.abs(row - right).max())
+            require_close(f"error of the {what} of {joint.name}", off, 0.0, limit, unit)
+
+
+def _loads(prepared: PreparedRobot, positions: FloatArray) -> FloatArray:
+    """Wrenches by which joints hold still what hangs on them, as `Simulator.joint_wrenches`."""
+    robot = prepared.robot
+    poses = link_poses(prepared, dict(zip(robot.joint_names, positions, strict=True)))
+    carried = {name: np.zeros(6) for name in prepared.links}  # about the world's origin
+    for joint in reversed(prepared.joints):  # children first
+        link, pose = prepared.links[joint.child], poses[joint.child]
+        lift = -link.mass * np.array(STANDARD_GRAVITY)
+        centre = pose.rotation() @ link.centre + pose.position
+        carried[joint.child] += np.concatenate([lift, np.cross(centre, lift)])
+        carried[joint.parent] += carried[joint.child]
+    children = {joint.name: joint.child for joint in prepared.joints}
+    rows = []
+    for name in robot.joint_names:
+        force, torque = np.hsplit(carried[children[name]], 2)
+        origin = np.asarray(poses[children[name]].position)
+        rows.append(np.concatenate([force, torque - np.cross(origin, force)]))
+    return np.array(rows)

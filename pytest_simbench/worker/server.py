@@ -26,6 +26,7 @@ from pytest_simbench import __version__
 from pytest_simbench.scene import Scene, Trajectory
 from pytest_simbench.simulator import Simulator, SimulatorError, SimulatorInfo
 from pytest_simbench.simulator.info import alternatives
+from pytest_simbench.simulator.loops import check_loops
 from pytest_simbench.simulator.memory import remembering
 from pytest_simbench.simulator.parity import check
 from pytest_simbench.simulator.quantities import expected_quantities
@@ -132,6 +133,7 @@ class Server:
         simulator = self._constructed()
         world = Scene.from_wire(received(scene))
         check_names(world)
+        check_loops(simulator.info, world)
         simulator.load(world)
         self.scene = world
         acting = Acting.of(simulator, world)
@@ -194,6 +196,9 @@ class Server:
                 pair, sign = (second, first), -1.0
             total[pair] = total.get(pair, 0.0) + sign * np.asarray(wrench, dtype=float)
         return [(*pair, wrench) for pair, wrench in total.items()]
+
+    def do_joint_wrenches(self) -> Any:
+        return np.asarray(self._constructed().joint_wrenches(), dtype=float)
 
     def do_render(self, width: int, height: int) -> Any:
         return self._constructed().render(width, height)

@@ -39,6 +39,7 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
+from pytest_simbench.simulator.loops import ends, reduced
 
 from .bodies import add_body, add_ground, set_surface
 from .readback import ReadBack
@@ -96,6 +97,8 @@ class DART(Simulator):
                 Capability.SAVE_RESTORE,
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
+                Capability.LOOPS,
+                Capability.JOINT_WRENCHES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -106,6 +109,7 @@ class DART(Simulator):
                 "servo motors are velocity constraints, neither springs nor dampers",
             ),
             Deviation("link/*/damping", "DART has no damping of links"),
+            Deviation("closure/*", "DART keeps the points of a ball joint to itself", only="loop"),
             Deviation("", "what sleeps has contacts without force"),
             Deviation(
                 "",
@@ -224,6 +228,11 @@ class DART(Simulator):
         initial = robot.column("initial_position")
         skeleton.setPositions(list(self._index), initial)
         self.world.addSkeleton(skeleton)
+        for closure in reduced(prepared):
+            bodies = (skeleton.getBodyNode(link) for link in (closure.first, closure.second))
+            place, _ = ends(prepared, closure)
+            held = dartpy.constraint.BallJointConstraint(*bodies, place)
+            self.world.getConstraintSolver().addConstraint(held)
         self._error_gain = np.zeros(len(names))
         self._error_gain[self._index] = self._gain
         self.command(initial, 0 * initial, 0 * initial)
@@ -310,6 +319,21 @@ class DART(Simulator):
         if self._robot is not None and owner == self._robot.getName():
             return f"link/{body.getName()}"
         return owner if owner == "ground" else f"body/{owner}"
+
+    def joint_wrenches(self) -> FloatArray:
+        rows = []
+        for joint in self._joints():
+            body = joint.getChildBodyNode()
+            turn = body.getWorldTransform().rotation()
+            torque, force = np.reshape(body.getBodyForce(), (2, 3))  # in the body's frame
+            rows.append([turn @ force, turn @ torque])
+        return np.array(rows).reshape(-1, 6)
+
+    def _joints(self) -> list[Any]:
+        """Of the robot, in the scene's order."""
+        if self.scene.robot is None:
+            return []
+        return [self._robot.getJoint(name) for name in self.scene.robot.joint_names]
 
     def contact_count(self) -> int:
         return int(self.world.getLastCollisionResult().getNumContacts())

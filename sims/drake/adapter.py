@@ -81,6 +81,8 @@ class Drake(Simulator):
                 Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
+                Capability.LOOPS,
+                Capability.JOINT_WRENCHES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -97,6 +99,7 @@ class Drake(Simulator):
             ),
             Deviation("joint/*/friction", "Drake's joints have no friction"),
             Deviation("link/*/damping", "Drake has no damping of links"),
+            Deviation("closure/*", "pydrake tells nothing of a ball constraint", only="loop"),
             Deviation(
                 "body/*/boxes",
                 "tuned: corners of free boxes are cut by 0.1 mm a face and rounded by a sphere",
@@ -267,6 +270,17 @@ class Drake(Simulator):
         for name, made in self.world.shapes.items():
             kind = "body/" if name in self.world.bodies else "link/"
             yield name if name == "ground" else kind + name, made
+
+    def joint_wrenches(self) -> FloatArray:
+        told = self.plant.get_reaction_forces_output_port().Eval(self.context)
+        order = list(self.plant.GetJointIndices())
+        rows = []
+        for drive in self.world.drives.values():
+            joint = drive.joint()
+            at_child = told[order.index(joint.index())]  # in the axes of the child's frame
+            turn = joint.frame_on_child().CalcRotationMatrixInWorld(self.context).matrix()
+            rows.append([turn @ at_child.translational(), turn @ at_child.rotational()])
+        return np.array(rows).reshape(-1, 6)
 
     def contact_count(self) -> int:
         results = self.plant.get_contact_results_output_port().Eval(self.context)

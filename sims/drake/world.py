@@ -19,6 +19,7 @@ from pytest_simbench.scene import (
     Sphere,
 )
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, Settings, heavy, lazy_import
+from pytest_simbench.simulator.loops import reduced
 from pytest_simbench.simulator.shapes import mesh_points
 from pytest_simbench.simulator.urdf import Link, Shape
 
@@ -266,6 +267,9 @@ class World:
             plant.AddCouplerConstraint(self.joints[first], self.joints[second], 1.0)
             for first, second in robot.gripper.couplings
         ]
+        for closure in reduced(prepared):
+            first, second = self.links[closure.first], self.links[closure.second]
+            plant.AddBallConstraint(first, closure.first_point, second, closure.second_point)
 
     def _filter_collisions(self) -> None:
         manager = self.scene_graph.collision_filter_manager()

@@ -41,13 +41,15 @@ from pytest_simbench.simulator import (
     heavy,
     lazy_import,
 )
+from pytest_simbench.simulator.loops import reduced
 
 from . import releases
 from .bounces import BOUNCES, direct
 from .heavy import leave_out
+from .loops import close_loops
 from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack
-from .touching import contact_forces
+from .touching import contact_forces, joint_wrenches
 
 mujoco = lazy_import("mujoco")
 
@@ -106,6 +108,8 @@ class MuJoCo(Simulator):
                 Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
+                Capability.LOOPS,
+                Capability.JOINT_WRENCHES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -150,7 +154,7 @@ class MuJoCo(Simulator):
             self.prepared = PreparedRobot(scene.robot)
             spec = mujoco.MjSpec.from_string(_mujoco_urdf(self.prepared))
         self._set_options(spec, scene)
-        if scene.robot is not None:
+        if scene.robot is not None and self.prepared is not None:
             for geom in spec.geoms:
                 self._set_surface(geom, scene.robot.friction, 0.0, ROBOT, 0)
                 geom.rgba = LINK_COLOUR
@@ -158,6 +162,7 @@ class MuJoCo(Simulator):
                 _add_drive(spec, joint)
             for pair in scene.robot.gripper.couplings:
                 _couple_fingers(spec, *pair)
+            close_loops(spec, reduced(self.prepared))
         ground = spec.worldbody.add_geom(
             name="ground",
             type=mujoco.mjtGeom.mjGEOM_PLANE,
@@ -315,6 +320,9 @@ class MuJoCo(Simulator):
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
         return contact_forces(self.model, self.data, self._numbers())
+
+    def joint_wrenches(self) -> FloatArray:
+        return joint_wrenches(self.model, self.data, self._numbers())
 
     def contact_count(self) -> int:
         return int(self.data.ncon)

@@ -21,6 +21,7 @@ from pytest_simbench.simulator.shapes import (
 )
 
 from .bounces import restitution_of
+from .loops import closed
 
 mujoco = lazy_import("mujoco")
 
@@ -79,6 +80,7 @@ class ReadBack:
         if self.prepared is not None:
             couplings = self.prepared.robot.gripper.couplings
             reported["gripper/coupled"] = float(all(map(self._coupled, couplings)))
+            reported |= closed(model, self.active)
         return reported | touches(self.scene, self.prepared, self._can_touch)
 
     def _box(self, prefix: str, geom: int) -> dict[str, Any]:

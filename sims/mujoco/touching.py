@@ -1,4 +1,4 @@
-"""Forces of MuJoCo's contacts; MuJoCo's adapter and Newton's share it."""
+"""Forces of MuJoCo's contacts and joints; MuJoCo's adapter and Newton's share it."""
 
 from __future__ import annotations
 
@@ -30,3 +30,12 @@ def contact_forces(model: Any, data: Any, at: Numbers) -> Iterator[tuple[str, st
         frame = np.reshape(contact.frame, (3, 3))  # its axes are rows
         force, torque = local[:3] @ frame, local[3:] @ frame
         yield second, first, np.concatenate([force, torque + np.cross(contact.pos, force)])
+
+
+def joint_wrenches(model: Any, data: Any, at: Numbers) -> FloatArray:
+    """Of the driven joints, on the links below about their origins, (n_joints, 6)."""
+    mujoco.mj_rnePostConstraint(model, data)
+    bodies = model.jnt_bodyid[list(at.joints.values())]
+    torque, force = np.hsplit(data.cfrc_int[bodies], 2)
+    centres = data.subtree_com[model.body_rootid[bodies]]  # which MuJoCo's torques are about
+    return np.hstack([force, torque + np.cross(centres - data.xpos[bodies], force)])

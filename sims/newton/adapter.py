@@ -37,7 +37,7 @@ from ..mujoco.bounces import BOUNCES, direct
 from ..mujoco.heavy import leave_out
 from ..mujoco.pictures import DISABLED, camera, renderer
 from ..mujoco.readback import Numbers, ReadBack
-from ..mujoco.touching import contact_forces
+from ..mujoco.touching import contact_forces, joint_wrenches
 from .world import NewtonSettings, build_model, make_solver, names
 
 LED = 1 << 20
@@ -70,6 +70,7 @@ class Newton(Simulator):
                 Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
+                Capability.JOINT_WRENCHES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -308,6 +309,9 @@ class Newton(Simulator):
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
         return contact_forces(self.solver.mj_model, self.solver.mj_data, self._numbers())
+
+    def joint_wrenches(self) -> FloatArray:
+        return joint_wrenches(self.solver.mj_model, self.solver.mj_data, self._numbers())
 
     def contact_count(self) -> int:
         """Contacts that take part in the solution; MuJoCo also lists those within the gap."""

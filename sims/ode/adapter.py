@@ -28,6 +28,7 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
+from pytest_simbench.simulator.loops import reduced
 
 from . import world as build
 from .axes import Axis
@@ -126,6 +127,8 @@ class ODE(Simulator):
                 Capability.SAVE_RESTORE,
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
+                Capability.LOOPS,
+                Capability.JOINT_WRENCHES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -186,6 +189,7 @@ class ODE(Simulator):
         self._led = [self._bodies[box.name].body for box in scene.prescribed_bodies]
         self._links: dict[str, Part] = {}
         self._axes: dict[str, Axis] = {}
+        self._closures: list[Any] = []
         self._drives: Drives | None = None
         self.prepared = None
         if scene.robot is not None:
@@ -203,6 +207,10 @@ class ODE(Simulator):
         self._links = build.add_links(self.world, self.contacts.space, prepared)
         self._axes = build.add_joints(self.world, prepared, self._links)
         build.put_links(prepared, self._links, {j.name: j.initial_position for j in robot.joints})
+        self._closures = [
+            build.close_loop(self.world, prepared, self._links, closure)
+            for closure in reduced(prepared)
+        ]
         self._drives = Drives(self.world, robot, self._axes, s.timestep, s.drive, s.position_gain)
 
     def read_back(self) -> dict[str, Any]:
@@ -213,6 +221,7 @@ class ODE(Simulator):
             self._bodies,
             self._links,
             self._axes,
+            self._closures,
             self._drives,
             self.contacts,
             self.scene,
@@ -284,6 +293,14 @@ class ODE(Simulator):
         if self._drives is not None and state.commanded is not None:
             self._drives.command(*state.commanded)
         library().dRandSetSeed(state.seed)
+
+    def joint_wrenches(self) -> FloatArray:
+        if self.prepared is None:
+            return np.empty((0, 6))
+        frames = {joint.name: self._links[joint.child].frame for joint in self.prepared.joints}
+        dt = self.settings.timestep
+        names = self.prepared.robot.joint_names
+        return np.array([self._axes[name].wrench(frames[name], dt) for name in names])
 
     def contact_count(self) -> int:
         return len(self.contacts.made)

@@ -6,6 +6,9 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
+from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.simulator import lazy_import
 
 ode = lazy_import("ode")
@@ -28,6 +31,7 @@ class Axis:
 
     def __init__(self, joint: Any, zero: float, wide: bool = False) -> None:
         self.joint, self.zero = joint, zero
+        joint.setFeedback(True)
         self.child, self.parent = joint.getBody(0), joint.getBody(1)
         self.hinged = isinstance(joint, ode.HingeJoint)
         self.turn: list[float] = [0.0, 0.0]
@@ -35,6 +39,18 @@ class Axis:
         self.angle = _counted(told, self.turn) if wide else told
         rate = joint.getAngleRate if self.hinged else joint.getPositionRate
         self.rate: Callable[[], float] = rate
+
+    def wrench(self, frame: Pose, timestep: float) -> FloatArray:
+        """What it did to its child in the last step, motor included, in the world, (6,).
+
+        Args:
+            frame: of the link in the child's, about whose origin the torque is.
+            timestep: of the last step, at whose begin the child stood where it acted [s].
+        """
+        force, torque = map(np.array, self.joint.getFeedback()[:2])  # about the child's centre
+        offset = np.array(self.child.vectorToWorld(frame.position))
+        offset -= timestep * np.cross(self.child.getAngularVel(), offset)
+        return np.concatenate([force, torque - np.cross(offset, force)])
 
     def position(self) -> float:
         """[rad or m]."""

@@ -5,7 +5,7 @@ ODE tells no corners of a mesh, so each is measured: a plane is moved towards it
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,7 @@ class ReadBack:
         timestep: that the world is stepped with [s].
         ground, bodies, links: the parts of the world.
         axes: its joints.
+        closures: what closes loops.
         drives: the motors, or None.
         contacts: whose joints hold nothing.
         scene, prepared: names of what was built; no value is taken from them.
@@ -62,6 +63,7 @@ class ReadBack:
         bodies: Mapping[str, Part],
         links: Mapping[str, Part],
         axes: Mapping[str, Axis],
+        closures: Sequence[Any],
         drives: Drives | None,
         contacts: Contacts,
         scene: Scene,
@@ -70,7 +72,7 @@ class ReadBack:
         self.world, self.timestep, self.ground = world, timestep, ground
         self.bodies, self.links, self.axes, self.drives = bodies, links, axes, drives
         self.contacts = contacts
-        self.scene, self.prepared = scene, prepared
+        self.scene, self.prepared, self.closures = scene, prepared, closures
         self.probe = ode.GeomPlane(None, (0.0, 0.0, 1.0), 0.0)
 
     def all(self) -> dict[str, Any]:
@@ -96,6 +98,8 @@ class ReadBack:
         if self.prepared is not None and self.drives is not None:
             for name, axis in self.axes.items():
                 reported |= self._joint(f"joint/{name}", name, axis, self.drives)
+            for k, joint in enumerate(self.closures):
+                reported[f"closure/{k}/points"] = self._points(joint)
             pinion, couplings = self.drives.pinion, self.prepared.robot.gripper.couplings
             reported["gripper/coupled"] = float(pinion.holds if pinion else not couplings)
         return reported | touches(self.scene, self.prepared, self._can_touch)
@@ -119,6 +123,18 @@ class ReadBack:
         if part.body is not None and not part.body.isKinematic():
             found |= self._inertial(prefix, part)
         return found
+
+    def _points(self, joint: Any) -> FloatArray:
+        """Of a closure, in the frames of its links, (2, 3)."""
+        bodies = joint.getBody(0), joint.getBody(1)
+        parts = (next(part for part in self.links.values() if part.body is body) for body in bodies)
+        points = joint.getAnchor(), joint.getAnchor2()
+        return np.concatenate(
+            [
+                placed(np.array([point]), self._frame(part).inverse())
+                for part, point in zip(parts, points, strict=True)
+            ]
+        )
 
     def _frame(self, part: Part) -> Pose:
         """The scene's frame of a body or link, in the world."""

@@ -14,9 +14,20 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, FloatArray, Pose, Sphere
+from pytest_simbench.scene import (
+    Body,
+    Box,
+    Capsule,
+    Closure,
+    ConvexMesh,
+    Cylinder,
+    FloatArray,
+    Pose,
+    Sphere,
+)
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, lazy_import
 from pytest_simbench.simulator.kinematics import link_poses, motion_subspace
+from pytest_simbench.simulator.loops import ends
 from pytest_simbench.simulator.mesh_check import TRIANGLE
 from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
 
@@ -128,6 +139,17 @@ def put_links(
     for joint in prepared.joints:
         part = links[joint.child]
         _put(part.body, poses[joint.child] * part.frame.inverse())
+
+
+def close_loop(
+    world: Any, prepared: PreparedRobot, links: Mapping[str, Part], closure: Closure
+) -> Any:
+    """Hold two links together by a ball joint; they stand at the joints' initial positions."""
+    first, second = ends(prepared, closure)
+    made = ode.BallJoint(world)
+    made.attach(links[closure.first].body, links[closure.second].body)
+    made.setAnchor(tuple((first + second) / 2))
+    return made
 
 
 def middle(prepared: PreparedRobot) -> dict[str, float]:

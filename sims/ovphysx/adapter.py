@@ -42,6 +42,7 @@ from pytest_simbench.simulator import (
 from pytest_simbench.simulator.kinematics import link_poses
 
 from . import stage as usd
+from .loads import wrenches
 from .readback import read_back
 from .session import Session
 
@@ -114,9 +115,14 @@ class OvPhysX(Simulator):
                 Capability.DETERMINISTIC,
                 Capability.SAVE_RESTORE,
                 Capability.CONTACT_FORCES,
+                Capability.LOOPS,
+                Capability.JOINT_WRENCHES,
             }
         ),
         deviations=(
+            Deviation(
+                "closure/*", "ovphysx tells nothing of joints beside an articulation", only="loop"
+            ),
             Deviation("timestep", "an argument of each step, which PhysX does not report"),
             Deviation("gravity", "PhysX reports no gravity through this package"),
             Deviation(
@@ -306,6 +312,14 @@ class OvPhysX(Simulator):
             binding.read(buffer)
             row[:] = buffer[0, self._columns]
         return state
+
+    def joint_wrenches(self) -> FloatArray:
+        if self.prepared is None or self._steps == 0:  # nothing was transmitted so far
+            return np.zeros((len(self._joints), 6))
+        binding, buffer = self._binding("ARTICULATION_LINK_INCOMING_JOINT_FORCE")
+        binding.read(buffer)
+        order = [binding.body_names.index(f"link_{k}") for k in range(len(self.prepared.links))]
+        return wrenches(buffer[0, order].astype(float), self.prepared, self.joint_state()[0])
 
     def read_back(self) -> dict[str, Any]:
         return read_back(self.session, self.scene, self.prepared, self._unit, self._placed)

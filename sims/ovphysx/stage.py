@@ -18,6 +18,7 @@ from pytest_simbench.scene import (
     Body,
     Box,
     Capsule,
+    Closure,
     ConvexMesh,
     Cylinder,
     FloatArray,
@@ -27,6 +28,7 @@ from pytest_simbench.scene import (
     Sphere,
 )
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot
+from pytest_simbench.simulator.loops import reduced
 from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
 
 from . import usd_text as usd
@@ -188,6 +190,8 @@ class Stage:
             limits = prepared.limits[joint.name]
             coupled_to = first if index in others else None
             prims.append(_joint(index, joint, robot.joints[index], limits, names, coupled_to))
+        for k, closure in enumerate(reduced(prepared)):
+            prims.append(_closure(k, closure, names))
         return prims
 
     def _link(self, index: int, link: Link, pose: Pose, friction: float) -> str:
@@ -229,6 +233,18 @@ def _material(friction: float, restitution: float) -> str:
     if restitution:
         name += f"_bouncing_{float(restitution)!r}"
     return name.translate(str.maketrans(".-+", "pmp"))
+
+
+def _closure(number: int, closure: Closure, links: Sequence[str]) -> str:
+    """A ball joint beside the articulation, which is a tree."""
+    lines = [
+        f"rel physics:body0 = <{link_path(links.index(closure.first))}>",
+        f"rel physics:body1 = <{link_path(links.index(closure.second))}>",
+        f"point3f physics:localPos0 = {usd.numbers(closure.first_point)}",
+        f"point3f physics:localPos1 = {usd.numbers(closure.second_point)}",
+        "bool physics:excludeFromArticulation = true",
+    ]
+    return usd.prim("PhysicsSphericalJoint", f"closure_{number}", (), lines)
 
 
 def _joint(

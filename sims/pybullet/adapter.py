@@ -32,8 +32,12 @@ from pytest_simbench.simulator import (
     heavy,
     lazy_import,
 )
+from pytest_simbench.simulator.kinematics import motion_subspace
+from pytest_simbench.simulator.loops import reduced
 from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
 
+from .loads import wrench
+from .loops import close_loop
 from .readback import ReadBack
 from .world import ROBOT, PyBulletSettings, add_body, set_surface
 
@@ -63,6 +67,8 @@ class PyBullet(Simulator):
                 Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
+                Capability.LOOPS,
+                Capability.JOINT_WRENCHES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -170,6 +176,7 @@ class PyBullet(Simulator):
         self.prepared = None
         self._robot = -1
         self._couplings: list[int] = []
+        self._closures: list[int] = []
         self._joints: list[int] = []
         self._links: dict[str, int] = {}
         if scene.robot is not None:
@@ -205,8 +212,13 @@ class PyBullet(Simulator):
             set_surface(c, self._robot, self.settings, robot.friction, link=link, group=ROBOT)
         for joint, drive in zip(self._joints, robot.joints, strict=True):
             pybullet.resetJointState(self._robot, joint, drive.initial_position, physicsClientId=c)
+        for joint in self._joints:
+            pybullet.enableJointForceTorqueSensor(self._robot, joint, True, physicsClientId=c)
         self._couplings = [
             self._couple(index[first], index[second]) for first, second in robot.gripper.couplings
+        ]
+        self._closures = [
+            close_loop(c, self._robot, self._links, closure) for closure in reduced(prepared)
         ]
         n = len(self._joints)
         self._forces = list(robot.column("effort_limit"))
@@ -241,6 +253,7 @@ class PyBullet(Simulator):
             self._links,
             self._joints,
             self._couplings,
+            self._closures,
             self.prepared,
         ).all()
 
@@ -317,6 +330,16 @@ class PyBullet(Simulator):
             )
             force = np.array([point[9], point[10], point[12]]) @ [point[7], point[11], point[13]]
             yield first, second, np.concatenate([force, np.cross(point[5], force)])
+
+    def joint_wrenches(self) -> FloatArray:
+        if self.prepared is None:
+            return np.empty((0, 6))
+        subspaces = {joint.name: motion_subspace(joint) for joint in self.prepared.joints}
+        rows = [
+            wrench(self.client, self._robot, joint, subspaces[name])
+            for name, joint in zip(self.prepared.robot.joint_names, self._joints, strict=True)
+        ]
+        return np.array(rows)
 
     def contact_count(self) -> int:
         return len(pybullet.getContactPoints(physicsClientId=self.client) or ())

@@ -22,6 +22,8 @@ from pytest_simbench.simulator.shapes import (
     round_reach,
 )
 
+from .loops import points
+
 pybullet = lazy_import("pybullet")
 
 
@@ -36,7 +38,7 @@ class ReadBack:
         robot: body of the robot.
         links: number of each link; -1 is the base.
         joints: numbers of the driven joints.
-        couplings: constraints between the fingers.
+        couplings, closures: constraints between the fingers, and of loops.
         prepared: names of links and joints; no value is taken from it.
     """
 
@@ -50,11 +52,12 @@ class ReadBack:
         links: Mapping[str, int],
         joints: Sequence[int],
         couplings: Sequence[int],
+        closures: Sequence[int],
         prepared: PreparedRobot | None,
     ) -> None:
         self.c, self.ground, self.heavy, self.bodies = client, ground, heavy, bodies
         self.robot, self.links, self.joints = robot, links, joints
-        self.couplings, self.prepared = couplings, prepared
+        self.couplings, self.closures, self.prepared = couplings, closures, prepared
 
     def all(self) -> dict[str, Any]:
         """Every quantity that Bullet tells, by its name."""
@@ -83,6 +86,8 @@ class ReadBack:
 
     def _robot_quantities(self, robot: Robot) -> dict[str, Any]:
         found: dict[str, Any] = {"gripper/coupled": self._coupled(robot)}
+        for k, closure in enumerate(self.closures):
+            found[f"closure/{k}/points"] = points(self.c, closure)
         for name, link in self.links.items():
             found |= self._part(f"link/{name}", self.robot, link)
             if link >= 0:

@@ -19,7 +19,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.scene import Closure, FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
     DataSeen,
@@ -32,6 +32,7 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
+from pytest_simbench.simulator.loops import reduced
 
 from .bodies import ROBOT, WORLD, add_body, add_ground
 from .drawing import Drawing
@@ -113,6 +114,8 @@ class SAPIEN(Simulator):
                 Capability.SAVE_RESTORE,
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
+                Capability.LOOPS,
+                Capability.JOINT_WRENCHES,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -192,6 +195,7 @@ class SAPIEN(Simulator):
         self._robot: Any = None
         self._joints: list[Any] = []
         self._links: dict[str, Any] = {}
+        self._closures: list[Any] = []
         if self.prepared is not None:
             self._load_robot(self.prepared)
 
@@ -241,6 +245,7 @@ class SAPIEN(Simulator):
             joint.set_friction(self.settings.joint_friction)
         for pair in robot.gripper.couplings:
             self._couple_fingers(*pair)
+        self._closures = [self._close(closure) for closure in reduced(prepared)]
         initial = np.empty(len(order))
         initial[self._order] = robot.column("initial_position")
         self._robot.set_qpos(initial)
@@ -261,6 +266,18 @@ class SAPIEN(Simulator):
             stiffness=self.settings.coupling_stiffness,
         )
 
+    def _close(self, closure: Closure) -> Any:
+        """Hold two links together by a joint that lets them turn alone."""
+        first, second = self._links[closure.first], self._links[closure.second]
+        made = physx.PhysxDriveComponent(second)
+        made.parent = first
+        made.pose_in_parent = sapien.Pose(closure.first_point)
+        made.pose_in_child = sapien.Pose(closure.second_point)
+        for lock in (made.set_limit_x, made.set_limit_y, made.set_limit_z):
+            lock(0.0, 0.0)
+        second.entity.add_component(made)
+        return made
+
     def read_back(self) -> dict[str, Any]:
         positions = self.joint_state()[0]
         return ReadBack(
@@ -270,6 +287,7 @@ class SAPIEN(Simulator):
             self._links,
             self._joints,
             positions,
+            self._closures,
             self.scene,
             self.prepared,
         ).all()
@@ -331,6 +349,18 @@ class SAPIEN(Simulator):
             return "ground"
         kind = "body" if component in self._bodies.values() else "link"
         return f"{kind}/{component.entity.name if kind == 'body' else component.name}"
+
+    def joint_wrenches(self) -> FloatArray:
+        if self._robot is None:
+            return np.empty((0, 6))
+        told = np.asarray(self._robot.get_link_incoming_joint_forces(), dtype=float)
+        links, rows = list(self._robot.links), []
+        for joint in self._joints:
+            link = joint.child_link
+            frame = link.pose * joint.pose_in_child  # in whose axes PhysX tells it
+            turn = frame.to_transformation_matrix()[:3, :3]
+            rows.append((told[links.index(link)].reshape(2, 3) @ turn.T).ravel())
+        return np.array(rows)
 
     def contact_count(self) -> int:
         return sum(len(contact.points) for contact in self._system.get_contacts())

@@ -36,6 +36,7 @@ class ReadBack:
         bodies, links: components by the scene's names.
         joints: of the driven joints.
         positions: of those joints [rad or m].
+        closures: what closes loops.
         scene, prepared: names of what was built; no value is taken from them.
     """
 
@@ -47,12 +48,13 @@ class ReadBack:
         links: Mapping[str, Any],
         joints: Sequence[Any],
         positions: Sequence[float],
+        closures: Sequence[Any],
         scene: Scene,
         prepared: PreparedRobot | None,
     ) -> None:
         self.system, self.ground, self.bodies, self.links = system, ground, bodies, links
         self.joints, self.positions = joints, positions
-        self.scene, self.prepared = scene, prepared
+        self.scene, self.prepared, self.closures = scene, prepared, closures
 
     def all(self) -> dict[str, Any]:
         """Every quantity that SAPIEN tells, by its name."""
@@ -72,6 +74,9 @@ class ReadBack:
                 reported |= _inertial(f"body/{name}", body)
                 velocity = np.concatenate([body.linear_velocity, body.angular_velocity])
                 reported[f"body/{name}/velocity"] = velocity
+        for k, closure in enumerate(self.closures):
+            points = closure.pose_in_parent.p, closure.pose_in_child.p
+            reported[f"closure/{k}/points"] = np.array(points)
         if self.prepared is not None:
             for name in self.prepared.links:
                 reported |= _part(f"link/{name}", self.links[name])

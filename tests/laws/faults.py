@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 from pytest_simbench.scene import Body, Box, Pose, Robot, Scene
+from pytest_simbench.simulator.robot_files import keep
 
 Fault = Callable[[Scene], Scene]
 
@@ -118,6 +120,26 @@ def acting(**values: Any) -> Fault:
     return bodies(change)
 
 
+def hung_on(part: str, joint: str) -> Fault:
+    """A joint of a mechanism hangs on another part, at the same place."""
+
+    def change(scene: Scene) -> Scene:
+        assert scene.robot is not None
+        xml = ET.parse(scene.robot.urdf)
+        for element in xml.iterfind(f"joint[@name='{joint}']/parent"):
+            element.set("link", f"{part} link")
+        urdf = str(keep(ET.tostring(xml.getroot(), encoding="unicode"), {}))
+        return replace(scene, robot=replace(scene.robot, urdf=urdf))
+
+    return change
+
+
+def left_open(scene: Scene) -> Scene:
+    """Loops are not closed."""
+    assert scene.robot is not None
+    return replace(scene, robot=replace(scene.robot, closures=()))
+
+
 FAULTS: dict[str, Fault] = {
     **dict.fromkeys(("free_fall", "fall_speed", "oblique_gravity", "projectile"), heavier),
     "damped_fall": bodies(lambda body: replace(body, linear_damping=2 * body.linear_damping)),
@@ -126,6 +148,10 @@ FAULTS: dict[str, Fault] = {
     **dict.fromkeys(("spin", "glide"), faster(1.1)),
     "free_top": sized(0.2, 0.2, 0.4),
     **dict.fromkeys(("tumble_energy", "tumble_momentum"), sized(0.3, 0.1, 0.02)),
+    **dict.fromkeys(
+        ("tumble_energy_drift", "tumble_momentum_drift"),
+        bodies(lambda body: replace(body, angular_damping=0.01)),
+    ),
     "axial_force": acting(force=(10.0, 0.0, 0.0)),  # doubled
     "axial_torque": acting(end=9.0),  # it never ends
     "belt_speed": faster(0.9),
@@ -161,14 +187,17 @@ FAULTS: dict[str, Fault] = {
     **dict.fromkeys(
         (
             "pendulum_period", "compound_pendulum", "pendulum_energy", "double_pendulum",
-            "swinging_slider", "spherical_pendulum", "feed_forward",
+            "swinging_slider", "spherical_pendulum", "feed_forward", "pendulum_energy_drift",
         ),
         heavier,
     ),
     **dict.fromkeys(("step_response", "spring_damper", "sag"), drives(stiffness=1.5)),
+    "two_pendulums": hung_on("swing 0", "swing 1"),  # a chain in place of two
     "double_pendulum_energy": lambda scene: heavier(heavier(heavier(scene))),
     "effort_limit": drives(effort_limit=1.5),
     "tracking": drives(stiffness=0.01),
+    "four_bar_closure": left_open,
+    **dict.fromkeys(("four_bar_swing", "pendulum_force", "pendulum_torque"), heavier),
     "push_force": rougher(1.5),
     "push_straight": moved(y=0.02),
     "push_tips": rougher(1.3),

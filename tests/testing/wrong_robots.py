@@ -202,3 +202,38 @@ class TiltedAxis(MuJoCo):
         return told | {k: v for k, v in self.straight.items() if k in told}
 
     straight: ClassVar[dict[str, Any]] = {"joint/panda_joint1/axis": [0, 0, 1, 0, 0, 0]}
+
+
+class OpenLoop(Lying):
+    def tamper(self) -> None:
+        self.data.eq_active[:] = 0
+
+
+class StuckLoop(Lying):
+    def tamper(self) -> None:
+        self.model.dof_damping[:] = 1e3
+
+
+class LinkAxes(MuJoCo):
+    """Tells what joints transmit in the axes of the link below."""
+
+    def joint_wrenches(self) -> FloatArray:
+        bodies = self.model.jnt_bodyid
+        turns = self.data.xmat[bodies].reshape(-1, 3, 3)
+        halves = super().joint_wrenches().reshape(-1, 2, 3)
+        return np.einsum("nij,nki->nkj", turns, halves).reshape(-1, 6)
+
+
+class OnTheLinkAbove(MuJoCo):
+    def joint_wrenches(self) -> FloatArray:
+        return -super().joint_wrenches()
+
+
+class AboutCentres(MuJoCo):
+    """Its torques are about the centres of mass of the links below."""
+
+    def joint_wrenches(self) -> FloatArray:
+        told, bodies = super().joint_wrenches(), self.model.jnt_bodyid
+        arms = self.data.xipos[bodies] - self.data.xpos[bodies]
+        told[:, 3:] -= np.cross(arms, told[:, :3])
+        return told
