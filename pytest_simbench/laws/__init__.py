@@ -90,6 +90,7 @@ from pytest_simbench.laws.sticking import (
     StickAngleAcross,
     StickAngleDiagonal,
 )
+from pytest_simbench.laws.turning import PushTurns
 from pytest_simbench.laws.wrenches import AxialForce, AxialTorque
 
 LAWS: tuple[Law, ...] = (
@@ -111,7 +112,7 @@ LAWS: tuple[Law, ...] = (
     DoublePendulumEnergy(), SwingingSlider(), SphericalPendulum(), StepResponse(),
     SpringAndDamper(), EffortLimit(), Tracking(), Sag(), FeedForward(),
     FourBarClosure(), FourBarSwing(), PendulumForce(), PendulumTorque(),
-    PushForce(), PushStraight(), PushTips(),
+    PushForce(), PushStraight(), PushTurns(), PushTips(),
 )  # fmt: skip
 """All of them, by phenomenon."""
 

@@ -200,5 +200,6 @@ FAULTS: dict[str, Fault] = {
     **dict.fromkeys(("four_bar_swing", "pendulum_force", "pendulum_torque"), heavier),
     "push_force": rougher(1.5),
     "push_straight": moved(y=0.02),
+    "push_turns": rougher(1.1),
     "push_tips": rougher(1.3),
 }  # fmt: skip

@@ -27,6 +27,7 @@ ELSEWHERE = {
         "pybullet",
     ),
     **dict.fromkeys(("dead_collision", "push_force"), "ode"),
+    "push_turns": "dart",
     **dict.fromkeys(("grip_holds", "heavy_on_top"), "ode"),
     **dict.fromkeys(("bounce_height", "oblique_bounce_slip", "oblique_bounce_stick"), "ode"),
 }  # fmt: skip
