@@ -168,10 +168,10 @@ OPTIONS = (
            metavar="RUN", ini=False, arguments={"nargs": "?", "const": True}),
     Option("--sim-merge", Files(), "join runs with different seeds (--sim-seed), made on several "
            "machines for instance, into one in --sim-output, and exit", metavar="RUN", ini=False,
-           arguments={"nargs": "+", "action": "store"}),
+           arguments={"nargs": "+", "action": "extend"}),
     Option("--sim-report", Files(), "print the tables and write the report of runs again, from "
            "their folders alone, and exit; several are merged, and written where --sim-output says",
-           metavar="RUN", ini=False, arguments={"nargs": "+", "action": "store"}),
+           metavar="RUN", ini=False, arguments={"nargs": "+", "action": "extend"}),
     Option("--sim-bisect", Bisection(), "run the tests on releases between a good and a bad one to "
            "find the first in which METRIC is worse, and exit",
            metavar=("NAME:GOOD..BAD", "METRIC"), ini=False,

@@ -138,6 +138,13 @@ def test_short_names_are_the_same_option(pytester: pytest.Pytester, short: str) 
         assert options.value(pytester.parseconfig("-o", ini), option.name) == by_long
 
 
+@pytest.mark.parametrize("name", ["sim_merge", "sim_report"])
+def test_runs_may_be_given_one_by_one(configure: Configure, name: str) -> None:
+    flag = options.option(name).flags[0]
+    config = configure(flag, "a", "b", flag, "c")
+    assert options.value(config, name) == ["a", "b", "c"]
+
+
 def test_values_of_every_form(pytester: pytest.Pytester) -> None:
     config = pytester.parseconfig(
         "--sim=mujoco,pybullet", "--sim=drake", "--sim-set=mujoco.timestep=1,pybullet.timestep=2",
