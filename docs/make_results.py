@@ -96,7 +96,7 @@ def overview(runs: Runs) -> str:
 
 def missing(runs: Runs) -> str:
     """What the README's table lacks, as a sentence; nothing where it lacks nothing."""
-    lacking = []
+    lacking: dict[str, list[str]] = {}
     for simulator, name in SIMULATORS.items():
         done = {task: runs.get(("ours", "tuned", task, simulator)) for task in TASKS}
         few = [
@@ -104,14 +104,18 @@ def missing(runs: Runs) -> str:
             for task, run in done.items()
             if not run or len(run.lines) < REPETITIONS
         ]
-        if few == [f"no {word}" for word in PLURALS.values()]:
-            lacking.append(name)
-        elif few:
-            lacking.append(f"{name} ({', '.join(few)})")
+        if few:
+            none = few == [f"no {word}" for word in PLURALS.values()]
+            lacking.setdefault("" if none else f" ({', '.join(few)})", []).append(name)
     if not lacking:
         return ""
-    names = " and ".join(filter(None, (", ".join(lacking[:-1]), lacking[-1])))
+    names = "; ".join(_listed(names) + few for few, names in lacking.items())
     return f"Not measured again yet: {names} ([earlier](docs/results.md#earlier-numbers))."
+
+
+def _listed(names: Sequence[str]) -> str:
+    """A, B and C."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 STACKING = ("placed", "at_end", "placed_strict", "at_end_strict", "failed_picks", "untouched_moved")
