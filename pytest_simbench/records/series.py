@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -139,17 +139,34 @@ def _label(
         known = [told(found) for _, found in same]
         every = dict.fromkeys(name for other in known for name in other)
         keys = [k for k in every if len({text(other.get(k)) for other in known}) > 1]
+        if ROBOT in keys:
+            keys = [ROBOT, *(k for k in keys if k != ROBOT and not _follows(k, ROBOT, known))]
         apart = len({tuple(text(other.get(k)) for k in keys) for other in known}) == len(same)
         if not apart and key.parameters:
             parts.append(f"[{key.parameters}]")
         mine = told(group)
-        differences = [f"{k.removeprefix('settings.')}={_shown(mine.get(k))}" for k in keys]
+        differences = [_difference(k, mine.get(k)) for k in keys]
         parts += differences[:MOST] + ["..."] * (len(differences) > MOST)
     return " ".join(parts)
 
 
 MOST = 3
 """Differences that a row's name lists."""
+
+ROBOT = "robot.name"
+"""What tells robots apart; their scenes, sizes and files differ with it."""
+
+
+def _follows(key: str, chief: str, known: Sequence[Mapping[str, object]]) -> bool:
+    """Whether one value is known as soon as the other is."""
+    pairs = {(text(other.get(chief)), text(other.get(key))) for other in known}
+    return len(pairs) == len({first for first, _ in pairs})
+
+
+def _difference(key: str, value: object) -> str:
+    if key == ROBOT:
+        return f"robot={_shown(value)}" if value else "default robot"
+    return f"{key.removeprefix('settings.')}={_shown(value)}"
 
 
 def _shown(value: object) -> str:

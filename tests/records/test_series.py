@@ -137,6 +137,19 @@ def test_a_label_lists_three_differences() -> None:
     assert labels(a=2, b=2, c=2, d=2) == ["a=1 b=1 c=1 ...", "a=2 b=2 c=2 ..."]
 
 
+def test_robots_are_told_by_name_alone_and_what_else_differs_beside() -> None:
+    own = record(1, scene="0", settings={"timestep": 0.002})
+    small = {"robot": {"name": "so101", "digest": "1"}, "scene": "1"}
+    other = replace(own, **small)  # type: ignore[arg-type]
+    finer = replace(other, settings={"timestep": 0.001})
+    assert [row.label for row in series([own, other])] == ["default robot", "robot=so101"]
+    assert [row.label for row in series([own, other, finer])] == [
+        "default robot timestep=0.002",
+        "robot=so101 timestep=0.002",
+        "robot=so101 timestep=0.001",
+    ]
+
+
 def test_rows_of_other_modes_profiles_or_functions_are_not_ranked() -> None:
     ours, other = record(1), record(1, simulator="b", test="test_stacking[b-headless]")
 
