@@ -17,6 +17,7 @@ MARKS = (
     "xfail_sim(name, reason=): expected to fail on this simulator",
     "needs(*capabilities): run only on simulators that have these capabilities",
     "reps(n): repetitions of this test, unless --reps is given",
+    "sim_conformance(kit): one test of each law of the conformance kit, see conformance_checks",
     "sim_timeout(seconds): time-out of a repetition, unless --sim-timeout is given",
 )
 
@@ -78,6 +79,8 @@ def pytest_cmdline_main(config: pytest.Config) -> int | None:
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "sim_case" in metafunc.fixturenames:
         session_of(metafunc.config).parametrize(metafunc)
+    elif metafunc.definition.get_closest_marker("sim_conformance"):
+        session_of(metafunc.config).parametrize_conformance(metafunc)
     elif "simbench_robot" in metafunc.fixturenames:
         session_of(metafunc.config).parametrize_robot(metafunc)
 

@@ -139,6 +139,13 @@ class SimSession:
                 "simbench_robot", list(robots), ids=ids, indirect=True, scope="session"
             )
 
+    def parametrize_conformance(self, metafunc: pytest.Metafunc) -> None:
+        """Make a test of each law of the conformance kit, with the robots of `--robot`."""
+        mark = metafunc.definition.get_closest_marker("sim_conformance")
+        if mark is not None:
+            tests = mark.args[0].tests(self.selection.robots.values())
+            metafunc.parametrize("check", [pytest.param(test, id=test.id) for test in tests])
+
     def check_collected(self, items: list[pytest.Item]) -> None:
         """Complain of marks, and have pytest-benchmark take the workers' seconds."""
         if self.problems:

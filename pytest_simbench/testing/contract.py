@@ -16,6 +16,7 @@ from pytest_simbench.simulator.settings import changed
 from pytest_simbench.simulator.versions import base_name
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
+from pytest_simbench.testing.robots import any_robot, finger_unit
 from pytest_simbench.testing.subject import Subject, logged, require, require_close
 
 SINGLE = 1e-5
@@ -112,7 +113,7 @@ def time_advances(subject: Subject) -> None:
             require_close("largest error of time", wrong, 0.0, 1e-6 * 100 * step, "s")
 
 
-@check()
+@check(robot=any_robot)
 def state_as_loaded(subject: Subject) -> None:
     """After loading, free bodies are at rest at their poses, (n_free, 13) in the scene's order,
     quaternion w first; joints at rest at their initial positions, (2, n_joints)."""
@@ -129,7 +130,7 @@ def state_as_loaded(subject: Subject) -> None:
                 f"pose of {box.name} is {row[:7].round(6)}, expected {expected.round(6)}",
             )
             require(np.abs(row[7:]).max() < SINGLE, f"{box.name} moves after loading: {row[7:]}")
-    robot = scenes.arm()
+    robot = subject.arm
     with subject.world(scenes.arm_alone(robot)) as world:
         n = len(robot.joints)
         require(world.joints.shape == (2, n), f"joint_state has shape {world.joints.shape}")
@@ -177,15 +178,19 @@ def quaternions_are_unit(subject: Subject) -> None:
     require_close("largest error of a norm", float(np.abs(norms - 1).max()), 0.0, SINGLE, "")
 
 
-@check()
+@check(robot=any_robot)
 def commands_persist(subject: Subject) -> None:
     """A command holds until the next one: 1 s after a single one, every joint is there (5 mrad,
-    1 mm), and stays there; no command at all means hold the initial positions (5 mrad)."""
-    robot = scenes.arm()
+    fingers that slide 1 mm), and stays there; no command at all means hold the initial positions
+    (5 mrad)."""
+    robot = subject.arm
     start = robot.column("initial_position")
     goal = start.copy()
-    goal[:7] += 0.05
-    goal[7:] -= 0.01
+    arm, fingers = len(robot.arm_joints), robot.finger_indices
+    goal[:arm] += 0.05
+    goal[fingers] -= 0.01
+    unit = finger_unit(robot)
+    allowed = 1e-3 if unit == "m" else 5e-3
     once = Trajectory.holding(subject.timestep, goal)
     with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "arm weightless")) as world:
         world.wait(0.2)
@@ -195,15 +200,16 @@ def commands_persist(subject: Subject) -> None:
         for _ in range(2):
             world.wait(1.0)
             error = np.abs(world.joints[0] - goal)
-            require_close("joint error after the command", error[:7].max(), 0, 5e-3, "rad")
-            require_close("finger error after the command", error[7:].max(), 0, 1e-3, "m")
+            require_close("joint error after the command", error[:arm].max(), 0, 5e-3, "rad")
+            worst = error[fingers].max(initial=0.0)
+            require_close("finger error after the command", worst, 0, allowed, unit)
 
 
-@check()
+@check(robot=any_robot)
 def bad_description_rejected(subject: Subject) -> None:
     """A robot description that does not exist is an error which names the file, and the same
     worker then loads a good scene."""
-    robot = dataclasses.replace(scenes.arm(), urdf="/nowhere/robot.urdf")
+    robot = dataclasses.replace(subject.arm, urdf="/nowhere/robot.urdf")
     process = subject.shared()
     subject.construct(process)
     wire = scenes.arm_alone(robot).to_wire()

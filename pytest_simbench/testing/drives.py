@@ -1,4 +1,4 @@
-"""Checks of the joint drives on the Panda: law in `scene.Joint`, Pinocchio as the reference."""
+"""Checks of the joint drives: law in `scene.Joint`, Pinocchio as the reference."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from pytest_simbench.scene import (
 )
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
+from pytest_simbench.testing.robots import any_robot, coupled, finger_unit, grasping
 from pytest_simbench.testing.subject import Subject, logged, require, require_close
 
 ARM_TICK = 0.004
@@ -34,37 +35,39 @@ def gravity_effort(robot: Robot, q: FloatArray, gravity: Vector3 = STANDARD_GRAV
     return np.asarray(model_of(robot).inverse_dynamics(np.array(gravity), q[None], zero, zero)[0])
 
 
-@check()
+@check(robot=any_robot)
 def static_hold(subject: Subject) -> None:
     """Without feed-forward a spring sags: k (q* - q) equals the gravity torque of the model, per
     arm joint within 3 % of the largest one. A drive whose stiffness is a declared deviation may be
     no spring: it may hold instead, within 5 mrad."""
-    robot = scenes.arm()
+    robot = subject.arm
     start = robot.column("initial_position")
     with subject.world(scenes.arm_alone(robot)) as world:
         world.wait(2.0)
         q = world.joints[0]
-    sag = float(np.abs(start - q)[:7].max())
+    arm = len(robot.arm_joints)
+    sag = float(np.abs(start - q)[:arm].max())
     declared = any(
         deviation.excuses(f"joint/{robot.joints[0].name}/stiffness")
         for deviation in subject.cls.info.deviations
     )
     if declared and sag <= 5e-3:
         return
-    held = (robot.column("stiffness") * (start - q))[:7]
-    law = gravity_effort(robot, q)[:7]
+    held = (robot.column("stiffness") * (start - q))[:arm]
+    law = gravity_effort(robot, q)[:arm]
     tolerance = 0.03 * float(np.abs(law).max())
-    for joint, value, expected in zip(robot.joints, held, law, strict=False):
+    for joint, value, expected in zip(robot.arm_joints, held, law, strict=True):
         require_close(f"holding torque of {joint.name}", value, expected, tolerance, "N m")
 
 
-@check()
+@check(robot=any_robot)
 def tracks_trajectory(subject: Subject) -> None:
-    """With feed-forward the arm follows a smooth trajectory (quintic, 0.4 rad in 1.5 s): at most
-    two steps late plus 2 mrad, at any joint and time."""
-    robot = scenes.arm()
+    """With feed-forward the arm follows a smooth trajectory (quintic, 0.4 rad in 1.5 s, away from a
+    limit that is near): at most two steps late plus 2 mrad, at any joint and time."""
+    robot = subject.arm
     start = robot.column("initial_position")
-    goal = start + np.array([0.4, -0.3, 0.3, 0.4, -0.3, 0.3, 0.4, -0.01, -0.01])
+    arm = len(robot.arm_joints)
+    goal = start + _turn(robot)
     time = np.arange(0.0, 1.5 + ARM_TICK / 2, ARM_TICK)
     s = (time / 1.5)[:, None]
     q = start + (goal - start) * (10 * s**3 - 15 * s**4 + 6 * s**5)
@@ -79,22 +82,32 @@ def tracks_trajectory(subject: Subject) -> None:
         motion = logged(world.follow(Trajectory(ARM_TICK, q, v, effort), log_period=0))
     late = motion.time - motion.time[0] + subject.timestep
     ideal = np.stack([np.interp(late, time, column) for column in q.T], axis=1)
-    error = np.abs(motion.joints[:, 0, :7] - ideal[:, :7]).max(axis=0)
-    allowed = 2 * subject.timestep * np.abs(v[:, :7]).max(axis=0) + 2e-3
-    for joint, value, limit in zip(robot.joints, error, allowed, strict=False):
+    error = np.abs(motion.joints[:, 0, :arm] - ideal[:, :arm]).max(axis=0)
+    allowed = 2 * subject.timestep * np.abs(v[:, :arm]).max(axis=0) + 2e-3
+    for joint, value, limit in zip(robot.arm_joints, error, allowed, strict=True):
         require_close(f"tracking error of {joint.name}", value, 0.0, float(limit), "rad")
 
 
-@check()
+def _turn(robot: Robot) -> FloatArray:
+    """How far each joint goes in `tracks_trajectory` from its start, (n_joints,) [rad, m]."""
+    model, arm = model_of(robot), len(robot.arm_joints)
+    start, turn = robot.column("initial_position"), np.full(len(robot.joints), -0.01)
+    turn[:arm] = np.resize([0.4, -0.3, 0.3], arm)
+    goal = (start + turn)[:arm]
+    turn[:arm][(goal < model.lower) | (goal > model.upper)] *= -1
+    return turn
+
+
+@check(robot=any_robot)
 def effort_limit_bounds_acceleration(subject: Subject) -> None:
     """A far command saturates the drive of joint 1, whose momentum p = (M(q) q')_1 then grows by
-    the effort limit and nothing else: its axis is vertical and M does not depend on it. After
+    the effort limit and nothing else: without gravity nothing depends on its position. After
     0.1 s p <= 1.05 limit t, and >= 0.8 limit t so that the limit is reached. A declared lack
     of rotor inertia is left out of M."""
-    robot = scenes.arm()
+    robot = subject.arm
     start = robot.column("initial_position")
     goal = start.copy()
-    goal[0] += 2.0
+    goal[0] += _far(robot)
     far = Trajectory.holding(subject.timestep, goal)
     with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "arm weightless")) as world:
         world.follow(far)
@@ -112,13 +125,19 @@ def effort_limit_bounds_acceleration(subject: Subject) -> None:
     )
 
 
-@check()
+def _far(robot: Robot) -> float:
+    """A far way of joint 1, away from the nearer of its limits [rad]."""
+    model, start = model_of(robot), robot.joints[0].initial_position
+    return 2.0 if model.upper[0] - start >= start - model.lower[0] else -2.0
+
+
+@check(robot=any_robot)
 def weak_joint_sags(subject: Subject) -> None:
     """A joint whose effort limit is a tenth of its gravity torque cannot hold: it moves by more
     than 0.05 rad within 0.5 s, while with its own limit it holds within 0.02 rad."""
-    robot = scenes.arm()
+    robot = subject.arm
     q = robot.column("initial_position")
-    load = np.abs(gravity_effort(robot, q)[:7])
+    load = np.abs(gravity_effort(robot, q)[: len(robot.arm_joints)])
     index = int(load.argmax())
     name = robot.joints[index].name
     moved = []
@@ -131,25 +150,29 @@ def weak_joint_sags(subject: Subject) -> None:
     require(moved[1] > 0.05, f"{name} held its load with a tenth of the effort it takes")
 
 
-@check()
+@check(robot=coupled)
 def fingers_stay_coupled(subject: Subject) -> None:
-    """The fingers stand equally far from the middle (1 mm) though told different positions."""
-    robot = scenes.arm()
+    """The fingers stand equally far from the middle (1 mm, those that turn 5 mrad) though told
+    different positions, 2/7 and 6/7 of their way."""
+    robot = subject.arm
     goal = robot.column("initial_position")
-    goal[robot.finger_indices] = [0.03, 0.01]
+    hand, unit = robot.gripper, finger_unit(robot)
+    shares = np.resize([6 / 7, 2 / 7], len(hand.joints))
+    goal[robot.finger_indices] = hand.closed + shares * (hand.opened - hand.closed)
     split = Trajectory.holding(subject.timestep, goal)
     with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "arm weightless")) as world:
         world.follow(split)
         world.wait(1.0)
-        first, second = world.joints[0, robot.finger_indices]
-    require_close("difference of the fingers", float(first - second), 0.0, 1e-3, "m")
+        fingers = world.joints[0, robot.finger_indices]
+    allowed = 1e-3 if unit == "m" else 5e-3
+    require_close("difference of the fingers", float(np.ptp(fingers)), 0.0, allowed, unit)
 
 
-@check()
+@check(robot=grasping)
 def grip_holds(subject: Subject) -> None:
     """A cube gripped with the scene's squeeze (25 N a finger on 1 N of weight, mu 1) stays in the
     hand for 2 s within 2 mm, from when the fingers have closed."""
-    scene = scenes.grip()
+    scene = scenes.grip(subject.arm)
     with subject.world(scene) as world:
         world.follow(close_command(scene, subject.timestep))
         world.wait(0.5)
@@ -164,7 +187,7 @@ def grip_holds(subject: Subject) -> None:
 
 def has_armature(subject: Subject) -> bool:
     """Whether the engine has rotor inertia, which an adapter may declare to lack."""
-    name = f"joint/{scenes.arm().joints[0].name}/armature"
+    name = f"joint/{subject.arm.joints[0].name}/armature"
     return not any(deviation.excuses(name) for deviation in subject.cls.info.deviations)
 
 
@@ -179,9 +202,20 @@ def joint_momentum(robot: Robot, q: FloatArray, v: FloatArray, armature: bool) -
     return np.asarray((upper + np.triu(upper, 1).T) @ v)
 
 
+def of_scene(scene: Scene) -> Robot:
+    """The scene's robot.
+
+    Raises:
+        LookupError: it has none.
+    """
+    if scene.robot is None:
+        raise LookupError(f"scene {scene.name!r} has no robot to command")
+    return scene.robot
+
+
 def hold_command(scene: Scene, timestep: float) -> Trajectory:
     """One command: everything at its start, gravity compensated."""
-    robot = scene.robot or scenes.arm()
+    robot = of_scene(scene)
     start = robot.column("initial_position")
     effort = gravity_effort(robot, start, scene.gravity)
     return Trajectory.holding(timestep, start, effort)
@@ -189,7 +223,7 @@ def hold_command(scene: Scene, timestep: float) -> Trajectory:
 
 def close_command(scene: Scene, timestep: float) -> Trajectory:
     """One command: arm at its start with gravity compensated, fingers closed."""
-    robot = scene.robot or scenes.arm()
+    robot = of_scene(scene)
     goal = robot.column("initial_position")
     effort = gravity_effort(robot, goal, scene.gravity)
     goal[robot.finger_indices] = robot.gripper.closed

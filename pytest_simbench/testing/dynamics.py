@@ -3,13 +3,12 @@ joints transmit; and of loops."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from pytest_simbench.laws.loops import FourBarSwing
-from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Pose, Robot, Trajectory
+from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Trajectory
 from pytest_simbench.simulator import Capability, PreparedRobot
 from pytest_simbench.simulator.kinematics import link_poses
 from pytest_simbench.simulator.loops import ends, reduced
@@ -22,13 +21,14 @@ from pytest_simbench.testing.drives import (
     joint_momentum,
     model_of,
 )
+from pytest_simbench.testing.robots import any_robot
 from pytest_simbench.testing.subject import Subject, logged, require, require_close
 
 _FALL = 0.2
 """For how long the limp arm falls [s]."""
 
 
-@check()
+@check(robot=any_robot)
 def limp_arm_falls(subject: Subject) -> None:
     """An arm without drives falls as its inertia and its weight say, and nothing else brakes it:
     from two random postures, after 0.2 s every joint's speed is that of Pinocchio's forward
@@ -50,7 +50,7 @@ def _falling_arm(subject: Subject, rng: np.random.Generator) -> tuple[Robot, Flo
     Its posture is random, but such that no joint reaches its limits.
     """
     while True:
-        robot = scenes.at_random(replace(scenes.arm(), base=Pose.at(0.0, 0.0, 2.0)), rng)
+        robot = scenes.at_random(scenes.lifted(subject.arm), rng)
         for joint in robot.arm_joints:
             limp = {"stiffness": 1e-3, "damping": 1e-3, "effort_limit": 1e-6}
             robot = scenes.with_joint(robot, joint.name, **limp)
@@ -80,14 +80,14 @@ def _fall(robot: Robot, armature: bool) -> tuple[FloatArray, FloatArray]:
     return np.array(path), v
 
 
-@check()
+@check(robot=any_robot)
 def every_effort_limit_counts(subject: Subject) -> None:
     """Each arm joint does what its effort limit allows and no more. Where gravity loads it: with
     1.25 times the effort that it asks of every joint the arm holds (0.01 rad in 0.3 s), with 0.7
     times in one joint that one gives way (0.02 rad). Where not: under a far command with a limit
     of 0.5 N m its momentum (M(q) q')_j is 0.5 N m t after 50 ms, within -20 and +5 %."""
     gravity = (7.0, 5.0, -11.0)
-    robot = scenes.at_random(scenes.arm(), np.random.default_rng(14))
+    robot = scenes.at_random(scenes.lifted(subject.arm), np.random.default_rng(14))
     q = robot.column("initial_position")
     load = np.abs(gravity_effort(robot, q, gravity)[: len(robot.arm_joints)])
     strong = robot
@@ -137,11 +137,11 @@ def _gives_way(subject: Subject, robot: Robot, gravity: tuple[float, float, floa
     return np.asarray(moved)
 
 
-@check()
+@check(robot=any_robot)
 def joints_stop_at_their_limits(subject: Subject) -> None:
-    """Led 0.2 rad beyond each of its limits within 2 s, every arm joint stops within 0.1 rad of
-    it, on the way up and on the way down."""
-    robot = replace(scenes.arm(), base=Pose.at(0.0, 0.0, 2.0))
+    """Led 0.2 rad beyond each of its limits within 2 s, or at 1.6 rad/s if that takes longer, every
+    arm joint stops within 0.1 rad of it, on the way up and on the way down."""
+    robot = scenes.lifted(subject.arm)
     limits = PreparedRobot(robot).limits
     low, high = np.array([limits[joint.name] for joint in robot.arm_joints]).T
     for name, end, beyond in (("upper", high, 0.2), ("lower", low, -0.2)):
@@ -149,7 +149,8 @@ def joints_stop_at_their_limits(subject: Subject) -> None:
             start = robot.column("initial_position")
             goal = start.copy()
             goal[: len(end)] = end + beyond
-            ramp = np.linspace(0.0, 1.0, 501)[:, None]
+            seconds = max(2.0, float(np.abs(goal - start).max()) / 1.6)
+            ramp = np.linspace(0.0, 1.0, round(seconds / 0.004) + 1)[:, None]
             path = start + ramp * (goal - start)
             still = np.zeros_like(path)
             world.follow(Trajectory(0.004, path, still, still))
@@ -175,11 +176,11 @@ def loops_stay_closed(subject: Subject) -> None:
     require(moved > 0.1, f"the crank of a four-bar linkage moved by {moved:.3g} rad only")
 
 
-@check(Capability.JOINT_WRENCHES)
+@check(Capability.JOINT_WRENCHES, any_robot)
 def joint_loads_are_told(subject: Subject) -> None:
     """Each joint of an arm that stands still carries what hangs on it: the weight, upward, and the
     torque of that weight about the joint, each within 2 % of the largest."""
-    robot = scenes.at_random(scenes.arm(), np.random.default_rng(5))
+    robot = scenes.at_random(scenes.lifted(subject.arm), np.random.default_rng(5))
     scene = scenes.arm_alone(robot, name="loaded arm")
     with subject.world(scene) as world:
         world.follow(hold_command(scene, subject.timestep))

@@ -10,17 +10,18 @@ from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
 from pytest_simbench.testing.drives import close_command, gravity_effort, hold_command, model_of
+from pytest_simbench.testing.robots import any_robot, grasping
 from pytest_simbench.testing.scenes import EDGE, GRAVITY, MASS
 from pytest_simbench.testing.subject import Subject, logged, require, require_close
-from pytest_simbench.testing.touch import Approach, approaches
+from pytest_simbench.testing.touch import Approach, approaches, beside
 
 
-@check()
+@check(robot=grasping)
 def squeeze_bounds_the_grip(subject: Subject) -> None:
     """Two fingers that press with F carry 2 mu F and no more: of what they can carry, a cube of
     0.6 times that weight stays (15 mm in 0.5 s), one of 1.3 times falls out (50 mm)."""
     force = 5.0
-    robot = scenes.squeezing(scenes.arm(), force)
+    robot = scenes.squeezing(subject.arm, force)
     moved = []
     for share in (0.6, 1.3):
         mass = share * 2 * robot.friction * force / GRAVITY
@@ -38,15 +39,15 @@ def squeeze_bounds_the_grip(subject: Subject) -> None:
     )
 
 
-@check()
+@check(robot=grasping)
 def open_hand_holds_nothing(subject: Subject) -> None:
-    """A cube between open fingers, and one below a hand that closes upon nothing, fall freely:
+    """A cube between open fingers, and one before a hand that closes upon nothing, fall freely:
     s = g t^2 / 2 and v = g t after 0.1 s, within what a step changes and 1 %."""
-    robot = scenes.arm()
+    robot = subject.arm
     between = scenes.grip(robot, gap=0.01, name="open hand")
     tool = model_of(robot).tool_pose(robot.column("initial_position"))
-    x, y, z = tool.position
-    below = Scene("closing hand", (scenes.cube("below", Pose.at(x, y, z - 0.06)),), robot=robot)
+    x, y, z = (tool * Pose.at(0.0, 0.0, 0.06)).position
+    below = Scene("closing hand", (scenes.cube("below", Pose.at(x, y, z)),), robot=robot)
     for scene, closing in ((between, False), (below, True)):
         with subject.world(scene) as world:
             if closing:
@@ -55,14 +56,14 @@ def open_hand_holds_nothing(subject: Subject) -> None:
             _require_free_fall(subject, scene, world.time, world.bodies)
 
 
-@check()
+@check(robot=any_robot)
 def every_body_falls(subject: Subject) -> None:
     """Free bodies of any mass and place, near the arm too, fall as in `open_hand_holds_nothing`:
     no body is without gravity, held, or slowed down."""
-    robot = scenes.arm()
+    robot = subject.arm
     places = [(0.3, 0.3), (0.3, -0.3), (-0.3, 0.3), (-0.3, -0.3), (0.7, 0.0)]
     cubes = [
-        scenes.cube(f"c{k}", Pose.at(x, y, 0.6 + 0.1 * k, yaw=k), mass=MASS * 3.0**k / 3)
+        scenes.cube(f"c{k}", Pose.at(*beside(robot, x, y), 0.6 + 0.1 * k, yaw=k), MASS * 3.0**k / 3)
         for k, (x, y) in enumerate(places)
     ]
     scene = Scene("all fall", tuple(cubes), robot=robot)
@@ -83,13 +84,13 @@ def _require_free_fall(subject: Subject, scene: Scene, t: float, rows: FloatArra
         require_close(f"sideways motion of {body.name}", aside, 0.0, 1e-4, "m")
 
 
-@check()
+@check(robot=grasping)
 def held_weight_is_felt(subject: Subject) -> None:
     """What the hand carries weighs on the arm. A joint that can carry the arm and half of what a
     held cube of 1.5 kg adds holds without the cube (0.02 rad in 0.5 s) and sags with it (0.05)."""
-    mass, robot = 1.5, scenes.arm()
+    mass, robot = 1.5, subject.arm
     q = robot.column("initial_position")
-    arm_load = gravity_effort(robot, q)[:7]
+    arm_load = gravity_effort(robot, q)[: len(robot.arm_joints)]
     model = model_of(robot)
     lift = model.tool_transform(q).rotation.T @ np.array([0.0, 0.0, mass * GRAVITY])
     cube_load = model.tool_jacobian(q)[:3].T @ lift
@@ -108,13 +109,12 @@ def held_weight_is_felt(subject: Subject) -> None:
     require(sags[1] > 0.05, f"{name} does not feel the cube: it sags by {sags[1]:.2g} rad")
 
 
-@check()
+@check(robot=any_robot)
 def links_are_felt(subject: Subject) -> None:
     """A cube that falls towards a link from 5 mm away stops where the link's shape begins: each
     link collides, with a shape that reaches as far as the description's within 3 mm there, and what
     the adapter declares of its meshes. It would have fallen 11 mm farther."""
-    robot = scenes.arm()
-    for group in approaches(robot):
+    for robot, group in approaches(subject.arm):
         x, y, z = (float(part) for part in 2 * GRAVITY * group[0].direction)
         cubes = tuple(approach.cube() for approach in group)
         scene = Scene(f"fly {group[0].link}", cubes, robot=robot, gravity=(x, y, z))

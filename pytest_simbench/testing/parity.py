@@ -16,6 +16,7 @@ from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
 from pytest_simbench.testing.faults import Fault, rounds, true_scene
+from pytest_simbench.testing.robots import any_robot
 from pytest_simbench.testing.state import busy_scene, require_same, swing_and_wait
 from pytest_simbench.testing.subject import Subject, require
 
@@ -23,19 +24,19 @@ POSITION = 1e-5
 """Engines in single precision keep about 7 digits; after some arithmetic 5 are safe."""
 
 
-@check()
+@check(robot=any_robot)
 def parity_of_full_scene(subject: Subject) -> None:
     """A world with robot, fixed and free bodies, odd sizes and tilted gravity passes parity."""
-    with subject.world(true_scene()):
+    with subject.world(replace(true_scene(), robot=replace(subject.arm, friction=0.7))):
         pass  # loading checks parity
 
 
-@check()
+@check(robot=any_robot)
 def parity_in_any_posture(subject: Subject) -> None:
     """The links stand where the description has them, at three random joint positions too, with
     the base moved and turned: parity holds there."""
     rng = np.random.default_rng(0)
-    robot = scenes.arm()
+    robot = subject.arm
     for _ in range(3):
         base = Pose.at(0.2 * rng.uniform(), -0.1, 0.1, yaw=3 * rng.uniform())
         moved = scenes.at_random(replace(robot, base=base), rng)
@@ -57,11 +58,11 @@ def read_back_is_the_engines(subject: Subject) -> None:
         )
 
 
-@check(Capability.DETERMINISTIC)
+@check(Capability.DETERMINISTIC, any_robot)
 def reading_changes_nothing(subject: Subject) -> None:
     """A world that was read back moves on, bit for bit, as one that was not: cubes falling and
     colliding, the arm swinging."""
-    scene, runs = busy_scene(), []
+    scene, runs = busy_scene(subject.arm), []
     for parity in (False, True):
         with subject.world(scene, fresh=True, parity=parity) as world:
             runs.append(swing_and_wait(world, scene, subject.timestep))

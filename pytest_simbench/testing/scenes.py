@@ -214,6 +214,13 @@ def arm() -> Robot:
     return panda()
 
 
+def lifted(robot: Robot) -> Robot:
+    """The same robot, so high above the ground that it does not touch it in any posture."""
+    from pytest_simbench.robot.model import RobotModel
+
+    return replace(robot, base=Pose.at(0.0, 0.0, max(2.0, 1.2 * RobotModel(robot).reach)))
+
+
 def with_joint(robot: Robot, name: str, **values: Any) -> Robot:
     """The same robot with values of one joint replaced."""
     joints = tuple(replace(j, **values) if j.name == name else j for j in robot.joints)
@@ -242,7 +249,7 @@ def arm_alone(
 def grip(
     robot: Robot | None = None, mass: float = MASS, gap: float = 2e-4, name: str = "grip"
 ) -> Scene:
-    """The Panda with a cube between its fingers, which stand `gap` [m] from it on either side."""
+    """A robot with a cube between its fingers, which stand `gap` [m] from it on either side."""
     from pytest_simbench.robot.model import RobotModel
 
     robot = robot or arm()

@@ -8,21 +8,23 @@ import numpy as np
 import pytest
 
 from pytest_simbench.client.world import Motion, World
-from pytest_simbench.scene import Pose, Scene, Trajectory
+from pytest_simbench.scene import Pose, Robot, Scene, Trajectory
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
-from pytest_simbench.testing.drives import close_command
+from pytest_simbench.testing.drives import close_command, of_scene
+from pytest_simbench.testing.robots import any_robot, grasping
 from pytest_simbench.testing.subject import Subject, logged, require
 
 
-def busy_scene() -> Scene:
+def busy_scene(robot: Robot) -> Scene:
+    """Cubes that fall upon each other before a robot."""
     cubes = [scenes.cube(f"c{i}", Pose.at(0.5, 0.02 * i, 0.1 + 0.08 * i)) for i in range(3)]
-    return Scene("busy", tuple(cubes), robot=scenes.arm())
+    return Scene("busy", tuple(cubes), robot=robot)
 
 
 def _swing(scene: Scene, timestep: float, share: float) -> Trajectory:
-    robot = scene.robot or scenes.arm()
+    robot = of_scene(scene)
     start = robot.column("initial_position")
     goal = start + share
     goal[robot.finger_indices] = start[robot.finger_indices]
@@ -47,11 +49,11 @@ def swing_and_wait(world: World, scene: Scene, timestep: float) -> Motion:
     return logged(world.wait(1.0, log_period=0.02))
 
 
-@check(Capability.SAVE_RESTORE)
+@check(Capability.SAVE_RESTORE, any_robot)
 def restore_repeats(subject: Subject) -> None:
     """From a restored state the same future follows every time, bit for bit: cubes falling and
     colliding, the arm moving under the command that was in force when the state was saved."""
-    scene = busy_scene()
+    scene = busy_scene(subject.arm)
     with subject.world(scene) as world:
         world.follow(_swing(scene, subject.timestep, 0.3))
         world.wait(0.1)
@@ -70,11 +72,11 @@ def restore_repeats(subject: Subject) -> None:
     require_same("third and first future", futures[2], futures[0])
 
 
-@check(Capability.EXACT_RESTORE)
+@check(Capability.EXACT_RESTORE, any_robot)
 def restore_continues(subject: Subject) -> None:
     """A run that was saved, and one that was restored as well, equal bit for bit the run that was
     not interrupted."""
-    scene, runs = busy_scene(), []
+    scene, runs = busy_scene(subject.arm), []
     for interrupted in (False, True):
         with subject.world(scene) as world:
             world.follow(_swing(scene, subject.timestep, 0.3))
@@ -89,10 +91,10 @@ def restore_continues(subject: Subject) -> None:
     require_same("restored and uninterrupted run", runs[2], runs[0])
 
 
-@check(Capability.SAVE_RESTORE)
+@check(Capability.SAVE_RESTORE, grasping)
 def restore_in_the_grip(subject: Subject) -> None:
     """The same with a cube between the fingers, from two restores."""
-    scene = scenes.grip()
+    scene = scenes.grip(subject.arm)
     with subject.world(scene) as world:
         world.follow(close_command(scene, subject.timestep))
         world.wait(0.3)
@@ -104,20 +106,20 @@ def restore_in_the_grip(subject: Subject) -> None:
     require_same("second and first future in the grip", futures[1], futures[0])
 
 
-@check(Capability.DETERMINISTIC)
+@check(Capability.DETERMINISTIC, any_robot)
 def fresh_processes_agree(subject: Subject) -> None:
     """Two fresh processes compute the same, bit for bit."""
-    scene, runs = busy_scene(), []
+    scene, runs = busy_scene(subject.arm), []
     for _ in range(2):
         with subject.world(scene, fresh=True) as world:
             runs.append(swing_and_wait(world, scene, subject.timestep))
     require_same("two fresh processes", runs[1], runs[0])
 
 
-@check(Capability.DETERMINISTIC)
+@check(Capability.DETERMINISTIC, any_robot)
 def reused_process_agrees(subject: Subject) -> None:
     """A second world in one process, after another scene was in between, computes the same."""
-    scene, runs = busy_scene(), []
+    scene, runs = busy_scene(subject.arm), []
     for _ in range(2):
         with subject.world(scene) as world:
             runs.append(swing_and_wait(world, scene, subject.timestep))
@@ -126,13 +128,13 @@ def reused_process_agrees(subject: Subject) -> None:
     require_same("two worlds in one process", runs[1], runs[0])
 
 
-@check(Capability.WINDOW)
+@check(Capability.WINDOW, any_robot)
 def window_changes_nothing(subject: Subject) -> None:
     """With a window the same is computed, bit for bit where determinism is claimed, else within
     1 mm. Skipped where there is no display."""
     if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         pytest.skip("no display; start one, e.g. with xvfb-run")
-    scene, runs = busy_scene(), []
+    scene, runs = busy_scene(subject.arm), []
     for gui in (False, True):
         with subject.world(scene, fresh=True, gui=gui) as world:
             runs.append(swing_and_wait(world, scene, subject.timestep))
@@ -143,12 +145,12 @@ def window_changes_nothing(subject: Subject) -> None:
         require(gap < 1e-3, f"with a window the cubes end {1000 * gap:.2g} mm away")
 
 
-@check(Capability.OFFSCREEN)
+@check(Capability.OFFSCREEN, any_robot)
 def picture_shows_something(subject: Subject) -> None:
     """An offscreen picture has the size asked for, (height, width, 3) bytes, more than one
     colour, and another one is drawn when the scene is another."""
     pictures = []
-    for scene in (busy_scene(), scenes.tower()):
+    for scene in (busy_scene(subject.arm), scenes.tower()):
         with subject.world(scene) as world:
             pictures.append(world.render(160, 120))
     for picture in pictures:

@@ -18,7 +18,8 @@ from pytest_simbench.client.errors import BadState, Diverged, Where, WorkerError
 from pytest_simbench.client.launch import Constructed, Launch
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import Motion, World
-from pytest_simbench.scene import Scene
+from pytest_simbench.robot.panda import panda
+from pytest_simbench.scene import Robot, Scene
 from pytest_simbench.simulator import Capability, Settings, Simulator
 from pytest_simbench.simulator.settings import profile
 from pytest_simbench.simulator.urdf import ROOT
@@ -52,7 +53,7 @@ _shared: dict[tuple[str | None, str, str], WorkerProcess] = {}
 
 @dataclass(frozen=True)
 class Subject:
-    """One adapter with one settings profile.
+    """One adapter with one settings profile, and a robot.
 
     Checks share one worker process per interpreter, in which every world is constructed anew, as
     the plugin does for engines that start slowly; a check that fails in the engine costs only
@@ -63,11 +64,14 @@ class Subject:
         profile: name of its settings profile.
         python: interpreter of its worker; None for that of its own environment where it has one
             (`pytest --sim-install`), else this one.
+        robot: that the laws are asked with; None: the Panda.
+        motions: what was asked already.
     """
 
     cls: type[Simulator]
     profile: str = "tuned"
     python: str | None = None
+    robot: Robot | None = None
     motions: dict[tuple[Any, ...], Motion] = field(default_factory=dict, compare=False)
 
     @property
@@ -86,6 +90,11 @@ class Subject:
     def timestep(self) -> float:
         """[s]."""
         return self.settings.timestep
+
+    @property
+    def arm(self) -> Robot:
+        """The robot that the laws are asked with."""
+        return self.robot or panda()
 
     def can(self, capability: Capability) -> bool:
         return capability in self.cls.info.capabilities

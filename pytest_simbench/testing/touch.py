@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,10 +11,13 @@ from pytest_simbench.scene import Box, FloatArray, Pose, Robot
 from pytest_simbench.simulator import PreparedRobot
 from pytest_simbench.simulator.kinematics import link_poses
 from pytest_simbench.simulator.shapes import DIRECTIONS, placed, shape_points
-from pytest_simbench.testing.scenes import MASS
+from pytest_simbench.testing.scenes import MASS, at_random, lifted
 
 _EDGE = 0.02
 """Of the flying cube [m]: small enough to reach between the links."""
+
+_POSTURES = 50
+"""That are tried."""
 
 _GAP = 0.005
 """From the cube's face to the link [m]."""
@@ -40,25 +44,50 @@ class Approach:
         return Box(f"to_{self.link}", (_EDGE,) * 3, pose, MASS)
 
 
-def approaches(robot: Robot) -> list[list[Approach]]:
-    """One approach to every link that moves, in groups that fly in one direction."""
+def link_clouds(robot: Robot) -> dict[str, FloatArray]:
+    """The corners of each link that has a shape, in the world, (n, 3) [m]: its hull's."""
     prepared = PreparedRobot(robot)
-    at = {joint.name: joint.initial_position for joint in robot.joints}
-    poses = link_poses(prepared, at)
-    clouds = {
+    poses = link_poses(prepared, {joint.name: joint.initial_position for joint in robot.joints})
+    return {
         link.name: np.vstack([placed(shape_points(s), poses[link.name]) for s in link.shapes])
         for link in prepared.links.values()
         if link.shapes
     }
-    groups: list[list[Approach]] = []
-    waiting = [name for name in clouds if name != prepared.root]
-    while waiting:
-        group = max((_reachable(waiting, clouds, d) for d in DIRECTIONS), key=len)
-        if not group:
-            raise LookupError(f"no cube can be flown to {', '.join(waiting)} of {robot.name}")
-        groups.append(group)
-        waiting = [name for name in waiting if name not in {a.link for a in group}]
-    return groups
+
+
+def approaches(robot: Robot) -> Iterator[tuple[Robot, list[Approach]]]:
+    """One approach to every link that moves, in groups that fly in one direction, each with the
+    robot as it stands then: as it is, and high up in random postures where others hide a link.
+
+    Raises:
+        LookupError: no cube reaches some of the links.
+    """
+    rng, waiting = np.random.default_rng(0), list(link_clouds(robot))
+    waiting.remove(PreparedRobot(robot).root)
+    for _ in range(_POSTURES):
+        clouds = link_clouds(robot)
+        while group := max((_reachable(waiting, clouds, d) for d in DIRECTIONS), key=len):
+            yield robot, group
+            waiting = [name for name in waiting if name not in {a.link for a in group}]
+        if not waiting:
+            return
+        robot = at_random(lifted(robot), rng)
+    raise LookupError(f"no cube can be flown to {', '.join(waiting)} of {robot.name}")
+
+
+def beside(robot: Robot, x: float, y: float) -> tuple[float, float]:
+    """The first place [m] from (x, y) on, away from the z axis, that no link is over or near."""
+    clouds = [cloud[:, :2] for cloud in link_clouds(robot).values()]
+    place, away = np.array([x, y]), np.array([x, y]) / 20
+    while any(_near(cloud, place) for cloud in clouds):
+        place += away
+    return float(place[0]), float(place[1])
+
+
+def _near(cloud: FloatArray, place: FloatArray) -> bool:
+    """Whether a place lies in the rectangle about the points, or within two edges of it."""
+    low, high = cloud.min(axis=0) - 2 * _EDGE, cloud.max(axis=0) + 2 * _EDGE
+    return bool(((place > low) & (place < high)).all())
 
 
 def _reachable(

@@ -1,0 +1,159 @@
+"""The laws as tests: one of each law, adapter, profile and robot."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_simbench.client.environments import missing
+from pytest_simbench.robot.registry import known
+from pytest_simbench.scene import Robot
+from pytest_simbench.simulator import Simulator
+from pytest_simbench.simulator.registry import adapter
+from pytest_simbench.testing.checks import CHECKS, Check
+from pytest_simbench.testing.expected import (
+    ConformanceWarning,
+    read_expected_failures,
+    reason_for,
+    unmatched,
+)
+from pytest_simbench.testing.subject import Subject
+
+
+@dataclass(frozen=True)
+class ConformanceTest:
+    """One check of one adapter, ready to be called in a test.
+
+    Attributes:
+        subject: adapter, profile and robot.
+        check: the law.
+        expected_failures: reasons by check, see `read_expected_failures`.
+    """
+
+    subject: Subject
+    check: Check
+    expected_failures: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def id(self) -> str:
+        """`mysim-tuned-free_fall`, and `mysim-tuned-ur5-static_hold` of another robot than the
+        Panda."""
+        robot = self.subject.robot
+        return _identifier(self.subject, "" if robot is None else robot.name, self.check.name)
+
+    def __call__(self) -> None:
+        """Run the check.
+
+        Raises:
+            ConformanceFailure: the adapter breaks the law, and nobody expected it.
+        """
+        info, needs = self.subject.cls.info, self.check.needs
+        if needs is not None and not self.subject.can(needs):
+            pytest.skip(f"{info.name} does not claim {needs}")
+        absent = None if self.subject.python else missing(info)
+        if absent:
+            pytest.skip(absent)
+        unfit = None if self.check.robot is None else self.check.robot(self.subject.arm)
+        if unfit:
+            pytest.skip(unfit)
+        reason = reason_for(self.id, self.expected_failures)
+        try:
+            self.check.law(self.subject)
+        except pytest.skip.Exception:
+            raise
+        except Exception as error:
+            if reason is None:
+                raise
+            pytest.xfail(f"{reason} ({error})")
+        if reason is not None:
+            warnings.warn(
+                f"{self.id} is listed as an expected failure ({reason}) but passes; remove it",
+                ConformanceWarning,
+                stacklevel=2,
+            )
+
+
+@dataclass(frozen=True)
+class Kit:
+    """Laws for adapters; the plugin makes tests of them when the robot is known.
+
+    Attributes:
+        subjects: adapters with their profiles, with the Panda.
+        names: of the checks.
+        expected_failures: reasons by check.
+    """
+
+    subjects: tuple[Subject, ...]
+    names: tuple[str, ...]
+    expected_failures: Mapping[str, str]
+
+    def tests(self, robots: Iterable[Robot | None]) -> Iterator[ConformanceTest]:
+        """Each law with each robot (None: the Panda); what is about no robot once."""
+        chosen = tuple(robots)
+        for subject in self.subjects:
+            for name in self.names:
+                check = CHECKS[name]
+                for robot in chosen if check.robot else (None,):
+                    yield ConformanceTest(
+                        replace(subject, robot=robot), check, self.expected_failures
+                    )
+
+    def identifiers(self) -> Iterator[str]:
+        """Ids of the tests with every known robot, the Panda's first."""
+        for robot in ("", *known()):
+            for subject in self.subjects:
+                for name in self.names:
+                    yield _identifier(subject, robot, name)
+
+
+def _identifier(subject: Subject, robot: str, check: str) -> str:
+    return "-".join(part for part in (subject.name, subject.profile, robot, check) if part)
+
+
+def conformance_checks(
+    *simulators: str | type[Simulator],
+    profiles: Iterable[str] = ("tuned",),
+    expected_failures: str | Path | Mapping[str, str] | None = None,
+    python: Mapping[str, str] | None = None,
+    only: Iterable[str] | None = None,
+) -> Callable[..., Any]:
+    """Decorator that parametrises a test with every check, as its argument `check`.
+
+    The robot is that of `--robot`, the Panda by default; laws without a robot run once.
+
+    Args:
+        simulators: registered names, or adapter classes.
+        profiles: settings profiles to check.
+        expected_failures: file or mapping of laws known to be broken: they become xfail. A line
+            that matches no check, or whose check passes, gives a `ConformanceWarning`.
+        python: interpreter by simulator name, for engines that are neither here nor in an
+            environment of their own.
+        only: names of the checks wanted, default all.
+
+    Raises:
+        UnknownSimulatorError: a name that nobody registered.
+        ValueError: an unknown name in `only`, or a malformed line of expected failures.
+    """
+    names = tuple(CHECKS if only is None else only)
+    unknown = [name for name in names if name not in CHECKS]
+    if unknown:
+        raise ValueError(f"no checks named {unknown}; choose from {', '.join(CHECKS)}")
+    reasons = {} if expected_failures is None else read_expected_failures(expected_failures)
+    subjects = []
+    for simulator in simulators:
+        cls = adapter(simulator) if isinstance(simulator, str) else simulator
+        own = (python or {}).get(cls.info.name)
+        subjects += [Subject(cls, profile, own) for profile in profiles]
+    kit = Kit(tuple(subjects), names, reasons)
+    for pattern in unmatched(reasons, kit.identifiers()) if only is None else ():
+        warnings.warn(
+            f"expected failure {pattern!r} matches no check; there are {', '.join(CHECKS)}",
+            ConformanceWarning,
+            stacklevel=2,
+        )
+    return pytest.mark.sim_conformance(kit)
