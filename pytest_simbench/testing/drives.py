@@ -202,20 +202,9 @@ def joint_momentum(robot: Robot, q: FloatArray, v: FloatArray, armature: bool) -
     return np.asarray((upper + np.triu(upper, 1).T) @ v)
 
 
-def of_scene(scene: Scene) -> Robot:
-    """The scene's robot.
-
-    Raises:
-        LookupError: it has none.
-    """
-    if scene.robot is None:
-        raise LookupError(f"scene {scene.name!r} has no robot to command")
-    return scene.robot
-
-
 def hold_command(scene: Scene, timestep: float) -> Trajectory:
     """One command: everything at its start, gravity compensated."""
-    robot = of_scene(scene)
+    robot = scenes.of_scene(scene)
     start = robot.column("initial_position")
     effort = gravity_effort(robot, start, scene.gravity)
     return Trajectory.holding(timestep, start, effort)
@@ -223,7 +212,7 @@ def hold_command(scene: Scene, timestep: float) -> Trajectory:
 
 def close_command(scene: Scene, timestep: float) -> Trajectory:
     """One command: arm at its start with gravity compensated, fingers closed."""
-    robot = of_scene(scene)
+    robot = scenes.of_scene(scene)
     goal = robot.column("initial_position")
     effort = gravity_effort(robot, goal, scene.gravity)
     goal[robot.finger_indices] = robot.gripper.closed

@@ -9,13 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from pytest_simbench.scene import Pose
+from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.parity import ParityResult, compare
 from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
 from pytest_simbench.testing.faults import Fault, rounds, true_scene
+from pytest_simbench.testing.robot_faults import robot_faults
 from pytest_simbench.testing.robots import any_robot
 from pytest_simbench.testing.state import busy_scene, require_same, swing_and_wait
 from pytest_simbench.testing.subject import Subject, require
@@ -27,8 +28,13 @@ POSITION = 1e-5
 @check(robot=any_robot)
 def parity_of_full_scene(subject: Subject) -> None:
     """A world with robot, fixed and free bodies, odd sizes and tilted gravity passes parity."""
-    with subject.world(replace(true_scene(), robot=replace(subject.arm, friction=0.7))):
+    with subject.world(_truth(subject)):
         pass  # loading checks parity
+
+
+def _truth(subject: Subject) -> Scene:
+    """The kit's full scene with the robot that the laws are asked with."""
+    return replace(true_scene(), robot=replace(subject.arm, friction=0.7))
 
 
 @check(robot=any_robot)
@@ -69,13 +75,14 @@ def reading_changes_nothing(subject: Subject) -> None:
     require_same("read back and not", runs[1], runs[0])
 
 
-@check()
+@check(robot=any_robot)
 def planted_faults_are_seen(subject: Subject) -> None:
     """Parity sees each fault of `testing.faults.FAULTS` that the adapter does not declare as not
     told; also when the adapter is made to remember the true scene, so that it must ask the engine.
+    With another robot than the Panda the faults are those of `testing.robot_faults`.
     """
     missed = []
-    for faults in rounds():
+    for faults in [robot_faults(subject.robot)] if subject.robot else rounds():
         found = planted(subject, faults.values())
         for name, fault in faults.items():
             if fault.quantity not in found.wrong and fault.quantity not in found.untold:
@@ -85,7 +92,7 @@ def planted_faults_are_seen(subject: Subject) -> None:
 
 def planted(subject: Subject, faults: Iterable[Fault]) -> ParityResult:
     """A world with the faults, read back by an adapter that remembers the true scene."""
-    truth = true_scene()
+    truth = _truth(subject)
     subject.can_build(truth)
     process = subject.shared()
     faulty = truth

@@ -214,6 +214,17 @@ def arm() -> Robot:
     return panda()
 
 
+def of_scene(scene: Scene) -> Robot:
+    """The scene's robot.
+
+    Raises:
+        LookupError: it has none.
+    """
+    if scene.robot is None:
+        raise LookupError(f"scene {scene.name!r} has no robot to command")
+    return scene.robot
+
+
 def lifted(robot: Robot) -> Robot:
     """The same robot, so high above the ground that it does not touch it in any posture."""
     from pytest_simbench.robot.model import RobotModel

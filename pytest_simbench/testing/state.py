@@ -12,7 +12,7 @@ from pytest_simbench.scene import Pose, Robot, Scene, Trajectory
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
-from pytest_simbench.testing.drives import close_command, of_scene
+from pytest_simbench.testing.drives import close_command
 from pytest_simbench.testing.robots import any_robot, grasping
 from pytest_simbench.testing.subject import Subject, logged, require
 
@@ -24,7 +24,7 @@ def busy_scene(robot: Robot) -> Scene:
 
 
 def _swing(scene: Scene, timestep: float, share: float) -> Trajectory:
-    robot = of_scene(scene)
+    robot = scenes.of_scene(scene)
     start = robot.column("initial_position")
     goal = start + share
     goal[robot.finger_indices] = start[robot.finger_indices]
