@@ -103,18 +103,22 @@ def effort_limit_bounds_acceleration(subject: Subject) -> None:
     """A far command saturates the drive of joint 1, whose momentum p = (M(q) q')_1 then grows by
     the effort limit and nothing else: without gravity nothing depends on its position. After
     0.1 s p <= 1.05 limit t, and >= 0.8 limit t so that the limit is reached. A declared lack
-    of rotor inertia is left out of M."""
+    of rotor inertia is left out of M. A light arm has a lower limit, with which it turns by 0.5 rad
+    in that time."""
     robot = subject.arm
     start = robot.column("initial_position")
+    seconds, armature = 0.1, has_armature(subject)
+    light = 2 * 0.5 * own_inertia(robot, start, 0, armature) / seconds**2
+    limit = min(robot.joints[0].effort_limit, light)
+    robot = scenes.with_joint(robot, robot.joints[0].name, effort_limit=limit)
     goal = start.copy()
     goal[0] += _far(robot)
     far = Trajectory.holding(subject.timestep, goal)
     with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "arm weightless")) as world:
         world.follow(far)
-        world.wait(0.1 - subject.timestep)
+        world.wait(seconds - subject.timestep)
         t, (q, v) = world.time, world.joints
-    momentum = float(joint_momentum(robot, q, v, has_armature(subject))[0])
-    limit = robot.joints[0].effort_limit
+    momentum = float(joint_momentum(robot, q, v, armature)[0])
     require(
         momentum <= 1.05 * limit * t,
         f"joint 1 gained {momentum:.3g} N m s in {t:.3g} s, its limit allows {limit * t:.3g}",
@@ -200,6 +204,11 @@ def joint_momentum(robot: Robot, q: FloatArray, v: FloatArray, armature: bool) -
         model.armature = np.zeros(len(q))
     upper = np.triu(pin.crba(model, model.createData(), q))
     return np.asarray((upper + np.triu(upper, 1).T) @ v)
+
+
+def own_inertia(robot: Robot, q: FloatArray, k: int, armature: bool) -> float:
+    """Inertia that the drive of joint `k` meets while the others stand still, M(q)_kk [kg m^2]."""
+    return float(joint_momentum(robot, q, np.eye(len(q))[k], armature)[k])
 
 
 def hold_command(scene: Scene, timestep: float) -> Trajectory:
