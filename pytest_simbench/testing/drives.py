@@ -103,14 +103,12 @@ def effort_limit_bounds_acceleration(subject: Subject) -> None:
     """A far command saturates the drive of joint 1, whose momentum p = (M(q) q')_1 then grows by
     the effort limit and nothing else: without gravity nothing depends on its position. After
     0.1 s p <= 1.05 limit t, and >= 0.8 limit t so that the limit is reached. A declared lack
-    of rotor inertia is left out of M. A light arm has a lower limit, with which it turns by 0.5 rad
-    in that time."""
+    of rotor inertia is left out of M. An arm whose limit would turn it by more than 1 rad in that
+    time, had it no rotor, gets the time for 1 rad."""
     robot = subject.arm
     start = robot.column("initial_position")
-    seconds, armature = 0.1, has_armature(subject)
-    light = 2 * 0.5 * own_inertia(robot, start, 0, armature) / seconds**2
-    limit = min(robot.joints[0].effort_limit, light)
-    robot = scenes.with_joint(robot, robot.joints[0].name, effort_limit=limit)
+    limit = robot.joints[0].effort_limit
+    seconds = min(0.1, (2 * 1.0 * own_inertia(robot, start, 0, armature=False) / limit) ** 0.5)
     goal = start.copy()
     goal[0] += _far(robot)
     far = Trajectory.holding(subject.timestep, goal)
@@ -118,7 +116,7 @@ def effort_limit_bounds_acceleration(subject: Subject) -> None:
         world.follow(far)
         world.wait(seconds - subject.timestep)
         t, (q, v) = world.time, world.joints
-    momentum = float(joint_momentum(robot, q, v, armature)[0])
+    momentum = float(joint_momentum(robot, q, v, has_armature(subject))[0])
     require(
         momentum <= 1.05 * limit * t,
         f"joint 1 gained {momentum:.3g} N m s in {t:.3g} s, its limit allows {limit * t:.3g}",

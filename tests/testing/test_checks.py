@@ -9,6 +9,7 @@ from textwrap import dedent
 import pytest
 
 from pytest_simbench.client.errors import WorkerError, WorldParityError
+from pytest_simbench.robot.registry import find
 from pytest_simbench.simulator import Simulator
 from pytest_simbench.testing import CHECKS, ConformanceFailure, ConformanceTest, Subject
 
@@ -91,6 +92,31 @@ FAULTS: list[tuple[type[Simulator], str]] = [
 )
 def test_fault_is_found(adapter: type[Simulator], name: str) -> None:
     test = ConformanceTest(Subject(adapter), CHECKS[name])
+    with pytest.raises((ConformanceFailure, WorldParityError)):
+        test()
+
+
+WITH_ROBOTS: list[tuple[type[Simulator], str, str]] = [
+    (wrong_robots.SoftDrives, "static_hold", "so101"),
+    (wrong_robots.NoFeedForward, "tracks_trajectory", "xarm7"),
+    (wrong_robots.NoEffortLimit, "effort_limit_bounds_acceleration", "so101"),
+    (wrong_robots.NoEffortLimit, "every_effort_limit_counts", "ur5"),
+    (wrong_robots.NoLimits, "joints_stop_at_their_limits", "xarm7"),
+    (wrong_robots.FreeFingers, "fingers_stay_coupled", "ur5"),
+    (wrong_robots.SlipperyHand, "grip_holds", "ur5"),
+    (wrong_robots.LinkAxes, "joint_loads_are_told", "ur5"),
+    (wrong.EchoLinkInertia, "planted_faults_are_seen", "so101"),
+    (wrong.Noisy, "reused_process_agrees", "so101"),
+]
+
+
+@pytest.mark.parametrize(
+    ("adapter", "name", "robot"),
+    WITH_ROBOTS,
+    ids=[f"{cls.__name__}-{robot}-{name}" for cls, name, robot in WITH_ROBOTS],
+)
+def test_fault_is_found_with_other_robots(adapter: type[Simulator], name: str, robot: str) -> None:
+    test = ConformanceTest(Subject(adapter, robot=find(robot)), CHECKS[name])
     with pytest.raises((ConformanceFailure, WorldParityError)):
         test()
 

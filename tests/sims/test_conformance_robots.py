@@ -1,0 +1,31 @@
+"""The laws of robots with others than the Panda: one with a parallel hand, and one with a jaw.
+
+All robots in all engines are measured by hand: docs/extending/robots.md has the table.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pytest_simbench.robot.registry import find
+from pytest_simbench.simulator.registry import adapter
+from pytest_simbench.testing import CHECKS, ConformanceTest, Subject
+from pytest_simbench.testing.expected import read_expected_failures
+from pytest_simbench.testing.kit import Kit
+
+EXPECTED = read_expected_failures(Path(__file__).with_name("expected_failures.txt"))
+LAWS = [law.name for law in CHECKS.values() if law.robot and law.name != "window_changes_nothing"]
+"""A window takes half a minute, and is drawn with the Panda."""
+
+TESTS = [
+    test
+    for engine, robot in (("mujoco", "ur5"), ("pybullet", "so101"))
+    for test in Kit((Subject(adapter(engine)),), tuple(LAWS), EXPECTED).tests([find(robot)])
+]
+
+
+@pytest.mark.parametrize("check", [pytest.param(test, id=test.id) for test in TESTS])
+def test_conformance(check: ConformanceTest) -> None:
+    check()
