@@ -5,7 +5,8 @@
 Each fault of `pytest_simbench.testing.faults` is planted in each engine for real: the adapter
 builds the faulty scene, is made to remember the true one, and reads back. What only an engine's
 own functions can change (restitution, margins, ...) is planted by tests/sims; here it is looked
-up whether the engine tells it.
+up whether the engine tells it. What no state holds (forces, motions in time) laws of the kit find.
+Columns of simulators that are not named, or not here, stay as they are.
 """
 
 from __future__ import annotations
@@ -15,9 +16,11 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from pytest_simbench.client.environments import missing
+from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.parity import ParityResult
 from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.testing import CHECKS, Subject
+from pytest_simbench.testing.expected import read_expected_failures, reason_for
 from pytest_simbench.testing.faults import FAULTS, Fault, rounds
 from pytest_simbench.testing.parity import planted
 
@@ -40,7 +43,20 @@ IN_THE_ENGINE = {
     "the ground is 10 mm higher": "ground/height",
     "the step is another one": "timestep",
     "the fingers are not coupled": "gripper/coupled",
+    "a loop is closed 10 mm aside": "closure/0/points",
 }
+
+IN_TIME: dict[str, tuple[str, Capability | None]] = {
+    "a force from outside is twice as large": ("force_acts_for_its_time", None),
+    "a torque from outside is in the body's axes": ("torque_acts_for_its_time", None),
+    "a prescribed body falls": ("moves_as_prescribed", None),
+    "a belt moves, its surface does not": ("belt_carries", None),
+    "contact forces have the wrong sign": ("weight_is_told", Capability.CONTACT_FORCES),
+    "contact forces lack friction": ("friction_is_told", Capability.CONTACT_FORCES),
+    "a loop is open": ("loops_stay_closed", Capability.LOOPS),
+    "joint wrenches are in the link's axes": ("joint_loads_are_told", Capability.JOINT_WRENCHES),
+}
+"""The law that finds a fault of what happens in time, and the capability that it needs."""
 
 MEASURED = {
     "gravity": "free_fall",
@@ -60,6 +76,7 @@ MEASURED = {
     "joint/*/friction": "limp_arm_falls",
     "joint/*finger*/effort_limit": "squeeze_bounds_the_grip",
     "joint/*/effort_limit": "every_effort_limit_counts",
+    "closure/*": "loops_stay_closed",
 }
 """The law of the kit that measures a quantity which an engine does not tell, first match."""
 
@@ -99,6 +116,8 @@ TOLD_AS_LOADED = {("pybullet", "joint/*/friction"): "`limp_arm_falls`"}
 
 
 def looked_up(subject: Subject, quantity: str) -> str:
+    if quantity.startswith("closure/") and not subject.can(Capability.LOOPS):
+        return UNCLAIMED
     if (subject.name, quantity) in TOLD_AS_LOADED:
         return TOLD_AS_LOADED[subject.name, quantity]
     example = quantity.replace("*", "x")
@@ -107,15 +126,42 @@ def looked_up(subject: Subject, quantity: str) -> str:
     return silent(subject, example) if untold else "parity"
 
 
-def table(names: list[str]) -> list[str]:
-    subjects = [Subject(adapter(name)) for name in names]
-    rows = [["planted fault", *names]]
-    found = [cells(subject) for subject in subjects]
-    for name, fault in FAULTS.items():
-        rows.append([fault.what, *(column[name] for column in found)])
-    for what, quantity in IN_THE_ENGINE.items():
-        rows.append([what, *(looked_up(s, quantity) for s in subjects)])
-    rows.insert(1, ["---"] * len(rows[0]))
+EXPECTED = read_expected_failures(PAGE.parents[1] / "tests" / "sims" / "expected_failures.txt")
+
+UNCLAIMED = "not claimed"
+"""The adapter does not claim the capability, so nobody asks it."""
+
+NOT_MEASURED = "not measured"
+
+
+def in_time(subject: Subject, law: str, needs: Capability | None) -> str:
+    if needs is not None and not subject.can(needs):
+        return UNCLAIMED
+    broken = reason_for(f"{subject.name}-{subject.profile}-{law}", EXPECTED)
+    return f"breaks `{law}`" if broken else f"`{law}`"
+
+
+def column(subject: Subject) -> dict[str, str]:
+    """What finds each fault in one engine, by the fault in plain words."""
+    found = cells(subject)
+    return {
+        **{fault.what: found[name] for name, fault in FAULTS.items()},
+        **{what: looked_up(subject, quantity) for what, quantity in IN_THE_ENGINE.items()},
+        **{what: in_time(subject, *law) for what, law in IN_TIME.items()},
+    }
+
+
+def read(lines: list[str]) -> dict[str, dict[str, str]]:
+    """The columns of a table, by simulator and fault."""
+    (_, *names), _, *rows = (line.strip("| ").split(" | ") for line in lines)
+    return {name: {row[0]: row[1 + k] for row in rows} for k, name in enumerate(names)}
+
+
+def table(columns: dict[str, dict[str, str]]) -> list[str]:
+    names = sorted(columns)
+    rows = [["planted fault", *names], ["---"] * (1 + len(names))]
+    for what in [*(fault.what for fault in FAULTS.values()), *IN_THE_ENGINE, *IN_TIME]:
+        rows.append([what, *(columns[name].get(what, NOT_MEASURED) for name in names)])
     return [f"| {' | '.join(row)} |" for row in rows]
 
 
@@ -123,8 +169,9 @@ def main() -> None:
     names = sys.argv[1:] or [name for name in registered() if not missing(adapter(name).info)]
     text = PAGE.read_text("utf-8")
     before, _, rest = text.partition("<!-- table -->\n")
-    _, _, after = rest.partition("<!-- end -->")
-    lines = "\n".join(table(names))
+    old, _, after = rest.partition("<!-- end -->")
+    measured = {name: column(Subject(adapter(name))) for name in names}
+    lines = "\n".join(table({**read(old.splitlines()), **measured}))
     PAGE.write_text(f"{before}<!-- table -->\n{lines}\n<!-- end -->{after}", "utf-8")
 
 
