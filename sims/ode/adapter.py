@@ -136,7 +136,7 @@ class ODE(Simulator):
             Deviation("joint/*/friction", "ODE's joints have no friction"),
             Deviation("body/*/margin link/*/margin", "ODE's shapes have no margin"),
             Deviation("", "what sleeps has no contacts, and so no forces"),
-            Deviation("", "a joint that turns by more than 360 degrees has no stops"),
+            Deviation("", "a joint that turns by 360 degrees or more has no stops"),
             Deviation(
                 "",
                 "with drive=velocity (profile default) the drives are Webots' controllers of "
@@ -207,6 +207,8 @@ class ODE(Simulator):
         self._links = build.add_links(self.world, self.contacts.space, prepared)
         self._axes = build.add_joints(self.world, prepared, self._links)
         build.put_links(prepared, self._links, {j.name: j.initial_position for j in robot.joints})
+        for joint in robot.joints:
+            self._axes[joint.name].stands(joint.initial_position)
         self._closures = [
             build.close_loop(self.world, prepared, self._links, closure)
             for closure in reduced(prepared)

@@ -52,6 +52,11 @@ class Axis:
         offset -= timestep * np.cross(self.child.getAngularVel(), offset)
         return np.concatenate([force, torque - np.cross(offset, force)])
 
+    def stands(self, position: float) -> None:
+        """Count whole turns from here on, where the joint stands [rad]."""
+        away = position - self.zero - self.angle()
+        self.turn[0] += round(away / math.tau)
+
     def position(self) -> float:
         """[rad or m]."""
         return self.zero + self.angle()

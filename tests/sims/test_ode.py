@@ -102,6 +102,19 @@ def test_whole_turns_are_counted(worlds: Worlds, tmp_path: Path) -> None:
     assert float(world.joints[0, 6]) == seen[0]
 
 
+@pytest.mark.parametrize("angle", [-5.5, -3.0, 2.0, 5.5])
+def test_a_wide_joint_may_start_beyond_half_a_turn(
+    worlds: Worlds, tmp_path: Path, angle: float
+) -> None:
+    robot = scenes.with_joint(
+        turning_on(scenes.arm(), tmp_path), "panda_joint7", initial_position=angle
+    )
+    world = worlds.load(scenes.arm_alone(robot))
+    assert float(world.joints[0, 6]) == pytest.approx(angle, abs=1e-6)
+    world.wait(0.1)
+    assert float(world.joints[0, 6]) == pytest.approx(angle, abs=0.01)
+
+
 def test_a_world_ends_without_the_collector(tmp_path: Path) -> None:
     """A worker that loaded a second arm died by SIGSEGV while collecting the first."""
     with Worlds(Mortal) as worlds:
