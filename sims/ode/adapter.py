@@ -136,7 +136,6 @@ class ODE(Simulator):
             Deviation("joint/*/friction", "ODE's joints have no friction"),
             Deviation("body/*/margin link/*/margin", "ODE's shapes have no margin"),
             Deviation("", "what sleeps has no contacts, and so no forces"),
-            Deviation("", "a joint that turns by 360 degrees or more has no stops"),
             Deviation(
                 "",
                 "with drive=velocity (profile default) the drives are Webots' controllers of "
@@ -251,6 +250,9 @@ class ODE(Simulator):
     def step(self) -> None:
         if self._drives is not None:
             self._drives.act()
+        for axis in self._axes.values():
+            if axis.wide:
+                axis.tell_stops()
         self.contacts.make()
         self._advance(self.settings.timestep)
         self._steps += 1

@@ -11,6 +11,8 @@ import numpy as np
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.simulator import lazy_import
 
+from .library import HI_STOP, LO_STOP
+
 ode = lazy_import("ode")
 
 
@@ -27,10 +29,13 @@ class Axis:
         angle: ODE's position of the joint, whole turns added where it is wide [rad or m].
         rate: its velocity [rad/s or m/s].
         turn: whole turns, and the last angle that ODE told; of a wide joint.
+        stops: joint of ODE that holds it at its limits: itself, or a motor of a wide one.
+        stopped: whether that motor acted in the last step.
     """
 
     def __init__(self, joint: Any, zero: float, wide: bool = False) -> None:
-        self.joint, self.zero = joint, zero
+        self.joint, self.zero, self.wide = joint, zero, wide
+        self.stops, self.stopped = joint, False
         joint.setFeedback(True)
         self.child, self.parent = joint.getBody(0), joint.getBody(1)
         self.hinged = isinstance(joint, ode.HingeJoint)
@@ -40,6 +45,28 @@ class Axis:
         rate = joint.getAngleRate if self.hinged else joint.getPositionRate
         self.rate: Callable[[], float] = rate
 
+    def limit(self, world: Any, lower: float, upper: float) -> None:
+        """Stop at ODE's positions `lower` and `upper` [rad or m].
+
+        A hinge knows no whole turns, and has no stops beyond half a one. A motor without force has:
+        it is told its angle, and adds nothing to the world but at its stops.
+        """
+        if self.wide:
+            self.stops = ode.AMotor(world)
+            self.stops.attach(self.child, self.parent)
+            self.stops.setNumAxes(1)
+            self.stops.setAxis(0, 1, self.joint.getAxis())  # 1: turns with the child
+            self.stops.setFeedback(True)
+        self.stops.setParam(LO_STOP, lower)
+        self.stops.setParam(HI_STOP, upper)
+
+    def tell_stops(self) -> None:
+        """Before a step: where a wide joint stands."""
+        angle = self.angle()
+        self.stops.setAngle(0, angle)
+        low, high = self.stops.getParam(LO_STOP), self.stops.getParam(HI_STOP)
+        self.stopped = not low < angle < high
+
     def wrench(self, frame: Pose, timestep: float) -> FloatArray:
         """What it did to its child in the last step, motor included, in the world, (6,).
 
@@ -48,6 +75,8 @@ class Axis:
             timestep: of the last step, at whose begin the child stood where it acted [s].
         """
         force, torque = map(np.array, self.joint.getFeedback()[:2])  # about the child's centre
+        if self.stopped:  # ODE writes no feedback of what did nothing
+            torque = torque + self.stops.getFeedback()[1]
         offset = np.array(self.child.vectorToWorld(frame.position))
         offset -= timestep * np.cross(self.child.getAngularVel(), offset)
         return np.concatenate([force, torque - np.cross(offset, force)])

@@ -172,7 +172,7 @@ class ReadBack:
 
     def _joint(self, prefix: str, name: str, axis: Axis, drives: Drives) -> dict[str, Any]:
         joint = axis.joint
-        limits = np.array([joint.getParam(LO_STOP), joint.getParam(HI_STOP)])
+        limits = np.array([axis.stops.getParam(LO_STOP), axis.stops.getParam(HI_STOP)])
         resistance = 1 / joint.getParam(SOFTNESS)
         stiffness = resistance * drives.gain(axis)
         found: dict[str, Any] = {

@@ -2,7 +2,7 @@
 
 The origin of a body of ODE is its centre of mass; its axes are those of the link. A hinge tells
 angles from -180 to 180 degrees: its zero is put into the middle of the joint's range, since one
-joint of a Panda turns to 215. ODE has no stops beyond 180 degrees from there.
+joint of a Panda turns to 215. Joints that turn by 360 degrees and more are counted on.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
 
 from .axes import Axis
 from .contacts import BASE, FIXED, FREE, GROUND, LINK, Part, Surface
-from .library import HI_STOP, LO_STOP, Convex, Mesh, place, set_damping
+from .library import Convex, Mesh, place, set_damping
 
 ode = lazy_import("ode")
 
@@ -103,6 +103,10 @@ def _add_link(world: Any, space: Any, link: Link, pose: Pose, prepared: Prepared
     return part
 
 
+SLACK = 0.2
+"""A range so much smaller than a turn is wide too: at a stop a joint gives way a little [rad]."""
+
+
 def add_joints(world: Any, prepared: PreparedRobot, links: Mapping[str, Part]) -> dict[str, Axis]:
     """The joints by name; the links stand in the middle of every joint's range."""
     places, zeros = link_poses(prepared, middle(prepared)), middle(prepared)
@@ -112,10 +116,9 @@ def add_joints(world: Any, prepared: PreparedRobot, links: Mapping[str, Part]) -
         axis = Axis(
             _joint(world, joint, links, places[joint.child]),
             zeros[joint.name],
-            wide=joint.kind == "revolute" and upper - lower > math.tau,
+            wide=joint.kind == "revolute" and upper - lower > math.tau - SLACK,
         )
-        axis.joint.setParam(LO_STOP, lower)
-        axis.joint.setParam(HI_STOP, upper)
+        axis.limit(world, lower, upper)
         axes[joint.name] = axis
     return axes
 

@@ -115,6 +115,24 @@ def test_a_wide_joint_may_start_beyond_half_a_turn(
     assert float(world.joints[0, 6]) == pytest.approx(angle, abs=0.01)
 
 
+@pytest.mark.parametrize("end", [-6.0, 6.0])
+def test_a_wide_joint_has_stops(worlds: Worlds, tmp_path: Path, end: float) -> None:
+    """Behind a whole turn it stops (0.05 rad) and goes back; what it carries then is told with the
+    torque of the stop, against that of the drive."""
+    robot = turning_on(scenes.arm(), tmp_path)
+    world = worlds.load(scenes.arm_alone(robot, (0.0, 0.0, 0.0)))
+    goal = robot.column("initial_position")
+    goal[6] = 1.1 * end
+    to(world, goal, 4.0)
+    world.wait(0.5)
+    assert float(world.joints[0, 6]) == pytest.approx(end, abs=0.05)
+    assert np.abs(world.joint_wrenches()[6, 3:]).max() < 1.0
+    goal[6] = 0.0
+    to(world, goal, 4.0)
+    world.wait(0.5)
+    assert float(world.joints[0, 6]) == pytest.approx(0.0, abs=0.01)
+
+
 def test_a_world_ends_without_the_collector(tmp_path: Path) -> None:
     """A worker that loaded a second arm died by SIGSEGV while collecting the first."""
     with Worlds(Mortal) as worlds:
