@@ -64,7 +64,7 @@ def static_hold(subject: Subject) -> None:
 def tracks_trajectory(subject: Subject) -> None:
     """With feed-forward the arm follows a smooth trajectory (quintic, 0.4 rad in 1.5 s, away from a
     limit that is near): at most two steps late plus 2 mrad, at any joint and time."""
-    robot = subject.arm
+    robot = scenes.lifted(subject.arm)
     start = robot.column("initial_position")
     arm = len(robot.arm_joints)
     goal = start + _turn(robot)
@@ -105,7 +105,7 @@ def effort_limit_bounds_acceleration(subject: Subject) -> None:
     0.1 s p <= 1.05 limit t, and >= 0.8 limit t so that the limit is reached. A declared lack
     of rotor inertia is left out of M. An arm whose limit would turn it by more than 1 rad in that
     time, had it no rotor, gets the time for 1 rad."""
-    robot = subject.arm
+    robot = scenes.lifted(subject.arm)
     start = robot.column("initial_position")
     limit = robot.joints[0].effort_limit
     seconds = min(0.1, (2 * 1.0 * own_inertia(robot, start, 0, armature=False) / limit) ** 0.5)
@@ -137,7 +137,7 @@ def _far(robot: Robot) -> float:
 def weak_joint_sags(subject: Subject) -> None:
     """A joint whose effort limit is a tenth of its gravity torque cannot hold: it moves by more
     than 0.05 rad within 0.5 s, while with its own limit it holds within 0.02 rad."""
-    robot = subject.arm
+    robot = scenes.lifted(subject.arm)
     q = robot.column("initial_position")
     load = np.abs(gravity_effort(robot, q)[: len(robot.arm_joints)])
     index = int(load.argmax())
