@@ -120,9 +120,9 @@ OPTIONS = (
            "without any, for six from four times the profile's own to an eighth of it",
            metavar="STEP,...", ini=False, arguments={"nargs": "?", "const": True}),
     Option("--sim-set", Assignments("SIM.SETTING=VALUE"), "change one setting: "
-           "mujoco.timestep=0.001", {}, metavar="SIM.SETTING=VALUE"),
+           "mysim.timestep=0.001", {}, metavar="SIM.SETTING=VALUE"),
     Option("--sim-python", Assignments("SIM=PATH", commas=False), "interpreter of a simulator's "
-           "worker: genesis=PATH; repeat the option for another one", {}, metavar="SIM=PATH"),
+           "worker: mysim=PATH; repeat the option for another one", {}, metavar="SIM=PATH"),
     Option("--sim-spec", Assignments("SIM=SPEC", commas=False), "execnet specification of a "
            "simulator's worker; repeat the option for another one", {}, metavar="SIM=SPEC"),
     Option("--sim-fresh", Flag(), "a new worker for each repetition even where starting is costly",

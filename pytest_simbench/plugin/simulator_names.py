@@ -1,5 +1,5 @@
-"""What `--sim` names: simulators, releases of them (`mujoco==3.3.7`), builds of them
-(`mujoco@PYTHON`, `mujoco@LABEL=PYTHON`)."""
+"""What `--sim` names: simulators, releases of them (`mysim==3.3.7`), builds of them
+(`mysim@PYTHON`, `mysim@LABEL=PYTHON`)."""
 
 from __future__ import annotations
 

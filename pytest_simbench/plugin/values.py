@@ -375,7 +375,7 @@ class Assignments(Kind):
 
 
 def _partition(pair: str) -> tuple[str, str, str]:
-    """A pair taken apart at its first `=` that is not of a version (`mujoco==3.3.7.timestep=1`)."""
+    """A pair taken apart at its first `=` that is not of a version (`mysim==3.3.7.timestep=1`)."""
     found = re.search(r"(?<!=)=(?!=)", pair)
     return (pair, "", "") if found is None else (pair[: found.start()], "=", pair[found.end() :])
 

@@ -133,7 +133,7 @@ def address(name: str) -> str | None:
 def adapter(name: str) -> type[Simulator]:
     """The adapter class of a simulator. Its engine is not imported.
 
-    Of a version (`mujoco==3.3.7`) it is the same class with an `info` of its own.
+    Of a version (`mysim==3.3.7`) it is the same class with an `info` of its own.
 
     Raises:
         UnknownSimulatorError: the message lists the known names.

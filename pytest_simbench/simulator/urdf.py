@@ -218,7 +218,7 @@ class PreparedRobot:
                 effort=repr(drive.effort_limit),
                 velocity=repr(self.velocity_limits[joint.name]),
             )
-        # Bullet reads files in pieces of 1024 bytes a line and may cut an attribute in two.
+        # One engine reads files in pieces of 1024 bytes a line and may cut an attribute in two.
         ET.indent(root)
         return ET.tostring(root, encoding="unicode")
 

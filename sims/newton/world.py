@@ -66,9 +66,8 @@ def build_model(scene: Scene, prepared: PreparedRobot | None, settings: NewtonSe
     # What MuJoCo needs of a contact beyond Newton's own parameters.
     model.mujoco.condim.fill_(settings.condim)
     for body in scene.bodies:
-        if not isinstance(
-            body, Box | ConvexMesh
-        ):  # their contacts neither roll nor spin with friction
+        if not isinstance(body, Box | ConvexMesh):
+            # contacts of a round shape neither roll nor spin with friction
             shape = model.shape_label.index(body.name)
             model.mujoco.condim.numpy()[shape] = 3
             model.mujoco.geom_priority.numpy()[shape] = 1
