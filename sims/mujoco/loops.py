@@ -41,7 +41,9 @@ def closed(model: Any, active: Any) -> dict[str, FloatArray]:
     """The quantity `closure/NUMBER/points` of each active closure, held by two sites or, as with
     Newton, by two bodies with a point each."""
     loops = np.flatnonzero((model.eq_type == mujoco.mjtEq.mjEQ_CONNECT) & active)
-    return {f"closure/{k}/points": _points(model, number) for k, number in enumerate(loops.tolist())}
+    return {
+        f"closure/{k}/points": _points(model, number) for k, number in enumerate(loops.tolist())
+    }
 
 
 def _points(model: Any, number: int) -> FloatArray:
