@@ -10,17 +10,28 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
+from pytest_simbench.client import package_index
+from pytest_simbench.measure.bisection import (
+    between,
+    difference,
+    first_worse,
+    like_the_bad_one,
+    steps,
+)
+from pytest_simbench.measure.limits import FAILURES
+from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.plugin import options
+from pytest_simbench.plugin.history import folder_of
 from pytest_simbench.plugin.values import Span, shown
+from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.records.series import series
 from pytest_simbench.records.text import for_terminal
-
-if TYPE_CHECKING:
-    from pytest_simbench.measure.results import ResultSet
-    from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.simulator.errors import SimulatorError
+from pytest_simbench.simulator.registry import adapter
+from pytest_simbench.tasks.metrics import Metric, UnknownMetric
 
 
 def bisect(config: pytest.Config) -> int:
@@ -29,13 +40,6 @@ def bisect(config: pytest.Config) -> int:
     Raises:
         pytest.UsageError: no such simulator, release or metric; a run that ends with an error.
     """
-    from pytest_simbench.measure.bisection import (
-        difference,
-        first_worse,
-        like_the_bad_one,
-        steps,
-    )
-
     wanted: Span = options.value(config, "sim_bisect")
     releases = _releases(wanted)
     search = Search(config, wanted, releases)
@@ -82,11 +86,6 @@ def _releases(wanted: Span) -> list[str]:
     Raises:
         pytest.UsageError: no such simulator or release; one sentence.
     """
-    from pytest_simbench.client import package_index
-    from pytest_simbench.measure.bisection import between
-    from pytest_simbench.simulator.errors import SimulatorError
-    from pytest_simbench.simulator.registry import adapter
-
     try:
         info = adapter(wanted.name).info
         known = package_index.releases(info.distribution)
@@ -114,8 +113,6 @@ class Search:
     """
 
     def __init__(self, config: pytest.Config, wanted: Span, releases: list[str]) -> None:
-        from pytest_simbench.plugin.history import folder_of
-
         given = options.value(config, "sim_output")
         here = config.invocation_params.dir
         self.folder = Path(here, given) if given else folder_of(config, wanted.name)
@@ -123,8 +120,6 @@ class Search:
 
     def run(self, *places: int) -> None:
         """Run the tests on some of the releases, unless the folder holds that."""
-        from pytest_simbench.records.folder import RunFolder
-
         names = ",".join(self._name(place) for place in places)
         keep = "--sim-resume" if RunFolder(self.folder).holds_run else "--sim-output"
         command = [
@@ -148,9 +143,6 @@ class Search:
         Raises:
             pytest.UsageError: no test has it, or several have, or neither direction is worse.
         """
-        from pytest_simbench.measure.limits import FAILURES
-        from pytest_simbench.tasks.metrics import UnknownMetric
-
         name, result = self._wanted.metric, self.result(0)
         if name == FAILURES.name:
             return FAILURES
@@ -168,10 +160,6 @@ class Search:
         Raises:
             pytest.UsageError: the folder holds nothing of it, or several tests.
         """
-        from pytest_simbench.measure.results import ResultSet
-        from pytest_simbench.records.folder import RunFolder
-        from pytest_simbench.records.series import series
-
         reading = RunFolder(self.folder).read()
         rows = [
             row

@@ -5,18 +5,21 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterator
 from importlib.metadata import version
-from typing import TYPE_CHECKING
 
 import pytest
 
+from pytest_simbench.client.environments import interpreter, outside
 from pytest_simbench.plugin import options, recording, spellings
+from pytest_simbench.plugin.bisect import bisect
+from pytest_simbench.plugin.data import download
+from pytest_simbench.plugin.environments import install, list_environments, uninstall
+from pytest_simbench.plugin.merge import merge_runs, report_runs
+from pytest_simbench.plugin.selection import Selection
 from pytest_simbench.plugin.session import session_of
 from pytest_simbench.records.text import for_terminal
-
-if TYPE_CHECKING:
-    from pytest_simbench.plugin.selection import Selection
-    from pytest_simbench.scene import Robot
-    from pytest_simbench.simulator.info import SimulatorInfo
+from pytest_simbench.scene import Robot
+from pytest_simbench.simulator.info import SimulatorInfo
+from pytest_simbench.simulator.registry import adapter, known, problem, registered, registry
 
 
 def run_command(config: pytest.Config) -> int:
@@ -25,11 +28,6 @@ def run_command(config: pytest.Config) -> int:
     Raises:
         pytest.UsageError: what is wrong with the input; one sentence.
     """
-    from pytest_simbench.plugin.bisect import bisect
-    from pytest_simbench.plugin.data import download
-    from pytest_simbench.plugin.environments import install, list_environments, uninstall
-    from pytest_simbench.plugin.merge import merge_runs, report_runs
-
     options.values(config)
     recording.check(config)
     actions = (
@@ -89,9 +87,6 @@ def _width() -> int:
 
 def _here(selection: Selection, name: str) -> str:
     """Where a simulator is and which version."""
-    from pytest_simbench.client.environments import interpreter, outside
-    from pytest_simbench.simulator.registry import adapter
-
     info = adapter(name).info
     if name in selection.pythons or name in selection.specs:
         return f"in {selection.pythons.get(name) or selection.specs[name]}"
@@ -119,7 +114,6 @@ def _simulators(selection: Selection) -> Iterator[str]:
 
 def _lines(selection: Selection) -> Iterator[str]:
     from pytest_simbench.report.capabilities import capability_table
-    from pytest_simbench.simulator.registry import adapter, known, problem, registered, registry
 
     yield capability_table([adapter(name).info for name in registered()], _width())
     yield ""

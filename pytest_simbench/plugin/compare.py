@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
+from pytest_simbench.measure.gate import GateReport, run_gate, side_by_side
 from pytest_simbench.measure.limits import Limit, LimitError, parse_limits
 from pytest_simbench.plugin import options
 from pytest_simbench.records.baseline import (
@@ -20,11 +21,9 @@ from pytest_simbench.records.baseline import (
 from pytest_simbench.records.configuration import other_meanings
 from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.text import for_terminal
+from pytest_simbench.report.changes import render_markdown, render_terminal
+from pytest_simbench.simulator.versions import base_name
 from pytest_simbench.tasks.metrics import Metric, UnknownMetric
-
-if TYPE_CHECKING:
-    from pytest_simbench.measure.gate import GateReport
-
 
 Beside = tuple[str, Sequence[str]]
 """A simulator, and others that are compared with it."""
@@ -49,8 +48,6 @@ class Comparison:
 
     def make(self, run: Reading) -> None:
         """Compare with this run, which says what the metrics mean."""
-        from pytest_simbench.measure.gate import run_gate, side_by_side
-
         before, now = self.baseline.records, run.records
         if self._beside is not None:
             before, now = side_by_side(run.records, *self._beside)
@@ -71,8 +68,6 @@ class Comparison:
 
     def text(self, width: int) -> str:
         """For the terminal."""
-        from pytest_simbench.report.changes import render_terminal
-
         parts = [f"baseline: {self.baseline.name}", *self.baseline.problems]
         if self._report is None:
             parts.append("nothing was compared: no repetition was recorded")
@@ -82,8 +77,6 @@ class Comparison:
 
     def markdown(self) -> str:
         """For the page of a CI job."""
-        from pytest_simbench.report.changes import render_markdown
-
         if self._report is None:
             return ""
         return render_markdown(self._report, self.baseline.name, bool(self.limits))
@@ -133,8 +126,6 @@ def _beside(config: pytest.Config, names: Sequence[str]) -> Beside | None:
     Raises:
         pytest.UsageError: no other version of it is in the run.
     """
-    from pytest_simbench.simulator.versions import base_name
-
     given = options.value(config, "sim_baseline")
     if given not in names:
         return None

@@ -8,8 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from pytest_simbench import __version__
+from pytest_simbench.client.package_index import newest_of_minors, releases
 from pytest_simbench.plugin import options
 from pytest_simbench.plugin.values import Releases
+from pytest_simbench.records.names import digest
+from pytest_simbench.simulator.registry import adapter
 
 FOLDER = ".simbench/history"
 """Where histories lie, in pytest's root folder."""
@@ -32,9 +36,6 @@ def releases_of(config: pytest.Config) -> list[str]:
         SimulatorError: no such simulator, or no package index answers.
         pytest.UsageError: the adapter runs with fewer than two.
     """
-    from pytest_simbench.client.package_index import newest_of_minors, releases
-    from pytest_simbench.simulator.registry import adapter
-
     wanted: Releases | None = options.value(config, "sim_history")
     if wanted is None:
         return []
@@ -78,19 +79,15 @@ def elsewhere(config: pytest.Config, name: str) -> str:
 
 def machine() -> dict[str, object]:
     """What a history's machine is known by."""
-    from pytest_simbench.experiment.repetition import host
+    from pytest_simbench.experiment.repetition import host  # which imports all that runs
 
     return host()
 
 
 def _named(config: pytest.Config, name: str) -> str:
-    from pytest_simbench import __version__
-
     values: dict[str, object] = {key: options.value(config, key) for key in SETTINGS}
     return f"{name}-{_digest({**values, 'version': __version__})}"
 
 
 def _digest(told: Mapping[str, object]) -> str:
-    from pytest_simbench.records.names import digest
-
     return digest(json.dumps(told, sort_keys=True, default=str))

@@ -7,10 +7,11 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
+from pytest_simbench.client.display import Displays
 from pytest_simbench.client.errors import DisplayError
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
@@ -23,16 +24,13 @@ from pytest_simbench.repeatability.agreement import FOLDER, Sample, agreements
 from pytest_simbench.repeatability.episode import Episodes
 from pytest_simbench.repeatability.perturbation import Perturbation
 from pytest_simbench.repeatability.replay import replay
+from pytest_simbench.repeatability.replay_result import Replay
+from pytest_simbench.repeatability.search import Finding
+from pytest_simbench.repeatability.stability import Sensitivity, Stability
 from pytest_simbench.report.repeatability import render_markdown, render_terminal, tables
 from pytest_simbench.simulator.info import Capability
 from pytest_simbench.simulator.registry import adapter
-
-if TYPE_CHECKING:
-    from pytest_simbench.client.display import Displays
-    from pytest_simbench.repeatability.replay_result import Replay
-    from pytest_simbench.repeatability.search import Finding
-    from pytest_simbench.repeatability.stability import Sensitivity, Stability
-    from pytest_simbench.tasks.base import Task
+from pytest_simbench.tasks.base import Task
 
 MARKDOWN_NAME = "repeatability.md"
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.executor import Executor
+from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.identity import expected
 from pytest_simbench.plugin import options
 from pytest_simbench.records.configuration import (
     agree,
@@ -19,11 +22,6 @@ from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RECORDS, RunFolder
 from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.records.series import configurations, short
-
-if TYPE_CHECKING:
-    from pytest_simbench.experiment.case import Case
-    from pytest_simbench.experiment.executor import Executor
-    from pytest_simbench.experiment.experiment import Experiment
 
 
 def folder_to_resume(config: pytest.Config) -> Path | None:
@@ -118,8 +116,6 @@ class Resumed:
         Raises:
             NotResumed: the records are of another configuration.
         """
-        from pytest_simbench.experiment.identity import expected
-
         case, now = experiment.case, expected(experiment)
         of_test = [
             record
