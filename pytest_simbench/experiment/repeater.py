@@ -9,9 +9,10 @@ from queue import Empty, SimpleQueue
 from typing import Protocol as Interface
 
 from pytest_simbench.client.errors import Unavailable, WorkerError, WorldParityError
-from pytest_simbench.experiment.executor import Carried, Executor, Hooks
+from pytest_simbench.experiment.executor import Carried, Executor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.interrupts import Interrupts
+from pytest_simbench.experiment.repetition import Hooks
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import short
@@ -101,8 +102,9 @@ class Repeater:
             begin=begin,
             phase=progress.phase,
             count=lambda done, total: progress.count(done, total, experiment.task.counted),
+            interrupts=interrupts,
         )
-        repetition = self.executor.repetition(experiment, number, hooks, interrupts)
+        repetition = self.executor.repetition(experiment, number, hooks)
         self._active.add(repetition)
         if self._stopping.is_set():  # this thread took it up just before it could be cancelled
             repetition.kill()

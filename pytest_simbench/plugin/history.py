@@ -10,6 +10,7 @@ import pytest
 
 from pytest_simbench import __version__
 from pytest_simbench.client.package_index import newest_of_minors, releases
+from pytest_simbench.experiment.repetition import host
 from pytest_simbench.plugin import options
 from pytest_simbench.plugin.values import Releases
 from pytest_simbench.records.names import digest
@@ -60,7 +61,7 @@ def releases_of(config: pytest.Config) -> list[str]:
 def folder_of(config: pytest.Config, name: str) -> Path:
     """Where the history of a simulator with these settings on this machine lies: results made with
     others are never in one folder."""
-    return config.rootpath / FOLDER / f"{_named(config, name)}-{_digest(machine())}"
+    return config.rootpath / FOLDER / f"{_named(config, name)}-{_digest(host())}"
 
 
 def elsewhere(config: pytest.Config, name: str) -> str:
@@ -75,13 +76,6 @@ def elsewhere(config: pytest.Config, name: str) -> str:
         f"results of another machine are not reused: {', '.join(others)} in {own.parent}, this "
         f"one's are in {own.name}"
     )
-
-
-def machine() -> dict[str, object]:
-    """What a history's machine is known by."""
-    from pytest_simbench.experiment.repetition import host  # which imports all that runs
-
-    return host()
 
 
 def _named(config: pytest.Config, name: str) -> str:
