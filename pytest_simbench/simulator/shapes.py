@@ -25,7 +25,7 @@ _ORDER = np.sqrt(np.arange(2.0, 28.0))
 """Weights of the directions that put shapes in an order of their own; roots, so that no
 symmetry makes two different shapes equal."""
 
-_STL_HEADER, _STL_TRIANGLE = (
+STL_HEADER, STL_TRIANGLE = (
     84,
     np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")]),
 )
@@ -128,9 +128,9 @@ def _mesh_points(path: str, _changed: int) -> FloatArray:
 
 def _stl_points(path: Path) -> FloatArray | None:
     data = path.read_bytes()
-    count = int.from_bytes(data[80:_STL_HEADER], "little")
-    if len(data) == _STL_HEADER + count * _STL_TRIANGLE.itemsize:
-        triangles = np.frombuffer(data, _STL_TRIANGLE, count, _STL_HEADER)
+    count = int.from_bytes(data[80:STL_HEADER], "little")
+    if len(data) == STL_HEADER + count * STL_TRIANGLE.itemsize:
+        triangles = np.frombuffer(data, STL_TRIANGLE, count, STL_HEADER)
         return np.asarray(triangles["corners"], dtype=float).reshape(-1, 3)
     if not data.lstrip().startswith(b"solid"):
         return None
