@@ -86,7 +86,7 @@ def _releases(wanted: Span) -> list[str]:
     Raises:
         pytest.UsageError: no such simulator or release; one sentence.
     """
-    try:
+    with options.refusing(SimulatorError, "--sim-bisect"):
         info = adapter(wanted.name).info
         known = package_index.releases(info.distribution)
         for version in (wanted.good, wanted.bad):
@@ -95,8 +95,6 @@ def _releases(wanted: Span) -> list[str]:
                 raise pytest.UsageError(f"--sim-bisect: {problem or f'write {version} in full'}")
             if refused := info.refused(version):
                 raise pytest.UsageError(f"--sim-bisect: {refused}")
-    except SimulatorError as error:
-        raise pytest.UsageError(f"--sim-bisect: {error}") from None
     return between(known, wanted.good, wanted.bad)
 
 
@@ -146,10 +144,8 @@ class Search:
         name, result = self._wanted.metric, self.result(0)
         if name == FAILURES.name:
             return FAILURES
-        try:
+        with options.refusing(UnknownMetric, "--sim-bisect"):
             metric = result.metric(name)
-        except UnknownMetric as error:
-            raise pytest.UsageError(f"--sim-bisect: {error}") from None
         if metric.better is None:
             raise pytest.UsageError(f"--sim-bisect: {name} can be neither better nor worse")
         return metric

@@ -102,22 +102,11 @@ def prepare(
     beside = _beside(config, simulators)
     if beside is not None:
         here = Reading(f"{beside[0]} in this run")
-        try:
-            found = _limits(text, here, typed=False) if text is not None else ()
-        except LimitError as error:
-            raise pytest.UsageError(f"--sim-compare-fail: {error}") from None
-        return Comparison(here, found, beside)
+        return Comparison(here, _limits(text, here, typed=False), beside)
     typed = config.getoption("sim_compare_fail") is not None
-    try:
+    with options.refusing(BaselineError):
         baseline = _baseline(config, saved, needed=typed)
-        if baseline is None:
-            return None
-        limits = _limits(text, baseline, typed=typed) if text is not None else ()
-        return Comparison(baseline, limits)
-    except BaselineError as error:
-        raise pytest.UsageError(str(error)) from None
-    except (LimitError, UnknownMetric) as error:
-        raise pytest.UsageError(f"--sim-compare-fail: {error}") from None
+    return Comparison(baseline, _limits(text, baseline, typed=typed)) if baseline else None
 
 
 def _beside(config: pytest.Config, names: Sequence[str]) -> Beside | None:
@@ -167,19 +156,26 @@ def _name(saved: Mapping[str, Any]) -> str:
     return f"the run saved {when} UTC" + (f", commit {commit}" if commit else "")
 
 
-def _limits(text: str, baseline: Reading, *, typed: bool) -> tuple[Limit, ...]:
-    """The limits, each on a metric that the baseline has.
+def _limits(text: str | None, baseline: Reading, *, typed: bool) -> tuple[Limit, ...]:
+    """The limits, each on a metric that the baseline has; none without a text.
 
     The ini file's hold for other runs too: what this baseline does not have is not compared, and
     the summary says so.
+
+    Raises:
+        pytest.UsageError: a malformed limit, an unknown metric.
     """
+    if text is None:
+        return ()
     metrics = {metric.name: metric for found in baseline.metrics.values() for metric in found}
     names = [name for record in baseline.records for name in record.metrics]
     if not typed:
         names += [part.partition(":")[0].strip() for part in text.split(",")]
     for name in dict.fromkeys(names):  # an older run does not say what kind of number it is
         metrics.setdefault(name, Metric(name, name, better="lower"))
-    try:
-        return parse_limits(text, metrics.values())
-    except UnknownMetric as error:
-        raise UnknownMetric(error.name, error.valid, " in the baseline") from None
+    with options.refusing((LimitError, UnknownMetric), "--sim-compare-fail"):
+        try:
+            limits = parse_limits(text, metrics.values())
+        except UnknownMetric as error:
+            raise UnknownMetric(error.name, error.valid, " in the baseline") from None
+    return limits

@@ -108,10 +108,8 @@ def _names(mark: pytest.Mark, node: Any) -> list[str]:
     _check_keywords(mark, node)
     if not mark.args:
         raise pytest.UsageError(f"{node.nodeid}: {mark.name} needs the name of a simulator")
-    try:
+    with options.refusing(registry.UnknownSimulatorError, f"{node.nodeid}: {mark.name}"):
         registry.check_names(map(str, mark.args))
-    except registry.UnknownSimulatorError as error:
-        raise pytest.UsageError(f"{node.nodeid}: {mark.name}: {error}") from None
     return list(mark.args)
 
 

@@ -77,10 +77,8 @@ class Runs:
             if file in files:
                 raise pytest.UsageError(f"{flag} {name}: the run is given twice")
             folders[name] = RunFolder.of(path)
-            try:
+            with options.refusing(RecordError, f"{flag} {name}"):
                 readings[name] = folders[name].read()
-            except RecordError as error:
-                raise pytest.UsageError(f"{flag} {name}: {error}") from None
             files.add(file)
         return cls(folders, readings)
 
@@ -95,11 +93,9 @@ class Runs:
         Raises:
             pytest.UsageError: they are not parts of one run, or hold nothing.
         """
-        try:
+        with options.refusing(MergeError, flag):
             records = merge({name: found.records for name, found in self.readings.items()})
             tasks = merge_tasks({name: found.tasks for name, found in self.readings.items()})
-        except MergeError as error:
-            raise pytest.UsageError(f"{flag}: {error}") from None
         if not records:
             raise pytest.UsageError(f"{flag}: none of the runs holds a repetition that ended")
         return records, Reading(records=tuple(item.record for item in records), tasks=tasks)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -197,6 +198,18 @@ COMMANDS = (
 """Options that do their work and exit, see `plugin.commands`."""
 
 _BY_NAME = {item.name: item for item in OPTIONS}
+
+
+@contextmanager
+def refusing(
+    errors: type[Exception] | tuple[type[Exception], ...], where: str = ""
+) -> Iterator[None]:
+    """Make usage errors of these errors in this block, in their own words, after `WHERE: `."""
+    try:
+        yield
+    except errors as error:
+        raise pytest.UsageError(f"{where}: {error}" if where else str(error)) from None
+
 
 OURS: pytest.StashKey[frozenset[str]] = pytest.StashKey()
 """What is ours of the names on the command line (`--gui`) and in the ini file (`gui`)."""

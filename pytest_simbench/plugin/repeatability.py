@@ -17,22 +17,20 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.plugin.arguments import can_do
-from pytest_simbench.records.repeatability import NAME, Line, append, read
+from pytest_simbench.records.repeatability import NAME, Line, append
 from pytest_simbench.records.text import for_terminal
 from pytest_simbench.repeatability import search, stability
-from pytest_simbench.repeatability.agreement import FOLDER, Sample, agreements
+from pytest_simbench.repeatability.agreement import FOLDER, Sample
 from pytest_simbench.repeatability.episode import Episodes
 from pytest_simbench.repeatability.perturbation import Perturbation
 from pytest_simbench.repeatability.replay import replay
 from pytest_simbench.repeatability.replay_result import Replay
 from pytest_simbench.repeatability.search import Finding
 from pytest_simbench.repeatability.stability import Sensitivity, Stability
-from pytest_simbench.report.repeatability import render_markdown, render_terminal, tables
+from pytest_simbench.report.repeatability import render_terminal, write_tables
 from pytest_simbench.simulator.info import Capability
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks.base import Task
-
-MARKDOWN_NAME = "repeatability.md"
 
 
 class ReplayFixture:
@@ -148,16 +146,10 @@ class Perturber:
 
 def summarise(reporter: pytest.TerminalReporter, folder: Path) -> None:
     """Print the tables of what is in the run folder, and write them there."""
-    try:
-        lines = read(folder)
-        found = tables(lines.items, agreements(folder))
-    except ValueError as error:
-        reporter.write_line(for_terminal(str(error)))
-        return
-    reporter.write_sep("=", "repeatability")
-    reporter.write_line(render_terminal(found, reporter._tw.fullwidth))
-    for problem in (*lines.problems, *lines.refused):
-        reporter.write_line(for_terminal(problem))
-    reporter.write_line(for_terminal(f"\nresults on repeatability: {folder / NAME}"))
-    with suppress(OSError):
-        (folder / MARKDOWN_NAME).write_text(render_markdown(found), encoding="utf-8")
+    found, problems = write_tables(folder, folder)
+    if found:
+        reporter.write_sep("=", "repeatability")
+        reporter.write_line(render_terminal(found, reporter._tw.fullwidth))
+        problems.append(f"\nresults on repeatability: {folder / NAME}")
+    for line in problems:
+        reporter.write_line(for_terminal(line))

@@ -82,10 +82,8 @@ class Resumed:
 
     def __init__(self, folder: RunFolder) -> None:
         self.folder = folder
-        try:
+        with options.refusing(RecordError, "--sim-resume"):
             reading = folder.read()
-        except RecordError as error:
-            raise pytest.UsageError(f"--sim-resume: {error}") from None
         self.records = reading.every
         self.tasks = reading.tasks
         self._problems = reading.problems

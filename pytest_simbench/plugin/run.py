@@ -99,10 +99,8 @@ class Run:
         """
         if self.folder.locked:
             return
-        try:
+        with options.refusing(FolderError):
             self.folder.lock(shared=self._shared_by is not None)
-        except FolderError as error:
-            raise pytest.UsageError(str(error)) from None
         if self._shared_by is not None:
             return
         if self.resumed is not None:

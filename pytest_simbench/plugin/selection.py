@@ -120,10 +120,9 @@ def select(config: pytest.Config) -> Selection:
         pytest.UsageError: an unknown or broken simulator, an unknown setting or profile, an
             interpreter or specification that cannot be one; one sentence.
     """
-    try:
-        return _select(config)
-    except SimulatorError as error:
-        raise pytest.UsageError(str(error)) from None
+    with options.refusing(SimulatorError):
+        selection = _select(config)
+    return selection
 
 
 def _select(config: pytest.Config) -> Selection:
@@ -210,11 +209,9 @@ def _robots(text: str | None) -> Mapping[str, Robot | None]:
     from pytest_simbench.robot.registry import BUILT_IN, DEFAULT, find
 
     names = BUILT_IN if text == EVERY else [text]
-    try:
+    with options.refusing(RobotError, f"--robot={shown(text)}"):
         found = [None if name == DEFAULT else find(name) for name in names]
-        return {"" if robot is None else robot.name: robot for robot in found}
-    except RobotError as error:
-        raise pytest.UsageError(f"--robot={shown(text)}: {error}") from None
+    return {"" if robot is None else robot.name: robot for robot in found}
 
 
 def _check_profile(name: str) -> None:

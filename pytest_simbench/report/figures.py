@@ -52,14 +52,21 @@ def write_figures(folder: Path, summaries: Sequence[TaskSummary]) -> list[Path]:
         for summary in summaries:
             for name in ("metrics", "times", "resources"):
                 figure = draw(summary, name)
-                if figure is None:
-                    continue
-                path = folder / f"{file_name(summary.task)}_{name}.png"
-                picture = io.BytesIO()
-                figure.savefig(picture, format="png", dpi=DPI)
-                write_whole(path, picture.getvalue())
-                paths.append(path)
+                if figure is not None:
+                    paths.append(save(figure, folder, f"{file_name(summary.task)}_{name}"))
     return paths
+
+
+def save(figure: Any, folder: Path, name: str) -> Path:
+    """Write a picture as PNG, whole or not at all, and return its path; within `drawing`.
+
+    Raises:
+        OSError: the folder cannot be written to.
+    """
+    path, picture = folder / f"{name}.png", io.BytesIO()
+    figure.savefig(picture, format="png", dpi=DPI)
+    write_whole(path, picture.getvalue())
+    return path
 
 
 @contextmanager
@@ -144,14 +151,8 @@ def _metrics(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -> 
                 continue
             scale = 100 if metric.bounded else 1
             if metric.kind != "yes_no":
-                axis.plot(
-                    [scale * found.min, scale * found.max],
-                    [y, y],
-                    color="0.8",
-                    lw=6,
-                    solid_capstyle="butt",
-                    zorder=1,
-                )
+                ends = [scale * found.min, scale * found.max]
+                axis.plot(ends, [y, y], color="0.8", lw=6, solid_capstyle="butt", zorder=1)
             if found.low is not None and found.high is not None:
                 axis.plot([scale * found.low, scale * found.high], [y, y], color=COLOURS[0], lw=2)
             axis.plot(scale * found.mean, y, "o", color=COLOURS[0])
@@ -208,22 +209,25 @@ def _phases(figure: Any, rows: Sequence[Row]) -> None:
     for kind, (axis, label) in enumerate(zip(panels, ("CPU, % of a core", "RAM, MB"), strict=True)):
         for place, (row, name) in enumerate(zip(rows, short_labels(rows), strict=True)):
             known = [phase for phase in order if phase in row.by_phase]
-            axis.plot(
-                [order.index(phase) for phase in known],
-                [row.by_phase[phase][kind].mean for phase in known],
-                marker=MARKERS[place % len(MARKERS)],
-                ls=("-", "--")[place // len(COLOURS) % 2],
-                color=COLOURS[place % len(COLOURS)],
-                ms=5,
-                lw=1.2,
-                label=for_figure(name),
-            )
+            x = [order.index(phase) for phase in known]
+            y = [row.by_phase[phase][kind].mean for phase in known]
+            axis.plot(x, y, ms=5, label=for_figure(name), **line_style(place))
         axis.set_xticks(range(len(order)), map(for_figure, order), rotation=40, ha="right")
         axis.set_ylim(bottom=0)
         axis.set_ylabel(label)
         axis.grid(axis="y", alpha=0.4)
     handles, names = panels[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside lower center", ncols=4, frameon=False)
+
+
+def line_style(place: int) -> dict[str, Any]:
+    """Of the line of a row, by its place: other rows have other ones."""
+    return {
+        "marker": MARKERS[place % len(MARKERS)],
+        "ls": ("-", "--")[place // len(COLOURS) % 2],
+        "color": COLOURS[place % len(COLOURS)],
+        "lw": 1.2,
+    }
 
 
 def _heading(metric: Metric) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,9 +12,8 @@ from pytest_simbench.measure.intervals import interval
 from pytest_simbench.measure.law_history import LawHistory, law_histories
 from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.names import file_name
-from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.text import for_figure
-from pytest_simbench.report.figures import COLOURS, DPI, drawing
+from pytest_simbench.report.figures import COLOURS, drawing, save
 from pytest_simbench.report.law_history import draw_laws
 
 AnyHistory = History | LawHistory
@@ -53,11 +51,8 @@ def write_pictures(folder: Path, found: Sequence[AnyHistory]) -> list[Path]:
     with drawing():
         for history in found:
             name = file_name(f"{history.simulator}_{history.task}_history", *history.identity)
-            picture = io.BytesIO()
             figure = draw_laws(history) if isinstance(history, LawHistory) else draw(history)
-            figure.savefig(picture, format="png", dpi=DPI)
-            paths.append(folder / f"{name}.png")
-            write_whole(paths[-1], picture.getvalue())
+            paths.append(save(figure, folder, name))
     return paths
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from pytest_simbench.measure.limits import FAILURES
 from pytest_simbench.report import cells
 from pytest_simbench.report.answer import short_labels, standing
-from pytest_simbench.report.grid import Column
+from pytest_simbench.report.grid import Column, capital
 from pytest_simbench.report.headline import cost_of
 from pytest_simbench.report.pooling import Spread
 from pytest_simbench.report.summary import Row, TaskSummary
@@ -126,7 +126,8 @@ COST_COLUMNS = (
 def from_columns(
     title: str, columns: Sequence[Column], note: str = "", rows: Mapping[tuple[str, ...], Of] = {}
 ) -> Table:
-    """A table of the other reports; `rows` says what the lines with these labels are of."""
+    """A table of the other reports, its title with a capital; `rows` says what the lines with these
+    labels are of."""
     headings = [Heading(column.heading, left=column.left) for column in columns]
     lines = []
     joined = [column.joined() if column.left else column for column in columns[1:]]
@@ -134,7 +135,7 @@ def from_columns(
         line = [Cell(cell, _leading(cell)) for cell in found]
         label = tuple(found[0])
         lines.append(TableRow(line, rows.get(label), label == ("reference",)))
-    return Table(title, headings, lines, note)
+    return Table(capital(title), headings, lines, note)
 
 
 def labelled(summary: TaskSummary) -> dict[tuple[str, ...], Of]:

@@ -193,19 +193,15 @@ def _subjects(summaries: Sequence[TaskSummary]) -> list[str]:
 def _truth(summaries: Sequence[TaskSummary]) -> list[Table]:
     if not truth.laws(summaries):
         return []
-    title = truth.TITLE[0].upper() + truth.TITLE[1:]
-    found = [from_columns(title, truth.table(summaries), truth.LEGEND)]
-    return found + [
-        from_columns(name[0].upper() + name[1:], columns)
-        for name, columns in truth.details(summaries)
-    ]
+    found = [from_columns(truth.TITLE, truth.table(summaries), truth.LEGEND)]
+    return found + [from_columns(name, columns) for name, columns in truth.details(summaries)]
 
 
 def _sweep(found: Sequence[Swept]) -> tuple[Sweep, str]:
     """And why there are no pictures."""
     shown = [(sweep.TITLE, sweep.table(found), sweep.LEGEND)]
     shown += [(name, table, "") for name, table in sweep.details(found)]
-    tables = [from_columns(name[0].upper() + name[1:], table, note) for name, table, note in shown]
+    tables = [from_columns(name, table, note) for name, table, note in shown]
     drawn, problem = of_sweeps(found)
     return Sweep(tables, drawn, sweep.READING), problem
 
@@ -214,9 +210,7 @@ def _tables(summary: TaskSummary) -> list[Table]:
     rows = labelled(summary)
     found = [item for item in columns.details(summary) if item[0] != "failures"]
     found.append((columns.BY_PHASE, columns.by_phase(summary)))
-    return [
-        from_columns(name[0].upper() + name[1:], table, rows=rows) for name, table in found if table
-    ]
+    return [from_columns(name, table, rows=rows) for name, table in found if table]
 
 
 def _causes(
@@ -247,16 +241,8 @@ def _causes(
 
 
 def _repeatability(folder: Path) -> tuple[list[Table], list[str]]:
-    from pytest_simbench.records.repeatability import read
-    from pytest_simbench.repeatability.agreement import agreements
-
-    try:
-        lines = read(folder)
-        found = repeatability.tables(lines.items, agreements(folder))
-    except ValueError as error:
-        return [], [str(error)]
-    tables = [from_columns(title, table, note) for title, note, table in found]
-    return tables, [*lines.problems, *lines.refused]
+    found, problems = repeatability.write_tables(folder)
+    return [from_columns(title, table, note) for title, note, table in found], problems
 
 
 def _compared(name: str, report: GateReport) -> Compared:
