@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 from typing import Protocol as Interface
 
@@ -29,29 +30,23 @@ class ProgressLine(Interface):
     def end_test(self) -> None: ...
 
 
+@dataclass(eq=False)
 class Repeater:
     """Runs repetitions of an experiment and hands each record over as it is made.
 
-    Args:
+    Attributes:
         experiment: what is repeated.
         executor: where and how many side by side.
         progress: the live line.
         keep: takes every record at once, before anything else can go wrong.
     """
 
-    def __init__(
-        self,
-        experiment: Experiment,
-        executor: Executor,
-        progress: ProgressLine,
-        keep: Callable[[Record], None],
-    ) -> None:
-        self.experiment = experiment
-        self.executor = executor
-        self.progress = progress
-        self.keep = keep
-        self._active: set[Carried] = set()
-        self._stopping = threading.Event()
+    experiment: Experiment
+    executor: Executor
+    progress: ProgressLine
+    keep: Callable[[Record], None]
+    _active: set[Carried] = field(default_factory=set, init=False)
+    _stopping: threading.Event = field(default_factory=threading.Event, init=False)
 
     def run(self, numbers: Iterable[int]) -> ResultSet:
         """Run the repetitions of these numbers.

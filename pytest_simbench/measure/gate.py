@@ -206,10 +206,10 @@ def _corrected(found: Iterable[Change | None]) -> tuple[Change, ...]:
 
 
 def _by_test(
-    baseline: Iterable[Record], current: Iterable[Record], metrics: Mapping[str, Sequence[Metric]]
+    baseline: Sequence[Record], current: Sequence[Record], metrics: Mapping[str, Sequence[Metric]]
 ) -> tuple[dict[str, ResultSet], dict[str, ResultSet]]:
     """Both runs' result sets by test and configuration."""
-    before, after = by_test([list(baseline), list(current)])
+    before, after = by_test([baseline, current])
     return tuple(  # type: ignore[return-value]
         {name: ResultSet(found, metrics.get(found[0].task, ())) for name, found in side.items()}
         for side in (before, after)
@@ -238,7 +238,7 @@ def _change(
     neither direction is the worse one."""
     normalised = False
     if limit.metric == FAILURES.name:
-        metric, first, second = FAILURES, _failed(old), _failed(new)
+        metric, first, second = FAILURES, old.failed_by_seed(), new.failed_by_seed()
     elif limit.metric in old.known and limit.metric in new.known:
         metric = new.metric(limit.metric)
         first, second = old.by_seed(metric.name), new.by_seed(metric.name)
@@ -266,11 +266,6 @@ def _of_machines(old: ResultSet, new: ResultSet, name: str) -> bool:
         {(r.host.get("cpu"), r.host.get("cores")) for r in side.ok} for side in (old, new)
     )
     return first != second and without_speed(name, old, new) is None
-
-
-def _failed(result: ResultSet) -> dict[int, float]:
-    """1 for each repetition that failed, 0 for each that did not, by seed."""
-    return {r.seed: float(not r.ok) for r in (*result.ok, *result.failures)}
 
 
 def _smallest_p(comparison: MeanDifference) -> float:

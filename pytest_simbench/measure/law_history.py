@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import series
+from pytest_simbench.records.series import grouped, series
 from pytest_simbench.simulator.versions import BUILD, RELEASE, VersionedName, release_numbers
 from pytest_simbench.tasks.metrics import significant
 from pytest_simbench.tasks.phenomena import PHENOMENA, PHENOMENON
@@ -134,10 +134,8 @@ class LawHistory:
 
 def law_histories(records: Iterable[Record]) -> list[LawHistory]:
     """The histories of laws in a run: of each simulator with two or more releases and builds."""
-    by_law: dict[str, list[Record]] = {}
-    for record in records:
-        if VersionedName.of(record.simulator).kind and record.settings.get(PHENOMENON):
-            by_law.setdefault(record.task, []).append(record)
+    versions = (r for r in records if VersionedName.of(r.simulator).kind)
+    by_law = grouped((r for r in versions if r.settings.get(PHENOMENON)), lambda r: r.task)
     places: dict[tuple[str, ...], dict[tuple[str, str], dict[str, list[Record]]]] = {}
     for law, of_law in by_law.items():
         for row in series(of_law):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,28 +29,26 @@ Beside = tuple[str, Sequence[str]]
 """A simulator, and others that are compared with it."""
 
 
+@dataclass(eq=False)
 class Comparison:
     """This run against a baseline: made when all tests have ended, shown in the summary.
 
-    Args:
+    Attributes:
         baseline: the run to compare with.
         limits: how much worse each metric may get; none: a table and no failures.
         beside: a simulator of this very run, and its other versions, that are compared with it.
     """
 
-    def __init__(
-        self, baseline: Reading, limits: Sequence[Limit] = (), beside: Beside | None = None
-    ) -> None:
-        self.baseline = baseline
-        self.limits = tuple(limits)
-        self._beside = beside
-        self._report: GateReport | None = None
+    baseline: Reading
+    limits: Sequence[Limit] = ()
+    beside: Beside | None = None
+    _report: GateReport | None = field(default=None, init=False)
 
     def make(self, run: Reading) -> None:
         """Compare with this run, which says what the metrics mean."""
         before, now = self.baseline.records, run.records
-        if self._beside is not None:
-            before, now = side_by_side(run.records, *self._beside)
+        if self.beside is not None:
+            before, now = side_by_side(run.records, *self.beside)
         metrics = {**self.baseline.metrics, **run.metrics}
         report = run_gate(before, now, self.limits, metrics)
         other = other_meanings(self.baseline.tasks, run.tasks)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing, suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,21 +33,21 @@ from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks.base import Task
 
 
+@dataclass(frozen=True)
 class ReplayFixture:
     """What the fixture `replay` does, called with a task.
 
-    Args:
+    Attributes:
         case: simulator and settings.
         displays: for a window, if the case has none.
         jobs: how many workers may run side by side.
         skips: skip what the robot cannot do (`can_do`).
     """
 
-    def __init__(self, case: Case, displays: Displays, jobs: int, skips: bool) -> None:
-        self.case = case
-        self.displays = displays
-        self.jobs = jobs
-        self.skips = skips
+    case: Case
+    displays: Displays
+    jobs: int
+    skips: bool
 
     def __call__(self, task: Task, **options: Any) -> Replay:
         """Run the first seed of a task, and again in every way."""
@@ -108,12 +108,12 @@ def _keep(kind: str, episodes: Episodes, result: Mapping[str, Any]) -> None:
         warnings.warn(problem, stacklevel=2)
 
 
+@dataclass(frozen=True)
 class Perturber:
     """One task in one simulator, to be perturbed; what `perturb(task)` gives."""
 
-    def __init__(self, episodes: Episodes, strict: bool = False) -> None:
-        self.episodes = episodes
-        self.strict = strict
+    episodes: Episodes
+    strict: bool = False
 
     @property
     def task(self) -> Task:

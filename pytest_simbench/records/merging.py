@@ -9,7 +9,7 @@ from itertools import combinations
 from pytest_simbench.records.configuration import differences, other_meanings, task_parameters
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import by_test, configurations
+from pytest_simbench.records.series import by_test, configurations, grouped
 
 
 class MergeError(ValueError):
@@ -88,10 +88,7 @@ def merge_tasks(runs: Mapping[str, Mapping[str, TaskDescription]]) -> dict[str, 
 
 def _task_parameters(records: Sequence[Record]) -> list[list[Record]]:
     """A test's records by the parameters of their task: it may repeat several."""
-    groups: dict[str, list[Record]] = {}
-    for record in records:
-        groups.setdefault(task_parameters(record), []).append(record)
-    return list(groups.values())
+    return list(grouped(records, task_parameters).values())
 
 
 def _check(test: str, parts: Mapping[str, Sequence[Record]]) -> None:
