@@ -138,7 +138,12 @@ def run_gate(
             f"{' and '.join(robots[1])}: different robots are not comparable"
         )
     broken = [_broken(test, before[test], after[test]) for test in common]
-    broken += dict.fromkeys(_vain(after[test], limit) for test in common for limit in limits)
+    broken += dict.fromkeys(  # limits, of metrics known only now, that cannot be exceeded
+        limit.vain(after[test].metric(limit.metric))
+        for test in common
+        for limit in limits
+        if limit.metric in after[test].known
+    )
     changes = _corrected(
         _change(test, before[test], after[test], limit) for test in common for limit in limits
     )
@@ -214,11 +219,6 @@ def _by_test(
         {name: ResultSet(found, metrics.get(found[0].task, ())) for name, found in side.items()}
         for side in (before, after)
     )
-
-
-def _vain(result: ResultSet, limit: Limit) -> str:
-    """A sentence when the limit, of a metric known only now, cannot be exceeded."""
-    return limit.vain(result.metric(limit.metric)) if limit.metric in result.known else ""
 
 
 def _broken(test: str, old: ResultSet, new: ResultSet) -> str:

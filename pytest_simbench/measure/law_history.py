@@ -68,7 +68,9 @@ class Row:
         """The places of releases that changed it, what was before, and what they reached."""
         before: Reached | None = None
         for place, now in enumerate(self.reached):
-            if now is not None and (before is None or _changed(before, now)):
+            if now is None:
+                continue
+            if before is None or _worse(before, now) or _worse(now, before):
                 if before is not None:
                     yield place, before, now
                 before = now
@@ -175,12 +177,8 @@ def _order(phenomenon: str) -> int:
     return PHENOMENA.index(phenomenon) if phenomenon in PHENOMENA else len(PHENOMENA)
 
 
-def _changed(before: Reached, now: Reached) -> bool:
-    """Whether the one decides against a release, and the other is better by `FACTOR`."""
-    return _worse(before, now) or _worse(now, before)
-
-
 def _worse(better: Reached, worse: Reached) -> bool:
+    """Whether the one decides against a release, and the other is better by `FACTOR`."""
     if math.isinf(better.most):
         return False
     return worse.least > BROKEN and worse.least >= FACTOR * better.most

@@ -164,7 +164,8 @@ class Search:
             if row.key.simulator == self._name(place)
         ]
         if len(rows) > 1:
-            rows = [row for row in rows if self._has(reading.metrics[row.records[0].task])]
+            names = {task: [m.name for m in known] for task, known in reading.metrics.items()}
+            rows = [r for r in rows if self._wanted.metric in names[r.records[0].task]]
         if len(rows) != 1:
             what = "no test" if not rows else "more than one test"
             raise pytest.UsageError(
@@ -185,9 +186,6 @@ class Search:
 
     def _name(self, place: int) -> str:
         return f"{self._wanted.name}=={self._releases[place]}"
-
-    def _has(self, metrics: tuple[Metric, ...]) -> bool:
-        return self._wanted.metric in [metric.name for metric in metrics]
 
     def _arguments(self) -> list[str]:
         """The command line, without what this command is asked for."""

@@ -41,7 +41,7 @@ def run_command(config: pytest.Config) -> int:
 def _list(config: pytest.Config) -> int:
     """`--sims`: the known simulators, what is here, what each can do and where it deviates."""
     for line in [*_simulators(session_of(config).selection), *spellings.foreign(config)]:
-        print(line)
+        print(for_terminal(line))
     return 0
 
 
@@ -81,10 +81,6 @@ def _robot_line(robot: Robot) -> str:
     return "".join([line, *(f"\n    no {t.name}: {p}" for t in tasks if (p := t.problem()))])
 
 
-def _width() -> int:
-    return shutil.get_terminal_size((160, 24)).columns
-
-
 def _here(selection: Selection, name: str) -> str:
     """Where a simulator is and which version."""
     info = adapter(name).info
@@ -109,13 +105,10 @@ def _size(info: SimulatorInfo) -> str:
 def _simulators(selection: Selection) -> Iterator[str]:
     """Lines: the table of capabilities, then a paragraph for each registered simulator, also for
     those whose adapter is broken."""
-    return map(for_terminal, _lines(selection))
-
-
-def _lines(selection: Selection) -> Iterator[str]:
     from pytest_simbench.report.capabilities import capability_table
 
-    yield capability_table([adapter(name).info for name in registered()], _width())
+    width = shutil.get_terminal_size((160, 24)).columns
+    yield capability_table([adapter(name).info for name in registered()], width)
     yield ""
     for name in known():
         broken = problem(name)

@@ -178,19 +178,17 @@ def report_runs(config: pytest.Config) -> int:
     elif options.value(config, recording.RECORD):
         recorded.append("no recordings: join the runs with --sim-merge first")
     _print(config, summaries, sweeps, [*runs.problems, *written.problems, *recorded])
-    for line in history.lines(histories, shutil.get_terminal_size().columns):
+    width = shutil.get_terminal_size().columns
+    for line in history.lines(histories, width):
         print(for_terminal(line))
     if not others and outcomes[0].compared is not None:
         name, report = outcomes[0].compared
-        text = render_terminal(report, shutil.get_terminal_size().columns, bool(report.changes))
+        text = render_terminal(report, width, bool(report.changes))
         print(for_terminal(f"\nbaseline: {name}\n{text}"))
     if tables or problems:
-        width = shutil.get_terminal_size().columns
-        print(
-            "\n".join(
-                ["", repeatability.render_terminal(tables, width), *map(for_terminal, problems)]
-            )
-        )
+        print(f"\n{repeatability.render_terminal(tables, width)}")
+        for problem in problems:
+            print(for_terminal(problem))
     if target is not None and written.complete:
         print(where(target / PAGE_NAME, config.invocation_params.dir))
     return 0 if written.complete else 1

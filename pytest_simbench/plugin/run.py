@@ -248,7 +248,8 @@ class Run:
 
     def complete(self) -> None:
         """Read what all processes wrote; called when all tests have ended."""
-        if (self.folder.used or self._shared()) and not self.problem:
+        shared = self.config.pluginmanager.has_plugin("dsession")
+        if (self.folder.used or shared) and not self.problem:
             self.reading = self.folder.scan()
 
     def summarise(
@@ -263,7 +264,7 @@ class Run:
         """
         if self.mistake:
             reporter.write_line(f"ERROR: {for_terminal(self.mistake)}", red=True)
-        if not self.reading.records and not self._repeated():
+        if not self.reading.records and not (self.folder.path / NAME).is_file():
             return
         path, records = self.folder.path, self.reading.records
         recorded = recording.record(self.config, path, path, records, self.progress)
@@ -298,13 +299,6 @@ class Run:
             problems.insert(0, f"\nwhat could be written is in {self.folder.path}")
         for line in [*map(for_terminal, filter(None, problems)), *unsaved]:
             reporter.write_line(line)
-
-    def _repeated(self) -> bool:
-        """Whether this run has results on repeatability."""
-        return (self.folder.path / NAME).is_file()
-
-    def _shared(self) -> bool:
-        return self.config.pluginmanager.has_plugin("dsession")
 
     def close(self) -> None:
         """End what the run started."""

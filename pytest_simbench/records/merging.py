@@ -46,7 +46,9 @@ def merge(runs: Mapping[str, Sequence[Record]]) -> list[Merged]:
     """
     ended = [[r for r in run if r.status != "interrupted"] for run in runs.values()]
     tests: dict[str, dict[str, list[Record]]] = {}
-    for name, groups in zip(runs, by_test(ended, apart=_task_parameters), strict=True):
+    # A test may repeat several tasks, which their parameters tell apart.
+    sides = by_test(ended, lambda records: list(grouped(records, task_parameters).values()))
+    for name, groups in zip(runs, sides, strict=True):
         for test, found in groups.items():
             tests.setdefault(test, {})[name] = found
     merged: list[Merged] = []
@@ -84,11 +86,6 @@ def merge_tasks(runs: Mapping[str, Mapping[str, TaskDescription]]) -> dict[str, 
             first.setdefault(task, name)
         found |= tasks
     return found
-
-
-def _task_parameters(records: Sequence[Record]) -> list[list[Record]]:
-    """A test's records by the parameters of their task: it may repeat several."""
-    return list(grouped(records, task_parameters).values())
 
 
 def _check(test: str, parts: Mapping[str, Sequence[Record]]) -> None:

@@ -17,7 +17,8 @@ from pytest_simbench.records.names import file_name
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.text import for_figure
 from pytest_simbench.report.answer import short_labels
-from pytest_simbench.report.pooling import Spread, merged_order
+from pytest_simbench.report.cells import unit
+from pytest_simbench.report.pooling import merged_order
 from pytest_simbench.report.summary import Row, TaskSummary
 from pytest_simbench.tasks.metrics import Metric
 
@@ -156,7 +157,7 @@ def _metrics(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -> 
             if found.low is not None and found.high is not None:
                 axis.plot([scale * found.low, scale * found.high], [y, y], color=COLOURS[0], lw=2)
             axis.plot(scale * found.mean, y, "o", color=COLOURS[0])
-        axis.set_xlabel(_heading(metric))
+        axis.set_xlabel(heading(metric))
         if metric.bounded:
             axis.set_xlim(-3, 103)
         axis.grid(axis="x", alpha=0.4)
@@ -174,14 +175,10 @@ def _times(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -> No
             y, row.end.mean - row.start.mean, left=row.start.mean, height=0.5, color=COLOURS[5]
         )
         for found, colour in ((row.start, COLOURS[2]), (row.end, COLOURS[1])):
-            _error_bar(axis, found, y, colour)
+            axis.errorbar(found.mean, y, xerr=found.std, fmt="o", color=colour, capsize=3, ms=4)
     axis.set_xlim(left=0)
     axis.set_xlabel("seconds from launch")
     axis.grid(axis="x", alpha=0.4)
-
-
-def _error_bar(axis: Any, found: Spread, y: float, colour: str) -> None:
-    axis.errorbar(found.mean, y, xerr=found.std, fmt="o", color=colour, capsize=3, ms=4)
 
 
 def _resources(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -> None:
@@ -230,6 +227,6 @@ def line_style(place: int) -> dict[str, Any]:
     }
 
 
-def _heading(metric: Metric) -> str:
-    unit = "%" if metric.bounded else metric.unit
-    return for_figure(f"{metric.title}, {unit}" if unit else metric.title)
+def heading(metric: Metric, between: str = ", ") -> str:
+    """Title and unit for an axis."""
+    return for_figure(between.join(filter(None, [metric.title, unit(metric)])))

@@ -22,7 +22,7 @@ from pytest_simbench.report.figures import FiguresUnavailable, write_figures
 from pytest_simbench.report.history import AnyHistory
 from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.outcome import Outcome
-from pytest_simbench.report.page import PAGE_NAME, Compared, page_of
+from pytest_simbench.report.page import PAGE_NAME, Compared
 from pytest_simbench.report.replay import REPLAY_NAME
 from pytest_simbench.report.replay.groups import Group, groups
 from pytest_simbench.report.sheet import sheet_name
@@ -115,6 +115,9 @@ def write_files(
         histories: of simulators, drawn too.
         sweeps: laws over time steps, drawn too.
     """
+    from pytest_simbench.report.page.context import page
+    from pytest_simbench.report.page.render import render  # Jinja2
+
     problems: list[str] = []
     failed: list[str] = []
     pictures: list[Path] = []
@@ -140,8 +143,8 @@ def write_files(
     problems += told
     shown, replay, told = _replay(run or folder, records)
     problems += told
-    page = page_of(run or folder, summaries, records, comparison, shown, sheets, sweeps)
-    contents = {PAGE_NAME: page}
+    told_page = page(run or folder, summaries, records, comparison, shown, sheets, sweeps)
+    contents = {PAGE_NAME: render(told_page)}
     if replay:
         contents[REPLAY_NAME] = replay
     if records:  # else the run has results on repeatability alone

@@ -13,7 +13,7 @@ from pytest_simbench.measure.law_history import LawHistory, law_histories
 from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.names import file_name
 from pytest_simbench.records.text import for_figure
-from pytest_simbench.report.figures import COLOURS, drawing, save
+from pytest_simbench.report.figures import COLOURS, drawing, heading, save
 from pytest_simbench.report.law_history import draw_laws
 
 AnyHistory = History | LawHistory
@@ -94,8 +94,7 @@ def _panel(axis: Any, course: Course) -> None:
         axis.plot(place, scale * found.mean, "o", color=COLOURS[0], ms=4)
     for change in course.changes:
         axis.axvline(present[change.place] - 0.5, color=COLOURS[1], ls="--", lw=1)
-    unit = "%" if metric.bounded else metric.unit
-    axis.set_ylabel(for_figure(f"{metric.title}\n{unit}" if unit else metric.title), fontsize=8)
+    axis.set_ylabel(heading(metric, between="\n"), fontsize=8)
     axis.margins(y=0.15)
     low, high = axis.get_ylim()
     least = 4 * scale * metric.smallest_difference  # a deterministic engine's rounding is no course

@@ -82,7 +82,12 @@ def study(summary: TaskSummary) -> Table:
         (Heading("simulator", left=True), [Cell([row.simulator, row.variant]) for row in rows]),
         (
             Heading("failed", FAILURES.doc),
-            _judged([_failures(row) for row in rows], FAILURES.name, _attempts(rows), summary),
+            _judged(
+                [_failures(row) for row in rows],
+                FAILURES.name,
+                [row.attempts for row in rows],
+                summary,
+            ),
         ),
     ]
     for metric in summary.study:
@@ -157,10 +162,6 @@ def _judged(
     return [
         Cell(cell.lines, cell.sort, verdicts.get(place, "")) for place, cell in enumerate(found)
     ]
-
-
-def _attempts(rows: Sequence[Row]) -> list[int]:
-    return [row.attempts for row in rows]
 
 
 def _counts(spreads: Iterable[Spread | None]) -> list[int]:

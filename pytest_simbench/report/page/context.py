@@ -17,6 +17,7 @@ from pytest_simbench.report.answer import sentences
 from pytest_simbench.report.changes import DIFFERENT
 from pytest_simbench.report.changes import columns as change_columns
 from pytest_simbench.report.headline import headline
+from pytest_simbench.report.page import Compared as Reported
 from pytest_simbench.report.page import setup
 from pytest_simbench.report.page.cells import Of, Table, from_columns, labelled, of, study
 from pytest_simbench.report.page.pictures import Picture, of_sweeps, pictures
@@ -112,12 +113,22 @@ def page(
     folder: Path,
     summaries: Sequence[TaskSummary],
     records: Sequence[Record],
-    comparison: tuple[str, GateReport] | None = None,
+    comparison: Reported | None = None,
     replays: Sequence[Group] = (),
     sheets: Mapping[str, bytes] | None = None,
     sweeps: Sequence[Swept] = (),
 ) -> Page:
-    """The page of a run, see `page_of`."""
+    """What the page of a run tells; `render.render` makes HTML of it.
+
+    Args:
+        folder: of the run; its results on repeatability are read from it.
+        summaries: from `summary.summarise`, with their wins.
+        records: that they were made of.
+        comparison: with a baseline, where there is one.
+        replays: what the replay beside the page shows.
+        sheets: contact sheets (PNG), by the name of their task.
+        sweeps: laws over time steps.
+    """
     records = at_own_steps(records)
     replay, video = links(replays), videos(folder)
     numbers: dict[int, int] = {}
