@@ -6,6 +6,7 @@ import json
 import threading
 from collections import Counter
 from collections.abc import Iterable
+from contextlib import AbstractContextManager, nullcontext
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -154,31 +155,32 @@ class Run:
     def progress(self) -> Progress:
         """The live line; silent in xdist workers, which have no terminal."""
         if self._progress is None:
-            reporter = self.config.pluginmanager.get_plugin("terminalreporter")
+            reporter = self._reporter
             width = reporter._tw.fullwidth if reporter else 80
             tty = bool(reporter and reporter.isatty)
             self._progress = Progress(self._write, is_tty=tty, width=width)
         return self._progress
 
     def _write(self, text: str) -> None:
-        reporter = self.config.pluginmanager.get_plugin("terminalreporter")
-        capture = self.config.pluginmanager.get_plugin("capturemanager")
-        if reporter is None or hasattr(self.config, "workerinput"):
-            return
-        with self._lock:
-            if capture is None:
-                reporter._tw.write(text, flush=True)
-            else:
-                with capture.global_and_fixture_disabled():
-                    reporter._tw.write(text, flush=True)
+        if self._reporter is not None and self._shared_by is None:
+            with self._lock, self._uncaptured():
+                self._reporter._tw.write(text, flush=True)
 
     def begin_lines(self) -> None:
         """Start a new line before the first progress of a test."""
-        reporter = self.config.pluginmanager.get_plugin("terminalreporter")
+        if self._reporter is not None:
+            with self._uncaptured():
+                self._reporter.ensure_newline()
+
+    @property
+    def _reporter(self) -> Any:
+        """Of the terminal, where there is one."""
+        return self.config.pluginmanager.get_plugin("terminalreporter")
+
+    def _uncaptured(self) -> AbstractContextManager[None]:
+        """What is printed in this block reaches the terminal."""
         capture = self.config.pluginmanager.get_plugin("capturemanager")
-        if reporter is not None and capture is not None:
-            with capture.global_and_fixture_disabled():
-                reporter.ensure_newline()
+        return capture.global_and_fixture_disabled() if capture else nullcontext()
 
     def begin(self, experiment: Experiment) -> int:
         """How often this process has begun these repetitions, with this time.
