@@ -307,15 +307,9 @@ class Repetition:
 
     def _keeps(self, *, failed: bool) -> bool:
         """Whether the motion of this repetition is kept."""
-        first = self.number == 1
-        wanted = {
-            "first": first,
-            "first-and-failed": first or failed,
-            "retain-on-failure": failed,
-            "on": True,
-            "off": False,
-        }
-        return wanted[self.case.trace]
+        first, when = self.number == 1, self.case.trace
+        wanted = when == "on" or (first and when in ("first", "first-and-failed"))
+        return wanted or (failed and when in ("first-and-failed", "retain-on-failure"))
 
     def _write_trace(self, *, failed: bool) -> str:
         """Joint and body states over time, and what is needed to draw them, in the run folder.

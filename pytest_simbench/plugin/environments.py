@@ -15,14 +15,12 @@ from pytest_simbench.simulator.registry import adapter
 
 def install(config: pytest.Config) -> int:
     """`--sim-install`: make the environments of simulators, also of releases of them."""
-    try:
+    with options.refusing(SimulatorError):
         for name in options.value(config, "sim_install"):
             environment = Environment.of(adapter(name).info)
             if environment.problem:
                 environment.create(progress())
             print(f"{name}: {environment.info.title} {environment.version()} is ready")
-    except SimulatorError as error:
-        raise pytest.UsageError(for_terminal(str(error))) from None
     return 0
 
 

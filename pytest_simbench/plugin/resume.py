@@ -42,17 +42,14 @@ def folder_to_resume(config: pytest.Config) -> Path | None:
         )
     if given or output:
         folder = Path(config.invocation_params.dir, given or output)
-        if not (folder / RECORDS).is_file():
-            raise pytest.UsageError(
-                f"there is no run to resume in {folder} (it has no {RECORDS}); write "
-                "--sim-resume=RUN with the folder of a run"
-            )
-        return folder
-    runs = sorted(config.rootpath.glob(f".simbench/*/{RECORDS}"), key=_begun)
-    if not runs:
+        runs, lacks = [folder / RECORDS], f" (it has no {RECORDS})"
+    else:
+        folder, lacks = config.rootpath / ".simbench", ""
+        runs = sorted(folder.glob(f"*/{RECORDS}"), key=_begun)
+    if not runs or not runs[-1].is_file():
         raise pytest.UsageError(
-            f"there is no run to resume in {config.rootpath / '.simbench'}; write "
-            "--sim-resume=RUN with the folder of a run"
+            f"there is no run to resume in {folder}{lacks}; write --sim-resume=RUN with the "
+            "folder of a run"
         )
     return runs[-1].parent
 

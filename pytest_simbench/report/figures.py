@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 import math
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -51,7 +51,7 @@ def write_figures(folder: Path, summaries: Sequence[TaskSummary]) -> list[Path]:
     paths: list[Path] = []
     with drawing():
         for summary in summaries:
-            for name in ("metrics", "times", "resources"):
+            for name in PICTURES:
                 figure = draw(summary, name)
                 if figure is not None:
                     paths.append(save(figure, folder, f"{file_name(summary.task)}_{name}"))
@@ -116,24 +116,20 @@ def draw(summary: TaskSummary, name: str, *, titled: bool = True) -> Any:
         figure: Any = Figure(figsize=(9, 3.2 + 0.16 * len(rows)), layout="constrained")
         _phases(figure, rows)
         return figure
-    panels = {"metrics": max(1, len(summary.study)), "times": 1, "resources": 2}[name]
+    panels, what, fill = PICTURES[name]
+    panels = panels or max(1, len(summary.study))
     size = (max(7, 2 + 3.5 * panels), 1.6 + 0.4 * len(rows))
     figure = Figure(figsize=size, layout="constrained")
     axes = figure.subplots(1, panels, sharey=True, squeeze=False)[0]
-    {"metrics": _metrics, "times": _times, "resources": _resources}[name](axes, summary, rows)
+    fill(axes, summary, rows)
     axes[0].set_yticks(range(len(rows)), map(for_figure, short_labels(rows)))
     axes[0].set_ylim(len(rows) - 0.5, -0.5)
     if titled:
-        figure.suptitle(_title(summary, rows, name), fontsize="medium")
+        figure.suptitle(_title(summary, rows, what), fontsize="medium")
     return figure
 
 
-def _title(summary: TaskSummary, rows: Sequence[Row], name: str) -> str:
-    what = {
-        "metrics": "mean with 95 % interval, min to max in grey",
-        "times": "start and end of the task, with deviation",
-        "resources": "CPU and RAM, mean and deviation over samples",
-    }[name]
+def _title(summary: TaskSummary, rows: Sequence[Row], what: str) -> str:
     shared = [
         values.pop()
         for values in ({row.mode for row in rows}, {row.profile for row in rows})
@@ -197,6 +193,16 @@ def _resources(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -
         axis.set_xlim(left=0)
         axis.set_xlabel(label)
         axis.grid(axis="x", alpha=0.4)
+
+
+Fill = Callable[[Sequence[Any], TaskSummary, Sequence[Row]], None]
+
+PICTURES: dict[str, tuple[int, str, Fill]] = {
+    "metrics": (0, "mean with 95 % interval, min to max in grey", _metrics),
+    "times": (1, "start and end of the task, with deviation", _times),
+    "resources": (2, "CPU and RAM, mean and deviation over samples", _resources),
+}
+"""By name: panels (0: one for each metric of the study), what is shown, and what draws it."""
 
 
 def _phases(figure: Any, rows: Sequence[Row]) -> None:

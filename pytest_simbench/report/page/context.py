@@ -134,12 +134,15 @@ def page(
     numbers: dict[int, int] = {}
     repetitions: list[dict[str, Any]] = []
 
+    def recorded(record: Record) -> tuple[str, str]:
+        """The addresses of its replay and video."""
+        return replay.get(id(record), ""), video(record)
+
     def number(record: Record) -> int:
         """Its place among the page's repetitions, where it is put when first asked for."""
         if id(record) not in numbers:
             numbers[id(record)] = len(repetitions)
-            links_of = replay.get(id(record), ""), video(record)
-            repetitions.append(_repetition(record, *links_of))
+            repetitions.append(_repetition(record, *recorded(record)))
         return numbers[id(record)]
 
     problems: dict[str, None] = {}
@@ -155,7 +158,7 @@ def page(
                 study(summary),
                 strips(summary, rows, number),
                 _tables(summary),
-                _causes(summary, rows, lambda r: (replay.get(id(r), ""), video(r))),
+                _causes(summary, rows, recorded),
                 drawn,
                 columns.notes(summary),
                 [
