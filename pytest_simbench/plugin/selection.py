@@ -30,7 +30,6 @@ class Selection:
 
     Attributes:
         simulators: names, in order.
-        explicit: the names that were asked for one by one; a missing one is an error.
         modes: `headless`, `gui`.
         profiles: settings profiles.
         changes: simulator name to changed settings, as texts; those of a bare name hold for all
@@ -43,7 +42,6 @@ class Selection:
     """
 
     simulators: tuple[str, ...]
-    explicit: frozenset[str]
     modes: tuple[str, ...]
     profiles: tuple[str, ...]
     changes: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -162,7 +160,6 @@ def _select(config: pytest.Config) -> Selection:
     everything = registry.known() if not names or "all" in asked else []
     selection = Selection(
         tuple(dict.fromkeys([*everything, *names])),
-        frozenset(names),
         _modes(config),
         options.value(config, "sim_profile"),
         changes,

@@ -24,7 +24,8 @@ from pytest_simbench.scene import (
     Scene,
     Sphere,
 )
-from pytest_simbench.simulator.shapes import STL_TRIANGLE, mesh_points
+from pytest_simbench.simulator.mesh_check import TRIANGLE
+from pytest_simbench.simulator.shapes import mesh_points
 from pytest_simbench.testing import scenes
 
 Plant = Callable[[Scene, Path], Scene]
@@ -167,7 +168,7 @@ def _scaled(mesh: ET.Element, robot: Robot, folder: Path) -> None:
     package, _, rest = mesh.attrib["filename"].removeprefix("package://").partition("/")
     points = 1.3 * mesh_points(str(Path(robot.packages[package]) / rest))
     corners = np.resize(points, (3 * math.ceil(len(points) / 3), 3)).reshape(-1, 3, 3)
-    record = np.zeros(len(corners), STL_TRIANGLE)
+    record = np.zeros(len(corners), TRIANGLE)
     record["corners"] = corners
     path = folder / "scaled.stl"
     path.write_bytes(bytes(80) + len(corners).to_bytes(4, "little") + record.tobytes())
