@@ -67,7 +67,7 @@ class Repeater:
         finally:
             self.executor.end_test()
             self.progress.end_test()
-        return ResultSet(records, self.experiment.metrics)
+        return ResultSet(records, self.experiment.task.metrics)
 
     def _one(self, number: int) -> Record:
         with Interrupts() as interrupts:

@@ -111,8 +111,7 @@ class ResultSet:
 
     def value(self, record: Record, name: str) -> float | None:
         """A metric's value in one record; None where it is not available."""
-        metric = self.metric(name)
-        found = record.metrics.get(name) if metric.name in self.metrics else record.cost(name)
+        found = self._reader(name)(record)
         return None if found is None else float(found)
 
     def values(self, name: str) -> list[float]:

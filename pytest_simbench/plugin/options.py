@@ -272,14 +272,9 @@ def _ini(config: pytest.Config, item: Option) -> tuple[str, Any]:
     """Name and value of the ini twin that is set, if one is."""
     for name in map(name_of, item.flags if item.ini else ()):
         if name in _ours(config):
-            try:
+            # Not a text, or quotes that do not match.
+            with refusing((TypeError, ValueError, pytest.UsageError), f"the ini option {name}"):
                 raw = config.getini(name)
-            except (
-                TypeError,
-                ValueError,
-                pytest.UsageError,
-            ) as error:  # not a text, or quotes that do not match
-                raise pytest.UsageError(f"the ini option {name}: {error}") from None
             if raw is not None:
                 return f"the ini option {name}", raw
     return "", None

@@ -59,15 +59,14 @@ class RepeatFixture:
         def up_to(number: int) -> list[Record]:
             return self._up_to(number, experiment, found)
 
+        metrics = experiment.task.metrics
         if isinstance(wanted, options.Auto):
             plan = Plan.up_to(wanted.limit)
             first = up_to(plan.looks[0])
-            result: ResultSet = SequentialResultSet(first, experiment.metrics, plan, up_to)
+            result: ResultSet = SequentialResultSet(first, metrics, plan, up_to)
         else:
             number = wanted or number_mark(self.node, "reps") or experiment.task.repetitions
-            result = ResultSet(
-                up_to(int(number or self.case.protocol.repetitions)), experiment.metrics
-            )
+            result = ResultSet(up_to(int(number or self.case.protocol.repetitions)), metrics)
         recording.photograph(self.node.config, experiment, result.records, self.run.tell)
         result.strict = options.value(self.node.config, "sim_strict")
         self.results.append(result)
