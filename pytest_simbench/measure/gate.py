@@ -127,7 +127,10 @@ def run_gate(
         metrics: the metrics of each task, by its name.
     """
     baseline, current = list(baseline), list(current)
-    before, after = _by_test(baseline, current, metrics)
+    before, after = (
+        {name: ResultSet(found, metrics.get(found[0].task, ())) for name, found in side.items()}
+        for side in by_test([baseline, current])
+    )
     robots = [_robots(baseline), _robots(current)]
     common = [test for test in after if test in before]
     notes = [f"{test} is not in the baseline and is not compared" for test in after.keys() - before]
@@ -208,17 +211,6 @@ def _corrected(found: Iterable[Change | None]) -> tuple[Change, ...]:
     changes = [change for change in found if change is not None]
     corrected = holm([change.comparison.p_value for change in changes])
     return tuple(replace(c, p_value=p) for c, p in zip(changes, corrected, strict=True))
-
-
-def _by_test(
-    baseline: Sequence[Record], current: Sequence[Record], metrics: Mapping[str, Sequence[Metric]]
-) -> tuple[dict[str, ResultSet], dict[str, ResultSet]]:
-    """Both runs' result sets by test and configuration."""
-    before, after = by_test([baseline, current])
-    return tuple(  # type: ignore[return-value]
-        {name: ResultSet(found, metrics.get(found[0].task, ())) for name, found in side.items()}
-        for side in (before, after)
-    )
 
 
 def _broken(test: str, old: ResultSet, new: ResultSet) -> str:

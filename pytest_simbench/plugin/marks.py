@@ -41,9 +41,7 @@ def parameters(metafunc: pytest.Metafunc, selection: Selection) -> list[Any]:
 
 
 def _wanted(node: Any, name: str) -> bool:
-    chosen: list[str] = []
-    for mark in node.iter_markers("only_sim"):
-        chosen += _names(mark, node)
+    chosen = [name for mark in node.iter_markers("only_sim") for name in _names(mark, node)]
     return not chosen or _among(chosen, name)
 
 

@@ -63,7 +63,8 @@ def draw(history: History) -> Any:
     """
     from matplotlib.figure import Figure
 
-    shown = _shown(history)
+    # Those that changed, then what the study shows and the costs.
+    shown = sorted(history.courses, key=lambda c: (not c.changes, not c.metric.study))[:SHOWN]
     figure: Any = Figure(
         figsize=(max(6.0, 2 + 0.45 * len(history.releases)), 0.9 + 1.5 * len(shown)),
         layout="constrained",
@@ -74,12 +75,6 @@ def draw(history: History) -> Any:
     panels[-1].set_xticks(range(len(history.releases)), history.releases, rotation=45, ha="right")
     figure.suptitle(for_figure(history.title), fontsize="medium")
     return figure
-
-
-def _shown(history: History) -> list[Course]:
-    """Courses of a picture: those that changed, then what the study shows and the costs."""
-    order = sorted(history.courses, key=lambda c: (not c.changes, not c.metric.study))
-    return order[:SHOWN]
 
 
 def _panel(axis: Any, course: Course) -> None:

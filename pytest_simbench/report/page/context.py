@@ -175,7 +175,7 @@ def page(
                 b64encode((sheets or {}).get(summary.task, b"")).decode("ascii"),
             )
         )
-    again, unreadable = _repeatability(folder)
+    again, unreadable = repeatability.write_tables(folder)
     problems |= dict.fromkeys(unreadable)
     swept, problem = _sweep(sweeps) if sweeps else (None, "")
     problems |= dict.fromkeys(filter(None, [problem]))
@@ -190,7 +190,7 @@ def page(
         _truth(summaries),
         swept,
         tasks,
-        again,
+        [from_columns(title, table, note) for title, note, table in again],
         None if comparison is None else _compared(*comparison),
         setup.setup(summaries, records),
         repetitions,
@@ -252,11 +252,6 @@ def _causes(
                 )
             )
     return found
-
-
-def _repeatability(folder: Path) -> tuple[list[Table], list[str]]:
-    found, problems = repeatability.write_tables(folder)
-    return [from_columns(title, table, note) for title, note, table in found], problems
 
 
 def _compared(name: str, report: GateReport) -> Compared:
