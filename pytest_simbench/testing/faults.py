@@ -218,16 +218,22 @@ def _built(what: str, quantity: str, **values: Any) -> Fault:
 
 FAULTS: dict[str, Fault] = {
     "finger_shape": _described(
-        "the rubber tip of a finger is 3 mm thinner", "link/panda_leftfinger/boxes",
-        f"{_TIP}/geometry/box", _set(size="17.5e-3 12.2e-3 18.5e-3"),
+        "the rubber tip of a finger is 3 mm thinner",
+        "link/panda_leftfinger/boxes",
+        f"{_TIP}/geometry/box",
+        _set(size="17.5e-3 12.2e-3 18.5e-3"),
     ),
     "finger_pad": _described(
-        "the rubber tip of a finger is 2 mm nearer to the hand", "link/panda_leftfinger/boxes",
-        f"{_TIP}/origin", _moved(z=-0.002),
+        "the rubber tip of a finger is 2 mm nearer to the hand",
+        "link/panda_leftfinger/boxes",
+        f"{_TIP}/origin",
+        _moved(z=-0.002),
     ),
     "mesh_scale": _described(
-        "the mesh of link 4 is 1.3 times as large", "link/panda_link4/meshes",
-        f"{_LINK4}/collision/geometry/mesh", _scaled,
+        "the mesh of link 4 is 1.3 times as large",
+        "link/panda_link4/meshes",
+        f"{_LINK4}/collision/geometry/mesh",
+        _scaled,
     ),
     "no_shape": _described(
         "link 4 has no collision shape", "link/panda_link4/meshes", _LINK4, _without_shapes
@@ -236,27 +242,37 @@ FAULTS: dict[str, Fault] = {
         "joint 4 is 10 mm aside", "link/panda_link4/pose", f"{_JOINT4}/origin", _moved(y=0.01)
     ),
     "joint_axis": _described(
-        "the axis of joint 1 is turned by 5 degrees", "joint/panda_joint1/axis",
-        "joint[@name='panda_joint1']/axis", _set(xyz=_TILTED),
+        "the axis of joint 1 is turned by 5 degrees",
+        "joint/panda_joint1/axis",
+        "joint[@name='panda_joint1']/axis",
+        _set(xyz=_TILTED),
     ),
     "joint_limits": _described(
-        "joint 4 stops 0.1 rad earlier", "joint/panda_joint4/limits", f"{_JOINT4}/limit",
+        "joint 4 stops 0.1 rad earlier",
+        "joint/panda_joint4/limits",
+        f"{_JOINT4}/limit",
         _set(lower="-2.9718"),
     ),
     "link_mass": _described(
         "link 4 weighs 5 kg", "link/panda_link4/mass", f"{_LINK4}/inertial/mass", _set(value="5.0")
     ),
     "centre_of_mass": _described(
-        "the centre of mass of link 4 is 100 mm off", "link/panda_link4/com",
-        f"{_LINK4}/inertial/origin", _moved(y=-0.1),
+        "the centre of mass of link 4 is 100 mm off",
+        "link/panda_link4/com",
+        f"{_LINK4}/inertial/origin",
+        _moved(y=-0.1),
     ),
     "inertia_turned": _described(
-        "the inertia of link 4 is turned by 90 degrees", "link/panda_link4/inertia",
-        f"{_LINK4}/inertial/inertia", _turned_inertia,
+        "the inertia of link 4 is turned by 90 degrees",
+        "link/panda_link4/inertia",
+        f"{_LINK4}/inertial/inertia",
+        _turned_inertia,
     ),
     "inertia_scaled": _described(
-        "the inertia of link 4 is 20 % larger about x", "link/panda_link4/inertia",
-        f"{_LINK4}/inertial/inertia", _set(ixx="0.031"),
+        "the inertia of link 4 is 20 % larger about x",
+        "link/panda_link4/inertia",
+        f"{_LINK4}/inertial/inertia",
+        _set(ixx="0.031"),
     ),
     "base": Fault(
         "the base is 10 mm aside", "link/panda_link1/pose", of_robot(base=Pose.at(0.0, 0.01, 0.0))
@@ -268,7 +284,8 @@ FAULTS: dict[str, Fault] = {
     "drive_damping": _driven("the drive of joint 4 damps 10 % more", damping=1.1),
     "effort_limit": _driven("joint 4 has twice its effort limit", effort_limit=2.0),
     "squeeze": Fault(
-        "the fingers squeeze twice as strongly", "joint/panda_finger_joint1/effort_limit",
+        "the fingers squeeze twice as strongly",
+        "joint/panda_finger_joint1/effort_limit",
         lambda scene, folder: of_joint("panda_finger_joint1", effort_limit=2.0)(
             of_joint("panda_finger_joint2", effort_limit=2.0)(scene, folder), folder
         ),
@@ -287,11 +304,13 @@ FAULTS: dict[str, Fault] = {
         "the wedge is 2 mm longer", "wedge/meshes", vertices=scenes.wedge(length=0.102)
     ),
     "wedge_inertia": _built(
-        "the wedge is 2 mm wider, and its inertia with it", "wedge/inertia",
+        "the wedge is 2 mm wider, and its inertia with it",
+        "wedge/inertia",
         vertices=scenes.wedge(width=0.052),
     ),
     "wedge_is_a_box": Fault(
-        "the wedge is the box around it", "body/wedge/meshes",
+        "the wedge is the box around it",
+        "body/wedge/meshes",
         lambda scene, _: scene.with_body(
             Box("wedge", scene.body("wedge").extents, LEANING, 0.15, 0.7)
         ),
@@ -302,7 +321,8 @@ FAULTS: dict[str, Fault] = {
     ),
     "body_damping": _built("the ball turns on undamped", "ball/damping", angular_damping=0.0),
     "round_kind": Fault(
-        "the pillar is a capsule as long as it", "body/pillar/rounds",
+        "the pillar is a capsule as long as it",
+        "body/pillar/rounds",
         lambda scene, _: scene.with_body(
             Capsule("pillar", 0.04, 0.12, scene.body("pillar").pose, friction=0.7)
         ),
@@ -314,7 +334,8 @@ FAULTS: dict[str, Fault] = {
         "the brick starts 1 cm/s faster", "brick/velocity", linear_velocity=(0.2, -0.1, 0.31)
     ),
     "angular_velocity": _built(
-        "the brick's spin is in its own frame", "brick/velocity",
+        "the brick's spin is in its own frame",
+        "brick/velocity",
         angular_velocity=tuple(TURNED.rotation().T @ SPIN),
     ),
     "body_pose": _built(
@@ -329,7 +350,7 @@ FAULTS: dict[str, Fault] = {
     "ground_friction": Fault(
         "the ground's friction is 0.5", "ground/friction", of_scene(ground_friction=0.5)
     ),
-}  # fmt: skip
+}
 """By short names."""
 
 
