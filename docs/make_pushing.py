@@ -9,13 +9,13 @@ A table stands between `<!-- pushing: ROBOT PROFILE -->` and `<!-- end -->`.
 from __future__ import annotations
 
 import csv
-import re
 import statistics
 import sys
 from collections import defaultdict
 from pathlib import Path
 
 from published_runs import SIMULATORS
+from tables import engine_version, filled
 
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.tasks import Pushing
@@ -38,10 +38,8 @@ def read(folders: list[str]) -> None:
         for folder in folders:
             for record in RunFolder(Path(folder)).read().records:
                 robot = record.robot.get("name", "panda")
-                other = ("python", "pytest-simbench")
-                version = next((v for k, v in record.versions.items() if k not in other), "")
                 way = "curve" if record.settings["task.turn"] else "line"
-                told = (record.simulator, version, way, record.seed, record.status)
+                told = (record.simulator, engine_version(record), way, record.seed, record.status)
                 values = [record.metrics.get(metric.name) for metric in Pushing().metrics]
                 cells = ["" if value is None else f"{value:.6g}" for value in values]
                 writer.writerow([robot, record.profile, *told, *cells])
@@ -77,12 +75,7 @@ def _cell(lines: list[dict[str, str]], metric: str) -> str:
 
 def page() -> str:
     """The page with its tables."""
-    return re.sub(
-        r"(<!-- pushing: (\w+) (\w+) -->\n).*?(<!-- end -->)",
-        lambda found: f"{found[1]}\n{table(found[2], found[3])}\n{found[4]}",
-        PAGE.read_text("utf-8"),
-        flags=re.DOTALL,
-    )
+    return filled(PAGE, "pushing", table)
 
 
 if __name__ == "__main__":

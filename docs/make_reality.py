@@ -10,7 +10,6 @@ A table stands between `<!-- reality: TASK -->` and `<!-- end -->`.
 from __future__ import annotations
 
 import csv
-import re
 import statistics
 import sys
 from collections import defaultdict
@@ -18,6 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from published_runs import SIMULATORS
+from tables import engine_version, filled
 
 from pytest_simbench.records.folder import RunFolder
 
@@ -56,11 +56,10 @@ def read(folders: list[str]) -> None:
         for record in RunFolder(Path(folder)).read().records:
             if record.task not in METRICS:
                 continue
-            other = ("python", "pytest-simbench")
-            version = next((v for k, v in record.versions.items() if k not in other), "")
             number = str((record.details.get("data") or ["", ""])[1])
             if record.task in FOLLOWING:
                 number = record.details.get("run", number)
+            version = engine_version(record)
             told = [record.profile, record.simulator, version, number, record.status]
             held = {**record.details, **record.metrics}
             values = [held.get(name) for name in columns(record.task)[len(HEADER) :]]
@@ -186,12 +185,7 @@ TABLES: dict[str, Callable[[], str]] = {
 
 def page() -> str:
     """The page with its tables."""
-    return re.sub(
-        r"(<!-- reality: (\w+) -->\n).*?(<!-- end -->)",
-        lambda found: f"{found[1]}\n{TABLES[found[2]]()}\n{found[3]}",
-        PAGE.read_text("utf-8"),
-        flags=re.DOTALL,
-    )
+    return filled(PAGE, "reality", lambda task: TABLES[task]())
 
 
 if __name__ == "__main__":

@@ -14,10 +14,11 @@ A table stands between `<!-- truth: PART PROFILE -->` and `<!-- end -->`; PART i
 from __future__ import annotations
 
 import csv
-import re
 import sys
 from dataclasses import replace
 from pathlib import Path
+
+from tables import engine_version, filled
 
 from pytest_simbench.laws import LAW, LAWS
 from pytest_simbench.measure.sweep import Swept, sweeps
@@ -60,14 +61,12 @@ def read(folders: list[str], swept: bool = False) -> None:
 
 
 def _line(record: Record) -> list[object]:
-    other = ("python", "pytest-simbench")
-    version = next((v for k, v in record.versions.items() if k not in other), "")
     told = record.details.get(LAW, {})
     numbers = [told.get(name) for name in READING]
     numbers += [record.metrics.get(name) for name in ("error", "ratio")]
     costs = [record.stepping.get(name) for name in ("cpu", "simulated")]
     return [
-        record.profile, record.simulator, version, record.settings["timestep"],
+        record.profile, record.simulator, engine_version(record), record.settings["timestep"],
         record.settings[PHENOMENON], record.task, record.status,
         *map(_text, numbers), BY_NAME[record.task].unit, *map(_text, costs),
     ]  # fmt: skip
@@ -190,12 +189,7 @@ def _list() -> str:
 
 def page() -> str:
     """The page with its tables."""
-    return re.sub(
-        r"(<!-- truth: (\w+) (\w+) -->\n).*?(<!-- end -->)",
-        lambda found: f"{found[1]}\n{part(found[2], found[3])}\n{found[4]}",
-        PAGE.read_text("utf-8"),
-        flags=re.DOTALL,
-    )
+    return filled(PAGE, "truth", part)
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ def asked(law):
     return pytest.param(law, id=law.name, marks=marks)
 
 
-@pytest.mark.parametrize("law", map(asked, LAWS))
+@pytest.mark.parametrize("law", [asked(law) for law in LAWS])
 def test_law(repeat, threshold, sim_swept, law):
     limit = threshold("ratio", ANY)
     result = repeat(law)

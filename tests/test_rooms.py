@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -44,6 +45,19 @@ def test_the_core_imports_no_simulator() -> None:
         for source in TOP.rglob("*.py")
         for name in imported(source)
         if name.removeprefix("pytest_simbench.").partition(".")[0] in roots
+    }
+    assert not found
+
+
+def test_the_core_names_no_simulator() -> None:
+    """Not in a comment, an example or a message either. Newton also was a man, with laws."""
+    names = "|".join(sorted({*registered(), "bullet", "physx", "webots"} - {"newton"}))
+    found = {
+        f"{source.relative_to(TOP)}:{number}: {line.strip()}"
+        for source in TOP.rglob("*.py")
+        for number, line in enumerate(source.read_text(encoding="utf-8").splitlines(), 1)
+        if re.search(rf"(?i)\b({names})(?!['\w])", line)
+        and "study" not in line  # who wrote down a constant: a source
     }
     assert not found
 

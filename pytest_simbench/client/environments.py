@@ -15,13 +15,12 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import distributions
-from importlib.util import find_spec
 from pathlib import Path
 
 from pytest_simbench.client import installing, package_index
 from pytest_simbench.client.system import SystemPython
 from pytest_simbench.simulator.errors import SimulatorError
-from pytest_simbench.simulator.info import SimulatorInfo, alternatives, no_module
+from pytest_simbench.simulator.info import SimulatorInfo, alternatives, importable, no_module
 from pytest_simbench.simulator.versions import RELEASE, VersionedName
 
 MARKER = "simbench.json"
@@ -197,11 +196,4 @@ def interpreter(info: SimulatorInfo) -> str | None:
 
 def _absent(info: SimulatorInfo) -> list[str]:
     """The engine's modules that cannot be imported here."""
-    return [names for names in info.modules if not any(map(_importable, alternatives(names)))]
-
-
-def _importable(module: str) -> bool:
-    try:
-        return find_spec(module) is not None
-    except (ImportError, ValueError):
-        return False
+    return [names for names in info.modules if not any(map(importable, alternatives(names)))]

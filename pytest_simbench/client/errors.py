@@ -5,6 +5,8 @@ from __future__ import annotations
 import signal
 from dataclasses import dataclass
 
+from pytest_simbench.simulator.program import signal_name
+
 
 @dataclass
 class Where:
@@ -122,10 +124,7 @@ def exit_text(code: int | None) -> str:
     if code in _OF_A_SHELL:
         return f"exited with status {code}, a shell's word for {_OF_A_SHELL[code]}"
     if code < 0:
-        try:
-            return f"was killed by {signal.Signals(-code).name}"
-        except ValueError:
-            return f"was killed by signal {-code}"
+        return f"was killed by {signal_name(-code)}"
     return f"exited with status {code}"
 
 

@@ -87,20 +87,17 @@ class ResourceUse:
 
     def to_wire(self) -> dict[str, Any]:
         """The `resources` of a record."""
-        cpu, rss = self.cpu_percent, self.rss_mb
+        found = self._told()
         peak = None if self.peak_mb is None else round(self.peak_mb, 3)
+        found["rss_mb"] = {**(found["rss_mb"] or {}), "peak": peak}
+        return {**found, "phases": {phase: use._told() for phase, use in self.phases().items()}}
+
+    def _told(self) -> dict[str, Any]:
+        cpu, rss = self.cpu_percent, self.rss_mb
         return {
             "cpu_percent": cpu.to_wire() if cpu else None,
-            "rss_mb": {**(rss.to_wire() if rss else {}), "peak": peak},
+            "rss_mb": rss.to_wire() if rss else None,
             "samples": len(self.samples),
-            "phases": {
-                phase: {
-                    "cpu_percent": MeanAndStd.of(s.cpu_percent for s in use.samples).to_wire(),
-                    "rss_mb": MeanAndStd.of(s.rss_mb for s in use.samples).to_wire(),
-                    "samples": len(use.samples),
-                }
-                for phase, use in self.phases().items()
-            },
         }
 
 

@@ -168,14 +168,7 @@ class World:
     def follow(self, trajectory: Trajectory, *, log_period: float | None = None) -> Motion | None:
         """Have the robot follow a trajectory; the motion sampled every `log_period` [s] (0: each
         step, None: no samples)."""
-        return self._move(
-            "follow",
-            log_period,
-            tick=trajectory.tick,
-            position=trajectory.position,
-            velocity=trajectory.velocity,
-            effort=trajectory.effort,
-        )
+        return self._move("follow", log_period, **vars(trajectory))
 
     def wait(self, duration: float, *, log_period: float | None = None) -> Motion | None:
         """Let `duration` [s] of simulated time pass under the last command."""

@@ -21,7 +21,7 @@ from pytest_simbench.client.errors import Interrupted, NodeLost, Unavailable, Wh
 from pytest_simbench.cluster.job import Job, Packed, TaskFailed, heard
 from pytest_simbench.cluster.offers import Node
 from pytest_simbench.cluster.pool import Pool
-from pytest_simbench.experiment.executor import Executor, Hooks
+from pytest_simbench.experiment.executor import Carried, Executor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import (
     file_stem,
@@ -30,7 +30,7 @@ from pytest_simbench.experiment.identity import (
     scene_digest,
     settings,
 )
-from pytest_simbench.experiment.interrupts import Interrupts
+from pytest_simbench.experiment.repetition import Hooks
 from pytest_simbench.recordings.trace import FOLDER as TRACES
 from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.records.record import Failure, Record, Status
@@ -90,15 +90,9 @@ class ClusterExecutor(Executor):
         return min(MOST_AT_ONCE, ROOM + 2 * sum(node.slots for node in self.pool.nodes()))
 
     def repetition(
-        self,
-        experiment: Experiment,
-        number: int,
-        hooks: Hooks | None = None,
-        interrupts: Interrupts | None = None,
-    ) -> RemoteRepetition:
-        return RemoteRepetition(
-            self.pool, self.shared, experiment, number, hooks or Hooks(), interrupts or Interrupts()
-        )
+        self, experiment: Experiment, number: int, hooks: Hooks | None = None
+    ) -> Carried:
+        return RemoteRepetition(self.pool, self.shared, experiment, number, hooks or Hooks())
 
     def probe(self, experiment: Experiment) -> tuple[Record, BaseException | None]:
         return self.repetition(experiment, 0).run()
@@ -129,7 +123,6 @@ class RemoteRepetition:
         experiment: Experiment,
         number: int,
         hooks: Hooks,
-        interrupts: Interrupts,
     ) -> None:
         self.pool = pool
         self.experiment = experiment
@@ -138,7 +131,6 @@ class RemoteRepetition:
         self.number = number
         self.hooks = hooks
         self.where = Where(case.simulator, case.mode, number, experiment.seed(number))
-        self._interrupts = interrupts
         self._stop = threading.Event()
         self._lost: list[str] = []
         self._node: Node | None = None
@@ -152,9 +144,9 @@ class RemoteRepetition:
         began = time.monotonic()
         try:
             answer = self._answer()
-            self._interrupts.hold()
+            self.hooks.interrupts.hold()
         except BaseException as error:
-            self._interrupts.hold()
+            self.hooks.interrupts.hold()
             return self._without_result(error, time.monotonic() - began), error
         return self._received(answer)
 

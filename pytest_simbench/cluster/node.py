@@ -24,7 +24,7 @@ from typing import Any
 from pytest_simbench.client.display import Displays
 from pytest_simbench.cluster.job import Job, Packed, told
 from pytest_simbench.experiment.identity import file_stem
-from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.experiment.repetition import Hooks, Repetition
 from pytest_simbench.experiment.workers import IdleWorkers
 from pytest_simbench.recordings.trace import FOLDER as TRACES
 
@@ -165,13 +165,8 @@ def carry_out(
     with benches().bench(job) as bench:
         display = displays() if job.case["mode"] == "gui" else None
         experiment = job.experiment(bench.folder, contended=slots > 1, display=display)
-        repetition = Repetition(
-            experiment,
-            number,
-            idle=bench.idle,
-            on_phase=progress.enter,
-            on_count=progress.count,
-        )
+        hooks = Hooks(phase=progress.enter, count=progress.count)
+        repetition = Repetition(experiment, number, idle=bench.idle, hooks=hooks)
         started(repetition)
         record, error = repetition.run() if number else repetition.probe()
         if isinstance(error, OSError) and error.errno in OF_THE_MACHINE:

@@ -3,8 +3,8 @@
     simbench               its slots: repetitions that it carries out at once
     simbench==0.1.0        version of pytest-simbench
     python==3.11           of Python: a task that a test defines travels as code
-    mujoco==4.0.0          a simulator that is ready there, and the engine's version
-    mujoco==3.3.7==3.3.7   the same of a release that has an environment of its own there
+    mysim==4.0.0           a simulator that is ready there, and the engine's version
+    mysim==3.3.7==3.3.7    the same of a release that has an environment of its own there
     display, gpu, vulkan   a display (its own or Xvfb), a GPU of NVIDIA's, a Vulkan device
 
 Names are all that Dask keeps, so versions stand in them. The amount of each is the number of slots.
@@ -116,7 +116,7 @@ class Node:
         return cls(address, str(name), int(resources[SLOTS]), frozenset(resources))
 
     def version(self, simulator: str) -> str | None:
-        """Of a simulator there, or None; a release is asked for by its name, `mujoco==3.3.7`."""
+        """Of a simulator there, or None; a release is asked for by its name, `mysim==3.3.7`."""
         versions = dict(_taken_apart(offer) for offer in self.offers if RELEASE in offer)
         return versions.get(simulator)
 

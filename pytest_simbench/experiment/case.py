@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from typing import Protocol as Interface
 
+from pytest_simbench.client.display import Displays
 from pytest_simbench.client.environments import Environment, interpreter
 from pytest_simbench.client.launch import Launch
 from pytest_simbench.experiment.protocol import PROTOCOLS, Protocol
@@ -16,20 +16,6 @@ from pytest_simbench.records.names import file_name
 from pytest_simbench.records.series import short
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator.registry import adapter, address
-
-
-class Display(Interface):
-    """What opens a display for windows, and knows what became of it; `display.Displays` is one."""
-
-    def environment(self) -> dict[str, str]:
-        """Variables that a worker with a window needs.
-
-        Raises:
-            DisplayError: there is no display to be had.
-        """
-
-    def problem(self, environment: Mapping[str, str]) -> str:
-        """Why the display of this environment is no longer there, or nothing."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +63,7 @@ class Case:
     python: str | None = None
     spec: str | None = None
     environment: Mapping[str, str] = field(default_factory=dict)
-    display: Display | None = None
+    display: Displays | None = None
     protocol: Protocol = PROTOCOLS["fast"]
     timeout: float | None = None
     stall_timeout: float = 60.0

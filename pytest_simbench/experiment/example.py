@@ -26,8 +26,7 @@ from pytest_simbench.robot.registry import BUILT_IN as ROBOTS
 from pytest_simbench.scene import Scene
 from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.files import FileError, read_file, read_json
-from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.simulator.settings import changed, profile
+from pytest_simbench.simulator.registry import adapter, settings_of
 
 FOLDER = "examples"
 SCHEMA = 2
@@ -177,7 +176,7 @@ def _case(
     _check(mode in cls.info.modes, f"{name} has no mode {mode!r}: {', '.join(cls.info.modes)}")
     if absent:
         raise SimulatorError(absent)
-    changed(profile(cls.profiles, given, name), changes, name)
+    settings_of(name, given, changes)  # complains
     return Case.of(
         name,
         python=python,

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol as Interface
 
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.interrupts import Interrupts
-from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.experiment.repetition import Hooks, Repetition
 from pytest_simbench.experiment.workers import IdleWorkers
 from pytest_simbench.records.record import Record
 
@@ -28,20 +25,6 @@ class Carried(Interface):
         """End it at once, from any thread; `run` then returns an interrupted record."""
 
 
-@dataclass(frozen=True)
-class Hooks:
-    """What is told of a repetition, from the thread that runs it.
-
-    Attributes:
-        begin: it begins, on the node of that name; empty for this machine.
-        phase, count: progress, see `tasks.base`.
-    """
-
-    begin: Callable[[str], None] = lambda node: None
-    phase: Callable[[str], None] = lambda name: None
-    count: Callable[[int, int], None] = lambda done, total: None
-
-
 class Executor(ABC):
     """Where repetitions are carried out, and how many at once.
 
@@ -56,19 +39,14 @@ class Executor(ABC):
 
     @abstractmethod
     def repetition(
-        self,
-        experiment: Experiment,
-        number: int,
-        hooks: Hooks | None = None,
-        interrupts: Interrupts | None = None,
+        self, experiment: Experiment, number: int, hooks: Hooks | None = None
     ) -> Carried:
         """A repetition that has not begun.
 
         Args:
             experiment: that is repeated.
             number: of the repetition, from 1.
-            hooks: progress.
-            interrupts: held from the moment that it has ended, so that its record can be kept.
+            hooks: what is told of it.
         """
 
     @abstractmethod
@@ -89,33 +67,21 @@ class LocalExecutor(Executor):
         jobs: workers side by side.
     """
 
+    jobs: int = 1
+
     def __init__(self, jobs: int = 1) -> None:
-        self._jobs = jobs
+        self.jobs = jobs
         self._idle = IdleWorkers()
         self._shared = False
 
-    @property
-    def jobs(self) -> int:
-        return self._jobs
-
     def repetition(
-        self,
-        experiment: Experiment,
-        number: int,
-        hooks: Hooks | None = None,
-        interrupts: Interrupts | None = None,
-    ) -> Repetition:
+        self, experiment: Experiment, number: int, hooks: Hooks | None = None
+    ) -> Carried:
         hooks = hooks or Hooks()
         hooks.begin("")
         self._shared = experiment.task.shares_worker
-        return Repetition(
-            experiment.in_case(contended=True) if self.jobs > 1 else experiment,
-            number,
-            idle=self._idle,
-            interrupts=interrupts,
-            on_phase=hooks.phase,
-            on_count=hooks.count,
-        )
+        experiment = experiment.in_case(contended=True) if self.jobs > 1 else experiment
+        return Repetition(experiment, number, idle=self._idle, hooks=hooks)
 
     def probe(self, experiment: Experiment) -> tuple[Record, BaseException | None]:
         return Repetition(experiment, 0).probe()

@@ -10,7 +10,6 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.robot.errors import RobotError
 from pytest_simbench.scene import Robot, Scene
 from pytest_simbench.tasks.base import ROBOT, Jitter, Task
-from pytest_simbench.tasks.metrics import Metric
 
 
 @dataclass(frozen=True)
@@ -72,11 +71,6 @@ class Experiment:
     def reuses_worker(self) -> bool:
         """Whether one worker serves several repetitions."""
         return self.case.reuses_worker or (self.task.shares_worker and not self.case.fresh)
-
-    @property
-    def metrics(self) -> tuple[Metric, ...]:
-        """What the task measures."""
-        return self.task.metrics
 
     @property
     def parameters(self) -> dict[str, Any]:

@@ -14,12 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from pytest_simbench import __version__
+from pytest_simbench.client.environments import outside
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.records.names import file_name
 from pytest_simbench.records.record import Record, Status
 from pytest_simbench.records.series import short
 from pytest_simbench.scene import MotionLimits, Robot
+from pytest_simbench.simulator.registry import adapter, address, settings_of
 from pytest_simbench.simulator.robot_files import CONTENT, with_content
 from pytest_simbench.tasks.base import Jitter, Task
 
@@ -78,20 +80,13 @@ def expected(experiment: Experiment, number: int = 1) -> Record:
 
 def settings(case: Case) -> dict[str, Any]:
     """The simulator's settings; empty for an adapter that is not registered under its name."""
-    from pytest_simbench.simulator.registry import adapter, address
-    from pytest_simbench.simulator.settings import changed, profile
-
     if address(case.simulator) != case.adapter:
         return {}  # its module may do anything when it is imported
-    found = profile(adapter(case.simulator).profiles, case.profile, case.simulator)
-    return changed(found, case.changes, case.simulator).to_wire()
+    return settings_of(case.simulator, case.profile, case.changes).to_wire()
 
 
 def versions(case: Case) -> dict[str, str]:
     """The engine's version, where it is installed here or in the interpreter that it lives in."""
-    from pytest_simbench.client.environments import outside
-    from pytest_simbench.simulator.registry import adapter, address
-
     if address(case.simulator) != case.adapter or case.spec:
         return {}
     info = adapter(case.simulator).info

@@ -5,13 +5,15 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 from typing import Protocol as Interface
 
 from pytest_simbench.client.errors import Unavailable, WorkerError, WorldParityError
-from pytest_simbench.experiment.executor import Carried, Executor, Hooks
+from pytest_simbench.experiment.executor import Carried, Executor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.interrupts import Interrupts
+from pytest_simbench.experiment.repetition import Hooks
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import short
@@ -28,29 +30,23 @@ class ProgressLine(Interface):
     def end_test(self) -> None: ...
 
 
+@dataclass(eq=False)
 class Repeater:
     """Runs repetitions of an experiment and hands each record over as it is made.
 
-    Args:
+    Attributes:
         experiment: what is repeated.
         executor: where and how many side by side.
         progress: the live line.
         keep: takes every record at once, before anything else can go wrong.
     """
 
-    def __init__(
-        self,
-        experiment: Experiment,
-        executor: Executor,
-        progress: ProgressLine,
-        keep: Callable[[Record], None],
-    ) -> None:
-        self.experiment = experiment
-        self.executor = executor
-        self.progress = progress
-        self.keep = keep
-        self._active: set[Carried] = set()
-        self._stopping = threading.Event()
+    experiment: Experiment
+    executor: Executor
+    progress: ProgressLine
+    keep: Callable[[Record], None]
+    _active: set[Carried] = field(default_factory=set, init=False)
+    _stopping: threading.Event = field(default_factory=threading.Event, init=False)
 
     def run(self, numbers: Iterable[int]) -> ResultSet:
         """Run the repetitions of these numbers.
@@ -71,7 +67,7 @@ class Repeater:
         finally:
             self.executor.end_test()
             self.progress.end_test()
-        return ResultSet(records, self.experiment.metrics)
+        return ResultSet(records, self.experiment.task.metrics)
 
     def _one(self, number: int) -> Record:
         with Interrupts() as interrupts:
@@ -101,8 +97,9 @@ class Repeater:
             begin=begin,
             phase=progress.phase,
             count=lambda done, total: progress.count(done, total, experiment.task.counted),
+            interrupts=interrupts,
         )
-        repetition = self.executor.repetition(experiment, number, hooks, interrupts)
+        repetition = self.executor.repetition(experiment, number, hooks)
         self._active.add(repetition)
         if self._stopping.is_set():  # this thread took it up just before it could be cancelled
             repetition.kill()

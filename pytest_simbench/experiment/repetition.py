@@ -7,6 +7,7 @@ import platform
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,23 @@ from pytest_simbench.worker.stepping import CHECK_PERIOD
 from pytest_simbench.worker.text import LONGEST, named, readable, told
 
 
+@dataclass(frozen=True)
+class Hooks:
+    """What is told of a repetition, from the thread that runs it.
+
+    Attributes:
+        begin: it begins, on the node of that name; empty for this machine.
+        phase, count: progress, see `tasks.base`.
+        interrupts: held from the moment that the task has ended or failed, so that the record is
+            made; the caller ends the block when it has kept it.
+    """
+
+    begin: Callable[[str], None] = lambda node: None
+    phase: Callable[[str], None] = lambda name: None
+    count: Callable[[int, int], None] = lambda done, total: None
+    interrupts: Interrupts = field(default_factory=Interrupts)
+
+
 class Repetition:
     """One repetition of a task. `run` once; `kill` from any thread.
 
@@ -47,9 +65,7 @@ class Repetition:
         experiment: the task, the simulator and its settings.
         number: of the repetition, from 1.
         idle: where workers come from and go to, if the case reuses them.
-        interrupts: held from the moment that the task has ended or failed, so that the record
-            is made; the caller ends the block when it has kept it.
-        on_phase, on_count: progress, see `tasks.base`.
+        hooks: what is told of it; not that it begins.
         camera: takes pictures by the engine's own renderer, see there; default: one for the film
             that the case asks for of every repetition.
     """
@@ -60,23 +76,19 @@ class Repetition:
         number: int,
         *,
         idle: IdleWorkers | None = None,
-        interrupts: Interrupts | None = None,
-        on_phase: Callable[[str], None] = lambda name: None,
-        on_count: Callable[[int, int], None] = lambda done, total: None,
+        hooks: Hooks | None = None,
         camera: Camera | None = None,
     ) -> None:
         self.experiment = experiment
         self.case = case = experiment.case
         self.number = number
+        self.hooks = hooks or Hooks()
         self.seed = experiment.seed(number)
         self.where = Where(case.simulator, case.mode, number, self.seed)
         self.stopwatch = Stopwatch()
         self._camera = camera or self._filming()
         self._idle = idle if idle is not None and experiment.reuses_worker else None
         self._reused = False
-        self._on_phase = on_phase
-        self._on_count = on_count
-        self._interrupts = interrupts or Interrupts()
         self._killed = threading.Event()
         self._process: WorkerProcess | None = None
         self._sampler: ResourceSampler | None = None
@@ -113,9 +125,9 @@ class Repetition:
         result, error = None, None
         try:
             result = do()
-            self._interrupts.hold()
+            self.hooks.interrupts.hold()
         except BaseException as raised:
-            self._interrupts.hold()
+            self.hooks.interrupts.hold()
             error = raised
         return result, self._because_of_display(error)
 
@@ -141,7 +153,7 @@ class Repetition:
         )
         if self._camera is not None:
             self._camera.enter(world, self.where.phase)
-        outcome = self.experiment.task.perform(world, self.seed, self._on_count)
+        outcome = self.experiment.task.perform(world, self.seed, self.hooks.count)
         self._stats = world.stats()
         return outcome
 
@@ -203,7 +215,7 @@ class Repetition:
             self._sampler.phase = group(phase)
         if self._camera is not None and self._world is not None:
             self._camera.enter(self._world, group(phase))
-        self._on_phase(phase)
+        self.hooks.phase(phase)
 
     def _finish(self, error: BaseException | None) -> dict[str, Any]:
         """End sampling and worker; resource use for the record."""
@@ -295,15 +307,9 @@ class Repetition:
 
     def _keeps(self, *, failed: bool) -> bool:
         """Whether the motion of this repetition is kept."""
-        first = self.number == 1
-        wanted = {
-            "first": first,
-            "first-and-failed": first or failed,
-            "retain-on-failure": failed,
-            "on": True,
-            "off": False,
-        }
-        return wanted[self.case.trace]
+        first, when = self.number == 1, self.case.trace
+        wanted = when == "on" or (first and when in ("first", "first-and-failed"))
+        return wanted or (failed and when in ("first-and-failed", "retain-on-failure"))
 
     def _write_trace(self, *, failed: bool) -> str:
         """Joint and body states over time, and what is needed to draw them, in the run folder.

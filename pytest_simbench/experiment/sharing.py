@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from functools import partial
 
 from pytest_simbench.client.errors import Interrupted, Where
-from pytest_simbench.experiment.executor import Carried, Executor, Hooks, LocalExecutor
+from pytest_simbench.experiment.executor import Carried, LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.interrupts import Interrupts
-from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.experiment.repetition import Hooks
 from pytest_simbench.experiment.slots import slot
 from pytest_simbench.records.record import Record
 
 
-class SharingExecutor(Executor):
+class SharingExecutor(LocalExecutor):
     """Workers of this machine, as many at once as the slots of the whole run.
 
     Args:
@@ -23,40 +23,21 @@ class SharingExecutor(Executor):
     """
 
     def __init__(self, jobs: int, address: str) -> None:
-        self._here = LocalExecutor(jobs)
+        super().__init__(jobs)
         self._address = address
 
-    @property
-    def jobs(self) -> int:
-        return self._here.jobs
-
     def repetition(
-        self,
-        experiment: Experiment,
-        number: int,
-        hooks: Hooks | None = None,
-        interrupts: Interrupts | None = None,
+        self, experiment: Experiment, number: int, hooks: Hooks | None = None
     ) -> Carried:
-        def make() -> Repetition:
-            return self._here.repetition(experiment, number, hooks, interrupts)
-
+        make = partial(super().repetition, experiment, number, hooks)
         return _Waiting(self._address, experiment, number, make)
-
-    def probe(self, experiment: Experiment) -> tuple[Record, BaseException | None]:
-        return self._here.probe(experiment)
-
-    def end_test(self) -> None:
-        self._here.end_test()
-
-    def close(self) -> None:
-        self._here.close()
 
 
 class _Waiting:
     """A repetition that begins when it has a slot."""
 
     def __init__(
-        self, address: str, experiment: Experiment, number: int, make: Callable[[], Repetition]
+        self, address: str, experiment: Experiment, number: int, make: Callable[[], Carried]
     ) -> None:
         self._address = address
         self._case = experiment.case
@@ -64,7 +45,7 @@ class _Waiting:
         self._test = f"{self._case.test} {experiment.task.name}"
         self._make = make
         self._stop = threading.Event()
-        self._repetition: Repetition | None = None
+        self._repetition: Carried | None = None
 
     def kill(self) -> None:
         self._stop.set()

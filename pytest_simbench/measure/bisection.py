@@ -58,13 +58,9 @@ def _values(
     metric: Metric, before: ResultSet, after: ResultSet
 ) -> tuple[Mapping[int, float], Mapping[int, float]]:
     if metric is FAILURES:
-        return _failed(before), _failed(after)
+        return before.failed_by_seed(), after.failed_by_seed()
     evened = without_speed(metric.name, before, after)
     return evened or (before.by_seed(metric.name), after.by_seed(metric.name))
-
-
-def _failed(result: ResultSet) -> dict[int, float]:
-    return {r.seed: float(not r.ok) for r in (*result.ok, *result.failures)}
 
 
 def steps(number: int) -> int:

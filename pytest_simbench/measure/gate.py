@@ -127,7 +127,10 @@ def run_gate(
         metrics: the metrics of each task, by its name.
     """
     baseline, current = list(baseline), list(current)
-    before, after = _by_test(baseline, current, metrics)
+    before, after = (
+        {name: ResultSet(found, metrics.get(found[0].task, ())) for name, found in side.items()}
+        for side in by_test([baseline, current])
+    )
     robots = [_robots(baseline), _robots(current)]
     common = [test for test in after if test in before]
     notes = [f"{test} is not in the baseline and is not compared" for test in after.keys() - before]
@@ -138,7 +141,12 @@ def run_gate(
             f"{' and '.join(robots[1])}: different robots are not comparable"
         )
     broken = [_broken(test, before[test], after[test]) for test in common]
-    broken += dict.fromkeys(_vain(after[test], limit) for test in common for limit in limits)
+    broken += dict.fromkeys(  # limits, of metrics known only now, that cannot be exceeded
+        limit.vain(after[test].metric(limit.metric))
+        for test in common
+        for limit in limits
+        if limit.metric in after[test].known
+    )
     changes = _corrected(
         _change(test, before[test], after[test], limit) for test in common for limit in limits
     )
@@ -205,22 +213,6 @@ def _corrected(found: Iterable[Change | None]) -> tuple[Change, ...]:
     return tuple(replace(c, p_value=p) for c, p in zip(changes, corrected, strict=True))
 
 
-def _by_test(
-    baseline: Iterable[Record], current: Iterable[Record], metrics: Mapping[str, Sequence[Metric]]
-) -> tuple[dict[str, ResultSet], dict[str, ResultSet]]:
-    """Both runs' result sets by test and configuration."""
-    before, after = by_test([list(baseline), list(current)])
-    return tuple(  # type: ignore[return-value]
-        {name: ResultSet(found, metrics.get(found[0].task, ())) for name, found in side.items()}
-        for side in (before, after)
-    )
-
-
-def _vain(result: ResultSet, limit: Limit) -> str:
-    """A sentence when the limit, of a metric known only now, cannot be exceeded."""
-    return limit.vain(result.metric(limit.metric)) if limit.metric in result.known else ""
-
-
 def _broken(test: str, old: ResultSet, new: ResultSet) -> str:
     """A sentence when nothing succeeds any more, so that there is no metric to compare."""
     if not old.ok or new.ok or not new.failures:
@@ -238,7 +230,7 @@ def _change(
     neither direction is the worse one."""
     normalised = False
     if limit.metric == FAILURES.name:
-        metric, first, second = FAILURES, _failed(old), _failed(new)
+        metric, first, second = FAILURES, old.failed_by_seed(), new.failed_by_seed()
     elif limit.metric in old.known and limit.metric in new.known:
         metric = new.metric(limit.metric)
         first, second = old.by_seed(metric.name), new.by_seed(metric.name)
@@ -266,11 +258,6 @@ def _of_machines(old: ResultSet, new: ResultSet, name: str) -> bool:
         {(r.host.get("cpu"), r.host.get("cores")) for r in side.ok} for side in (old, new)
     )
     return first != second and without_speed(name, old, new) is None
-
-
-def _failed(result: ResultSet) -> dict[int, float]:
-    """1 for each repetition that failed, 0 for each that did not, by seed."""
-    return {r.seed: float(not r.ok) for r in (*result.ok, *result.failures)}
 
 
 def _smallest_p(comparison: MeanDifference) -> float:

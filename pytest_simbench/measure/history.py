@@ -10,7 +10,7 @@ from pytest_simbench.measure.limits import FAILURES
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.speed import without_speed
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import series
+from pytest_simbench.records.series import grouped, series
 from pytest_simbench.simulator.versions import RELEASE, VersionedName, release_numbers
 from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.phenomena import PHENOMENON
@@ -106,13 +106,10 @@ def histories(records: Iterable[Record], metrics: Mapping[str, Sequence[Metric]]
         records: of the run.
         metrics: of each task, by its name.
     """
-    by_task: dict[str, list[Record]] = {}
-    for record in records:
-        law = record.settings.get(PHENOMENON)  # `law_history` has them
-        if not law and VersionedName.of(record.simulator).kind == RELEASE:
-            by_task.setdefault(record.task, []).append(record)
+    of_releases = (r for r in records if VersionedName.of(r.simulator).kind == RELEASE)
+    no_laws = (r for r in of_releases if not r.settings.get(PHENOMENON))  # see `law_history`
     found = []
-    for task, of_task in by_task.items():
+    for task, of_task in grouped(no_laws, lambda r: r.task).items():
         rows: dict[tuple[str, ...], dict[str, list[Record]]] = {}
         for row in series(of_task):
             name, key = VersionedName.of(row.key.simulator), row.key
@@ -135,8 +132,7 @@ def _courses(history: History) -> list[Course]:
     metrics += [results[-1].metric(name) for name in COSTS if name not in results[-1].metrics]
     courses = [Course(m, tuple(_values(m.name, results, k) for k in range(len(results))))
                for m in metrics]  # fmt: skip
-    failed = tuple({r.seed: float(not r.ok) for r in (*s.ok, *s.failures)} for s in results)
-    courses.append(Course(FAILURES, failed))
+    courses.append(Course(FAILURES, tuple(result.failed_by_seed() for result in results)))
     return [course for course in courses if any(course.values)]
 
 

@@ -23,7 +23,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,21 +74,6 @@ class Interval:
     @property
     def half_width(self) -> float:
         return (self.high - self.low) / 2
-
-    def to_wire(self) -> dict[str, Any]:
-        """Plain data; ends that are not known become None."""
-        return {
-            "mean": _known(self.mean),
-            "low": _known(self.low),
-            "high": _known(self.high),
-            "n": self.n,
-            "method": self.method,
-            "confidence": self.confidence,
-        }
-
-
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def proportion(successes: float, n: int, confidence: float = CONFIDENCE) -> Interval:

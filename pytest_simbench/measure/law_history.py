@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import series
+from pytest_simbench.records.series import grouped, series
 from pytest_simbench.simulator.versions import BUILD, RELEASE, VersionedName, release_numbers
 from pytest_simbench.tasks.metrics import significant
 from pytest_simbench.tasks.phenomena import PHENOMENA, PHENOMENON
@@ -68,7 +68,9 @@ class Row:
         """The places of releases that changed it, what was before, and what they reached."""
         before: Reached | None = None
         for place, now in enumerate(self.reached):
-            if now is not None and (before is None or _changed(before, now)):
+            if now is None:
+                continue
+            if before is None or _worse(before, now) or _worse(now, before):
                 if before is not None:
                     yield place, before, now
                 before = now
@@ -134,10 +136,8 @@ class LawHistory:
 
 def law_histories(records: Iterable[Record]) -> list[LawHistory]:
     """The histories of laws in a run: of each simulator with two or more releases and builds."""
-    by_law: dict[str, list[Record]] = {}
-    for record in records:
-        if VersionedName.of(record.simulator).kind and record.settings.get(PHENOMENON):
-            by_law.setdefault(record.task, []).append(record)
+    versions = (r for r in records if VersionedName.of(r.simulator).kind)
+    by_law = grouped((r for r in versions if r.settings.get(PHENOMENON)), lambda r: r.task)
     places: dict[tuple[str, ...], dict[tuple[str, str], dict[str, list[Record]]]] = {}
     for law, of_law in by_law.items():
         for row in series(of_law):
@@ -177,12 +177,8 @@ def _order(phenomenon: str) -> int:
     return PHENOMENA.index(phenomenon) if phenomenon in PHENOMENA else len(PHENOMENA)
 
 
-def _changed(before: Reached, now: Reached) -> bool:
-    """Whether the one decides against a release, and the other is better by `FACTOR`."""
-    return _worse(before, now) or _worse(now, before)
-
-
 def _worse(better: Reached, worse: Reached) -> bool:
+    """Whether the one decides against a release, and the other is better by `FACTOR`."""
     if math.isinf(better.most):
         return False
     return worse.least > BROKEN and worse.least >= FACTOR * better.most

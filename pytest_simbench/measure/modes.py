@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pytest_simbench.measure.comparison import ALPHA, Equivalence, equivalence
 from pytest_simbench.records.configuration import text
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import series, told
+from pytest_simbench.records.series import RowKey, series, told
 from pytest_simbench.tasks.metrics import Metric
 
 MARGIN = 0.05
@@ -51,17 +51,13 @@ class ModeComparison:
 def compare_modes(records: Sequence[Record], metrics: Iterable[Metric]) -> list[ModeComparison]:
     """Every simulator that ran in both modes, at each of the study's shares, paired by seed."""
     shares = [metric for metric in metrics if metric.study and metric.bounded]
-    sides: dict[tuple[object, ...], dict[str, dict[int, Record]]] = {}
-    named: dict[tuple[object, ...], tuple[str, str, str]] = {}
+    sides: dict[tuple[RowKey, str], dict[str, dict[int, Record]]] = {}
     for row in series(record for record in records if record.ok):
-        of = row.key
         # The two modes of one test and configuration.
-        key = (*of._replace(mode=""), text(told(row.records)))
-        named[key] = (of.simulator, of.profile, of.function)
-        sides.setdefault(key, {})[of.mode] = {record.seed: record for record in row.records}
+        key = (row.key._replace(mode=""), text(told(row.records)))
+        sides.setdefault(key, {})[row.key.mode] = {record.seed: record for record in row.records}
     found = []
-    for side, modes in sides.items():
-        simulator, profile, test = named[side]
+    for (of, _), modes in sides.items():
         if not {"headless", "gui"} <= set(modes):
             continue
         for metric in shares:
@@ -76,5 +72,6 @@ def compare_modes(records: Sequence[Record], metrics: Iterable[Metric]) -> list[
             if len(pairs) >= 2:
                 headless, gui = zip(*pairs, strict=True)
                 result = equivalence(headless, gui, MARGIN)
-            found.append(ModeComparison(simulator, profile, test, metric, len(pairs), result))
+            side = (of.simulator, of.profile, of.function)
+            found.append(ModeComparison(*side, metric, len(pairs), result))
     return found

@@ -19,6 +19,7 @@ from pytest_simbench.measure.verdicts import (
     judge,
 )
 from pytest_simbench.records.record import Record
+from pytest_simbench.records.series import grouped
 from pytest_simbench.tasks.metrics import COSTS, Metric, UnknownMetric
 
 
@@ -88,10 +89,7 @@ class ResultSet:
 
     def causes(self) -> dict[str, list[Record]]:
         """The failures by cause (`WorkerHung in settle`), the most frequent first."""
-        found: dict[str, list[Record]] = {}
-        for record in self.failures:
-            cause = record.error.cause if record.error else "unknown cause"
-            found.setdefault(cause, []).append(record)
+        found = grouped(self.failures, lambda r: r.error.cause if r.error else "unknown cause")
         return dict(sorted(found.items(), key=lambda item: -len(item[1])))
 
     @property
@@ -113,8 +111,7 @@ class ResultSet:
 
     def value(self, record: Record, name: str) -> float | None:
         """A metric's value in one record; None where it is not available."""
-        metric = self.metric(name)
-        found = record.metrics.get(name) if metric.name in self.metrics else record.cost(name)
+        found = self._reader(name)(record)
         return None if found is None else float(found)
 
     def values(self, name: str) -> list[float]:
@@ -126,6 +123,10 @@ class ResultSet:
         """A metric's values by seed, for pairing with another set; ok repetitions only."""
         read = self._reader(name)
         return {r.seed: float(value) for r in self.ok if (value := read(r)) is not None}
+
+    def failed_by_seed(self) -> dict[int, float]:
+        """1 for each repetition that failed, 0 for each that did not, by seed."""
+        return {r.seed: float(not r.ok) for r in (*self.ok, *self.failures)}
 
     def _reader(self, name: str) -> Callable[[Record], float | None]:
         """What finds a metric's value in a record."""

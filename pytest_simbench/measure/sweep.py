@@ -21,7 +21,7 @@ from pytest_simbench.laws import LAW
 from pytest_simbench.laws.base import rounding
 from pytest_simbench.measure.convergence import Convergence, convergence
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import RowKey, configurations
+from pytest_simbench.records.series import RowKey, configurations, grouped
 from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.phenomena import PHENOMENON
 
@@ -121,12 +121,9 @@ def sweeps(records: Iterable[Record], metrics: Mapping[str, Sequence[Metric]]) -
         records: of one run.
         metrics: what each task declares, for the unit.
     """
-    by_law: dict[str, list[Record]] = {}
-    for record in records:
-        if PHENOMENON in record.settings and record.status != "interrupted":
-            by_law.setdefault(record.task, []).append(record)
+    ended = (r for r in records if PHENOMENON in r.settings and r.status != "interrupted")
     found = []
-    for law, of_law in by_law.items():
+    for law, of_law in grouped(ended, lambda r: r.task).items():
         unit = next((m.unit for m in metrics.get(law, ()) if m.name == "error"), "")
         lines = [line for line in _lines(of_law, unit) if len(line.points) > 1]
         if lines:
@@ -173,11 +170,9 @@ def choice(laws: Sequence[Swept], who: tuple[str, str, str, int]) -> Choice | No
 
 def _lines(records: Sequence[Record], unit: str) -> list[Line]:
     """Of one law."""
-    of: dict[tuple[str, str, str, str], list[Record]] = {}
-    for record in sorted(records, key=lambda r: RowKey.of(r).order):
-        of.setdefault(RowKey.of(record)[:4], []).append(record)
+    ordered = sorted(records, key=lambda r: RowKey.of(r).order)
     found: list[Line] = []
-    for key, group in of.items():
+    for key, group in grouped(ordered, lambda r: RowKey.of(r)[:4]).items():
         stepless = [replace(r, settings={**r.settings, "timestep": 0.0}) for r in group]
         origin = {id(copy): record for copy, record in zip(stepless, group, strict=True)}
         for same in configurations(stepless):

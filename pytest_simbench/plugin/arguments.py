@@ -63,9 +63,7 @@ def once(task: Task, done: list[Task]) -> None:
 def checked_settings(value: Any, simulator: str, profile: str) -> dict[str, Any]:
     """What the fixture `sim_settings` gives, if the simulator can take it; else the test fails."""
     from pytest_simbench.simulator.errors import SettingsError
-    from pytest_simbench.simulator.registry import adapter
-    from pytest_simbench.simulator.settings import changed
-    from pytest_simbench.simulator.settings import profile as named
+    from pytest_simbench.simulator.registry import settings_of
 
     if not isinstance(value, Mapping):
         _refuse(
@@ -74,7 +72,7 @@ def checked_settings(value: Any, simulator: str, profile: str) -> dict[str, Any]
         )
     problem = ""  # refused outside of `except`, else pytest shows both exceptions
     try:
-        changed(named(adapter(simulator).profiles, profile, simulator), value, simulator)
+        settings_of(simulator, profile, value)
     except SettingsError as error:
         problem = str(error)
     if problem:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 Group = tuple[Any, Sequence[Mapping[str, Any]]]
 """Name and benchmarks, as the hook `pytest_benchmark_group_stats` gives them."""
 
+SAVED = ("simulator", "mode", "profile", "protocol")
 SAVED_COSTS = ("rtf", "cpu", "ram", "ram_peak", "cpu_cost", "start", "end", "total")
 
 
@@ -106,13 +107,8 @@ def give_rounds(
     first = result.ok[0]
     benchmark.extra_info.update(
         {
-            "simulator": first.simulator,
-            "mode": first.mode,
-            "profile": first.profile,
-            "protocol": first.protocol,
-            "settings": dict(first.settings),
-            "versions": dict(first.versions),
-            "host": dict(first.host),
+            **{name: getattr(first, name) for name in SAVED},
+            **{name: dict(getattr(first, name)) for name in ("settings", "versions", "host")},
             "failures": len(result.failures),
             "metrics": {name: result.values(name) for name in result.metrics},
             "seeds": [record.seed for record in result.ok],

@@ -10,17 +10,28 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
+from pytest_simbench.client import package_index
+from pytest_simbench.measure.bisection import (
+    between,
+    difference,
+    first_worse,
+    like_the_bad_one,
+    steps,
+)
+from pytest_simbench.measure.limits import FAILURES
+from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.plugin import options
+from pytest_simbench.plugin.history import folder_of
 from pytest_simbench.plugin.values import Span, shown
+from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.records.series import series
 from pytest_simbench.records.text import for_terminal
-
-if TYPE_CHECKING:
-    from pytest_simbench.measure.results import ResultSet
-    from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.simulator.errors import SimulatorError
+from pytest_simbench.simulator.registry import adapter
+from pytest_simbench.tasks.metrics import Metric, UnknownMetric
 
 
 def bisect(config: pytest.Config) -> int:
@@ -29,13 +40,6 @@ def bisect(config: pytest.Config) -> int:
     Raises:
         pytest.UsageError: no such simulator, release or metric; a run that ends with an error.
     """
-    from pytest_simbench.measure.bisection import (
-        difference,
-        first_worse,
-        like_the_bad_one,
-        steps,
-    )
-
     wanted: Span = options.value(config, "sim_bisect")
     releases = _releases(wanted)
     search = Search(config, wanted, releases)
@@ -82,12 +86,7 @@ def _releases(wanted: Span) -> list[str]:
     Raises:
         pytest.UsageError: no such simulator or release; one sentence.
     """
-    from pytest_simbench.client import package_index
-    from pytest_simbench.measure.bisection import between
-    from pytest_simbench.simulator.errors import SimulatorError
-    from pytest_simbench.simulator.registry import adapter
-
-    try:
+    with options.refusing(SimulatorError, "--sim-bisect"):
         info = adapter(wanted.name).info
         known = package_index.releases(info.distribution)
         for version in (wanted.good, wanted.bad):
@@ -96,8 +95,6 @@ def _releases(wanted: Span) -> list[str]:
                 raise pytest.UsageError(f"--sim-bisect: {problem or f'write {version} in full'}")
             if refused := info.refused(version):
                 raise pytest.UsageError(f"--sim-bisect: {refused}")
-    except SimulatorError as error:
-        raise pytest.UsageError(f"--sim-bisect: {error}") from None
     return between(known, wanted.good, wanted.bad)
 
 
@@ -114,8 +111,6 @@ class Search:
     """
 
     def __init__(self, config: pytest.Config, wanted: Span, releases: list[str]) -> None:
-        from pytest_simbench.plugin.history import folder_of
-
         given = options.value(config, "sim_output")
         here = config.invocation_params.dir
         self.folder = Path(here, given) if given else folder_of(config, wanted.name)
@@ -123,8 +118,6 @@ class Search:
 
     def run(self, *places: int) -> None:
         """Run the tests on some of the releases, unless the folder holds that."""
-        from pytest_simbench.records.folder import RunFolder
-
         names = ",".join(self._name(place) for place in places)
         keep = "--sim-resume" if RunFolder(self.folder).holds_run else "--sim-output"
         command = [
@@ -148,16 +141,11 @@ class Search:
         Raises:
             pytest.UsageError: no test has it, or several have, or neither direction is worse.
         """
-        from pytest_simbench.measure.limits import FAILURES
-        from pytest_simbench.tasks.metrics import UnknownMetric
-
         name, result = self._wanted.metric, self.result(0)
         if name == FAILURES.name:
             return FAILURES
-        try:
+        with options.refusing(UnknownMetric, "--sim-bisect"):
             metric = result.metric(name)
-        except UnknownMetric as error:
-            raise pytest.UsageError(f"--sim-bisect: {error}") from None
         if metric.better is None:
             raise pytest.UsageError(f"--sim-bisect: {name} can be neither better nor worse")
         return metric
@@ -168,10 +156,6 @@ class Search:
         Raises:
             pytest.UsageError: the folder holds nothing of it, or several tests.
         """
-        from pytest_simbench.measure.results import ResultSet
-        from pytest_simbench.records.folder import RunFolder
-        from pytest_simbench.records.series import series
-
         reading = RunFolder(self.folder).read()
         rows = [
             row
@@ -180,7 +164,8 @@ class Search:
             if row.key.simulator == self._name(place)
         ]
         if len(rows) > 1:
-            rows = [row for row in rows if self._has(reading.metrics[row.records[0].task])]
+            names = {task: [m.name for m in known] for task, known in reading.metrics.items()}
+            rows = [r for r in rows if self._wanted.metric in names[r.records[0].task]]
         if len(rows) != 1:
             what = "no test" if not rows else "more than one test"
             raise pytest.UsageError(
@@ -201,9 +186,6 @@ class Search:
 
     def _name(self, place: int) -> str:
         return f"{self._wanted.name}=={self._releases[place]}"
-
-    def _has(self, metrics: tuple[Metric, ...]) -> bool:
-        return self._wanted.metric in [metric.name for metric in metrics]
 
     def _arguments(self) -> list[str]:
         """The command line, without what this command is asked for."""

@@ -49,12 +49,10 @@ def pool(config: pytest.Config) -> Pool:
         from pytest_simbench.cluster.pool import Pool
         from pytest_simbench.experiment.executor import ExecutorError
 
-        try:
+        with options.refusing(ExecutorError, given):
             found = Pool(options.value(config, "sim_cluster"))
             config.stash[_POOL] = found
             problem = refusal(found.nodes())
-        except ExecutorError as error:
-            raise pytest.UsageError(f"{given}: {error}") from None
         if problem:
             raise pytest.UsageError(f"{given}: {problem}")
     return config.stash[_POOL]

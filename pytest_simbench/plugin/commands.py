@@ -5,18 +5,21 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterator
 from importlib.metadata import version
-from typing import TYPE_CHECKING
 
 import pytest
 
+from pytest_simbench.client.environments import interpreter, outside
 from pytest_simbench.plugin import options, recording, spellings
+from pytest_simbench.plugin.bisect import bisect
+from pytest_simbench.plugin.data import download
+from pytest_simbench.plugin.environments import install, list_environments, uninstall
+from pytest_simbench.plugin.merge import merge_runs, report_runs
+from pytest_simbench.plugin.selection import Selection
 from pytest_simbench.plugin.session import session_of
 from pytest_simbench.records.text import for_terminal
-
-if TYPE_CHECKING:
-    from pytest_simbench.plugin.selection import Selection
-    from pytest_simbench.scene import Robot
-    from pytest_simbench.simulator.info import SimulatorInfo
+from pytest_simbench.scene import Robot
+from pytest_simbench.simulator.info import SimulatorInfo
+from pytest_simbench.simulator.registry import adapter, known, problem, registered, registry
 
 
 def run_command(config: pytest.Config) -> int:
@@ -25,11 +28,6 @@ def run_command(config: pytest.Config) -> int:
     Raises:
         pytest.UsageError: what is wrong with the input; one sentence.
     """
-    from pytest_simbench.plugin.bisect import bisect
-    from pytest_simbench.plugin.data import download
-    from pytest_simbench.plugin.environments import install, list_environments, uninstall
-    from pytest_simbench.plugin.merge import merge_runs, report_runs
-
     options.values(config)
     recording.check(config)
     actions = (
@@ -43,7 +41,7 @@ def run_command(config: pytest.Config) -> int:
 def _list(config: pytest.Config) -> int:
     """`--sims`: the known simulators, what is here, what each can do and where it deviates."""
     for line in [*_simulators(session_of(config).selection), *spellings.foreign(config)]:
-        print(line)
+        print(for_terminal(line))
     return 0
 
 
@@ -83,15 +81,8 @@ def _robot_line(robot: Robot) -> str:
     return "".join([line, *(f"\n    no {t.name}: {p}" for t in tasks if (p := t.problem()))])
 
 
-def _width() -> int:
-    return shutil.get_terminal_size((160, 24)).columns
-
-
 def _here(selection: Selection, name: str) -> str:
     """Where a simulator is and which version."""
-    from pytest_simbench.client.environments import interpreter, outside
-    from pytest_simbench.simulator.registry import adapter
-
     info = adapter(name).info
     if name in selection.pythons or name in selection.specs:
         return f"in {selection.pythons.get(name) or selection.specs[name]}"
@@ -114,14 +105,10 @@ def _size(info: SimulatorInfo) -> str:
 def _simulators(selection: Selection) -> Iterator[str]:
     """Lines: the table of capabilities, then a paragraph for each registered simulator, also for
     those whose adapter is broken."""
-    return map(for_terminal, _lines(selection))
-
-
-def _lines(selection: Selection) -> Iterator[str]:
     from pytest_simbench.report.capabilities import capability_table
-    from pytest_simbench.simulator.registry import adapter, known, problem, registered, registry
 
-    yield capability_table([adapter(name).info for name in registered()], _width())
+    width = shutil.get_terminal_size((160, 24)).columns
+    yield capability_table([adapter(name).info for name in registered()], width)
     yield ""
     for name in known():
         broken = problem(name)

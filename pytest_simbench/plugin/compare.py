@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
+from pytest_simbench.measure.gate import GateReport, run_gate, side_by_side
 from pytest_simbench.measure.limits import Limit, LimitError, parse_limits
 from pytest_simbench.plugin import options
 from pytest_simbench.records.baseline import (
@@ -20,40 +21,34 @@ from pytest_simbench.records.baseline import (
 from pytest_simbench.records.configuration import other_meanings
 from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.text import for_terminal
+from pytest_simbench.report.changes import render_markdown, render_terminal
+from pytest_simbench.simulator.versions import base_name
 from pytest_simbench.tasks.metrics import Metric, UnknownMetric
-
-if TYPE_CHECKING:
-    from pytest_simbench.measure.gate import GateReport
-
 
 Beside = tuple[str, Sequence[str]]
 """A simulator, and others that are compared with it."""
 
 
+@dataclass(eq=False)
 class Comparison:
     """This run against a baseline: made when all tests have ended, shown in the summary.
 
-    Args:
+    Attributes:
         baseline: the run to compare with.
         limits: how much worse each metric may get; none: a table and no failures.
         beside: a simulator of this very run, and its other versions, that are compared with it.
     """
 
-    def __init__(
-        self, baseline: Reading, limits: Sequence[Limit] = (), beside: Beside | None = None
-    ) -> None:
-        self.baseline = baseline
-        self.limits = tuple(limits)
-        self._beside = beside
-        self._report: GateReport | None = None
+    baseline: Reading
+    limits: Sequence[Limit] = ()
+    beside: Beside | None = None
+    _report: GateReport | None = field(default=None, init=False)
 
     def make(self, run: Reading) -> None:
         """Compare with this run, which says what the metrics mean."""
-        from pytest_simbench.measure.gate import run_gate, side_by_side
-
         before, now = self.baseline.records, run.records
-        if self._beside is not None:
-            before, now = side_by_side(run.records, *self._beside)
+        if self.beside is not None:
+            before, now = side_by_side(run.records, *self.beside)
         metrics = {**self.baseline.metrics, **run.metrics}
         report = run_gate(before, now, self.limits, metrics)
         other = other_meanings(self.baseline.tasks, run.tasks)
@@ -71,8 +66,6 @@ class Comparison:
 
     def text(self, width: int) -> str:
         """For the terminal."""
-        from pytest_simbench.report.changes import render_terminal
-
         parts = [f"baseline: {self.baseline.name}", *self.baseline.problems]
         if self._report is None:
             parts.append("nothing was compared: no repetition was recorded")
@@ -82,8 +75,6 @@ class Comparison:
 
     def markdown(self) -> str:
         """For the page of a CI job."""
-        from pytest_simbench.report.changes import render_markdown
-
         if self._report is None:
             return ""
         return render_markdown(self._report, self.baseline.name, bool(self.limits))
@@ -109,22 +100,11 @@ def prepare(
     beside = _beside(config, simulators)
     if beside is not None:
         here = Reading(f"{beside[0]} in this run")
-        try:
-            found = _limits(text, here, typed=False) if text is not None else ()
-        except LimitError as error:
-            raise pytest.UsageError(f"--sim-compare-fail: {error}") from None
-        return Comparison(here, found, beside)
+        return Comparison(here, _limits(text, here, typed=False), beside)
     typed = config.getoption("sim_compare_fail") is not None
-    try:
+    with options.refusing(BaselineError):
         baseline = _baseline(config, saved, needed=typed)
-        if baseline is None:
-            return None
-        limits = _limits(text, baseline, typed=typed) if text is not None else ()
-        return Comparison(baseline, limits)
-    except BaselineError as error:
-        raise pytest.UsageError(str(error)) from None
-    except (LimitError, UnknownMetric) as error:
-        raise pytest.UsageError(f"--sim-compare-fail: {error}") from None
+    return Comparison(baseline, _limits(text, baseline, typed=typed)) if baseline else None
 
 
 def _beside(config: pytest.Config, names: Sequence[str]) -> Beside | None:
@@ -133,8 +113,6 @@ def _beside(config: pytest.Config, names: Sequence[str]) -> Beside | None:
     Raises:
         pytest.UsageError: no other version of it is in the run.
     """
-    from pytest_simbench.simulator.versions import base_name
-
     given = options.value(config, "sim_baseline")
     if given not in names:
         return None
@@ -176,19 +154,26 @@ def _name(saved: Mapping[str, Any]) -> str:
     return f"the run saved {when} UTC" + (f", commit {commit}" if commit else "")
 
 
-def _limits(text: str, baseline: Reading, *, typed: bool) -> tuple[Limit, ...]:
-    """The limits, each on a metric that the baseline has.
+def _limits(text: str | None, baseline: Reading, *, typed: bool) -> tuple[Limit, ...]:
+    """The limits, each on a metric that the baseline has; none without a text.
 
     The ini file's hold for other runs too: what this baseline does not have is not compared, and
     the summary says so.
+
+    Raises:
+        pytest.UsageError: a malformed limit, an unknown metric.
     """
+    if text is None:
+        return ()
     metrics = {metric.name: metric for found in baseline.metrics.values() for metric in found}
     names = [name for record in baseline.records for name in record.metrics]
     if not typed:
         names += [part.partition(":")[0].strip() for part in text.split(",")]
     for name in dict.fromkeys(names):  # an older run does not say what kind of number it is
         metrics.setdefault(name, Metric(name, name, better="lower"))
-    try:
-        return parse_limits(text, metrics.values())
-    except UnknownMetric as error:
-        raise UnknownMetric(error.name, error.valid, " in the baseline") from None
+    with options.refusing((LimitError, UnknownMetric), "--sim-compare-fail"):
+        try:
+            limits = parse_limits(text, metrics.values())
+        except UnknownMetric as error:
+            raise UnknownMetric(error.name, error.valid, " in the baseline") from None
+    return limits

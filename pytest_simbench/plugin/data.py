@@ -55,9 +55,7 @@ def download(config: pytest.Config) -> int:
     from pytest_simbench.data.errors import DataError
     from pytest_simbench.data.sets import data_set
 
-    try:
+    with options.refusing(DataError):
         for wanted in [data_set(name) for name in options.value(config, "sim_download")]:
             bring(wanted, folder(config), lambda text: print(for_terminal(text)))
-    except DataError as error:
-        raise pytest.UsageError(for_terminal(str(error))) from None
     return 0

@@ -4,33 +4,28 @@ from __future__ import annotations
 
 import pytest
 
+from pytest_simbench.client.environments import Environment, default_folder, existing, remove
+from pytest_simbench.client.installing import size_mb
 from pytest_simbench.plugin import options
 from pytest_simbench.plugin.simulator_names import progress
 from pytest_simbench.records.text import for_terminal
+from pytest_simbench.simulator.errors import SimulatorError
+from pytest_simbench.simulator.registry import adapter
 
 
 def install(config: pytest.Config) -> int:
     """`--sim-install`: make the environments of simulators, also of releases of them."""
-    from pytest_simbench.client.environments import Environment
-    from pytest_simbench.simulator.errors import SimulatorError
-    from pytest_simbench.simulator.registry import adapter
-
-    try:
+    with options.refusing(SimulatorError):
         for name in options.value(config, "sim_install"):
             environment = Environment.of(adapter(name).info)
             if environment.problem:
                 environment.create(progress())
             print(f"{name}: {environment.info.title} {environment.version()} is ready")
-    except SimulatorError as error:
-        raise pytest.UsageError(for_terminal(str(error))) from None
     return 0
 
 
 def uninstall(config: pytest.Config) -> int:
     """`--sim-uninstall`: remove environments, whether or not their adapters are still known."""
-    from pytest_simbench.client.environments import default_folder, existing, remove
-    from pytest_simbench.client.installing import size_mb
-
     there = {folder.name: folder for folder in existing()}
     names = options.value(config, "sim_uninstall")
     for name in names:
@@ -51,11 +46,6 @@ def uninstall(config: pytest.Config) -> int:
 
 def list_environments(config: pytest.Config) -> int:
     """`--sim-environments`: what is there, how large it is, and what is wrong with it."""
-    from pytest_simbench.client.environments import Environment, default_folder, existing
-    from pytest_simbench.client.installing import size_mb
-    from pytest_simbench.simulator.errors import SimulatorError
-    from pytest_simbench.simulator.registry import adapter
-
     total = 0.0
     for folder in existing():
         size = size_mb(folder)

@@ -145,7 +145,7 @@ def simbench_case(
     request: pytest.FixtureRequest, sim_case: Variant, sim_settings: dict[str, Any]
 ) -> Case:
     """Everything that the repetitions of this test have in common."""
-    from pytest_simbench.plugin.selection import number_mark
+    from pytest_simbench.plugin.marks import number_mark
 
     given = options.value(request.config, "sim_timeout")
     named = sim_case.simulator, sim_case.profile

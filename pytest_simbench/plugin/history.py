@@ -8,8 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from pytest_simbench import __version__
+from pytest_simbench.client.package_index import newest_of_minors, releases
+from pytest_simbench.experiment.repetition import host
 from pytest_simbench.plugin import options
 from pytest_simbench.plugin.values import Releases
+from pytest_simbench.records.names import digest
+from pytest_simbench.simulator.registry import adapter
 
 FOLDER = ".simbench/history"
 """Where histories lie, in pytest's root folder."""
@@ -32,9 +37,6 @@ def releases_of(config: pytest.Config) -> list[str]:
         SimulatorError: no such simulator, or no package index answers.
         pytest.UsageError: the adapter runs with fewer than two.
     """
-    from pytest_simbench.client.package_index import newest_of_minors, releases
-    from pytest_simbench.simulator.registry import adapter
-
     wanted: Releases | None = options.value(config, "sim_history")
     if wanted is None:
         return []
@@ -59,7 +61,7 @@ def releases_of(config: pytest.Config) -> list[str]:
 def folder_of(config: pytest.Config, name: str) -> Path:
     """Where the history of a simulator with these settings on this machine lies: results made with
     others are never in one folder."""
-    return config.rootpath / FOLDER / f"{_named(config, name)}-{_digest(machine())}"
+    return config.rootpath / FOLDER / f"{_named(config, name)}-{_digest(host())}"
 
 
 def elsewhere(config: pytest.Config, name: str) -> str:
@@ -76,21 +78,10 @@ def elsewhere(config: pytest.Config, name: str) -> str:
     )
 
 
-def machine() -> dict[str, object]:
-    """What a history's machine is known by."""
-    from pytest_simbench.experiment.repetition import host
-
-    return host()
-
-
 def _named(config: pytest.Config, name: str) -> str:
-    from pytest_simbench import __version__
-
     values: dict[str, object] = {key: options.value(config, key) for key in SETTINGS}
     return f"{name}-{_digest({**values, 'version': __version__})}"
 
 
 def _digest(told: Mapping[str, object]) -> str:
-    from pytest_simbench.records.names import digest
-
     return digest(json.dumps(told, sort_keys=True, default=str))

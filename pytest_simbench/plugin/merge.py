@@ -13,21 +13,34 @@ import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
+from pytest_simbench.experiment.identity import file_stem_of
+from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.plugin import options, recording
 from pytest_simbench.records.folder import RECORDS, TASKS, Reading, RunFolder
 from pytest_simbench.records.merging import Merged, MergeError, merge, merge_tasks
 from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.records.text import for_terminal
-
-if TYPE_CHECKING:
-    from pytest_simbench.measure.sweep import Swept
-    from pytest_simbench.report.outcome import Outcome
-    from pytest_simbench.report.summary import TaskSummary
+from pytest_simbench.report import history, repeatability, sweep
+from pytest_simbench.report.brief import render_brief
+from pytest_simbench.report.changes import render_terminal
+from pytest_simbench.report.files import (
+    Written,
+    in_order,
+    summaries_of,
+    where,
+    write_badge,
+    write_files,
+    write_outcome,
+    write_report,
+)
+from pytest_simbench.report.outcome import Outcome
+from pytest_simbench.report.page import PAGE_NAME
+from pytest_simbench.report.summary import TaskSummary
+from pytest_simbench.report.tables import render_run
 
 
 @dataclass(frozen=True)
@@ -64,17 +77,13 @@ class Runs:
             if file in files:
                 raise pytest.UsageError(f"{flag} {name}: the run is given twice")
             folders[name] = RunFolder.of(path)
-            try:
+            with options.refusing(RecordError, f"{flag} {name}"):
                 readings[name] = folders[name].read()
-            except RecordError as error:
-                raise pytest.UsageError(f"{flag} {name}: {error}") from None
             files.add(file)
         return cls(folders, readings)
 
     def outcomes(self) -> tuple[list[Outcome], list[str]]:
         """How each ended, and what is wrong with what says so."""
-        from pytest_simbench.report.outcome import Outcome
-
         found = [Outcome.read(folder.path) for folder in self.folders.values()]
         return [outcome for outcome, _ in found], [problem for _, problem in found if problem]
 
@@ -84,11 +93,9 @@ class Runs:
         Raises:
             pytest.UsageError: they are not parts of one run, or hold nothing.
         """
-        try:
+        with options.refusing(MergeError, flag):
             records = merge({name: found.records for name, found in self.readings.items()})
             tasks = merge_tasks({name: found.tasks for name, found in self.readings.items()})
-        except MergeError as error:
-            raise pytest.UsageError(f"{flag}: {error}") from None
         if not records:
             raise pytest.UsageError(f"{flag}: none of the runs holds a repetition that ended")
         return records, Reading(records=tuple(item.record for item in records), tasks=tasks)
@@ -106,8 +113,6 @@ def publish(config: pytest.Config, records: Sequence[Record], passed: bool | Non
     badge = options.value(config, "sim_badge")
     if not badge:
         return ""
-    from pytest_simbench.report.files import write_badge
-
     return write_badge(Path(config.invocation_params.dir, badge), records, passed)
 
 
@@ -118,10 +123,6 @@ def merge_runs(config: pytest.Config) -> int:
         pytest.UsageError: a run that cannot be read, runs that are not parts of one, or a folder
             that already holds a run or cannot be written to.
     """
-    from pytest_simbench.report.files import where, write_outcome, write_report
-    from pytest_simbench.report.outcome import Outcome
-    from pytest_simbench.report.page import PAGE_NAME
-
     runs = Runs.named(config, "sim_merge")
     records, whole = runs.merged("--sim-merge")
     folder = _locked(config)
@@ -155,11 +156,6 @@ def report_runs(config: pytest.Config) -> int:
     Raises:
         pytest.UsageError: a run that cannot be read, or runs that are not parts of one.
     """
-    from pytest_simbench.report import history, repeatability, sweep
-    from pytest_simbench.report.changes import render_terminal
-    from pytest_simbench.report.files import Written, in_order, summaries_of, where, write_files
-    from pytest_simbench.report.page import PAGE_NAME
-
     runs = Runs.named(config, "sim_report")
     target = _target(config, list(runs.folders.values()))
     (first, folder), *others = runs.folders.items()
@@ -182,19 +178,17 @@ def report_runs(config: pytest.Config) -> int:
     elif options.value(config, recording.RECORD):
         recorded.append("no recordings: join the runs with --sim-merge first")
     _print(config, summaries, sweeps, [*runs.problems, *written.problems, *recorded])
-    for line in history.lines(histories, shutil.get_terminal_size().columns):
+    width = shutil.get_terminal_size().columns
+    for line in history.lines(histories, width):
         print(for_terminal(line))
     if not others and outcomes[0].compared is not None:
         name, report = outcomes[0].compared
-        text = render_terminal(report, shutil.get_terminal_size().columns, bool(report.changes))
+        text = render_terminal(report, width, bool(report.changes))
         print(for_terminal(f"\nbaseline: {name}\n{text}"))
     if tables or problems:
-        width = shutil.get_terminal_size().columns
-        print(
-            "\n".join(
-                ["", repeatability.render_terminal(tables, width), *map(for_terminal, problems)]
-            )
-        )
+        print(f"\n{repeatability.render_terminal(tables, width)}")
+        for problem in problems:
+            print(for_terminal(problem))
     if target is not None and written.complete:
         print(where(target / PAGE_NAME, config.invocation_params.dir))
     return 0 if written.complete else 1
@@ -223,10 +217,6 @@ def _print(
     sweeps: Sequence[Swept],
     problems: list[str],
 ) -> None:
-    from pytest_simbench.report import sweep
-    from pytest_simbench.report.brief import render_brief
-    from pytest_simbench.report.tables import render_run
-
     verbose, width = config.get_verbosity() > 0, shutil.get_terminal_size().columns
     print((render_run if verbose else render_brief)(summaries, width))
     if sweeps:
@@ -269,8 +259,6 @@ def _copy(records: list[Merged], folders: dict[str, RunFolder], to: RunFolder) -
     Returns:
         What was refused, one sentence each.
     """
-    from pytest_simbench.experiment.identity import file_stem_of
-
     refused: dict[str, None] = {}
     for item in records:
         was, stem, folder = file_stem_of(item.was), file_stem_of(item.record), folders[item.run]

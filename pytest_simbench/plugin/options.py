@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -120,9 +121,9 @@ OPTIONS = (
            "without any, for six from four times the profile's own to an eighth of it",
            metavar="STEP,...", ini=False, arguments={"nargs": "?", "const": True}),
     Option("--sim-set", Assignments("SIM.SETTING=VALUE"), "change one setting: "
-           "mujoco.timestep=0.001", {}, metavar="SIM.SETTING=VALUE"),
+           "mysim.timestep=0.001", {}, metavar="SIM.SETTING=VALUE"),
     Option("--sim-python", Assignments("SIM=PATH", commas=False), "interpreter of a simulator's "
-           "worker: genesis=PATH; repeat the option for another one", {}, metavar="SIM=PATH"),
+           "worker: mysim=PATH; repeat the option for another one", {}, metavar="SIM=PATH"),
     Option("--sim-spec", Assignments("SIM=SPEC", commas=False), "execnet specification of a "
            "simulator's worker; repeat the option for another one", {}, metavar="SIM=SPEC"),
     Option("--sim-fresh", Flag(), "a new worker for each repetition even where starting is costly",
@@ -198,6 +199,18 @@ COMMANDS = (
 
 _BY_NAME = {item.name: item for item in OPTIONS}
 
+
+@contextmanager
+def refusing(
+    errors: type[Exception] | tuple[type[Exception], ...], where: str = ""
+) -> Iterator[None]:
+    """Make usage errors of these errors in this block, in their own words, after `WHERE: `."""
+    try:
+        yield
+    except errors as error:
+        raise pytest.UsageError(f"{where}: {error}" if where else str(error)) from None
+
+
 OURS: pytest.StashKey[frozenset[str]] = pytest.StashKey()
 """What is ours of the names on the command line (`--gui`) and in the ini file (`gui`)."""
 
@@ -259,14 +272,9 @@ def _ini(config: pytest.Config, item: Option) -> tuple[str, Any]:
     """Name and value of the ini twin that is set, if one is."""
     for name in map(name_of, item.flags if item.ini else ()):
         if name in _ours(config):
-            try:
+            # Not a text, or quotes that do not match.
+            with refusing((TypeError, ValueError, pytest.UsageError), f"the ini option {name}"):
                 raw = config.getini(name)
-            except (
-                TypeError,
-                ValueError,
-                pytest.UsageError,
-            ) as error:  # not a text, or quotes that do not match
-                raise pytest.UsageError(f"the ini option {name}: {error}") from None
             if raw is not None:
                 return f"the ini option {name}", raw
     return "", None

@@ -74,14 +74,11 @@ def check(config: pytest.Config) -> None:
     Raises:
         pytest.UsageError: there will be no motion to record, or what writes is not installed.
     """
-    if options.value(config, VIDEO) != "off":
+    if (video := options.value(config, VIDEO)) != "off":
         from pytest_simbench.recordings import film
 
-        try:
+        with options.refusing(film.FilmsUnavailable, f"--sim-video={video}"):
             film.check_available()
-        except film.FilmsUnavailable as error:
-            video = options.value(config, VIDEO)
-            raise pytest.UsageError(f"--sim-video={video}: {error}") from None
     if not options.value(config, RECORD):
         return
     if trace_mode(config) == "off":
@@ -90,10 +87,8 @@ def check(config: pytest.Config) -> None:
         )
     from pytest_simbench.recordings.bag import BagsUnavailable, check_available
 
-    try:
+    with options.refusing(BagsUnavailable, "--sim-record=mcap"):
         check_available()
-    except BagsUnavailable as error:
-        raise pytest.UsageError(f"--sim-record=mcap: {error}") from None
 
 
 def record(

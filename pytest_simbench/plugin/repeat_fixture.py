@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
@@ -18,16 +18,14 @@ from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.plugin import options, recording
 from pytest_simbench.plugin.arguments import can_do
 from pytest_simbench.plugin.benchmark import give_rounds
+from pytest_simbench.plugin.marks import number_mark
 from pytest_simbench.plugin.resume import NotResumed
-from pytest_simbench.plugin.selection import number_mark
+from pytest_simbench.plugin.run import Run
 from pytest_simbench.plugin.session import session_of
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.text import in_one_line
-
-if TYPE_CHECKING:
-    from pytest_simbench.plugin.run import Run
-    from pytest_simbench.tasks.base import Task
+from pytest_simbench.tasks.base import Task
 
 
 class RepeatFixture:
@@ -61,15 +59,14 @@ class RepeatFixture:
         def up_to(number: int) -> list[Record]:
             return self._up_to(number, experiment, found)
 
+        metrics = experiment.task.metrics
         if isinstance(wanted, options.Auto):
             plan = Plan.up_to(wanted.limit)
             first = up_to(plan.looks[0])
-            result: ResultSet = SequentialResultSet(first, experiment.metrics, plan, up_to)
+            result: ResultSet = SequentialResultSet(first, metrics, plan, up_to)
         else:
             number = wanted or number_mark(self.node, "reps") or experiment.task.repetitions
-            result = ResultSet(
-                up_to(int(number or self.case.protocol.repetitions)), experiment.metrics
-            )
+            result = ResultSet(up_to(int(number or self.case.protocol.repetitions)), metrics)
         recording.photograph(self.node.config, experiment, result.records, self.run.tell)
         result.strict = options.value(self.node.config, "sim_strict")
         self.results.append(result)

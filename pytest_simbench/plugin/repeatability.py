@@ -5,53 +5,49 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing, suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
+from pytest_simbench.client.display import Displays
 from pytest_simbench.client.errors import DisplayError
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.plugin.arguments import can_do
-from pytest_simbench.records.repeatability import NAME, Line, append, read
+from pytest_simbench.records.repeatability import NAME, Line, append
 from pytest_simbench.records.text import for_terminal
 from pytest_simbench.repeatability import search, stability
-from pytest_simbench.repeatability.agreement import FOLDER, Sample, agreements
+from pytest_simbench.repeatability.agreement import FOLDER, Sample
 from pytest_simbench.repeatability.episode import Episodes
 from pytest_simbench.repeatability.perturbation import Perturbation
 from pytest_simbench.repeatability.replay import replay
-from pytest_simbench.report.repeatability import render_markdown, render_terminal, tables
+from pytest_simbench.repeatability.replay_result import Replay
+from pytest_simbench.repeatability.search import Finding
+from pytest_simbench.repeatability.stability import Sensitivity, Stability
+from pytest_simbench.report.repeatability import render_terminal, write_tables
 from pytest_simbench.simulator.info import Capability
 from pytest_simbench.simulator.registry import adapter
-
-if TYPE_CHECKING:
-    from pytest_simbench.client.display import Displays
-    from pytest_simbench.repeatability.replay_result import Replay
-    from pytest_simbench.repeatability.search import Finding
-    from pytest_simbench.repeatability.stability import Sensitivity, Stability
-    from pytest_simbench.tasks.base import Task
-
-MARKDOWN_NAME = "repeatability.md"
+from pytest_simbench.tasks.base import Task
 
 
+@dataclass(frozen=True)
 class ReplayFixture:
     """What the fixture `replay` does, called with a task.
 
-    Args:
+    Attributes:
         case: simulator and settings.
         displays: for a window, if the case has none.
         jobs: how many workers may run side by side.
         skips: skip what the robot cannot do (`can_do`).
     """
 
-    def __init__(self, case: Case, displays: Displays, jobs: int, skips: bool) -> None:
-        self.case = case
-        self.displays = displays
-        self.jobs = jobs
-        self.skips = skips
+    case: Case
+    displays: Displays
+    jobs: int
+    skips: bool
 
     def __call__(self, task: Task, **options: Any) -> Replay:
         """Run the first seed of a task, and again in every way."""
@@ -112,12 +108,12 @@ def _keep(kind: str, episodes: Episodes, result: Mapping[str, Any]) -> None:
         warnings.warn(problem, stacklevel=2)
 
 
+@dataclass(frozen=True)
 class Perturber:
     """One task in one simulator, to be perturbed; what `perturb(task)` gives."""
 
-    def __init__(self, episodes: Episodes, strict: bool = False) -> None:
-        self.episodes = episodes
-        self.strict = strict
+    episodes: Episodes
+    strict: bool = False
 
     @property
     def task(self) -> Task:
@@ -150,16 +146,10 @@ class Perturber:
 
 def summarise(reporter: pytest.TerminalReporter, folder: Path) -> None:
     """Print the tables of what is in the run folder, and write them there."""
-    try:
-        lines = read(folder)
-        found = tables(lines.items, agreements(folder))
-    except ValueError as error:
-        reporter.write_line(for_terminal(str(error)))
-        return
-    reporter.write_sep("=", "repeatability")
-    reporter.write_line(render_terminal(found, reporter._tw.fullwidth))
-    for problem in (*lines.problems, *lines.refused):
-        reporter.write_line(for_terminal(problem))
-    reporter.write_line(for_terminal(f"\nresults on repeatability: {folder / NAME}"))
-    with suppress(OSError):
-        (folder / MARKDOWN_NAME).write_text(render_markdown(found), encoding="utf-8")
+    found, problems = write_tables(folder, folder)
+    if found:
+        reporter.write_sep("=", "repeatability")
+        reporter.write_line(render_terminal(found, reporter._tw.fullwidth))
+        problems.append(f"\nresults on repeatability: {folder / NAME}")
+    for line in problems:
+        reporter.write_line(for_terminal(line))

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.executor import Executor
+from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.identity import expected
 from pytest_simbench.plugin import options
 from pytest_simbench.records.configuration import (
     agree,
@@ -19,11 +22,6 @@ from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RECORDS, RunFolder
 from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.records.series import configurations, short
-
-if TYPE_CHECKING:
-    from pytest_simbench.experiment.case import Case
-    from pytest_simbench.experiment.executor import Executor
-    from pytest_simbench.experiment.experiment import Experiment
 
 
 def folder_to_resume(config: pytest.Config) -> Path | None:
@@ -44,17 +42,14 @@ def folder_to_resume(config: pytest.Config) -> Path | None:
         )
     if given or output:
         folder = Path(config.invocation_params.dir, given or output)
-        if not (folder / RECORDS).is_file():
-            raise pytest.UsageError(
-                f"there is no run to resume in {folder} (it has no {RECORDS}); write "
-                "--sim-resume=RUN with the folder of a run"
-            )
-        return folder
-    runs = sorted(config.rootpath.glob(f".simbench/*/{RECORDS}"), key=_begun)
-    if not runs:
+        runs, lacks = [folder / RECORDS], f" (it has no {RECORDS})"
+    else:
+        folder, lacks = config.rootpath / ".simbench", ""
+        runs = sorted(folder.glob(f"*/{RECORDS}"), key=_begun)
+    if not runs or not runs[-1].is_file():
         raise pytest.UsageError(
-            f"there is no run to resume in {config.rootpath / '.simbench'}; write "
-            "--sim-resume=RUN with the folder of a run"
+            f"there is no run to resume in {folder}{lacks}; write --sim-resume=RUN with the "
+            "folder of a run"
         )
     return runs[-1].parent
 
@@ -84,10 +79,8 @@ class Resumed:
 
     def __init__(self, folder: RunFolder) -> None:
         self.folder = folder
-        try:
+        with options.refusing(RecordError, "--sim-resume"):
             reading = folder.read()
-        except RecordError as error:
-            raise pytest.UsageError(f"--sim-resume: {error}") from None
         self.records = reading.every
         self.tasks = reading.tasks
         self._problems = reading.problems
@@ -118,8 +111,6 @@ class Resumed:
         Raises:
             NotResumed: the records are of another configuration.
         """
-        from pytest_simbench.experiment.identity import expected
-
         case, now = experiment.case, expected(experiment)
         of_test = [
             record

@@ -6,27 +6,40 @@ import json
 import threading
 from collections import Counter
 from collections.abc import Iterable
+from contextlib import AbstractContextManager, nullcontext
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from pytest_simbench.client.display import Displays
-from pytest_simbench.plugin import cluster, options, recording
+from pytest_simbench.cluster.executor import ClusterExecutor
+from pytest_simbench.experiment.executor import Executor, LocalExecutor
+from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.sharing import SharingExecutor
+from pytest_simbench.experiment.slots import Slots
+from pytest_simbench.plugin import cluster, options, recording, thresholds
+from pytest_simbench.plugin.compare import Comparison
+from pytest_simbench.plugin.history import elsewhere, folder_of
+from pytest_simbench.plugin.merge import publish
+from pytest_simbench.plugin.resume import Resumed, folder_to_resume
+from pytest_simbench.records.description import Threshold
 from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import Record
+from pytest_simbench.records.repeatability import NAME
 from pytest_simbench.records.text import for_terminal
-
-if TYPE_CHECKING:
-    from pytest_simbench.experiment.executor import Executor
-    from pytest_simbench.experiment.experiment import Experiment
-    from pytest_simbench.experiment.slots import Slots
-    from pytest_simbench.plugin.compare import Comparison
-    from pytest_simbench.plugin.resume import Resumed
-    from pytest_simbench.report.progress import Progress
-    from pytest_simbench.tasks.base import Task
+from pytest_simbench.report import markdown, sweep
+from pytest_simbench.report.brief import render_brief
+from pytest_simbench.report.files import write_outcome, write_report
+from pytest_simbench.report.github import append_summary
+from pytest_simbench.report.history import lines
+from pytest_simbench.report.outcome import Outcome
+from pytest_simbench.report.page import PAGE_NAME
+from pytest_simbench.report.progress import Progress
+from pytest_simbench.report.tables import render_run
+from pytest_simbench.tasks.base import Task
 
 RUNS = ".simbench"
 """Where runs without an `--sim-output` lie, in pytest's root folder."""
@@ -60,16 +73,12 @@ class Run:
         self.resumed: Resumed | None = None
         kept = options.value(config, "sim_history") is not None and self.folder.holds_run
         if config.getoption("sim_resume") is not None or kept:
-            from pytest_simbench.plugin.resume import Resumed
-
             self.resumed = Resumed(self.folder)
 
     def _choose_path(self) -> Path:
         if self._shared_by is not None and "simbench_folder" in self._shared_by:
             return Path(self._shared_by["simbench_folder"])
         if self.config.getoption("sim_resume") is not None:
-            from pytest_simbench.plugin.resume import folder_to_resume
-
             folder = folder_to_resume(self.config)
             if folder is not None:
                 return folder
@@ -78,8 +87,6 @@ class Run:
             return Path(self.config.invocation_params.dir, given)
         history = options.value(self.config, "sim_history")
         if history is not None:
-            from pytest_simbench.plugin.history import elsewhere, folder_of
-
             self.tell(elsewhere(self.config, history.name))
             return folder_of(self.config, history.name)
         return new_name(self.config.rootpath / RUNS)
@@ -93,10 +100,8 @@ class Run:
         """
         if self.folder.locked:
             return
-        try:
+        with options.refusing(FolderError):
             self.folder.lock(shared=self._shared_by is not None)
-        except FolderError as error:
-            raise pytest.UsageError(str(error)) from None
         if self._shared_by is not None:
             return
         if self.resumed is not None:
@@ -133,16 +138,10 @@ class Run:
     def executor(self) -> Executor:
         """Where repetitions are carried out."""
         if cluster.asked(self.config):
-            from pytest_simbench.cluster.executor import ClusterExecutor
-
             return ClusterExecutor(cluster.pool(self.config))
         jobs = options.value(self.config, "sim_jobs")
         if self._shared_by is not None and "simbench_slots" in self._shared_by:
-            from pytest_simbench.experiment.sharing import SharingExecutor
-
             return SharingExecutor(jobs, self._shared_by["simbench_slots"])
-        from pytest_simbench.experiment.executor import LocalExecutor
-
         return LocalExecutor(jobs)
 
     @cached_property
@@ -150,41 +149,38 @@ class Run:
         """What `--sim-jobs` gives to all workers of xdist together; None without that option."""
         if cluster.asked(self.config) or not options.mentioned(self.config, ["sim_jobs"]):
             return None
-        from pytest_simbench.experiment.slots import Slots
-
         return Slots(options.value(self.config, "sim_jobs"))
 
     @property
     def progress(self) -> Progress:
         """The live line; silent in xdist workers, which have no terminal."""
         if self._progress is None:
-            from pytest_simbench.report.progress import Progress
-
-            reporter = self.config.pluginmanager.get_plugin("terminalreporter")
+            reporter = self._reporter
             width = reporter._tw.fullwidth if reporter else 80
             tty = bool(reporter and reporter.isatty)
             self._progress = Progress(self._write, is_tty=tty, width=width)
         return self._progress
 
     def _write(self, text: str) -> None:
-        reporter = self.config.pluginmanager.get_plugin("terminalreporter")
-        capture = self.config.pluginmanager.get_plugin("capturemanager")
-        if reporter is None or hasattr(self.config, "workerinput"):
-            return
-        with self._lock:
-            if capture is None:
-                reporter._tw.write(text, flush=True)
-            else:
-                with capture.global_and_fixture_disabled():
-                    reporter._tw.write(text, flush=True)
+        if self._reporter is not None and self._shared_by is None:
+            with self._lock, self._uncaptured():
+                self._reporter._tw.write(text, flush=True)
 
     def begin_lines(self) -> None:
         """Start a new line before the first progress of a test."""
-        reporter = self.config.pluginmanager.get_plugin("terminalreporter")
+        if self._reporter is not None:
+            with self._uncaptured():
+                self._reporter.ensure_newline()
+
+    @property
+    def _reporter(self) -> Any:
+        """Of the terminal, where there is one."""
+        return self.config.pluginmanager.get_plugin("terminalreporter")
+
+    def _uncaptured(self) -> AbstractContextManager[None]:
+        """What is printed in this block reaches the terminal."""
         capture = self.config.pluginmanager.get_plugin("capturemanager")
-        if reporter is not None and capture is not None:
-            with capture.global_and_fixture_disabled():
-                reporter.ensure_newline()
+        return capture.global_and_fixture_disabled() if capture else nullcontext()
 
     def begin(self, experiment: Experiment) -> int:
         """How often this process has begun these repetitions, with this time.
@@ -215,15 +211,11 @@ class Run:
         The test fails where `--sim-threshold` gives one of its metrics a value that can never fail.
         """
         self.folder.describe(task)
-        from pytest_simbench.plugin.thresholds import bad_value
-
-        if wrong := bad_value(self._thresholds, task.metrics):
+        if wrong := thresholds.bad_value(self._thresholds, task.metrics):
             pytest.fail(wrong, pytrace=False)
 
     def ask(self, test: str, metric: str, value: float) -> None:
         """Write a threshold that a test asked for."""
-        from pytest_simbench.records.description import Threshold
-
         self.use()
         self.folder.ask(Threshold(test, metric, value))
 
@@ -239,9 +231,7 @@ class Run:
         if not ended or session.shouldstop or session.shouldfail:
             return  # some tests have not run, and may know it
         if self._thresholds and (self.reading.records or self.reading.thresholds):
-            from pytest_simbench.plugin.thresholds import problem
-
-            self.mistake = problem(self._thresholds, self.reading)
+            self.mistake = thresholds.problem(self._thresholds, self.reading)
             if self.mistake:
                 session.exitstatus = pytest.ExitCode.USAGE_ERROR
 
@@ -260,7 +250,8 @@ class Run:
 
     def complete(self) -> None:
         """Read what all processes wrote; called when all tests have ended."""
-        if (self.folder.used or self._shared()) and not self.problem:
+        shared = self.config.pluginmanager.has_plugin("dsession")
+        if (self.folder.used or shared) and not self.problem:
             self.reading = self.folder.scan()
 
     def summarise(
@@ -275,18 +266,8 @@ class Run:
         """
         if self.mistake:
             reporter.write_line(f"ERROR: {for_terminal(self.mistake)}", red=True)
-        if not self.reading.records and not self._repeated():
+        if not self.reading.records and not (self.folder.path / NAME).is_file():
             return
-        from pytest_simbench.plugin.merge import publish
-        from pytest_simbench.report import markdown, sweep
-        from pytest_simbench.report.brief import render_brief
-        from pytest_simbench.report.files import write_outcome, write_report
-        from pytest_simbench.report.github import append_summary
-        from pytest_simbench.report.history import lines
-        from pytest_simbench.report.outcome import Outcome
-        from pytest_simbench.report.page import PAGE_NAME
-        from pytest_simbench.report.tables import render_run
-
         path, records = self.folder.path, self.reading.records
         recorded = recording.record(self.config, path, path, records, self.progress)
         written = write_report(self.folder, self.reading, comparison.found if comparison else None)
@@ -320,15 +301,6 @@ class Run:
             problems.insert(0, f"\nwhat could be written is in {self.folder.path}")
         for line in [*map(for_terminal, filter(None, problems)), *unsaved]:
             reporter.write_line(line)
-
-    def _repeated(self) -> bool:
-        """Whether this run has results on repeatability."""
-        from pytest_simbench.records.repeatability import NAME
-
-        return (self.folder.path / NAME).is_file()
-
-    def _shared(self) -> bool:
-        return self.config.pluginmanager.has_plugin("dsession")
 
     def close(self) -> None:
         """End what the run started."""

@@ -110,7 +110,7 @@ class SimSession:
 
     def parametrize(self, metafunc: pytest.Metafunc) -> None:
         """Make a test of each simulator and mode, as its marks say."""
-        from pytest_simbench.plugin.selection import NOTHING, number_mark, parameters
+        from pytest_simbench.plugin.marks import NOTHING, number_mark, parameters
 
         try:
             for name in ("reps", "sim_timeout"):
@@ -152,7 +152,7 @@ class SimSession:
             raise pytest.UsageError("\n".join(dict.fromkeys(self.problems)))
         ours = [item for item in items if "sim_case" in fixtures_of(item)]
         if ours:
-            from pytest_simbench.plugin.selection import skip_what_parameters_need
+            from pytest_simbench.plugin.marks import skip_what_parameters_need
 
             skip_what_parameters_need(ours)
         timed = [item for item in items if "simbench_rounds" in fixtures_of(item)]

@@ -1,5 +1,5 @@
-"""What `--sim` names: simulators, releases of them (`mujoco==3.3.7`), builds of them
-(`mujoco@PYTHON`, `mujoco@LABEL=PYTHON`)."""
+"""What `--sim` names: simulators, releases of them (`mysim==3.3.7`), builds of them
+(`mysim@PYTHON`, `mysim@LABEL=PYTHON`)."""
 
 from __future__ import annotations
 
@@ -9,8 +9,13 @@ from collections.abc import Callable, Iterable
 
 import pytest
 
+from pytest_simbench.client.environments import Environment, outside
+from pytest_simbench.client.system import OLDEST, look_into
 from pytest_simbench.plugin.interpreters import interpreter_path
 from pytest_simbench.plugin.values import shown
+from pytest_simbench.simulator.info import no_module
+from pytest_simbench.simulator.registry import adapter, check_names
+from pytest_simbench.simulator.versions import BUILD, RELEASE, VersionedName, base_name
 
 LABEL = re.compile(r"[A-Za-z0-9](?:[\w.+-]{0,58}\w)?", re.ASCII)
 
@@ -24,9 +29,6 @@ def read_names(asked: Iterable[str], config: pytest.Config) -> tuple[list[str], 
         pytest.UsageError: an unknown simulator, a version that is none, an interpreter that
             cannot be used; one sentence.
     """
-    from pytest_simbench.simulator.registry import adapter, check_names
-    from pytest_simbench.simulator.versions import BUILD, base_name
-
     names: list[str] = []
     builds: dict[str, str] = {}
     for text in asked:
@@ -72,8 +74,6 @@ def read_names(asked: Iterable[str], config: pytest.Config) -> tuple[list[str], 
 
 def _check_release(text: str) -> None:
     """Complain of `==` without a version behind it."""
-    from pytest_simbench.simulator.versions import RELEASE, VersionedName
-
     base, equals, version = text.partition(RELEASE)
     if equals and VersionedName.of(text).which != version:
         raise pytest.UsageError(
@@ -85,10 +85,6 @@ def _check_release(text: str) -> None:
 def _version(base: str, python: str, where: str) -> str:
     """The version of a simulator's engine in an interpreter that has all that a worker needs;
     empty where the interpreter does not tell it."""
-    from pytest_simbench.client.system import OLDEST, look_into
-    from pytest_simbench.simulator.info import no_module
-    from pytest_simbench.simulator.registry import adapter
-
     info = adapter(base).info
     found = look_into(python, info.distribution, ("numpy", *info.modules))
     if found is None:
@@ -109,9 +105,6 @@ def install_missing(names: Iterable[str], tell: Callable[[str], None]) -> None:
     Raises:
         SimulatorError: one cannot be made.
     """
-    from pytest_simbench.client.environments import Environment, outside
-    from pytest_simbench.simulator.registry import adapter
-
     for name in names:
         environment = outside(adapter(name).info)
         if isinstance(environment, Environment) and environment.problem:

@@ -100,22 +100,18 @@ class Number(Kind):
         # 30 digits: Python refuses to read whole numbers of thousands of digits
         if not re.fullmatch(number, text, re.ASCII | re.IGNORECASE) or len(text) > 30:
             raise BadValue(texts[-1], self.advice)
-        try:
-            return self.check(int(text) if self.whole else float(text))
-        except BadValue:
-            raise BadValue(texts[-1], self.advice) from None
+        return self.check(int(text) if self.whole else float(text), texts[-1])
 
-    def check(self, value: Any) -> int | float:
-        """The number itself, if it is one of this kind.
+    def check(self, value: Any, given: Any = None) -> int | float:
+        """The number itself, if it is one of this kind; `given` is what the user wrote.
 
         Raises:
             BadValue: it is none.
         """
         types = int if self.whole else (int, float)
-        if isinstance(value, bool) or not isinstance(value, types):
-            raise BadValue(value, self.advice)
-        if not (isfinite(value) and self.low <= value <= self.high):
-            raise BadValue(value, self.advice)
+        fine = isinstance(value, types) and not isinstance(value, bool) and isfinite(value)
+        if not (fine and self.low <= value <= self.high):
+            raise BadValue(value if given is None else given, self.advice)
         return int(value) if self.whole else value
 
     @property
@@ -154,13 +150,11 @@ class Repetitions(Kind):
         word, colon, limit = texts[-1].strip().partition(":")
         if word == "auto" and not colon:
             return Auto(self.auto)
-        number = Number(1, self.most, whole=True)
         try:
-            if word == "auto":
-                return Auto(int(number.read([limit])))
-            return int(number.read(texts))
-        except BadValue:
-            raise BadValue(texts[-1], f"{number.advice}, auto or auto:LIMIT") from None
+            found = int(Number(1, self.most, whole=True).read([limit] if word == "auto" else texts))
+        except BadValue as error:
+            raise BadValue(texts[-1], f"{error.advice}, auto or auto:LIMIT") from None
+        return Auto(found) if word == "auto" else found
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -170,13 +164,12 @@ class Jobs(Kind):
     most: int
 
     def read(self, texts: Sequence[str]) -> int:
-        number = Number(1, self.most, whole=True)
         if texts[-1].strip() == "auto":
             return min(len(os.sched_getaffinity(0)), self.most)
         try:
-            return int(number.read(texts))
-        except BadValue:
-            raise BadValue(texts[-1], f"{number.advice}, or auto") from None
+            return int(Number(1, self.most, whole=True).read(texts))
+        except BadValue as error:
+            raise BadValue(texts[-1], f"{error.advice}, or auto") from None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -375,7 +368,7 @@ class Assignments(Kind):
 
 
 def _partition(pair: str) -> tuple[str, str, str]:
-    """A pair taken apart at its first `=` that is not of a version (`mujoco==3.3.7.timestep=1`)."""
+    """A pair taken apart at its first `=` that is not of a version (`mysim==3.3.7.timestep=1`)."""
     found = re.search(r"(?<!=)=(?!=)", pair)
     return (pair, "", "") if found is None else (pair[: found.start()], "=", pair[found.end() :])
 

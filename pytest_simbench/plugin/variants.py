@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from pytest_simbench.records.series import step_text
+from pytest_simbench.simulator.settings import LARGEST_TIMESTEP, SHORTEST_TIMESTEP
 
 USUAL = "tuned"
 """The settings profile of a run that names none."""
@@ -79,8 +80,6 @@ def variants(
 def around(own: float) -> list[float]:
     """The steps of a sweep around a profile's own [s], the longest first: powers of two of it, of
     which none is too long or too short for a setting."""
-    from pytest_simbench.simulator.settings import LARGEST_TIMESTEP, SHORTEST_TIMESTEP
-
     most = math.floor(math.log2(LARGEST_TIMESTEP / own) + 1e-9)
     least = math.ceil(math.log2(SHORTEST_TIMESTEP / own) - 1e-9)
     first = max(min(LONGER, most), least + STEPS - 1)
@@ -89,8 +88,6 @@ def around(own: float) -> list[float]:
 
 def problem(steps: Sequence[float]) -> str:
     """Why no simulator takes these time steps [s]; empty where they can be taken."""
-    from pytest_simbench.simulator.settings import LARGEST_TIMESTEP, SHORTEST_TIMESTEP
-
     for step in steps:
         if not SHORTEST_TIMESTEP <= step <= LARGEST_TIMESTEP:
             return (

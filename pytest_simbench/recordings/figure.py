@@ -15,13 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_simbench.scene import FloatArray, Pose, Robot, Vector3
+from pytest_simbench.simulator.mesh_check import HEADER, TRIANGLE
 from pytest_simbench.simulator.urdf import PreparedRobot
-
-_HEADER, _TRIANGLE = (
-    84,
-    np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")]),
-)
-"""Layout of a binary STL file: header and count [bytes], then one record a triangle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +35,8 @@ class Mesh:
     def from_stl(cls, path: str | Path) -> Mesh:
         """The triangles of a binary STL file, the only form that a checked robot has."""
         data = Path(path).read_bytes()
-        count = int.from_bytes(data[_HEADER - 4 : _HEADER], "little")
-        triangles = np.frombuffer(data, _TRIANGLE, count, _HEADER)
+        count = int.from_bytes(data[HEADER - 4 : HEADER], "little")
+        triangles = np.frombuffer(data, TRIANGLE, count, HEADER)
         corners = triangles["corners"].reshape(-1, 3)
         vertices, faces = np.unique(corners, axis=0, return_inverse=True)
         return cls(vertices.astype(np.float32), faces.reshape(-1, 3).astype(np.int32))

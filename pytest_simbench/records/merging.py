@@ -9,7 +9,7 @@ from itertools import combinations
 from pytest_simbench.records.configuration import differences, other_meanings, task_parameters
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import by_test, configurations
+from pytest_simbench.records.series import by_test, configurations, grouped
 
 
 class MergeError(ValueError):
@@ -46,7 +46,9 @@ def merge(runs: Mapping[str, Sequence[Record]]) -> list[Merged]:
     """
     ended = [[r for r in run if r.status != "interrupted"] for run in runs.values()]
     tests: dict[str, dict[str, list[Record]]] = {}
-    for name, groups in zip(runs, by_test(ended, apart=_task_parameters), strict=True):
+    # A test may repeat several tasks, which their parameters tell apart.
+    sides = by_test(ended, lambda records: list(grouped(records, task_parameters).values()))
+    for name, groups in zip(runs, sides, strict=True):
         for test, found in groups.items():
             tests.setdefault(test, {})[name] = found
     merged: list[Merged] = []
@@ -84,14 +86,6 @@ def merge_tasks(runs: Mapping[str, Mapping[str, TaskDescription]]) -> dict[str, 
             first.setdefault(task, name)
         found |= tasks
     return found
-
-
-def _task_parameters(records: Sequence[Record]) -> list[list[Record]]:
-    """A test's records by the parameters of their task: it may repeat several."""
-    groups: dict[str, list[Record]] = {}
-    for record in records:
-        groups.setdefault(task_parameters(record), []).append(record)
-    return list(groups.values())
 
 
 def _check(test: str, parts: Mapping[str, Sequence[Record]]) -> None:

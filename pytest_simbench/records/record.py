@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, Literal, get_args
 
 from pytest_simbench.records import checked
@@ -227,29 +227,15 @@ def _failure(error: Mapping[str, Any]) -> Failure:
 
 
 _REQUIRED = (
-    "test",
-    "task",
-    "simulator",
-    "mode",
-    "profile",
-    "repetition",
-    "seed",
-    "status",
+    *(f.name for f in fields(Record) if f.default is MISSING and f.default_factory is MISSING),
     "metrics",
 )
 _NAMES = ("test", "task", "simulator", "mode", "profile", "protocol", "scene")
 _TEXT_DETAILS = ("log", "untested", "closing")
-_OBJECTS = (
-    "details",
-    "seconds",
-    "stepping",
-    "timeline",
-    "resources",
-    "settings",
-    "versions",
-    "robot",
-    "limits",
-    "host",
+_OBJECTS = tuple(
+    f.name
+    for f in fields(Record)
+    if f.default_factory is dict and f.name not in ("metrics", "extra")
 )
 _SHARED = ("settings", "versions", "robot", "limits", "host", "deviations")
 """What records of a run have in common."""

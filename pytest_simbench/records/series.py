@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from pytest_simbench.records.configuration import (
     Told,
@@ -18,6 +18,9 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.simulator.versions import VersionedName, release_numbers
 
 TWIN = equal_to("twin")
+
+T = TypeVar("T")
+K = TypeVar("K")
 
 
 def settled(records: Iterable[Record]) -> list[Record]:
@@ -66,6 +69,14 @@ def configurations(records: Iterable[Record]) -> list[list[Record]]:
         else:
             groups.append([place])
     return [[records[k] for k in sorted(group)] for group in sorted(groups, key=min)]
+
+
+def grouped(items: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
+    """Items by what they have in common, groups and items in order of appearance."""
+    found: dict[K, list[T]] = {}
+    for item in items:
+        found.setdefault(key(item), []).append(item)
+    return found
 
 
 class RowKey(NamedTuple):
@@ -118,9 +129,7 @@ class Series(NamedTuple):
 
 def series(records: Iterable[Record]) -> list[Series]:
     """The records of one task as rows, sorted: a row is one test and one configuration."""
-    by_subject: dict[RowKey, list[Record]] = {}
-    for record in sorted(records, key=lambda r: r.repetition):
-        by_subject.setdefault(RowKey.of(record), []).append(record)
+    by_subject = grouped(sorted(records, key=lambda r: r.repetition), RowKey.of)
     ordered = sorted(by_subject.items(), key=lambda item: item[0].order)
     rows = [(s, group) for s, found in ordered for group in configurations(found)]
     return [
@@ -210,10 +219,7 @@ def by_test(
     whole = any(len({r.test for r in run}) > len({short(r.test) for r in run}) for run in runs)
     sides: list[dict[tuple[str, str, int], list[Record]]] = []
     for run in runs:
-        groups: dict[tuple[str, str], list[Record]] = {}
-        for record in run:
-            key = (record.test if whole else short(record.test), record.task)
-            groups.setdefault(key, []).append(record)
+        groups = grouped(run, lambda r: (r.test if whole else short(r.test), r.task))
         sides.append(
             {
                 (*key, number): group

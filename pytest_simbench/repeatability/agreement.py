@@ -62,16 +62,10 @@ class Sample:
 
     @classmethod
     def of(cls, episode: Episode, label: str, task: str, seed: int) -> Sample:
-        return cls(
-            label,
-            task,
-            seed,
-            list(episode.bodies),
-            episode.motions,
-            [_command(operation) for operation in episode.tape],
-            [operation.duration for operation in episode.tape],
-            episode.counts,
-        )
+        commands = [_command(operation) for operation in episode.tape]
+        durations = [operation.duration for operation in episode.tape]
+        bodies, motions, counts = list(episode.bodies), episode.motions, episode.counts
+        return cls(label, task, seed, bodies, motions, commands, durations, counts)
 
     def save(self, path: Path) -> None:
         """Write it as .npz.
@@ -198,19 +192,6 @@ class Agreement:
     commands_part: float | None
     until: float
     same_outcome: bool
-
-    def to_wire(self) -> dict[str, Any]:
-        """Plain data for the run's records."""
-        return {
-            "first": self.first,
-            "second": self.second,
-            "partings": {
-                f"{limit:g}": None if p is None else vars(p) for limit, p in self.partings.items()
-            },
-            "commands_part": self.commands_part,
-            "until": self.until,
-            "same_outcome": self.same_outcome,
-        }
 
 
 def agreement(first: Sample, second: Sample) -> Agreement:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from pytest_simbench.client.tape import Operation, Tape, TapedWorld
 from pytest_simbench.client.world import Motion
@@ -81,13 +80,8 @@ class Episodes:
             WorkerError: whatever happened to the worker.
         """
         scene = perturbed(self.scene(), perturbations)
-        options: dict[str, Any] = {
-            "period": PERIOD,
-            "play": play,
-            "before": before,
-            "delay": controller_delay(perturbations),
-        }
-        with (handle or self.handle).episode(scene, **options) as world:
+        delay, worker = controller_delay(perturbations), handle or self.handle
+        with worker.episode(scene, period=PERIOD, play=play, before=before, delay=delay) as world:
             outcome = self.task.perform(world, self.experiment.seed(), lambda done, total: None)
         return Episode(
             outcome,

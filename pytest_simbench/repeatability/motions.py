@@ -79,20 +79,16 @@ def gaps(first: Sequence[Motion], second: Sequence[Motion]) -> Gaps:
     """
     times, distances, positions = [], [], []
     for number, (a, b) in enumerate(zip(first, second, strict=False)):
-        here = a.bodies[:, :, :3]
+        here, time = a.bodies[:, :, :3], a.time
         if number == 0 or np.array_equal(a.time, b.time):
             there = b.bodies[: len(here), :, :3]
         else:
             clock = a.time - first[number - 1].time[-1]
             before = second[number - 1]
             until = b.time[-1] - before.time[-1]
-            here, a_time = here[clock <= until + 1e-9], a.time[clock <= until + 1e-9]
-            there = _at(clock[clock <= until + 1e-9], before, b)
-            times.append(a_time)
-            distances.append(np.linalg.norm(here - there, axis=2))
-            positions.append(here)
-            continue
-        times.append(a.time)
+            both = clock <= until + 1e-9
+            here, time, there = here[both], time[both], _at(clock[both], before, b)
+        times.append(time)
         distances.append(np.linalg.norm(here - there, axis=2))
         positions.append(here)
     return Gaps(np.concatenate(times), np.concatenate(distances), np.concatenate(positions))

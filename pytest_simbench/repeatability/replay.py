@@ -159,32 +159,19 @@ def _after_another(episodes: Episodes, first: Episode) -> Episode:
 
 def _restored(way: str, moment: Moment, episodes: Episodes, first: Episode) -> Again:
     """Save at a moment, go on for a while, restore, and carry on."""
-    counter = _Counter(moment)
+    seen = 0  # operations in the moment's phase
 
     def before(world: TapedWorld, operation: Operation) -> None:
-        if counter.reached(operation):
+        nonlocal seen
+        here = operation.phase == moment.phase
+        seen += here
+        if here and seen == moment.operation + 1:
             world.save("replay")
             world.perform(operation)
             world.perform(Operation("wait", {"duration": ASTRAY}))
             world.restore("replay")
 
     result = _again(way, first, lambda: episodes.run(play=first.tape, before=before))
-    if not counter.done and not result.failure:
+    if seen <= moment.operation and not result.failure:
         return Again(way, skipped=f"the task never came to {moment.phase}")
     return result
-
-
-class _Counter:
-    """Tells when a moment has come."""
-
-    def __init__(self, moment: Moment) -> None:
-        self.moment = moment
-        self.done = False
-        self._seen = 0
-
-    def reached(self, operation: Operation) -> bool:
-        if self.done or operation.phase != self.moment.phase:
-            return False
-        self._seen += 1
-        self.done = self._seen > self.moment.operation
-        return self.done

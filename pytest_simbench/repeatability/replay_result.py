@@ -58,14 +58,14 @@ class Again:
         return what + (f"; changed {', '.join(self.changed)}" if self.changed else "")
 
     def to_wire(self) -> dict[str, Any]:
-        d = self.difference
+        parted: dict[str, Any] = dict.fromkeys(("first", "body", "growth", "largest"))
+        if self.difference is not None:
+            growth = {f"{after:g}": gap for after, gap in self.difference.growth.items()}
+            parted = {**vars(self.difference), "growth": growth}
         return {
             "way": self.way,
             "identical": self.identical,
-            "first": None if d is None else d.first,
-            "body": None if d is None else d.body,
-            "growth": None if d is None else {f"{k:g}": v for k, v in d.growth.items()},
-            "largest": None if d is None else d.largest,
+            **parted,
             "changed": list(self.changed),
             "left_at": self.left_at,
             "skipped": self.skipped,

@@ -17,8 +17,13 @@ if TYPE_CHECKING:
 
 from pytest_simbench.experiment.example import replay_command, write_example
 from pytest_simbench.repeatability.attack import Attack, Perturbations
-from pytest_simbench.repeatability.episode import Episode, Episodes
-from pytest_simbench.repeatability.perturbation import Perturbation, described, perturbations
+from pytest_simbench.repeatability.episode import Episodes
+from pytest_simbench.repeatability.perturbation import (
+    QUANTITIES,
+    Perturbation,
+    described,
+    perturbations,
+)
 from pytest_simbench.repeatability.perturbation import perturbed as perturbed_scene
 
 EXAMPLES = 60
@@ -159,7 +164,7 @@ def search(
         smallest is not None and _confirmed(attack, smallest),
         failing[0] if failing else None,
         bounds_in_words(episodes, bounds),
-        _outcome(attack.base),
+        ", ".join(f"{name} {value}" for name, value in attack.base.counts.items()),
         _kept_example(attack, smallest) if smallest else "",
     )
 
@@ -225,19 +230,10 @@ def _confirmed(attack: Attack, smallest: Perturbations) -> bool:
 
 def bounds_in_words(episodes: Episodes, bounds: Mapping[str, float] | None) -> str:
     """The largest changes as text, for instance "1 mm in x, 10 % in mass"."""
-    from pytest_simbench.repeatability.perturbation import QUANTITIES
-
     robot = episodes.scene().robot is not None
     limits = bounds or {q.name: q.bound for q in QUANTITIES.values() if robot or q.of != "robot"}
-    parts = []
-    for name, bound in limits.items():
-        quantity = QUANTITIES[name]
-        parts.append(f"{bound * quantity.shown:.3g} {quantity.unit} in {name}")
-    return ", ".join(parts)
-
-
-def _outcome(episode: Episode) -> str:
-    return ", ".join(f"{name} {value}" for name, value in episode.counts.items())
+    known = ((name, QUANTITIES[name], bound) for name, bound in limits.items())
+    return ", ".join(f"{bound * q.shown:.3g} {q.unit} in {name}" for name, q, bound in known)
 
 
 def to_wire(finding: Finding) -> dict[str, Any]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from pytest_simbench.measure.intervals import FEWEST
 from pytest_simbench.report import cells
-from pytest_simbench.report.pooling import Spread
 from pytest_simbench.report.summary import Row, TaskSummary
 from pytest_simbench.tasks.metrics import Metric
 
@@ -91,7 +90,7 @@ def _compare(metric: Metric, summary: TaskSummary, names: Sequence[str]) -> str:
         if (value := row.metrics.get(metric.name)) is not None
     }
     texts = {
-        place: f"{names[place]} {_value(value, metric)}"
+        place: f"{names[place]} {cells.mean_in_words(value, metric)}"
         for place, value in sorted(values.items(), key=lambda item: sign * item[1].mean)
     }
     if len(texts) < 2:
@@ -118,12 +117,6 @@ def _compare(metric: Metric, summary: TaskSummary, names: Sequence[str]) -> str:
     over = f" of {_list(behind)}" if of_each else f"; behind: {_list(behind)}"
     rest = f"; not told apart: {_list(others)}" if others else ""
     return f"{metric.title}: {_list(ahead)} {verb} ahead{over}{rest}."
-
-
-def _value(found: Spread, metric: Metric) -> str:
-    unit = "%" if metric.bounded else metric.unit
-    text = f"{cells.metric_value(found.mean, metric)} {unit} {cells.interval(found, metric)}"
-    return " ".join(text.split())
 
 
 def _list(texts: Sequence[str]) -> str:

@@ -97,7 +97,17 @@ def failures(row: Row) -> list[str]:
     return lines
 
 
+def unit(metric: Metric) -> str:
+    """In which its values are shown: % for shares."""
+    return "%" if metric.bounded else metric.unit
+
+
 def heading(metric: Metric) -> str:
     """Title and unit of a metric."""
-    unit = "%" if metric.bounded else metric.unit
-    return f"{metric.title} {unit}".rstrip()
+    return f"{metric.title} {unit(metric)}".rstrip()
+
+
+def mean_in_words(found: Spread, metric: Metric) -> str:
+    """Mean, unit and interval in one line."""
+    text = f"{metric_value(found.mean, metric)} {unit(metric)} {interval(found, metric)}"
+    return " ".join(text.split())

@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 import math
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,8 @@ from pytest_simbench.records.names import file_name
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.text import for_figure
 from pytest_simbench.report.answer import short_labels
-from pytest_simbench.report.pooling import Spread, merged_order
+from pytest_simbench.report.cells import unit
+from pytest_simbench.report.pooling import merged_order
 from pytest_simbench.report.summary import Row, TaskSummary
 from pytest_simbench.tasks.metrics import Metric
 
@@ -50,16 +51,23 @@ def write_figures(folder: Path, summaries: Sequence[TaskSummary]) -> list[Path]:
     paths: list[Path] = []
     with drawing():
         for summary in summaries:
-            for name in ("metrics", "times", "resources"):
+            for name in PICTURES:
                 figure = draw(summary, name)
-                if figure is None:
-                    continue
-                path = folder / f"{file_name(summary.task)}_{name}.png"
-                picture = io.BytesIO()
-                figure.savefig(picture, format="png", dpi=DPI)
-                write_whole(path, picture.getvalue())
-                paths.append(path)
+                if figure is not None:
+                    paths.append(save(figure, folder, f"{file_name(summary.task)}_{name}"))
     return paths
+
+
+def save(figure: Any, folder: Path, name: str) -> Path:
+    """Write a picture as PNG, whole or not at all, and return its path; within `drawing`.
+
+    Raises:
+        OSError: the folder cannot be written to.
+    """
+    path, picture = folder / f"{name}.png", io.BytesIO()
+    figure.savefig(picture, format="png", dpi=DPI)
+    write_whole(path, picture.getvalue())
+    return path
 
 
 @contextmanager
@@ -108,24 +116,20 @@ def draw(summary: TaskSummary, name: str, *, titled: bool = True) -> Any:
         figure: Any = Figure(figsize=(9, 3.2 + 0.16 * len(rows)), layout="constrained")
         _phases(figure, rows)
         return figure
-    panels = {"metrics": max(1, len(summary.study)), "times": 1, "resources": 2}[name]
+    panels, what, fill = PICTURES[name]
+    panels = panels or max(1, len(summary.study))
     size = (max(7, 2 + 3.5 * panels), 1.6 + 0.4 * len(rows))
     figure = Figure(figsize=size, layout="constrained")
     axes = figure.subplots(1, panels, sharey=True, squeeze=False)[0]
-    {"metrics": _metrics, "times": _times, "resources": _resources}[name](axes, summary, rows)
+    fill(axes, summary, rows)
     axes[0].set_yticks(range(len(rows)), map(for_figure, short_labels(rows)))
     axes[0].set_ylim(len(rows) - 0.5, -0.5)
     if titled:
-        figure.suptitle(_title(summary, rows, name), fontsize="medium")
+        figure.suptitle(_title(summary, rows, what), fontsize="medium")
     return figure
 
 
-def _title(summary: TaskSummary, rows: Sequence[Row], name: str) -> str:
-    what = {
-        "metrics": "mean with 95 % interval, min to max in grey",
-        "times": "start and end of the task, with deviation",
-        "resources": "CPU and RAM, mean and deviation over samples",
-    }[name]
+def _title(summary: TaskSummary, rows: Sequence[Row], what: str) -> str:
     shared = [
         values.pop()
         for values in ({row.mode for row in rows}, {row.profile for row in rows})
@@ -144,18 +148,12 @@ def _metrics(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -> 
                 continue
             scale = 100 if metric.bounded else 1
             if metric.kind != "yes_no":
-                axis.plot(
-                    [scale * found.min, scale * found.max],
-                    [y, y],
-                    color="0.8",
-                    lw=6,
-                    solid_capstyle="butt",
-                    zorder=1,
-                )
+                ends = [scale * found.min, scale * found.max]
+                axis.plot(ends, [y, y], color="0.8", lw=6, solid_capstyle="butt", zorder=1)
             if found.low is not None and found.high is not None:
                 axis.plot([scale * found.low, scale * found.high], [y, y], color=COLOURS[0], lw=2)
             axis.plot(scale * found.mean, y, "o", color=COLOURS[0])
-        axis.set_xlabel(_heading(metric))
+        axis.set_xlabel(heading(metric))
         if metric.bounded:
             axis.set_xlim(-3, 103)
         axis.grid(axis="x", alpha=0.4)
@@ -173,14 +171,10 @@ def _times(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -> No
             y, row.end.mean - row.start.mean, left=row.start.mean, height=0.5, color=COLOURS[5]
         )
         for found, colour in ((row.start, COLOURS[2]), (row.end, COLOURS[1])):
-            _error_bar(axis, found, y, colour)
+            axis.errorbar(found.mean, y, xerr=found.std, fmt="o", color=colour, capsize=3, ms=4)
     axis.set_xlim(left=0)
     axis.set_xlabel("seconds from launch")
     axis.grid(axis="x", alpha=0.4)
-
-
-def _error_bar(axis: Any, found: Spread, y: float, colour: str) -> None:
-    axis.errorbar(found.mean, y, xerr=found.std, fmt="o", color=colour, capsize=3, ms=4)
 
 
 def _resources(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -> None:
@@ -201,6 +195,16 @@ def _resources(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -
         axis.grid(axis="x", alpha=0.4)
 
 
+Fill = Callable[[Sequence[Any], TaskSummary, Sequence[Row]], None]
+
+PICTURES: dict[str, tuple[int, str, Fill]] = {
+    "metrics": (0, "mean with 95 % interval, min to max in grey", _metrics),
+    "times": (1, "start and end of the task, with deviation", _times),
+    "resources": (2, "CPU and RAM, mean and deviation over samples", _resources),
+}
+"""By name: panels (0: one for each metric of the study), what is shown, and what draws it."""
+
+
 def _phases(figure: Any, rows: Sequence[Row]) -> None:
     """CPU and RAM along the task's phases, a line for each row."""
     order = merged_order(row.by_phase for row in rows)
@@ -208,16 +212,9 @@ def _phases(figure: Any, rows: Sequence[Row]) -> None:
     for kind, (axis, label) in enumerate(zip(panels, ("CPU, % of a core", "RAM, MB"), strict=True)):
         for place, (row, name) in enumerate(zip(rows, short_labels(rows), strict=True)):
             known = [phase for phase in order if phase in row.by_phase]
-            axis.plot(
-                [order.index(phase) for phase in known],
-                [row.by_phase[phase][kind].mean for phase in known],
-                marker=MARKERS[place % len(MARKERS)],
-                ls=("-", "--")[place // len(COLOURS) % 2],
-                color=COLOURS[place % len(COLOURS)],
-                ms=5,
-                lw=1.2,
-                label=for_figure(name),
-            )
+            x = [order.index(phase) for phase in known]
+            y = [row.by_phase[phase][kind].mean for phase in known]
+            axis.plot(x, y, ms=5, label=for_figure(name), **line_style(place))
         axis.set_xticks(range(len(order)), map(for_figure, order), rotation=40, ha="right")
         axis.set_ylim(bottom=0)
         axis.set_ylabel(label)
@@ -226,6 +223,16 @@ def _phases(figure: Any, rows: Sequence[Row]) -> None:
     figure.legend(handles, names, loc="outside lower center", ncols=4, frameon=False)
 
 
-def _heading(metric: Metric) -> str:
-    unit = "%" if metric.bounded else metric.unit
-    return for_figure(f"{metric.title}, {unit}" if unit else metric.title)
+def line_style(place: int) -> dict[str, Any]:
+    """Of the line of a row, by its place: other rows have other ones."""
+    return {
+        "marker": MARKERS[place % len(MARKERS)],
+        "ls": ("-", "--")[place // len(COLOURS) % 2],
+        "color": COLOURS[place % len(COLOURS)],
+        "lw": 1.2,
+    }
+
+
+def heading(metric: Metric, between: str = ", ") -> str:
+    """Title and unit for an axis."""
+    return for_figure(between.join(filter(None, [metric.title, unit(metric)])))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
@@ -22,7 +22,7 @@ from pytest_simbench.report.figures import FiguresUnavailable, write_figures
 from pytest_simbench.report.history import AnyHistory
 from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.outcome import Outcome
-from pytest_simbench.report.page import PAGE_NAME, Compared, page_of
+from pytest_simbench.report.page import PAGE_NAME, Compared
 from pytest_simbench.report.replay import REPLAY_NAME
 from pytest_simbench.report.replay.groups import Group, groups
 from pytest_simbench.report.sheet import sheet_name
@@ -115,6 +115,9 @@ def write_files(
         histories: of simulators, drawn too.
         sweeps: laws over time steps, drawn too.
     """
+    from pytest_simbench.report.page.context import page
+    from pytest_simbench.report.page.render import render  # Jinja2
+
     problems: list[str] = []
     failed: list[str] = []
     pictures: list[Path] = []
@@ -122,8 +125,11 @@ def write_files(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         return Written((f"no report: {_unwritable(folder, error)}",), False)
+    sheets: Mapping[str, bytes] = {}
     if figures:
         try:
+            sheets, told = sheets_of(run or folder, records)
+            problems += told
             pictures = [
                 *write_figures(folder, others(summaries)),
                 *history.write_pictures(folder, histories),
@@ -136,12 +142,10 @@ def write_files(
     told_of = {found.title: found.sentences() for found in histories}
     names = [picture.name for picture in pictures]
     text = markdown.render_run(summaries, names, told_of, sweeps)
-    sheets, told = _sheets(run or folder, records) if figures else ({}, [])
-    problems += told
     shown, replay, told = _replay(run or folder, records)
     problems += told
-    page = page_of(run or folder, summaries, records, comparison, shown, sheets, sweeps)
-    contents = {PAGE_NAME: page}
+    told_page = page(run or folder, summaries, records, comparison, shown, sheets, sweeps)
+    contents = {PAGE_NAME: render(told_page)}
     if replay:
         contents[REPLAY_NAME] = replay
     if records:  # else the run has results on repeatability alone
@@ -154,14 +158,6 @@ def write_files(
         except OSError as error:
             failed.append(_unwritable(folder / name, error))
     return Written((*problems, *failed), not failed)
-
-
-def _sheets(run: Path, records: Sequence[Record]) -> tuple[dict[str, bytes], list[str]]:
-    """The contact sheet of each task, and what could not be shown."""
-    try:
-        return sheets_of(run, records)
-    except FiguresUnavailable as error:
-        return {}, [str(error)]
 
 
 def _replay(run: Path, records: Sequence[Record]) -> tuple[list[Group], str, list[str]]:

@@ -92,6 +92,11 @@ def fill(text: str, width: int, indent: str = "") -> str:
     return f"\n{indent}".join(line.plain.rstrip() for line in lines)
 
 
+def capital(text: str) -> str:
+    """A title with a large letter at its beginning."""
+    return text[:1].upper() + text[1:]
+
+
 def _best(columns: Sequence[Column], width: int) -> str:
     single = [column.joined() for column in columns]
     return _draw(single if _fits(single, width) else columns, width)

@@ -87,12 +87,7 @@ def _who(metric: Metric, values: Sequence[Spread | None], summary: TaskSummary) 
     """Who is ahead and who behind; of a single row its value."""
     there = [value for value in values if value is not None]
     if len(there) < 2:
-        value = there[0] if there else None
-        if value is None:
-            return ""
-        unit = "%" if metric.bounded else metric.unit
-        text = f"{cells.metric_value(value.mean, metric)} {unit} {cells.interval(value, metric)}"
-        return " ".join(text.split())
+        return "".join(cells.mean_in_words(value, metric) for value in there)
     found = standing(metric.name, [v.count if v else 0 for v in values], summary)
     if found == Standing():
         return "too few repetitions to compare"

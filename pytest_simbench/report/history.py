@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,9 +12,8 @@ from pytest_simbench.measure.intervals import interval
 from pytest_simbench.measure.law_history import LawHistory, law_histories
 from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.names import file_name
-from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.text import for_figure
-from pytest_simbench.report.figures import COLOURS, DPI, drawing
+from pytest_simbench.report.figures import COLOURS, drawing, heading, save
 from pytest_simbench.report.law_history import draw_laws
 
 AnyHistory = History | LawHistory
@@ -53,11 +51,8 @@ def write_pictures(folder: Path, found: Sequence[AnyHistory]) -> list[Path]:
     with drawing():
         for history in found:
             name = file_name(f"{history.simulator}_{history.task}_history", *history.identity)
-            picture = io.BytesIO()
             figure = draw_laws(history) if isinstance(history, LawHistory) else draw(history)
-            figure.savefig(picture, format="png", dpi=DPI)
-            paths.append(folder / f"{name}.png")
-            write_whole(paths[-1], picture.getvalue())
+            paths.append(save(figure, folder, name))
     return paths
 
 
@@ -68,7 +63,8 @@ def draw(history: History) -> Any:
     """
     from matplotlib.figure import Figure
 
-    shown = _shown(history)
+    # Those that changed, then what the study shows and the costs.
+    shown = sorted(history.courses, key=lambda c: (not c.changes, not c.metric.study))[:SHOWN]
     figure: Any = Figure(
         figsize=(max(6.0, 2 + 0.45 * len(history.releases)), 0.9 + 1.5 * len(shown)),
         layout="constrained",
@@ -79,12 +75,6 @@ def draw(history: History) -> Any:
     panels[-1].set_xticks(range(len(history.releases)), history.releases, rotation=45, ha="right")
     figure.suptitle(for_figure(history.title), fontsize="medium")
     return figure
-
-
-def _shown(history: History) -> list[Course]:
-    """Courses of a picture: those that changed, then what the study shows and the costs."""
-    order = sorted(history.courses, key=lambda c: (not c.changes, not c.metric.study))
-    return order[:SHOWN]
 
 
 def _panel(axis: Any, course: Course) -> None:
@@ -99,8 +89,7 @@ def _panel(axis: Any, course: Course) -> None:
         axis.plot(place, scale * found.mean, "o", color=COLOURS[0], ms=4)
     for change in course.changes:
         axis.axvline(present[change.place] - 0.5, color=COLOURS[1], ls="--", lw=1)
-    unit = "%" if metric.bounded else metric.unit
-    axis.set_ylabel(for_figure(f"{metric.title}\n{unit}" if unit else metric.title), fontsize=8)
+    axis.set_ylabel(heading(metric, between="\n"), fontsize=8)
     axis.margins(y=0.15)
     low, high = axis.get_ylim()
     least = 4 * scale * metric.smallest_difference  # a deterministic engine's rounding is no course

@@ -8,7 +8,7 @@ from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.records.text import for_markdown
 from pytest_simbench.report import columns, sweep, truth
 from pytest_simbench.report.answer import sentences
-from pytest_simbench.report.grid import Column
+from pytest_simbench.report.grid import Column, capital
 from pytest_simbench.report.summary import TaskSummary
 
 
@@ -46,26 +46,22 @@ def render_run(
 
 def _truth(summaries: Sequence[TaskSummary]) -> str:
     """What simulators make of laws."""
-    parts = [f"## {_capital(truth.TITLE)}"]
+    parts = [f"## {capital(truth.TITLE)}"]
     if told := truth.sentences(summaries):
         parts.append("\n".join(f"- {for_markdown(text)}" for text in told))
     parts += [table(truth.table(summaries)), for_markdown(truth.LEGEND)]
     for name, found in truth.details(summaries):
-        parts.append(f"### {for_markdown(_capital(name))}\n\n{table(found)}")
+        parts.append(f"### {for_markdown(capital(name))}\n\n{table(found)}")
     return "\n\n".join(parts)
 
 
 def _sweep(found: Sequence[Swept]) -> str:
     """Laws over time steps."""
-    parts = [f"## {_capital(sweep.TITLE)}", table(sweep.table(found)), for_markdown(sweep.LEGEND)]
+    parts = [f"## {capital(sweep.TITLE)}", table(sweep.table(found)), for_markdown(sweep.LEGEND)]
     parts.append(for_markdown(sweep.READING))
     for name, columns_ in sweep.details(found):
-        parts.append(f"### {for_markdown(_capital(name))}\n\n{table(columns_)}")
+        parts.append(f"### {for_markdown(capital(name))}\n\n{table(columns_)}")
     return "\n\n".join(parts)
-
-
-def _capital(text: str) -> str:
-    return text[0].upper() + text[1:]
 
 
 def render_task(summary: TaskSummary, level: int = 2) -> str:
@@ -76,7 +72,7 @@ def render_task(summary: TaskSummary, level: int = 2) -> str:
     tables = [*columns.details(summary), (columns.BY_PHASE, columns.by_phase(summary))]
     for name, found in tables:
         if found:
-            heading = for_markdown(_capital(name))
+            heading = for_markdown(capital(name))
             parts.append(f"{'#' * (level + 1)} {heading}\n\n{table(found)}")
     notes = columns.notes(summary)
     if notes:

@@ -34,8 +34,12 @@ class _Repetition:
 
     def describe(self) -> str:
         """Node, phase and count, for instance `on lab1  place  9/15 cubes`."""
-        count = f"{self.done}/{self.total} {self.noun}".rstrip() if self.total else ""
-        return "  ".join(part for part in (self.place, self.phase, count) if part)
+        return "  ".join(part for part in (self.place, self.phase, self.counted) if part)
+
+    @property
+    def counted(self) -> str:
+        """What is done of how many, for instance `9/15 cubes`."""
+        return f"{self.done}/{self.total} {self.noun}".rstrip() if self.total else ""
 
     @property
     def place(self) -> str:
@@ -130,18 +134,17 @@ class Progress:
 
     def phase(self, name: str) -> None:
         """The calling thread's repetition is now doing this: launch, load, pick, settle, ..."""
-        with self._lock:
-            current = self._current()
-            if current is not None:
-                current.phase = in_one_line(name)
-                self._update()
+        self._tell(phase=in_one_line(name))
 
     def count(self, done: int, total: int, noun: str = "") -> None:
         """The calling thread's repetition has done so many of its things, for instance cubes."""
+        self._tell(done=done, total=total, noun=in_one_line(noun))
+
+    def _tell(self, **told: object) -> None:
         with self._lock:
             current = self._current()
             if current is not None:
-                current.done, current.total, current.noun = done, total, in_one_line(noun)
+                vars(current).update(told)
                 self._update()
 
     def end_repetition(self, status: str, seconds: float) -> None:
@@ -207,9 +210,8 @@ class Progress:
 
     def _log(self, test: _Test, ended: _Repetition, outcome: str) -> None:
         """One plain line for a repetition that ended."""
-        count = f"{ended.done}/{ended.total} {ended.noun}".rstrip() if ended.total else ""
         where = f"repetition {ended.number} of {test.last}"
-        parts = [test.id, where, ended.place, outcome, count, self._left(test)]
+        parts = [test.id, where, ended.place, outcome, ended.counted, self._left(test)]
         self._write("  ".join(part for part in parts if part) + "\n")
         self._last = self._clock()
 

@@ -18,6 +18,9 @@ from pytest_simbench.report.progress import Progress
 FOLDER = "recordings"
 """In the run folder."""
 
+TOLD = ("test", "simulator", "mode", "profile", "task", "seed", "repetition", "status")
+"""Of the record's fields those that are in a bag's metadata."""
+
 
 def trace_of(run: Path, record: Record) -> Path | None:
     """The file of a repetition's trace, if the run folder has it.
@@ -98,14 +101,5 @@ def _up_to_date(folder: Path, trace: Path) -> bool:
 
 def _told(record: Record) -> dict[str, str]:
     """What the bag's metadata says of the repetition."""
-    return {
-        "test": record.test,
-        "simulator": record.simulator,
-        "mode": record.mode,
-        "profile": record.profile,
-        "task": record.task,
-        "seed": str(record.seed),
-        "repetition": str(record.repetition),
-        "status": record.status,
-        "versions": ", ".join(f"{name} {version}" for name, version in record.versions.items()),
-    }
+    versions = ", ".join(f"{name} {version}" for name, version in record.versions.items())
+    return {**{name: str(getattr(record, name)) for name in TOLD}, "versions": versions}

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from pytest_simbench.measure.wins import Win
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import series
+from pytest_simbench.records.series import grouped, series
 from pytest_simbench.report.pooling import (
     AMOUNT,
     Ends,
@@ -158,11 +158,8 @@ def summarise(
         references: by task, then by metric.
         ends: the intervals to show.
     """
-    by_task: dict[str, list[Record]] = {}
-    for record in records:
-        by_task.setdefault(record.task, []).append(record)
     summaries = []
-    for task, found in by_task.items():
+    for task, found in grouped(records, lambda r: r.task).items():
         declared = tuple(metrics[task] if task in metrics else _undeclared(found))
         rows = tuple(_row(r.records, declared, r.label, ends) for r in series(found))
         protocols = ", ".join(sorted({record.protocol for record in found}))
@@ -237,12 +234,10 @@ def _seconds(records: Sequence[Record]) -> dict[str, float]:
 
 
 def _causes(records: Sequence[Record]) -> tuple[Cause, ...]:
-    groups: dict[tuple[str, str], list[Record]] = {}
-    for record in records:
-        if record.status == "failed":
-            error = record.error
-            key = (error.type, error.phase) if error else ("unknown", "")
-            groups.setdefault(key, []).append(record)
+    failed = (record for record in records if record.status == "failed")
+    groups = grouped(
+        failed, lambda r: (r.error.type, r.error.phase) if r.error else ("unknown", "")
+    )
     causes = []
     for (kind, phase), group in sorted(groups.items(), key=lambda item: -len(item[1])):
         error = group[0].error

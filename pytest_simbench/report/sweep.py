@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -12,11 +11,10 @@ from pytest_simbench.measure.convergence import Convergence
 from pytest_simbench.measure.sweep import REFERENCE, Choice, Line, Point, Swept, choice, sweeps
 from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.names import file_name
-from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.series import step_text
 from pytest_simbench.records.text import for_figure, for_terminal
 from pytest_simbench.report import cells
-from pytest_simbench.report.figures import COLOURS, DPI, MARKERS, drawing
+from pytest_simbench.report.figures import drawing, line_style, save
 from pytest_simbench.report.grid import Column, fill, render
 from pytest_simbench.tasks.phenomena import ordered
 
@@ -153,11 +151,8 @@ def write_pictures(folder: Path, found: Sequence[Swept]) -> list[Path]:
     with drawing():
         for phenomenon in phenomena(found):
             for over in OVER:
-                picture = io.BytesIO()
-                draw(found, phenomenon, over).savefig(picture, format="png", dpi=DPI)
                 name = file_name(f"sweep_{phenomenon.replace(' ', '_')}_{over}")
-                paths.append(folder / f"{name}.png")
-                write_whole(paths[-1], picture.getvalue())
+                paths.append(save(draw(found, phenomenon, over), folder, name))
     return paths
 
 
@@ -182,11 +177,7 @@ def draw(found: Sequence[Swept], phenomenon: str, over: str) -> Any:
         for place, (who, name) in enumerate(names.items()):
             for line in (line for line in law.lines if line.who == who):
                 x, y = _course(line.points, over)
-                axis.plot(
-                    x, y, marker=MARKERS[place % len(MARKERS)], ms=4, lw=1.2,
-                    ls=("-", "--")[place // len(COLOURS) % 2],
-                    color=COLOURS[place % len(COLOURS)], label=for_figure(name),
-                )  # fmt: skip
+                axis.plot(x, y, ms=4, label=for_figure(name), **line_style(place))
         if over == "step" and law.tolerances:
             steps = sorted(law.tolerances)
             axis.plot([1e3 * h for h in steps], [law.tolerances[h] for h in steps], color="0.6",

@@ -13,7 +13,7 @@ from pytest_simbench.scene.checks import SceneError
 from pytest_simbench.scene.pose import FloatArray, Pose, Vector3, quaternion_of
 
 MOST = 64
-"""Corners of a mesh, as many as the engine that takes fewest does: PhysX, of hulls for a GPU."""
+"""Corners of a mesh, as many as the engine that takes fewest does, of hulls for a GPU."""
 
 EVEN = 1e-6
 """Share of its size by which a mesh's corners, centre and axes may be off: single precision has 7

@@ -1,6 +1,6 @@
 """The base of an adapter whose simulator is a program of its own, stepped in lock-step.
 
-What it would take for Webots and CoppeliaSim is in docs/external.md.
+What it would take for the programs that the study compared is in docs/external.md.
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from fnmatch import fnmatchcase
+from importlib.util import find_spec
 
 from pytest_simbench.scene import Robot, Scene
 from pytest_simbench.simulator.errors import SimulatorError
@@ -80,6 +81,14 @@ class Deviation:
 def alternatives(modules: str) -> list[str]:
     """The modules that an entry of `SimulatorInfo.modules` names, one of which is enough."""
     return modules.split("|")
+
+
+def importable(module: str) -> bool:
+    """Whether a module is there. It is not imported, but the package that it lies in is."""
+    try:
+        return find_spec(module) is not None
+    except (ImportError, ValueError):
+        return False
 
 
 def no_module(absent: Iterable[str]) -> str:

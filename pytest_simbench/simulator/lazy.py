@@ -18,6 +18,6 @@ def lazy_import(name: str) -> Any:
     """Stand-in for the module `name`, which is imported when its first attribute is read.
 
     An adapter's facts and settings can so be read where its engine is not installed. Missing
-    submodules are imported by naming them: `lazy_import("mujoco.viewer")`.
+    submodules are imported by naming them: `lazy_import("engine.viewer")`.
     """
     return _LazyModule(name)

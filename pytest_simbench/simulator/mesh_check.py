@@ -23,6 +23,12 @@ THINNEST = 1e-6
 
 PACKAGE = "package://"
 
+HEADER = 84
+"""Of a binary STL file [bytes]: 80, and the number of triangles (uint32)."""
+
+TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+"""One record a triangle after that."""
+
 
 def mesh_path(filename: str, urdf: str, packages: Mapping[str, str]) -> Path:
     """Where a mesh lies that a URDF names: in one of the robot's packages or beside the URDF.
@@ -72,18 +78,14 @@ def check_mesh(path: Path) -> None:
     if path.suffix.lower() != ".stl":
         raise FileError(f"{path} is no mesh that every engine reads; give a binary .stl file")
     data = read_file(path, LARGEST_MESH, "the mesh")
-    count = int.from_bytes(data[80:84], "little")
-    if len(data) != 84 + count * TRIANGLE.itemsize or not count:
+    count = int.from_bytes(data[80:HEADER], "little")
+    if len(data) != HEADER + count * TRIANGLE.itemsize or not count:
         raise FileError(f"{path} holds no binary STL mesh; write it anew from a mesh editor")
     if count > MOST_TRIANGLES:
         raise FileError(f"{path} has {count} triangles; simplify it to {MOST_TRIANGLES} or fewer")
-    points = np.frombuffer(data, TRIANGLE, offset=84)["corners"].reshape(-1, 3).astype(float)
+    points = np.frombuffer(data, TRIANGLE, offset=HEADER)["corners"].reshape(-1, 3).astype(float)
     if not (np.abs(points) <= FARTHEST).all():  # false for NaN
         raise FileError(f"{path} has a vertex that is not finite, or more than {FARTHEST:g} away")
     spread = np.linalg.eigvalsh(np.cov(points.T))
     if not spread[0] > THINNEST**2 * spread[2]:
         raise FileError(f"{path} is flat: it has no convex hull, which is what engines collide")
-
-
-TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-"""One of a binary STL, after 80 bytes of header and the number of triangles (uint32)."""

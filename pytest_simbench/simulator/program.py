@@ -140,7 +140,7 @@ class Program:
             if found.si_code == os.CLD_EXITED:
                 self._how = f"exited with status {found.si_status}"
             else:
-                self._how = f"was killed by {_signal_name(found.si_status)}"
+                self._how = f"was killed by {signal_name(found.si_status)}"
         return self._how
 
     def words(self) -> str:
@@ -215,7 +215,8 @@ class Program:
                 self.kill()
 
 
-def _signal_name(number: int) -> str:
+def signal_name(number: int) -> str:
+    """SIGSEGV, for instance."""
     try:
         return signal.Signals(number).name
     except ValueError:

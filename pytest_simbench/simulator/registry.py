@@ -7,10 +7,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import Distribution, EntryPoint, distributions
+from typing import Any
 
 from pytest_simbench.simulator.base import Simulator
 from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.info import SimulatorInfo
+from pytest_simbench.simulator.settings import Settings, changed, profile
 from pytest_simbench.simulator.versions import VersionedName, base_name
 
 GROUP = "pytest_simbench.simulators"
@@ -133,7 +135,7 @@ def address(name: str) -> str | None:
 def adapter(name: str) -> type[Simulator]:
     """The adapter class of a simulator. Its engine is not imported.
 
-    Of a version (`mujoco==3.3.7`) it is the same class with an `info` of its own.
+    Of a version (`mysim==3.3.7`) it is the same class with an `info` of its own.
 
     Raises:
         UnknownSimulatorError: the message lists the known names.
@@ -163,3 +165,13 @@ def adapter(name: str) -> type[Simulator]:
     if not (isinstance(getattr(cls, "profiles", None), Mapping) and cls.profiles):
         raise SimulatorError(f"{whose} has no settings in its attribute profiles")
     return cls
+
+
+def settings_of(name: str, profile_name: str, changes: Mapping[str, Any]) -> Settings:
+    """The settings of a simulator: those of a profile, some of them changed.
+
+    Raises:
+        SimulatorError: as `adapter`.
+        SettingsError: it has no such profile, or cannot take a change.
+    """
+    return changed(profile(adapter(name).profiles, profile_name, name), changes, name)

@@ -19,8 +19,8 @@ SHORTEST_TIMESTEP = 1e-6
 
 LARGEST_TIMESTEP = 1 / 60
 """[s]. At the 3 m/s that the arm reaches, a cube of 5 cm then moves by its own width in a step, and
-with longer steps one may pass through another unseen. No engine here has a longer default
-(Omniverse PhysX has this one), and no motion or wait of a task is shorter."""
+with longer steps one may pass through another unseen. No engine has a longer default, and no motion
+or wait of a task is shorter."""
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ import numpy as np
 
 from pytest_simbench.scene import FloatArray, Polytope, Pose
 from pytest_simbench.simulator.errors import DescriptionError
+from pytest_simbench.simulator.mesh_check import HEADER, TRIANGLE
 from pytest_simbench.simulator.urdf import Shape
 
 _GRID = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
@@ -24,12 +25,6 @@ DIRECTIONS: FloatArray = _GRID / np.linalg.norm(_GRID, axis=1, keepdims=True)
 _ORDER = np.sqrt(np.arange(2.0, 28.0))
 """Weights of the directions that put shapes in an order of their own; roots, so that no
 symmetry makes two different shapes equal."""
-
-_STL_HEADER, _STL_TRIANGLE = (
-    84,
-    np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")]),
-)
-"""Layout of a binary STL file: header and count [bytes], then one record a triangle."""
 
 
 def reach(points: FloatArray) -> FloatArray:
@@ -128,9 +123,9 @@ def _mesh_points(path: str, _changed: int) -> FloatArray:
 
 def _stl_points(path: Path) -> FloatArray | None:
     data = path.read_bytes()
-    count = int.from_bytes(data[80:_STL_HEADER], "little")
-    if len(data) == _STL_HEADER + count * _STL_TRIANGLE.itemsize:
-        triangles = np.frombuffer(data, _STL_TRIANGLE, count, _STL_HEADER)
+    count = int.from_bytes(data[80:HEADER], "little")
+    if len(data) == HEADER + count * TRIANGLE.itemsize:
+        triangles = np.frombuffer(data, TRIANGLE, count, HEADER)
         return np.asarray(triangles["corners"], dtype=float).reshape(-1, 3)
     if not data.lstrip().startswith(b"solid"):
         return None

@@ -24,6 +24,9 @@ from pytest_simbench.simulator.urdf_check import Description
 ROOT = "base"
 """Link of a reduced robot that is fixed in the world."""
 
+INERTIA = {f"i{'xyz'[row]}{'xyz'[k]}": (row, k) for row in range(3) for k in range(row, 3)}
+"""Attributes of a URDF's tensor, ixx, ixy, ..., izz, and where each stands in it."""
+
 
 @dataclass(frozen=True)
 class Shape:
@@ -139,29 +142,19 @@ class PreparedRobot:
         """Attach what hangs on raw link `name`, which sits at `pose` in reduced link `into`."""
         self.places[name] = into, pose
         for joint in joints:
-            if _parent(joint) != name:
+            if _required(joint, "parent").attrib["link"] != name:
                 continue
-            child, origin = _child(joint), pose * origin_of(joint)
-            if joint.attrib["type"] == "fixed":
+            moved, kind = joint.attrib["name"], joint.attrib["type"]
+            child, origin = _required(joint, "child").attrib["link"], pose * origin_of(joint)
+            if kind == "fixed":
                 self.links[into].absorb(raw[child], origin)
                 self._descend(child, into, origin, joints, raw)
                 continue
-            kind, limit = joint.attrib["type"], _required(joint, "limit")
-            axis = joint.find("axis")
-            self.joints.append(
-                MovingJoint(
-                    joint.attrib["name"],
-                    kind,
-                    into,
-                    child,
-                    origin,
-                    _vector("1 0 0" if axis is None else axis.attrib["xyz"]),
-                )
-            )
-            self.limits[joint.attrib["name"]] = np.array(
-                [float(limit.attrib["lower"]), float(limit.attrib["upper"])]
-            )
-            self.velocity_limits[joint.attrib["name"]] = float(limit.attrib["velocity"])
+            limit, told = _required(joint, "limit").attrib, joint.find("axis")
+            axis = _vector("1 0 0" if told is None else told.attrib["xyz"])
+            self.joints.append(MovingJoint(moved, kind, into, child, origin, axis))
+            self.limits[moved] = np.array([float(limit["lower"]), float(limit["upper"])])
+            self.velocity_limits[moved] = float(limit["velocity"])
             self.links[child] = raw[child]
             self._descend(child, child, Pose(), joints, raw)
 
@@ -172,14 +165,9 @@ class PreparedRobot:
             mass, i = inertial.find("mass"), inertial.find("inertia")
             if mass is not None and i is not None:
                 pose = origin_of(inertial)
-                values = {key: float(value) for key, value in i.attrib.items()}
-                tensor = np.array(
-                    [
-                        [values["ixx"], values["ixy"], values["ixz"]],
-                        [values["ixy"], values["iyy"], values["iyz"]],
-                        [values["ixz"], values["iyz"], values["izz"]],
-                    ]
-                )
+                tensor = np.zeros((3, 3))
+                for key, (row, column) in INERTIA.items():
+                    tensor[row, column] = tensor[column, row] = float(i.attrib[key])
                 link.mass = float(mass.attrib["value"])
                 link.centre = np.asarray(pose.position)
                 link.inertia = pose.rotation() @ tensor @ pose.rotation().T
@@ -218,7 +206,7 @@ class PreparedRobot:
                 effort=repr(drive.effort_limit),
                 velocity=repr(self.velocity_limits[joint.name]),
             )
-        # Bullet reads files in pieces of 1024 bytes a line and may cut an attribute in two.
+        # One engine reads files in pieces of 1024 bytes a line and may cut an attribute in two.
         ET.indent(root)
         return ET.tostring(root, encoding="unicode")
 
@@ -233,14 +221,6 @@ def _about(inertia: FloatArray, mass: float, offset: FloatArray) -> FloatArray:
     """Inertia about a point `offset` away from the centre of mass (Steiner)."""
     steiner = mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
     return np.asarray(inertia + steiner)
-
-
-def _parent(joint: ET.Element) -> str:
-    return _required(joint, "parent").attrib["link"]
-
-
-def _child(joint: ET.Element) -> str:
-    return _required(joint, "child").attrib["link"]
 
 
 def _required(element: ET.Element, tag: str) -> ET.Element:
@@ -293,16 +273,8 @@ def _write_inertial(element: ET.Element, link: Link) -> None:
     inertial = ET.SubElement(element, "inertial")
     ET.SubElement(inertial, "origin", xyz=_spaced(link.centre), rpy="0 0 0")
     ET.SubElement(inertial, "mass", value=repr(float(link.mass)))
-    i = link.inertia
-    names = {
-        "ixx": (0, 0),
-        "ixy": (0, 1),
-        "ixz": (0, 2),
-        "iyy": (1, 1),
-        "iyz": (1, 2),
-        "izz": (2, 2),
-    }
-    ET.SubElement(inertial, "inertia", {n: repr(float(i[at])) for n, at in names.items()})
+    values = {name: repr(float(link.inertia[at])) for name, at in INERTIA.items()}
+    ET.SubElement(inertial, "inertia", values)
 
 
 def _write_shape(element: ET.Element, shape: Shape) -> None:

@@ -1,4 +1,4 @@
-"""Names of simulators with a version in them: `mujoco==3.3.7`, a release; `mujoco@main`, a build.
+"""Names of simulators with a version in them: `mysim==3.3.7`, a release; `mysim@main`, a build.
 
 A release lives in an environment of its own. A build lives in an interpreter that the user names;
 what follows the `@` is its version, or a label that the user gave it.

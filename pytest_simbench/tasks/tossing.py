@@ -2,8 +2,7 @@
 
 A repetition is one toss. It starts as the real one did, and position and attitude are compared at
 every sample of the real one until it lies at rest. The measure is the literature's (Acosta, Yang,
-Posa, RA-L 2022, arXiv 2110.00541), where with parameters fitted to each simulator Drake has 13.5 %
-and 16.5 degrees, Bullet 14.9 % and 16.5, MuJoCo 25.1 % and 21.7.
+Posa, RA-L 2022, arXiv 2110.00541). docs/reality.md has what was published.
 """
 
 from __future__ import annotations

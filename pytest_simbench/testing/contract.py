@@ -6,6 +6,8 @@ import dataclasses
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -33,6 +35,17 @@ sys.path[:0] = {path!r}
 cls = getattr(importlib.import_module({module!r}), {name!r})
 cls.info, cls.profiles
 """
+
+
+@contextmanager
+def refused(what: str) -> Iterator[list[WorkerError]]:
+    """What is done in this block must be an error, which the list holds afterwards."""
+    found: list[WorkerError] = []
+    try:
+        yield found
+    except WorkerError as error:
+        found.append(error)
+    require(found, f"{what} accepted")
 
 
 @check()
@@ -91,14 +104,11 @@ def profiles_complete(subject: Subject) -> None:
 @check()
 def unknown_setting_rejected(subject: Subject) -> None:
     """A setting that does not exist is an error which lists those there are."""
-    try:
+    with refused("an unknown setting was") as error:
         subject.construct(subject.shared(), {"no_such_setting": 1})
-    except WorkerError as error:
-        known = [f.name for f in dataclasses.fields(subject.settings)]
-        silent = [name for name in known if name not in str(error)]
-        require(not silent, f"the error does not list {silent}: {error.what}")
-    else:
-        require(False, "an unknown setting was accepted")
+    known = [f.name for f in dataclasses.fields(subject.settings)]
+    silent = [name for name in known if name not in str(error[0])]
+    require(not silent, f"the error does not list {silent}: {error[0].what}")
 
 
 @check()
@@ -213,12 +223,10 @@ def bad_description_rejected(subject: Subject) -> None:
     process = subject.shared()
     subject.construct(process)
     wire = scenes.arm_alone(robot).to_wire()
-    try:
+    with refused("a robot description that does not exist was") as error:
         process.request("load", timeout=600.0, scene=wire, parity=False)
-    except WorkerError as error:
-        require("/nowhere/robot.urdf" in error.what, f"the error does not name it: {error.what}")
-    else:
-        require(False, "a robot description that does not exist was accepted")
+    what = error[0].what
+    require("/nowhere/robot.urdf" in what, f"the error does not name it: {what}")
     require(process.alive, "the worker died of a bad robot description")
     with subject.world(scenes.falling()) as world:
         require(world.time == 0, "the next scene does not start at time 0")
@@ -231,10 +239,7 @@ def overlap_rejected(subject: Subject) -> None:
     wire["bodies"][1]["pose"]["position"][2] -= 0.01
     process = subject.shared()
     subject.construct(process)
-    try:
+    with refused("overlapping bodies were") as error:
         process.request("load", timeout=600.0, scene=wire, parity=False)
-    except WorkerError as error:
-        named = "level0" in error.what and "level1" in error.what
-        require(named, f"the error does not name both bodies: {error.what}")
-    else:
-        require(False, "overlapping bodies were accepted")
+    what = error[0].what
+    require("level0" in what and "level1" in what, f"the error does not name both bodies: {what}")

@@ -24,10 +24,12 @@ from pytest_simbench.scene import (
     Scene,
     Sphere,
 )
+from pytest_simbench.simulator.mesh_check import TRIANGLE
 from pytest_simbench.simulator.shapes import mesh_points
 from pytest_simbench.testing import scenes
 
 Plant = Callable[[Scene, Path], Scene]
+Edit = Callable[[ET.Element, Robot, Path], None]
 
 
 @dataclass(frozen=True)
@@ -130,7 +132,7 @@ def of_joint(name: str, **factors: float) -> Plant:
     return plant
 
 
-def of_description(path: str, edit: Callable[[ET.Element, Robot, Path], None]) -> Plant:
+def of_description(path: str, edit: Edit) -> Plant:
     """An element of the URDF, edited."""
 
     def plant(scene: Scene, folder: Path) -> Scene:
@@ -152,7 +154,7 @@ def _robot(scene: Scene) -> Robot:
     return scene.robot
 
 
-def _set(**values: str) -> Callable[[ET.Element, Robot, Path], None]:
+def _set(**values: str) -> Edit:
     return lambda element, robot, folder: element.attrib.update(values)
 
 
@@ -166,16 +168,14 @@ def _scaled(mesh: ET.Element, robot: Robot, folder: Path) -> None:
     package, _, rest = mesh.attrib["filename"].removeprefix("package://").partition("/")
     points = 1.3 * mesh_points(str(Path(robot.packages[package]) / rest))
     corners = np.resize(points, (3 * math.ceil(len(points) / 3), 3)).reshape(-1, 3, 3)
-    record = np.zeros(
-        len(corners), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")]
-    )
+    record = np.zeros(len(corners), TRIANGLE)
     record["corners"] = corners
     path = folder / "scaled.stl"
     path.write_bytes(bytes(80) + len(corners).to_bytes(4, "little") + record.tobytes())
     mesh.attrib["filename"] = path.name
 
 
-def _moved(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Callable[..., None]:
+def _moved(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Edit:
     """An <origin> moved."""
 
     def edit(origin: ET.Element, robot: Robot, folder: Path) -> None:
@@ -193,91 +193,96 @@ def _turned_inertia(inertia: ET.Element, robot: Robot, folder: Path) -> None:
     inertia.attrib.update(ixx=old["iyy"], iyy=old["ixx"], ixy=negative, ixz=turned, iyz=old["ixz"])
 
 
-_LINK, _JOINT = "link[@name='panda_link4']", "joint[@name='panda_joint4']"
+_JOINT4, _LINK4 = "joint[@name='panda_joint4']", "link[@name='panda_link4']"
+_TIP = "link[@name='panda_leftfinger']/collision[4]"
 _TILTED = f"{math.sin(math.radians(5))} 0 {math.cos(math.radians(5))}"
+_THINNER = (0.1, 0.058, 0.03)
+
+
+def _described(what: str, quantity: str, path: str, edit: Edit) -> Fault:
+    """An element of the URDF, edited."""
+    return Fault(what, quantity, of_description(path, edit))
+
+
+def _driven(what: str, **factor: float) -> Fault:
+    """One value of joint 4's drive, multiplied."""
+    return Fault(
+        what, f"joint/panda_joint4/{next(iter(factor))}", of_joint("panda_joint4", **factor)
+    )
+
+
+def _built(what: str, quantity: str, **values: Any) -> Fault:
+    """A body with other values; the quantity is `NAME/QUANTITY`."""
+    return Fault(what, f"body/{quantity}", of_body(quantity.partition("/")[0], **values))
+
 
 FAULTS: dict[str, Fault] = {
-    "finger_shape": Fault(
+    "finger_shape": _described(
         "the rubber tip of a finger is 3 mm thinner",
         "link/panda_leftfinger/boxes",
-        of_description(
-            "link[@name='panda_leftfinger']/collision[4]/geometry/box",
-            _set(size="17.5e-3 12.2e-3 18.5e-3"),
-        ),
+        f"{_TIP}/geometry/box",
+        _set(size="17.5e-3 12.2e-3 18.5e-3"),
     ),
-    "finger_pad": Fault(
+    "finger_pad": _described(
         "the rubber tip of a finger is 2 mm nearer to the hand",
         "link/panda_leftfinger/boxes",
-        of_description("link[@name='panda_leftfinger']/collision[4]/origin", _moved(z=-0.002)),
+        f"{_TIP}/origin",
+        _moved(z=-0.002),
     ),
-    "mesh_scale": Fault(
+    "mesh_scale": _described(
         "the mesh of link 4 is 1.3 times as large",
         "link/panda_link4/meshes",
-        of_description(f"{_LINK}/collision/geometry/mesh", _scaled),
+        f"{_LINK4}/collision/geometry/mesh",
+        _scaled,
     ),
-    "no_shape": Fault(
-        "link 4 has no collision shape",
-        "link/panda_link4/meshes",
-        of_description(_LINK, _without_shapes),
+    "no_shape": _described(
+        "link 4 has no collision shape", "link/panda_link4/meshes", _LINK4, _without_shapes
     ),
-    "joint_origin": Fault(
-        "joint 4 is 10 mm aside",
-        "link/panda_link4/pose",
-        of_description(f"{_JOINT}/origin", _moved(y=0.01)),
+    "joint_origin": _described(
+        "joint 4 is 10 mm aside", "link/panda_link4/pose", f"{_JOINT4}/origin", _moved(y=0.01)
     ),
-    "joint_axis": Fault(
+    "joint_axis": _described(
         "the axis of joint 1 is turned by 5 degrees",
         "joint/panda_joint1/axis",
-        of_description("joint[@name='panda_joint1']/axis", _set(xyz=_TILTED)),
+        "joint[@name='panda_joint1']/axis",
+        _set(xyz=_TILTED),
     ),
-    "joint_limits": Fault(
+    "joint_limits": _described(
         "joint 4 stops 0.1 rad earlier",
         "joint/panda_joint4/limits",
-        of_description(f"{_JOINT}/limit", _set(lower="-2.9718")),
+        f"{_JOINT4}/limit",
+        _set(lower="-2.9718"),
     ),
-    "link_mass": Fault(
-        "link 4 weighs 5 kg",
-        "link/panda_link4/mass",
-        of_description(f"{_LINK}/inertial/mass", _set(value="5.0")),
+    "link_mass": _described(
+        "link 4 weighs 5 kg", "link/panda_link4/mass", f"{_LINK4}/inertial/mass", _set(value="5.0")
     ),
-    "centre_of_mass": Fault(
+    "centre_of_mass": _described(
         "the centre of mass of link 4 is 100 mm off",
         "link/panda_link4/com",
-        of_description(f"{_LINK}/inertial/origin", _moved(y=-0.1)),
+        f"{_LINK4}/inertial/origin",
+        _moved(y=-0.1),
     ),
-    "inertia_turned": Fault(
+    "inertia_turned": _described(
         "the inertia of link 4 is turned by 90 degrees",
         "link/panda_link4/inertia",
-        of_description(f"{_LINK}/inertial/inertia", _turned_inertia),
+        f"{_LINK4}/inertial/inertia",
+        _turned_inertia,
     ),
-    "inertia_scaled": Fault(
+    "inertia_scaled": _described(
         "the inertia of link 4 is 20 % larger about x",
         "link/panda_link4/inertia",
-        of_description(f"{_LINK}/inertial/inertia", _set(ixx="0.031")),
+        f"{_LINK4}/inertial/inertia",
+        _set(ixx="0.031"),
     ),
     "base": Fault(
-        "the base is 10 mm aside",
-        "link/panda_link1/pose",
-        of_robot(base=Pose.at(0.0, 0.01, 0.0)),
+        "the base is 10 mm aside", "link/panda_link1/pose", of_robot(base=Pose.at(0.0, 0.01, 0.0))
     ),
     "finger_friction": Fault(
         "the robot's friction is 4", "link/panda_leftfinger/friction", of_robot(friction=4.0)
     ),
-    "stiffness": Fault(
-        "the drive of joint 4 is 10 % stiffer",
-        "joint/panda_joint4/stiffness",
-        of_joint("panda_joint4", stiffness=1.1),
-    ),
-    "drive_damping": Fault(
-        "the drive of joint 4 damps 10 % more",
-        "joint/panda_joint4/damping",
-        of_joint("panda_joint4", damping=1.1),
-    ),
-    "effort_limit": Fault(
-        "joint 4 has twice its effort limit",
-        "joint/panda_joint4/effort_limit",
-        of_joint("panda_joint4", effort_limit=2.0),
-    ),
+    "stiffness": _driven("the drive of joint 4 is 10 % stiffer", stiffness=1.1),
+    "drive_damping": _driven("the drive of joint 4 damps 10 % more", damping=1.1),
+    "effort_limit": _driven("joint 4 has twice its effort limit", effort_limit=2.0),
     "squeeze": Fault(
         "the fingers squeeze twice as strongly",
         "joint/panda_finger_joint1/effort_limit",
@@ -285,43 +290,23 @@ FAULTS: dict[str, Fault] = {
             of_joint("panda_finger_joint2", effort_limit=2.0)(scene, folder), folder
         ),
     ),
-    "armature": Fault(
-        "joint 4 has half its rotor inertia",
-        "joint/panda_joint4/armature",
-        of_joint("panda_joint4", armature=0.5),
+    "armature": _driven("joint 4 has half its rotor inertia", armature=0.5),
+    "initial_position": _driven("joint 4 starts 1 % nearer to zero", initial_position=0.99),
+    "body_mass": _built("the brick weighs 1 kg", "brick/mass", mass=1.0),
+    "body_size": _built("the brick is 2 mm thinner", "brick/boxes", size=_THINNER),
+    "ball_size": _built("the ball is 1 mm smaller", "ball/rounds", radius=0.0295),
+    "can_length": _built("the can is 2 mm shorter", "can/rounds", length=0.108),
+    "can_inertia": _built(
+        "the can is 1 mm thinner, and its inertia with it", "can/inertia", radius=0.0325
     ),
-    "initial_position": Fault(
-        "joint 4 starts 1 % nearer to zero",
-        "joint/panda_joint4/initial_position",
-        of_joint("panda_joint4", initial_position=0.99),
+    "pill_length": _built("the pill is 2 mm longer", "pill/rounds", length=0.062),
+    "wedge_corners": _built(
+        "the wedge is 2 mm longer", "wedge/meshes", vertices=scenes.wedge(length=0.102)
     ),
-    "body_mass": Fault("the brick weighs 1 kg", "body/brick/mass", of_body("brick", mass=1.0)),
-    "body_size": Fault(
-        "the brick is 2 mm thinner",
-        "body/brick/boxes",
-        of_body("brick", size=(0.1, 0.058, 0.03)),
-    ),
-    "ball_size": Fault(
-        "the ball is 1 mm smaller", "body/ball/rounds", of_body("ball", radius=0.0295)
-    ),
-    "can_length": Fault("the can is 2 mm shorter", "body/can/rounds", of_body("can", length=0.108)),
-    "can_inertia": Fault(
-        "the can is 1 mm thinner, and its inertia with it",
-        "body/can/inertia",
-        of_body("can", radius=0.0325),
-    ),
-    "pill_length": Fault(
-        "the pill is 2 mm longer", "body/pill/rounds", of_body("pill", length=0.062)
-    ),
-    "wedge_corners": Fault(
-        "the wedge is 2 mm longer",
-        "body/wedge/meshes",
-        of_body("wedge", vertices=scenes.wedge(length=0.102)),
-    ),
-    "wedge_inertia": Fault(
+    "wedge_inertia": _built(
         "the wedge is 2 mm wider, and its inertia with it",
-        "body/wedge/inertia",
-        of_body("wedge", vertices=scenes.wedge(width=0.052)),
+        "wedge/inertia",
+        vertices=scenes.wedge(width=0.052),
     ),
     "wedge_is_a_box": Fault(
         "the wedge is the box around it",
@@ -330,15 +315,11 @@ FAULTS: dict[str, Fault] = {
             Box("wedge", scene.body("wedge").extents, LEANING, 0.15, 0.7)
         ),
     ),
-    "restitution": Fault(
-        "the ball bounces less", "body/ball/restitution", of_body("ball", restitution=0.55)
-    ),
+    "restitution": _built("the ball bounces less", "ball/restitution", restitution=0.55),
     "ground_restitution": Fault(
         "the ground bounces less", "ground/restitution", of_scene(ground_restitution=0.55)
     ),
-    "body_damping": Fault(
-        "the ball turns on undamped", "body/ball/damping", of_body("ball", angular_damping=0.0)
-    ),
+    "body_damping": _built("the ball turns on undamped", "ball/damping", angular_damping=0.0),
     "round_kind": Fault(
         "the pillar is a capsule as long as it",
         "body/pillar/rounds",
@@ -346,35 +327,23 @@ FAULTS: dict[str, Fault] = {
             Capsule("pillar", 0.04, 0.12, scene.body("pillar").pose, friction=0.7)
         ),
     ),
-    "body_inertia": Fault(
-        "the brick is 2 mm thinner, and its inertia with it",
-        "body/brick/inertia",
-        of_body("brick", size=(0.1, 0.058, 0.03)),
+    "body_inertia": _built(
+        "the brick is 2 mm thinner, and its inertia with it", "brick/inertia", size=_THINNER
     ),
-    "linear_velocity": Fault(
-        "the brick starts 1 cm/s faster",
-        "body/brick/velocity",
-        of_body("brick", linear_velocity=(0.2, -0.1, 0.31)),
+    "linear_velocity": _built(
+        "the brick starts 1 cm/s faster", "brick/velocity", linear_velocity=(0.2, -0.1, 0.31)
     ),
-    "angular_velocity": Fault(
+    "angular_velocity": _built(
         "the brick's spin is in its own frame",
-        "body/brick/velocity",
-        of_body("brick", angular_velocity=tuple(TURNED.rotation().T @ SPIN)),
+        "brick/velocity",
+        angular_velocity=tuple(TURNED.rotation().T @ SPIN),
     ),
-    "body_pose": Fault(
-        "the cube is 1 mm aside",
-        "body/cube/pose",
-        of_body("cube", pose=Pose.at(0.601, -0.1, 0.325, yaw=-1.0)),
+    "body_pose": _built(
+        "the cube is 1 mm aside", "cube/pose", pose=Pose.at(0.601, -0.1, 0.325, yaw=-1.0)
     ),
-    "body_friction": Fault(
-        "the brick's friction is 0.5", "body/brick/friction", of_body("brick", friction=0.5)
-    ),
-    "fixed_body": Fault(
-        "the cube is fixed in the world", "body/cube/dynamic", of_body("cube", mass=0.0)
-    ),
-    "driven_body": Fault(
-        "the belt is a free body", "body/belt/dynamic", of_body("belt", prescribed=False, mass=0.4)
-    ),
+    "body_friction": _built("the brick's friction is 0.5", "brick/friction", friction=0.5),
+    "fixed_body": _built("the cube is fixed in the world", "cube/dynamic", mass=0.0),
+    "driven_body": _built("the belt is a free body", "belt/dynamic", prescribed=False, mass=0.4),
     "gravity": Fault(
         "gravity is 1 % stronger", "gravity", of_scene(gravity=(0.303, -0.202, -3.737))
     ),

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
 import numpy as np
 import pytest
 
-from pytest_simbench.client.world import Motion, World
+from pytest_simbench.client.world import Motion
 from pytest_simbench.scene import Pose, Robot, Scene, Trajectory
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
@@ -44,9 +45,12 @@ def require_same(what: str, a: Motion, b: Motion) -> None:
             )
 
 
-def swing_and_wait(world: World, scene: Scene, timestep: float) -> Motion:
-    world.follow(_swing(scene, timestep, 0.2))
-    return logged(world.wait(1.0, log_period=0.02))
+def swung(subject: Subject, **options: Any) -> Motion:
+    """What happens in a world of the busy scene while the arm swings; options of its making."""
+    scene = busy_scene(subject.arm)
+    with subject.world(scene, **options) as world:
+        world.follow(_swing(scene, subject.timestep, 0.2))
+        return logged(world.wait(1.0, log_period=0.02))
 
 
 @check(Capability.SAVE_RESTORE, any_robot)
@@ -109,23 +113,17 @@ def restore_in_the_grip(subject: Subject) -> None:
 @check(Capability.DETERMINISTIC, any_robot)
 def fresh_processes_agree(subject: Subject) -> None:
     """Two fresh processes compute the same, bit for bit."""
-    scene, runs = busy_scene(subject.arm), []
-    for _ in range(2):
-        with subject.world(scene, fresh=True) as world:
-            runs.append(swing_and_wait(world, scene, subject.timestep))
-    require_same("two fresh processes", runs[1], runs[0])
+    first = swung(subject, fresh=True)
+    require_same("two fresh processes", swung(subject, fresh=True), first)
 
 
 @check(Capability.DETERMINISTIC, any_robot)
 def reused_process_agrees(subject: Subject) -> None:
     """A second world in one process, after another scene was in between, computes the same."""
-    scene, runs = busy_scene(subject.arm), []
-    for _ in range(2):
-        with subject.world(scene) as world:
-            runs.append(swing_and_wait(world, scene, subject.timestep))
-        with subject.world(scenes.tower()) as world:
-            world.wait(0.1)
-    require_same("two worlds in one process", runs[1], runs[0])
+    first = swung(subject)
+    with subject.world(scenes.tower()) as world:
+        world.wait(0.1)
+    require_same("two worlds in one process", swung(subject), first)
 
 
 @check(Capability.WINDOW, any_robot)
@@ -134,10 +132,7 @@ def window_changes_nothing(subject: Subject) -> None:
     1 mm. Skipped where there is no display."""
     if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         pytest.skip("no display; start one, e.g. with xvfb-run")
-    scene, runs = busy_scene(subject.arm), []
-    for gui in (False, True):
-        with subject.world(scene, fresh=True, gui=gui) as world:
-            runs.append(swing_and_wait(world, scene, subject.timestep))
+    runs = [swung(subject, fresh=True, gui=gui) for gui in (False, True)]
     if subject.can(Capability.DETERMINISTIC):
         require_same("with and without a window", runs[1], runs[0])
     else:

@@ -17,7 +17,6 @@ import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,7 @@ import numpy as np
 from pytest_simbench import __version__
 from pytest_simbench.scene import Scene, Trajectory
 from pytest_simbench.simulator import Simulator, SimulatorError, SimulatorInfo
-from pytest_simbench.simulator.info import alternatives
+from pytest_simbench.simulator.info import alternatives, importable
 from pytest_simbench.simulator.loops import check_loops
 from pytest_simbench.simulator.memory import remembering
 from pytest_simbench.simulator.parity import check
@@ -267,19 +266,12 @@ def _import_engine(info: SimulatorInfo) -> None:
     for modules in info.modules:
         names = alternatives(modules)
         try:
-            importlib.import_module(next(filter(_there, names), names[0]))
+            importlib.import_module(next(filter(importable, names), names[0]))
         except ImportError as error:
             raise SimulatorError(
                 f"{info.title} does not import ({error}); it is missing or half installed in "
                 f"{sys.executable}: {info.install}"
             ) from error
-
-
-def _there(module: str) -> bool:
-    try:
-        return find_spec(module) is not None
-    except (ImportError, ValueError):
-        return False
 
 
 def serve(receive: Callable[[], Any], send: Callable[[Any], None]) -> None:

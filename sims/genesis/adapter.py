@@ -81,6 +81,7 @@ class Genesis(Simulator):
                 Capability.EXACT_RESTORE,
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
+                Capability.LOOPS,
                 Capability.DETERMINISTIC,
             }
         ),

@@ -91,7 +91,14 @@ class ReadBack:
                 found |= self._inertial(f"link/{name}", link)
         for name in prepared.robot.joint_names:
             found |= self._joint(f"joint/{name}", self.robot.get_joint(name))
-        return found
+        return found | self._closures()
+
+    def _closures(self) -> dict[str, FloatArray]:
+        """The two points of each loop, in the frames of their links."""
+        _, _, kinds = self._equalities()
+        loops = np.flatnonzero(kinds == genesis.EQUALITY_TYPE.CONNECT)
+        data = self._array("equalities", "eq_data")[loops, 0]
+        return {f"closure/{k}/points": row[:6].reshape(2, 3) for k, row in enumerate(data)}
 
     def _array(self, group: str, name: str) -> Any:
         """A tensor of the solver's description, read once."""
@@ -188,7 +195,8 @@ class ReadBack:
 
     def _equalities(self) -> tuple[Any, Any, Any]:
         names = ("eq_obj1id", "eq_obj2id", "eq_type")
-        first, second, kinds = (self._array("equalities", name)[:, 0] for name in names)
+        many = self.solver.n_equalities  # behind them there is room for more
+        first, second, kinds = (self._array("equalities", name)[:many, 0] for name in names)
         return first, second, kinds
 
     def _coupled(self, fingers: Sequence[str]) -> bool:

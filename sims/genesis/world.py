@@ -9,8 +9,11 @@ from math import degrees
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, Scene, Sphere
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, Settings, lazy_import
+from pytest_simbench.simulator.loops import reduced
 from pytest_simbench.simulator.shapes import write_obj
 from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
 
@@ -177,7 +180,8 @@ def _shape(geometry: ET.Element, body: Body, folder: Path) -> None:
 
 
 def add_robot(world: Any, prepared: PreparedRobot) -> Any:
-    """The entity of the reduced robot, its fingers held together by an equality constraint."""
+    """The entity of the reduced robot. Equality constraints hold its fingers together, and close
+    its loops."""
     xml = ET.fromstring(prepared.to_urdf())
     fingers = prepared.robot.gripper.joints
     for joint in xml.findall("joint"):
@@ -191,7 +195,17 @@ def add_robot(world: Any, prepared: PreparedRobot) -> Any:
         default_armature=None,
         requires_jac_and_IK=False,
     )
-    return world.add_entity(morph, material=material(prepared.robot.friction))
+    robot = world.add_entity(morph, material=material(prepared.robot.friction))
+    for number, closure in enumerate(reduced(prepared)):
+        # Genesis has no public call for it: this is what it calls for those of an MJCF file.
+        robot._add_equality(
+            name=f"closure {number}",
+            type=genesis.EQUALITY_TYPE.CONNECT,
+            objs_name=(closure.first, closure.second),
+            data=np.array([*closure.first_point, *closure.second_point, *[0.0] * 5]),
+            sol_params=genesis.utils.geom.default_solver_params(),
+        )
+    return robot
 
 
 def add_camera(world: Any, width: int, height: int) -> Any:

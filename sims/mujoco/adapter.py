@@ -248,9 +248,8 @@ class MuJoCo(Simulator):
             **mesh,
         )
         self._set_surface(geom, part.friction, part.restitution, WORLD, WORLD | ROBOT)
-        if not isinstance(
-            part, Box | ConvexMesh
-        ):  # their contacts neither roll nor spin with friction
+        if not isinstance(part, Box | ConvexMesh):
+            # contacts of a round shape neither roll nor spin with friction
             geom.condim, geom.priority = 3, 1
         if part.prescribed:
             geom.contype, geom.conaffinity = LED, ROBOT

@@ -38,7 +38,17 @@ def close_loops(spec: Any, closures: Iterable[Closure]) -> None:
 
 
 def closed(model: Any, active: Any) -> dict[str, FloatArray]:
-    """The quantity `closure/NUMBER/points` of each active closure."""
-    kinds = (model.eq_type == mujoco.mjtEq.mjEQ_CONNECT) & active
-    ends = np.stack([model.eq_obj1id, model.eq_obj2id], axis=1)[kinds]
-    return {f"closure/{k}/points": model.site_pos[pair] for k, pair in enumerate(ends)}
+    """The quantity `closure/NUMBER/points` of each active closure, held by two sites or, as with
+    Newton, by two bodies with a point each."""
+    loops = np.flatnonzero((model.eq_type == mujoco.mjtEq.mjEQ_CONNECT) & active)
+    return {
+        f"closure/{k}/points": _points(model, number) for k, number in enumerate(loops.tolist())
+    }
+
+
+def _points(model: Any, number: int) -> FloatArray:
+    """What a closure holds together, (2, 3), each in the frame of its link [m]."""
+    if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
+        sites = [model.eq_obj1id[number], model.eq_obj2id[number]]
+        return np.array(model.site_pos[sites])
+    return np.array(model.eq_data[number, :6]).reshape(2, 3)

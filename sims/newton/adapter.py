@@ -71,6 +71,7 @@ class Newton(Simulator):
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
                 Capability.JOINT_WRENCHES,
+                Capability.LOOPS,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -144,7 +145,7 @@ class Newton(Simulator):
         self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         self.model = build_model(scene, self.prepared, self.settings)
         self._number(scene)
-        self.solver = make_solver(self.model, self.settings)
+        self.solver = make_solver(self.model, self.prepared, self.settings)
         self._set_mujoco(scene)
         self._states = [self.model.state(), self.model.state()]
         self._control = self.model.control()

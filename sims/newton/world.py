@@ -19,6 +19,7 @@ from pytest_simbench.scene import (
     Sphere,
 )
 from pytest_simbench.simulator import PreparedRobot, Settings, heavy, lazy_import
+from pytest_simbench.simulator.loops import reduced
 
 newton = lazy_import("newton")
 wp = lazy_import("warp")
@@ -66,9 +67,8 @@ def build_model(scene: Scene, prepared: PreparedRobot | None, settings: NewtonSe
     # What MuJoCo needs of a contact beyond Newton's own parameters.
     model.mujoco.condim.fill_(settings.condim)
     for body in scene.bodies:
-        if not isinstance(
-            body, Box | ConvexMesh
-        ):  # their contacts neither roll nor spin with friction
+        if not isinstance(body, Box | ConvexMesh):
+            # contacts of a round shape neither roll nor spin with friction
             shape = model.shape_label.index(body.name)
             model.mujoco.condim.numpy()[shape] = 3
             model.mujoco.geom_priority.numpy()[shape] = 1
@@ -76,7 +76,7 @@ def build_model(scene: Scene, prepared: PreparedRobot | None, settings: NewtonSe
     return model
 
 
-def make_solver(model: Any, settings: NewtonSettings) -> Any:
+def make_solver(model: Any, prepared: PreparedRobot | None, settings: NewtonSettings) -> Any:
     """SolverMuJoCo with MuJoCo's C code, and what Newton has no parameters for."""
     solver = newton.solvers.SolverMuJoCo(
         model,
@@ -89,9 +89,19 @@ def make_solver(model: Any, settings: NewtonSettings) -> Any:
     options.timestep = settings.timestep
     # On a state that is not finite MuJoCo would start over from its initial state, silently.
     options.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    # The fingers' coupling, as stiff as the step allows.
+    # The fingers' coupling and the loops, as stiff as the step allows.
     solver.mj_model.eq_solref[:] = (2 * settings.timestep, 1.0)
+    if prepared is not None:
+        _set_second_points(solver.mj_model, prepared)
     return solver
+
+
+def _set_second_points(model: Any, prepared: PreparedRobot) -> None:
+    """MuJoCo finds a closure's point of the second link at its own zero posture, where the loop is
+    open. So the scene's are written."""
+    loops = model.eq_type == mujoco.mjtEq.mjEQ_CONNECT
+    for number, closure in zip(np.flatnonzero(loops), reduced(prepared), strict=True):
+        model.eq_data[number, 3:6] = closure.second_point
 
 
 def names(paths: list[str]) -> list[str]:
@@ -118,6 +128,14 @@ def _add_robot(builder: Any, prepared: PreparedRobot, surface: Any) -> None:
         _set_drive(builder, joints.index(joint.name), joint)
     for first, second in robot.gripper.couplings:
         builder.set_joint_mimic(joints.index(second), joints.index(first))
+    links = names(builder.body_label)
+    for closure in reduced(prepared):
+        newton.solvers.mujoco.add_equality_connect(
+            builder,
+            links.index(closure.first),
+            links.index(closure.second),
+            anchor=wp.vec3(*closure.first_point),
+        )
 
 
 def _add_body(builder: Any, part: Body, surface: Any, most: float) -> None:

@@ -21,7 +21,7 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.repeater import Repeater
-from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.experiment.repetition import Hooks, Repetition
 from pytest_simbench.records.record import Record
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
 from tests.client.test_faults import Silent
@@ -135,7 +135,7 @@ def test_the_limits_are_those_given(case: Case, limit: float) -> None:
     repetition._made = lambda process: (keep(process), made.append(process))  # type: ignore
     before = time.monotonic()
     deadlines = []
-    repetition._on_phase = lambda name: deadlines.extend(p.deadline for p in made)
+    repetition.hooks = Hooks(phase=lambda name: deadlines.extend(p.deadline for p in made))
     repetition.run()
     assert deadlines
     assert all(before + limit <= at <= before + limit + 1.0 for at in deadlines if at)

@@ -12,7 +12,7 @@ from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.protocol import PROTOCOLS
-from pytest_simbench.experiment.repetition import Repetition, group
+from pytest_simbench.experiment.repetition import Hooks, Repetition, group
 from pytest_simbench.tasks.base import Count, Outcome, Task
 from tests.tiny import Falling
 
@@ -45,7 +45,7 @@ def test_paper_runs_in_real_time_and_records_before(case: Case) -> None:
 
 def test_phases_follow_each_other(case: Case) -> None:
     phases: list[str] = []
-    Repetition(Experiment(case, Falling()), 1, on_phase=phases.append).run()
+    Repetition(Experiment(case, Falling()), 1, hooks=Hooks(phase=phases.append)).run()
     assert [name for k, name in enumerate(phases) if phases[k - 1 : k] != [name]] == [
         *("launch", "load", "launch", "task", "fall", "task"),
     ]

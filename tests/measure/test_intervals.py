@@ -246,14 +246,8 @@ def test_values_that_cannot_be_are_refused() -> None:
         interval([0.5, math.nan], COUNT)
 
 
-def test_the_wire_form_has_no_number_where_nothing_is_known() -> None:
+def test_an_interval_knows_its_width_and_what_lies_in_it() -> None:
     found = Interval(0.5, 0.25, 0.875, 20, "betting")
-    assert found.to_wire() == {
-        **{"mean": 0.5, "low": 0.25, "high": 0.875, "n": 20},
-        **{"method": "betting", "confidence": 0.95},
-    }
-    unknown = interval([], COUNT).to_wire()
-    assert (unknown["mean"], unknown["low"], unknown["high"]) == (None, None, None)
     assert found.half_width == 0.3125
     assert 0.25 in found
     assert 0.2 not in found

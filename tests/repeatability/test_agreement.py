@@ -10,7 +10,14 @@ import numpy as np
 import pytest
 
 from pytest_simbench.client.world import Motion
-from pytest_simbench.repeatability.agreement import FOLDER, Sample, agreement, agreements
+from pytest_simbench.repeatability.agreement import (
+    FOLDER,
+    Agreement,
+    Parting,
+    Sample,
+    agreement,
+    agreements,
+)
 from pytest_simbench.repeatability.episode import Episodes
 from tests.repeatability.scripted import episode, motion, operation
 
@@ -175,20 +182,11 @@ def test_a_file_with_something_else_in_it(tmp_path: Path, wrong: dict[str, objec
         Sample.load(path)
 
 
-def test_an_agreement_on_the_wire() -> None:
+def test_an_agreement_is_known_in_full() -> None:
     first = sample("a", TIMES, [0.2, 0.2, 0.2, 0.2])
     second = replace(sample("b", TIMES, [0.2, 0.2, 0.2015, 0.2]), counts={"n": 0.5})
-    assert agreement(first, second).to_wire() == {
-        "first": "a",
-        "second": "b",
-        "partings": {
-            "0.001": {"time": 0.3, "body": "moving", "position": (0.2, 0.0, 0.0)},
-            "0.01": None,
-        },
-        "commands_part": None,
-        "until": 0.4,
-        "same_outcome": False,
-    }
+    partings = {0.001: Parting(0.3, "moving", (0.2, 0.0, 0.0)), 0.01: None}
+    assert agreement(first, second) == Agreement("a", "b", partings, None, 0.4, False)
 
 
 def test_what_was_run_otherwise_is_told() -> None:

@@ -10,9 +10,9 @@ from typing import NamedTuple
 from pytest_simbench.measure.limits import FAILURES
 from pytest_simbench.report import cells
 from pytest_simbench.report.answer import short_labels, standing
-from pytest_simbench.report.grid import Column
+from pytest_simbench.report.grid import Column, capital
 from pytest_simbench.report.headline import cost_of
-from pytest_simbench.report.pooling import Spread
+from pytest_simbench.report.pooling import Sampled, Spread
 from pytest_simbench.report.summary import Row, TaskSummary
 from pytest_simbench.tasks.metrics import Metric
 
@@ -80,11 +80,10 @@ def study(summary: TaskSummary) -> Table:
     rows = summary.rows
     columns: list[tuple[Heading, list[Cell]]] = [
         (Heading("simulator", left=True), [Cell([row.simulator, row.variant]) for row in rows]),
-        (
-            Heading("failed", FAILURES.doc),
-            _judged([_failures(row) for row in rows], FAILURES.name, _attempts(rows), summary),
-        ),
     ]
+    failed, attempts = [_failures(row) for row in rows], [row.attempts for row in rows]
+    judged = _judged(failed, FAILURES.name, attempts, summary)
+    columns.append((Heading("failed", FAILURES.doc), judged))
     for metric in summary.study:
         spreads = [row.metrics.get(metric.name) for row in rows]
         found = [_spread(value, metric) for value in spreads]
@@ -93,17 +92,14 @@ def study(summary: TaskSummary) -> Table:
         columns.append((Heading(cells.heading(metric), metric.doc), found))
     for heading, note, name in COST_COLUMNS:
         costs = [cost_of(row, name) for row in rows]
-        texts = [cells.sampled(row.rss_mb) if name == "ram" else cells.cost(c) for row, c in
-                 zip(rows, costs, strict=True)]  # fmt: skip
-        found = [
-            Cell(text, None if cost is None else cost.mean)
-            for text, cost in zip(texts, costs, strict=True)
-        ]
+        texts = (
+            [cells.sampled(row.rss_mb) for row in rows] if name == "ram" else map(cells.cost, costs)
+        )
+        found = [Cell(text, _mean(cost)) for text, cost in zip(texts, costs, strict=True)]
         columns.append((Heading(heading, note), _judged(found, name, _counts(costs), summary)))
     columns += [
         (Heading("CPU %", "of one core: mean and deviation of worker and children"),
-         [Cell(cells.sampled(r.cpu_percent), r.cpu_percent.mean if r.cpu_percent else None)
-          for r in rows]),
+         [Cell(cells.sampled(row.cpu_percent), _mean(row.cpu_percent)) for row in rows]),
         (Heading("start s", "from launch to the start of the task"),
          [Cell(cells.cost(row.start), _mean(row.start)) for row in rows]),
         (Heading("end s", "from launch to the end of the task"),
@@ -126,7 +122,8 @@ COST_COLUMNS = (
 def from_columns(
     title: str, columns: Sequence[Column], note: str = "", rows: Mapping[tuple[str, ...], Of] = {}
 ) -> Table:
-    """A table of the other reports; `rows` says what the lines with these labels are of."""
+    """A table of the other reports, its title with a capital; `rows` says what the lines with these
+    labels are of."""
     headings = [Heading(column.heading, left=column.left) for column in columns]
     lines = []
     joined = [column.joined() if column.left else column for column in columns[1:]]
@@ -134,7 +131,7 @@ def from_columns(
         line = [Cell(cell, _leading(cell)) for cell in found]
         label = tuple(found[0])
         lines.append(TableRow(line, rows.get(label), label == ("reference",)))
-    return Table(title, headings, lines, note)
+    return Table(capital(title), headings, lines, note)
 
 
 def labelled(summary: TaskSummary) -> dict[tuple[str, ...], Of]:
@@ -156,10 +153,6 @@ def _judged(
     return [
         Cell(cell.lines, cell.sort, verdicts.get(place, "")) for place, cell in enumerate(found)
     ]
-
-
-def _attempts(rows: Sequence[Row]) -> list[int]:
-    return [row.attempts for row in rows]
 
 
 def _counts(spreads: Iterable[Spread | None]) -> list[int]:
@@ -184,7 +177,7 @@ def _spread(found: Spread | None, metric: Metric) -> Cell:
     return Cell([line for line in lines if line], found.mean)
 
 
-def _mean(found: Spread | None) -> float | None:
+def _mean(found: Spread | Sampled | None) -> float | None:
     return None if found is None else found.mean
 
 

@@ -17,6 +17,7 @@ from pytest_simbench.report.answer import sentences
 from pytest_simbench.report.changes import DIFFERENT
 from pytest_simbench.report.changes import columns as change_columns
 from pytest_simbench.report.headline import headline
+from pytest_simbench.report.page import Compared as Reported
 from pytest_simbench.report.page import setup
 from pytest_simbench.report.page.cells import Of, Table, from_columns, labelled, of, study
 from pytest_simbench.report.page.pictures import Picture, of_sweeps, pictures
@@ -112,23 +113,36 @@ def page(
     folder: Path,
     summaries: Sequence[TaskSummary],
     records: Sequence[Record],
-    comparison: tuple[str, GateReport] | None = None,
+    comparison: Reported | None = None,
     replays: Sequence[Group] = (),
     sheets: Mapping[str, bytes] | None = None,
     sweeps: Sequence[Swept] = (),
 ) -> Page:
-    """The page of a run, see `page_of`."""
+    """What the page of a run tells; `render.render` makes HTML of it.
+
+    Args:
+        folder: of the run; its results on repeatability are read from it.
+        summaries: from `summary.summarise`, with their wins.
+        records: that they were made of.
+        comparison: with a baseline, where there is one.
+        replays: what the replay beside the page shows.
+        sheets: contact sheets (PNG), by the name of their task.
+        sweeps: laws over time steps.
+    """
     records = at_own_steps(records)
     replay, video = links(replays), videos(folder)
     numbers: dict[int, int] = {}
     repetitions: list[dict[str, Any]] = []
 
+    def recorded(record: Record) -> tuple[str, str]:
+        """The addresses of its replay and video."""
+        return replay.get(id(record), ""), video(record)
+
     def number(record: Record) -> int:
         """Its place among the page's repetitions, where it is put when first asked for."""
         if id(record) not in numbers:
             numbers[id(record)] = len(repetitions)
-            links_of = replay.get(id(record), ""), video(record)
-            repetitions.append(_repetition(record, *links_of))
+            repetitions.append(_repetition(record, *recorded(record)))
         return numbers[id(record)]
 
     problems: dict[str, None] = {}
@@ -144,7 +158,7 @@ def page(
                 study(summary),
                 strips(summary, rows, number),
                 _tables(summary),
-                _causes(summary, rows, lambda r: (replay.get(id(r), ""), video(r))),
+                _causes(summary, rows, recorded),
                 drawn,
                 columns.notes(summary),
                 [
@@ -161,7 +175,7 @@ def page(
                 b64encode((sheets or {}).get(summary.task, b"")).decode("ascii"),
             )
         )
-    again, unreadable = _repeatability(folder)
+    again, unreadable = repeatability.write_tables(folder)
     problems |= dict.fromkeys(unreadable)
     swept, problem = _sweep(sweeps) if sweeps else (None, "")
     problems |= dict.fromkeys(filter(None, [problem]))
@@ -176,7 +190,7 @@ def page(
         _truth(summaries),
         swept,
         tasks,
-        again,
+        [from_columns(title, table, note) for title, note, table in again],
         None if comparison is None else _compared(*comparison),
         setup.setup(summaries, records),
         repetitions,
@@ -193,19 +207,15 @@ def _subjects(summaries: Sequence[TaskSummary]) -> list[str]:
 def _truth(summaries: Sequence[TaskSummary]) -> list[Table]:
     if not truth.laws(summaries):
         return []
-    title = truth.TITLE[0].upper() + truth.TITLE[1:]
-    found = [from_columns(title, truth.table(summaries), truth.LEGEND)]
-    return found + [
-        from_columns(name[0].upper() + name[1:], columns)
-        for name, columns in truth.details(summaries)
-    ]
+    found = [from_columns(truth.TITLE, truth.table(summaries), truth.LEGEND)]
+    return found + [from_columns(name, columns) for name, columns in truth.details(summaries)]
 
 
 def _sweep(found: Sequence[Swept]) -> tuple[Sweep, str]:
     """And why there are no pictures."""
     shown = [(sweep.TITLE, sweep.table(found), sweep.LEGEND)]
     shown += [(name, table, "") for name, table in sweep.details(found)]
-    tables = [from_columns(name[0].upper() + name[1:], table, note) for name, table, note in shown]
+    tables = [from_columns(name, table, note) for name, table, note in shown]
     drawn, problem = of_sweeps(found)
     return Sweep(tables, drawn, sweep.READING), problem
 
@@ -214,9 +224,7 @@ def _tables(summary: TaskSummary) -> list[Table]:
     rows = labelled(summary)
     found = [item for item in columns.details(summary) if item[0] != "failures"]
     found.append((columns.BY_PHASE, columns.by_phase(summary)))
-    return [
-        from_columns(name[0].upper() + name[1:], table, rows=rows) for name, table in found if table
-    ]
+    return [from_columns(name, table, rows=rows) for name, table in found if table]
 
 
 def _causes(
@@ -244,19 +252,6 @@ def _causes(
                 )
             )
     return found
-
-
-def _repeatability(folder: Path) -> tuple[list[Table], list[str]]:
-    from pytest_simbench.records.repeatability import read
-    from pytest_simbench.repeatability.agreement import agreements
-
-    try:
-        lines = read(folder)
-        found = repeatability.tables(lines.items, agreements(folder))
-    except ValueError as error:
-        return [], [str(error)]
-    tables = [from_columns(title, table, note) for title, note, table in found]
-    return tables, [*lines.problems, *lines.refused]
 
 
 def _compared(name: str, report: GateReport) -> Compared:

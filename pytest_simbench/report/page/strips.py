@@ -241,8 +241,7 @@ def _swarm(found: Sequence[tuple[int, float, str]]) -> list[Dot]:
 
 
 def _text(value: float, metric: Metric) -> str:
-    unit = "%" if metric.bounded else metric.unit
-    return f"{cells.metric_value(value, metric)} {unit}".rstrip()
+    return f"{cells.metric_value(value, metric)} {cells.unit(metric)}".rstrip()
 
 
 def _finite(record: Record, value: Callable[[Record], float | None]) -> float | None:

@@ -11,7 +11,8 @@ import pytest
 from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.matrix import with_wins
-from pytest_simbench.report.page import PAGE_NAME, page_of
+from pytest_simbench.report.page import PAGE_NAME, context
+from pytest_simbench.report.page.render import render
 from pytest_simbench.report.summary import summarise
 from tests.hostile import HOSTILE
 from tests.report.browser import Opened, browser, opened
@@ -35,7 +36,7 @@ def write(folder: Path, found: list[Record], baseline: list[Record] | None = Non
     if baseline:
         comparison = ("runs/before", run_gate(baseline, found, (), metrics))
     path = folder / PAGE_NAME
-    path.write_text(page_of(folder, summaries, found, comparison), encoding="utf-8")
+    path.write_text(render(context.page(folder, summaries, found, comparison)), encoding="utf-8")
     return path
 
 

@@ -13,7 +13,8 @@ from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import Line, append
 from pytest_simbench.report.matrix import with_wins
-from pytest_simbench.report.page import context, page_of
+from pytest_simbench.report.page import context
+from pytest_simbench.report.page.render import render
 from pytest_simbench.report.summary import summarise
 from tests.hostile import HOSTILE, assert_harmless_terminal
 from tests.report.samples import METRICS, failed, record, stacking_run, throwing_run
@@ -61,7 +62,7 @@ class Parsed(HTMLParser):
 
 def made(found: list[Record], folder: Path, metrics: object = METRICS) -> str:
     summaries = with_wins(summarise(found, metrics), found)  # type: ignore[arg-type]
-    return page_of(folder, summaries, found)
+    return render(context.page(folder, summaries, found))
 
 
 def kinds(page: str) -> set[tuple[str, str]]:
