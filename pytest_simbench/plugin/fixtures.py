@@ -145,16 +145,20 @@ def simbench_case(
     request: pytest.FixtureRequest, sim_case: Variant, sim_settings: dict[str, Any]
 ) -> Case:
     """Everything that the repetitions of this test have in common."""
+    return case_of(request.node, sim_case, sim_settings)
+
+
+def case_of(item: pytest.Item, variant: Variant, settings: dict[str, Any]) -> Case:
+    """The case of a test, with the settings that it changes."""
     from pytest_simbench.plugin.selection import number_mark
 
-    given = options.value(request.config, "sim_timeout")
-    named = sim_case.simulator, sim_case.profile
+    given = options.value(item.config, "sim_timeout")
     return _case(
-        request.config,
-        sim_case,
-        request.node.nodeid,
-        settings=arguments.checked_settings(sim_settings, *named),
-        timeout=given if given is not None else number_mark(request.node, "sim_timeout"),
+        item.config,
+        variant,
+        item.nodeid,
+        settings=arguments.checked_settings(settings, variant.simulator, variant.profile),
+        timeout=given if given is not None else number_mark(item, "sim_timeout"),
     )
 
 

@@ -14,6 +14,7 @@ import pytest
 
 from pytest_simbench.client.display import Displays
 from pytest_simbench.plugin import cluster, options, recording
+from pytest_simbench.plugin.ahead import expected
 from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import Record
@@ -42,6 +43,7 @@ class Run:
         mistake: in what was typed, found when the tests had ended; one sentence.
         resumed: the interrupted run that this one completes, if it does.
         page: to look at, once the whole report is written.
+        tests: that will run, in their order, once they are collected.
     """
 
     def __init__(self, config: pytest.Config) -> None:
@@ -54,6 +56,7 @@ class Run:
         self.reading = Reading()
         self.mistake = ""
         self.page: Path | None = None
+        self.tests: list[pytest.Item] = []
         self._attempts: Counter[tuple[str, str, str]] = Counter()
         self._lock = threading.Lock()
         self._progress: Progress | None = None
@@ -141,6 +144,10 @@ class Run:
             from pytest_simbench.experiment.sharing import SharingExecutor
 
             return SharingExecutor(jobs, self._shared_by["simbench_slots"])
+        if jobs > 1:
+            from pytest_simbench.experiment.ahead import AheadExecutor
+
+            return AheadExecutor(jobs, expected(self.config, self.tests))
         from pytest_simbench.experiment.executor import LocalExecutor
 
         return LocalExecutor(jobs)

@@ -156,8 +156,10 @@ class SimSession:
 
     def lock(self, items: Iterable[pytest.Item]) -> None:
         """Complain of a run folder that the ini file names, if a test needs one, before it runs."""
-        if self._alone and any("sim_case" in fixtures_of(item) for item in items):
+        ours = [item for item in items if "sim_case" in fixtures_of(item)]
+        if self._alone and ours:
             self.run.lock()
+            self.run.tests = ours
 
     def tell_worker(self, node: Any) -> None:
         """Tell an xdist worker which run folder all share, why it cannot be used, and where the
