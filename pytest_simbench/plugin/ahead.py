@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -13,24 +13,34 @@ from pytest_simbench.plugin import cluster, options
 from pytest_simbench.plugin.variants import Variant
 
 if TYPE_CHECKING:
+    from pytest_simbench.experiment.case import Case
     from pytest_simbench.experiment.experiment import Experiment
+
+    CaseOf = Callable[[pytest.Item, Variant, dict[str, Any]], Case]
 
 MARK = "repeats"
 
 
-def expected(config: pytest.Config, items: Iterable[pytest.Item]) -> list[Experiment]:
-    """What tests will ask for, in their order; empty where nothing may begin before its test."""
+def expected(
+    config: pytest.Config, items: Iterable[pytest.Item], case_of: CaseOf
+) -> list[Experiment]:
+    """What tests will ask for, in their order; empty where nothing may begin before its test.
+
+    Args:
+        config: of the run.
+        items: its tests.
+        case_of: gives the case of a test of a variant that changes no settings.
+    """
     alone = not hasattr(config, "workerinput") and not cluster.asked(config)
     again = config.getoption("sim_resume") is not None
     if not alone or again or options.value(config, "sim_jobs") < 2:
         return []
-    return [experiment for item in items for experiment in _of(item)]
+    return [experiment for item in items for experiment in _of(item, case_of)]
 
 
-def _of(item: pytest.Item) -> Iterator[Experiment]:
+def _of(item: pytest.Item, case_of: CaseOf) -> Iterator[Experiment]:
     """The experiment of a test of one repetition, if it tells and runs without a window."""
     from pytest_simbench.experiment.experiment import Experiment
-    from pytest_simbench.plugin.fixtures import case_of
     from pytest_simbench.plugin.selection import number_mark
     from pytest_simbench.simulator import SimulatorError
     from pytest_simbench.tasks.base import Task

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench.plugin import arguments, benchmark, cluster, data, options, recording
+from pytest_simbench.plugin import ahead, arguments, benchmark, cluster, data, options, recording
 from pytest_simbench.plugin.session import session_of
 from pytest_simbench.plugin.spellings import is_conftest
 
@@ -188,7 +188,9 @@ def repeat(
     """Runs a task `--reps` times: `result = repeat(Stacking())`; each task once in a test."""
     from pytest_simbench.plugin.repeat_fixture import RepeatFixture
 
-    repeat = RepeatFixture(request.node, simbench_case, session_of(request.config).run)
+    run = session_of(request.config).run
+    run.expected = lambda: ahead.expected(request.config, request.session.items, case_of)
+    repeat = RepeatFixture(request.node, simbench_case, run)
     done: list[Task] = []
 
     def perform(task: Task) -> ResultSet:

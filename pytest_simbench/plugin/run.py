@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,6 @@ import pytest
 
 from pytest_simbench.client.display import Displays
 from pytest_simbench.plugin import cluster, options, recording
-from pytest_simbench.plugin.ahead import expected
 from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import Record
@@ -43,7 +42,7 @@ class Run:
         mistake: in what was typed, found when the tests had ended; one sentence.
         resumed: the interrupted run that this one completes, if it does.
         page: to look at, once the whole report is written.
-        tests: that will run, in their order, once they are collected.
+        expected: what later tests will ask for, see `ahead`; set before the first one asks.
     """
 
     def __init__(self, config: pytest.Config) -> None:
@@ -56,7 +55,7 @@ class Run:
         self.reading = Reading()
         self.mistake = ""
         self.page: Path | None = None
-        self.tests: list[pytest.Item] = []
+        self.expected: Callable[[], Iterable[Experiment]] = tuple
         self._attempts: Counter[tuple[str, str, str]] = Counter()
         self._lock = threading.Lock()
         self._progress: Progress | None = None
@@ -147,7 +146,7 @@ class Run:
         if jobs > 1:
             from pytest_simbench.experiment.ahead import AheadExecutor
 
-            return AheadExecutor(jobs, expected(self.config, self.tests))
+            return AheadExecutor(jobs, self.expected())
         from pytest_simbench.experiment.executor import LocalExecutor
 
         return LocalExecutor(jobs)

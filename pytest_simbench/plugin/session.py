@@ -156,10 +156,8 @@ class SimSession:
 
     def lock(self, items: Iterable[pytest.Item]) -> None:
         """Complain of a run folder that the ini file names, if a test needs one, before it runs."""
-        ours = [item for item in items if "sim_case" in fixtures_of(item)]
-        if self._alone and ours:
+        if self._alone and any("sim_case" in fixtures_of(item) for item in items):
             self.run.lock()
-            self.run.tests = ours
 
     def tell_worker(self, node: Any) -> None:
         """Tell an xdist worker which run folder all share, why it cannot be used, and where the
