@@ -28,6 +28,7 @@ def asked(law):
     return pytest.param(law, id=law.name, marks=marks)
 
 
+@pytest.mark.repeats("law")
 @pytest.mark.parametrize("law", [asked(law) for law in LAWS])
 def test_law(repeat, threshold, sim_swept, law):
     limit = threshold("ratio", ANY)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench.plugin import arguments, benchmark, cluster, data, options, recording
+from pytest_simbench.plugin import ahead, arguments, benchmark, cluster, data, options, recording
 from pytest_simbench.plugin.session import session_of
 from pytest_simbench.plugin.spellings import is_conftest
 
@@ -145,16 +145,20 @@ def simbench_case(
     request: pytest.FixtureRequest, sim_case: Variant, sim_settings: dict[str, Any]
 ) -> Case:
     """Everything that the repetitions of this test have in common."""
+    return case_of(request.node, sim_case, sim_settings)
+
+
+def case_of(item: pytest.Item, variant: Variant, settings: dict[str, Any]) -> Case:
+    """The case of a test, with the settings that it changes."""
     from pytest_simbench.plugin.marks import number_mark
 
-    given = options.value(request.config, "sim_timeout")
-    named = sim_case.simulator, sim_case.profile
+    given = options.value(item.config, "sim_timeout")
     return _case(
-        request.config,
-        sim_case,
-        request.node.nodeid,
-        settings=arguments.checked_settings(sim_settings, *named),
-        timeout=given if given is not None else number_mark(request.node, "sim_timeout"),
+        item.config,
+        variant,
+        item.nodeid,
+        settings=arguments.checked_settings(settings, variant.simulator, variant.profile),
+        timeout=given if given is not None else number_mark(item, "sim_timeout"),
     )
 
 
@@ -184,7 +188,9 @@ def repeat(
     """Runs a task `--reps` times: `result = repeat(Stacking())`; each task once in a test."""
     from pytest_simbench.plugin.repeat_fixture import RepeatFixture
 
-    repeat = RepeatFixture(request.node, simbench_case, session_of(request.config).run)
+    run = session_of(request.config).run
+    run.expected = lambda: ahead.expected(request.config, request.session.items, case_of)
+    repeat = RepeatFixture(request.node, simbench_case, run)
     done: list[Task] = []
 
     def perform(task: Task) -> ResultSet:

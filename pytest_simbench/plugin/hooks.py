@@ -17,6 +17,8 @@ MARKS = (
     "xfail_sim(name, reason=): expected to fail on this simulator",
     "needs(*capabilities): run only on simulators that have these capabilities",
     "reps(n): repetitions of this test, unless --reps is given",
+    "repeats(parameter): the test repeats the task that this parameter holds; with --sim-jobs it "
+    "may begin before the test does",
     "sim_conformance(kit): one test of each law of the conformance kit, see conformance_checks",
     "sim_timeout(seconds): time-out of a repetition, unless --sim-timeout is given",
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from functools import cached_property
 from pathlib import Path
@@ -15,6 +15,7 @@ import pytest
 
 from pytest_simbench.client.display import Displays
 from pytest_simbench.cluster.executor import ClusterExecutor
+from pytest_simbench.experiment.ahead import AheadExecutor
 from pytest_simbench.experiment.executor import Executor, LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.sharing import SharingExecutor
@@ -55,6 +56,7 @@ class Run:
         mistake: in what was typed, found when the tests had ended; one sentence.
         resumed: the interrupted run that this one completes, if it does.
         page: to look at, once the whole report is written.
+        expected: what later tests will ask for, see `ahead`; set before the first one asks.
     """
 
     def __init__(self, config: pytest.Config) -> None:
@@ -67,6 +69,7 @@ class Run:
         self.reading = Reading()
         self.mistake = ""
         self.page: Path | None = None
+        self.expected: Callable[[], Iterable[Experiment]] = tuple
         self._attempts: Counter[tuple[str, str, str]] = Counter()
         self._lock = threading.Lock()
         self._progress: Progress | None = None
@@ -142,6 +145,8 @@ class Run:
         jobs = options.value(self.config, "sim_jobs")
         if self._shared_by is not None and "simbench_slots" in self._shared_by:
             return SharingExecutor(jobs, self._shared_by["simbench_slots"])
+        if jobs > 1:
+            return AheadExecutor(jobs, self.expected())
         return LocalExecutor(jobs)
 
     @cached_property

@@ -6,6 +6,7 @@ Runs in Genesis' own interpreter.
 from __future__ import annotations
 
 import dataclasses
+import gc
 import importlib
 import inspect
 from collections.abc import Iterator
@@ -22,7 +23,11 @@ genesis = lazy_import("genesis")
 
 
 def start_engine(precision: str) -> None:
-    """Initialise Genesis, which a process does once for each precision."""
+    """Initialise Genesis, which a process does once for each precision.
+
+    What lives then, 3000 modules, lives on: Python's garbage collector need not look at it in each
+    world's end. Measured: 0.26 CPU s for each world, 0.01 without.
+    """
     if genesis._initialized:
         if genesis.np_float == np.dtype(f"float{precision}"):
             return
@@ -30,6 +35,8 @@ def start_engine(precision: str) -> None:
     genesis.init(backend=genesis.cpu, precision=precision, logging_level="warning", seed=0)
     with quick_inspection():
         importlib.import_module("genesis.engine.simulator")
+    gc.collect()
+    gc.freeze()
 
 
 @contextmanager
