@@ -20,7 +20,7 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.records.names import file_name
 from pytest_simbench.records.record import Record, Status
 from pytest_simbench.records.series import short
-from pytest_simbench.scene import MotionLimits, Robot
+from pytest_simbench.scene import MotionLimits, Pose, Robot
 from pytest_simbench.simulator.registry import adapter, address, settings_of
 from pytest_simbench.simulator.robot_files import CONTENT, with_content
 from pytest_simbench.tasks.base import Jitter, Task
@@ -104,16 +104,19 @@ def versions(case: Case) -> dict[str, str]:
 
 def robot_told(robot: Robot | None) -> dict[str, str]:
     """Name of a robot and twelve digits of everything that it is; empty for a task's own robot."""
-    return {} if robot is None else dict(_robot_told(robot, robot.limits, robot.swing))
+    return {} if robot is None else dict(_robot_told(robot, robot.limits, robot.swing, robot.stand))
 
 
 @lru_cache(maxsize=16)
-def _robot_told(robot: Robot, limits: MotionLimits | None, swing: object) -> dict[str, str]:
-    """The same; limits and swing are arguments since robots that differ in them alone are equal."""
+def _robot_told(
+    robot: Robot, limits: MotionLimits | None, swing: object, stand: Pose | None
+) -> dict[str, str]:
+    """The same; what is no part of a robot's equality is an argument."""
     wire = with_content({"robot": robot.to_wire()}, robot)["robot"]
     meshes = sorted(wire[CONTENT].pop("meshes"))  # named by their content
     bounds = asdict(limits) if limits else None
-    data = json.dumps([wire, meshes, bounds, *([swing] if swing else [])])
+    others = [*([swing] if swing else []), *([stand.to_wire()] if stand else [])]
+    data = json.dumps([wire, meshes, bounds, *others])
     return {"name": robot.name, "digest": hashlib.sha256(data.encode()).hexdigest()[:12]}
 
 

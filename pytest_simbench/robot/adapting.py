@@ -94,12 +94,15 @@ def lock_joints(robot: ET.Element, positions: Mapping[str, float]) -> None:
         write_origin(joint, origin * moved)
 
 
-def add_tool(robot: ET.Element, link: str, pose: Pose) -> None:
+def add_tool(
+    robot: ET.Element, link: str, pose: Pose, name: str = TOOL_LINK, joint_name: str = TOOL_JOINT
+) -> None:
     """Add a link without mass at the tool centre point.
 
     Args:
         link: that carries it.
         pose: in that link.
+        name, joint_name: of the new link and its joint.
 
     Raises:
         DescriptionError: there is no such link, or one with the new link's name.
@@ -109,14 +112,14 @@ def add_tool(robot: ET.Element, link: str, pose: Pose) -> None:
         raise DescriptionError(
             f"the tool frame {link!r} is no link; choose from {', '.join(names)}"
         )
-    if TOOL_LINK in names:
+    if name in names:
         raise DescriptionError(
-            f"there is a link {TOOL_LINK!r} already; name it as tool_frame, without xyz and rpy"
+            f"there is a link {name!r} already; name it as tool_frame, without xyz and rpy"
         )
-    ET.SubElement(robot, "link", name=TOOL_LINK)
-    joint = ET.SubElement(robot, "joint", name=TOOL_JOINT, type=FIXED)
+    ET.SubElement(robot, "link", name=name)
+    joint = ET.SubElement(robot, "joint", name=joint_name, type=FIXED)
     ET.SubElement(joint, "parent", link=link)
-    ET.SubElement(joint, "child", link=TOOL_LINK)
+    ET.SubElement(joint, "child", link=name)
     write_origin(joint, pose)
 
 

@@ -15,7 +15,8 @@ from pytest_simbench.scene import Body, FloatArray, Pose, Scene
 from pytest_simbench.simulator.robot_files import description_xml
 
 MARGIN = 0.012
-"""Distance kept from obstacles in free motions [m]; straight approaches may touch."""
+"""Distance kept from obstacles in free motions [m]; straight approaches may touch. In a scene of
+the study's size; all distances here go with the scene's scale but `FLATNESS`."""
 
 HELD_SLACK = 0.002
 """The held cube is checked smaller by this on each face [m]: it may rest where it stands."""
@@ -33,13 +34,18 @@ class PlanningScene:
     Link pairs listed in the SRDF are not checked. The root link is fixed and not checked
     against the world.
 
+    Args:
+        scale: of the scene's lengths over those of the study's.
+
     Attributes:
+        scale: the same.
         opening: position of each finger that is assumed in every check [m, or rad].
         held: name of the cube in the hand, or None.
     """
 
-    def __init__(self, model: RobotModel, scene: Scene) -> None:
+    def __init__(self, model: RobotModel, scene: Scene, scale: float = 1.0) -> None:
         self.model = model
+        self.scale = scale
         self.opening = model.robot.gripper.opened
         self.held: str | None = None
         robot = model.robot
@@ -74,7 +80,7 @@ class PlanningScene:
         self._pairs = [(pair.first, pair.second) for pair in geometry.collisionPairs]
         self._exact, self._wide = pin.GeometryData(geometry), pin.GeometryData(geometry)
         for request, (_, second) in zip(self._wide.collisionRequests, self._pairs, strict=True):
-            request.security_margin = MARGIN if second >= len(self._links) else 0.0
+            request.security_margin = MARGIN * scale if second >= len(self._links) else 0.0
         self.update({body.name: body.pose for body in scene.free_bodies})
 
     def _add_held_cubes(self, scene: Scene, geometry: pin.GeometryModel, ground: int) -> None:
@@ -90,7 +96,7 @@ class PlanningScene:
                 f"held {body.name}",
                 tool.parentJoint,
                 tool.placement,
-                coal.Box(*(edge - 2 * HELD_SLACK for edge in body.extents)),
+                coal.Box(*(edge - 2 * HELD_SLACK * self.scale for edge in body.extents)),
             )
             index = geometry.addGeometryObject(rider)
             self._riding[body.name] = index
@@ -134,20 +140,41 @@ class PlanningScene:
             above: how far above the tool centre point it may touch what it pushes [m].
         """
         model = self.model
-        fingers = np.full(len(model.robot.joints) - model.arm, model.robot.gripper.closed)
-        q = np.concatenate([model.robot.column("initial_position")[: model.arm], fingers])
-        pin.updateGeometryPlacements(model.pin, model.data, self._geometry, self._exact, q)
-        tool = pin.updateFramePlacement(model.pin, model.data, model.tool)
-        carrier = model.pin.frames[model.tool].parentJoint
-        corners = [
-            _below(tool.actInv(self._exact.oMg[link]), shape.geometry, above)
-            for link in self._links
-            if (shape := self._geometry.geometryObjects[link]).parentJoint >= carrier
-        ]
-        points = np.concatenate(corners)
+        points = self._hand(model.robot.gripper.closed, above, model.arm)
         depth = float(points[:, 0].max())
         face = points[points[:, 0] > depth - FLATNESS, 1]
         return depth, float(face.max() - face.min())
+
+    def gap(self, opening: float, above: float) -> float:
+        """How far a jaw that turns stands from the plane y = 0 of the tool frame [m], on which the
+        face of the fixed jaw lies; infinite where it is all above.
+
+        Args:
+            opening: position of the jaw [rad].
+            above: how far above the tool centre point what it grasps ends [m].
+        """
+        return float(self._hand(opening, above, self.model.arm + 1)[:, 1].min(initial=np.inf))
+
+    def _hand(self, opening: float, above: float, first: int) -> FloatArray:
+        """Corners of the hand's part at most so far above the tool centre point, in the tool frame,
+        (n, 3).
+
+        Args:
+            opening: position of each finger [m, or rad].
+            above: [m]
+            first: joint that carries the first link of the part.
+        """
+        model = self.model
+        fingers = np.full(len(model.robot.joints) - model.arm, opening)
+        q = np.concatenate([model.robot.column("initial_position")[: model.arm], fingers])
+        pin.updateGeometryPlacements(model.pin, model.data, self._geometry, self._exact, q)
+        tool = pin.updateFramePlacement(model.pin, model.data, model.tool)
+        corners = [
+            _below(tool.actInv(self._exact.oMg[link]), shape.geometry, above)
+            for link in self._links
+            if (shape := self._geometry.geometryObjects[link]).parentJoint >= first
+        ]
+        return np.concatenate(corners)
 
     def _activate(self, ignored: Iterable[str] = ()) -> None:
         """Switch off the pairs of ignored bodies, of the held cube's place, of cubes not held."""

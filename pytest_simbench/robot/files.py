@@ -25,7 +25,7 @@ from pytest_simbench.robot.adapting import (
 )
 from pytest_simbench.robot.collision import PlanningScene
 from pytest_simbench.robot.errors import RobotError
-from pytest_simbench.robot.hulls import with_hulls
+from pytest_simbench.robot.hulls import AXES, Cuts, with_hulls
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.mounting import mounted, pairs_not_checked
 from pytest_simbench.robot.table import Table
@@ -109,10 +109,11 @@ class _Reader:
         corners = table.number("hull_corners", 0.0, least=0.0)
         if corners and (corners < FEWEST_CORNERS or corners != int(corners)):
             raise table.error("hull_corners", f"give a whole number of at least {FEWEST_CORNERS}")
+        cuts = self._cuts(description, bool(corners))
         if self._changed or corners:
             kept = content(description, self.name)
             if corners:
-                kept = with_hulls(kept, int(corners))
+                kept = with_hulls(kept, int(corners), cuts)
             self.urdf, self.packages = str(keep(kept["urdf"], kept["meshes"])), {}
 
     def read(self) -> Robot:
@@ -125,6 +126,7 @@ class _Reader:
         hand = self._hand()
         swing = self._swing(len(names)) if "throw" in table else None
         position, yaw = table.each("base", 3, 0.0), table.number("yaw", 0.0)
+        stand = Pose.at(*table.each("stand", 3), yaw=yaw) if "stand" in table else None
         srdf = self._path(table.text("srdf")) if "srdf" in table else None
         robot = Robot(
             name=self.name,
@@ -137,6 +139,7 @@ class _Reader:
             base=Pose.at(*position, yaw=yaw),
             friction=table.number("friction", 1.0, least=0.0),
             swing=swing,
+            stand=stand,
         )
         table.close()
         robot = _with_files(robot, hand, srdf)
@@ -151,6 +154,21 @@ class _Reader:
         self._changed = any(changes)
         _check_moving(self.table, "locked", self._locked, _moving(urdf.findall("joint")))
         lock_joints(urdf, self._locked)
+
+    def _cuts(self, description: Description, hulls: bool) -> dict[str, Cuts]:
+        """Where the meshes of links are cut, by link."""
+        found, links = {}, description.links
+        for name, table in self.table.tables("cut").items():
+            if not hulls:
+                raise self.table.error("cut", "give hull_corners too: each slice becomes a hull")
+            if name not in links:
+                raise self.table.error("cut", f"{name!r:.80} is no link; it has {', '.join(links)}")
+            axis = table.text("axis")
+            if axis not in AXES:
+                raise table.error("axis", f"choose from {', '.join(AXES)}")
+            found[name] = Cuts(axis, table.some("at"))
+            table.close()
+        return found
 
     def _path(self, text: str) -> str:
         """A path from the file's folder, or of a package."""

@@ -72,6 +72,17 @@ class RobotModel:
         return sum(float(np.linalg.norm(end.translation)) for end in ends)
 
     @property
+    def wrist_reach(self) -> float:
+        """The same up to the last joint, without the hand [m]."""
+        ends = [self.pin.jointPlacements[joint] for joint in range(2, self.arm + 1)]
+        return sum(float(np.linalg.norm(end.translation)) for end in ends)
+
+    @property
+    def has_one_jaw(self) -> bool:
+        """Whether the hand is one jaw that turns, towards a fixed one."""
+        return len(self._fingers) == 1 and self.finger_unit == "rad"
+
+    @property
     def has_parallel_fingers(self) -> bool:
         """Whether the hand is two fingers that slide."""
         kinds = [joint.shortname() for joint in list(self.pin.joints)[self.arm + 1 :]]

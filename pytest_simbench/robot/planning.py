@@ -33,7 +33,7 @@ __all__ = ["MotionPlanner", "PlanningError"]
 
 CHECK_SPACING = 0.02
 """Farthest that the hand moves between two collision checks [m]. The planning scene's margin is
-more than half of it, so nothing is brushed in between."""
+more than half of it, so nothing is brushed in between. Both go with the scene's scale."""
 
 MAX_CHECKS = 20_000
 """Collision checks after which a search gives up, about 2 s."""
@@ -63,6 +63,7 @@ class MotionPlanner:
         self.scene = scene
         self.rng = rng
         self.gravity = np.array(list(gravity))
+        self._spacing = CHECK_SPACING * scene.scale
 
     def move_to(
         self, start: FloatArray, goal: FloatArray, fingers: float, *, speed: float = 1.0
@@ -179,7 +180,7 @@ class MotionPlanner:
             if feasible
             else study_swing(self.model, start, goal)
         )
-        throw = released(self.model, timed, duration, fraction)
+        throw = released(self.model, timed, duration, fraction, self.scene.scale)
         fingers = np.where(np.arange(len(timed.position)) >= throw.row, opened, closed)
         return self._trajectory(timed, fingers), throw
 
@@ -221,7 +222,7 @@ class MotionPlanner:
 
         information.setStateValidityChecker(valid)
         information.setStateValidityCheckingResolution(
-            CHECK_SPACING / float(np.linalg.norm(self.levers)) / space.getMaximumExtent()
+            self._spacing / float(np.linalg.norm(self.levers)) / space.getMaximumExtent()
         )
         information.setup()
         problem = base.ProblemDefinition(information)
@@ -256,13 +257,13 @@ class MotionPlanner:
 
     def _segment(self, a: FloatArray, b: FloatArray) -> FloatArray:
         """Positions between a and b to check, both ends among them."""
-        steps = max(1, int(np.ceil(self.levers @ np.abs(b - a) / CHECK_SPACING)))
+        steps = max(1, int(np.ceil(self.levers @ np.abs(b - a) / self._spacing)))
         return np.asarray(a + np.linspace(0.0, 1.0, steps + 1)[:, None] * (b - a))
 
     def _thinned(self, rows: FloatArray) -> FloatArray:
-        """Rows between which the hand moves at most `CHECK_SPACING`, first and last among them."""
+        """Rows between which the hand moves at most the spacing, first and last among them."""
         ways = np.abs(np.diff(rows, axis=0)) @ self.levers
         travelled = np.concatenate([[0.0], np.cumsum(ways)])
-        wanted = np.arange(0.0, travelled[-1], CHECK_SPACING)
+        wanted = np.arange(0.0, travelled[-1], self._spacing)
         picked = np.unique(np.searchsorted(travelled, wanted))
         return np.vstack([rows[picked], rows[-1:]])

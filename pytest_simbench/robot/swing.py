@@ -20,6 +20,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -28,8 +29,10 @@ from scipy.optimize import linprog
 
 from pytest_simbench.robot.collision import PlanningScene
 from pytest_simbench.robot.errors import PlanningError, RobotError
+from pytest_simbench.robot.grasping import grasp_of, grasping
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.registry import find
+from pytest_simbench.robot.scale import grasping_scale_of
 from pytest_simbench.robot.throw import LANDING_HEIGHT, SPEED_SHARE, feasible_swing, released
 from pytest_simbench.scene import STANDARD_GRAVITY, Box, FloatArray, Pose, Robot, Scene
 
@@ -37,7 +40,7 @@ DRAWN = 4000
 """Positions of the joints in the plane that are looked at."""
 
 LOWEST = 0.4
-"""Lowest release above the ground [m]."""
+"""Lowest release above the ground [m]. It and the lengths below go with the scene's scale."""
 
 OUTWARDS = 0.0
 """Least cosine between the flight and the way out of the hand: not into the palm."""
@@ -73,7 +76,7 @@ class _Candidate(NamedTuple):
 
 
 def found_swing(
-    robot: Robot, held: Box, gravity: FloatArray, landing: float
+    robot: Robot, held: Box, gravity: FloatArray, landing: float, scale: float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
     """Arm joints before and after a throw that lands at x = `landing`, y = 0, each (arm,) [rad].
 
@@ -81,16 +84,17 @@ def found_swing(
         robot: with its base; it throws along x.
         held: what it throws.
         gravity: [m/s^2], (3,).
-        landing: where the flight crosses `throw.LANDING_HEIGHT` [m].
+        landing: where the flight crosses `throw.LANDING_HEIGHT` times the scale [m].
+        scale: of the scene over the study's.
 
     Raises:
         RobotError: no such swing was found.
     """
     model = RobotModel(robot)
-    planning = PlanningScene(model, Scene("throw", (held,), robot))
+    planning = PlanningScene(model, Scene("throw", (held,), robot), scale)
     planning.attach(held.name, Pose())
-    planning.opening = held.size[1] / 2
-    candidates = sorted(_candidates(model, gravity, landing), key=lambda c: c.share)
+    planning.opening = grasp_of(robot, held.size[1], scale).touching
+    candidates = sorted(_candidates(model, gravity, landing, scale), key=lambda c: c.share)
     for candidate in candidates[:TRIED]:
         swing = _adjusted(model, planning, candidate, held, gravity, landing)
         if swing is not None:
@@ -101,7 +105,9 @@ def found_swing(
     )
 
 
-def _candidates(model: RobotModel, gravity: FloatArray, landing: float) -> Iterator[_Candidate]:
+def _candidates(
+    model: RobotModel, gravity: FloatArray, landing: float, scale: float
+) -> Iterator[_Candidate]:
     """Releases from which the flight lands where it should, within the limits of velocity."""
     limits = model.limits.column("velocity")
     ready, moving = _in_plane(model, landing)
@@ -112,12 +118,12 @@ def _candidates(model: RobotModel, gravity: FloatArray, landing: float) -> Itera
         tool = model.tool_transform(joints)
         away = np.array([landing, 0.0, 0.0]) - tool.translation
         distance, height = float(np.hypot(*away[:2])), float(tool.translation[2])
-        if height < LOWEST or away[0] <= 0:
+        if height < LOWEST * scale or away[0] <= 0:
             continue
         plane = np.array([[*(away[:2] / distance), 0.0], [0.0, 0.0, 1.0]])
         turned = plane @ tool.rotation @ model.tool_jacobian(joints)[:3, moving]
         for elevation in ELEVATIONS:
-            speed = _speed(distance, height - LANDING_HEIGHT, elevation, gravity)
+            speed = _speed(distance, height - LANDING_HEIGHT * scale, elevation, gravity)
             if speed is None:
                 continue
             flight = plane.T @ [np.cos(elevation), np.sin(elevation)]
@@ -211,7 +217,7 @@ def _adjusted(
 
     def lands(time: float) -> float:
         timed, duration = feasible_swing(model, *ends(time), gravity, held)
-        throw = released(model, timed, duration, 0.5)
+        throw = released(model, timed, duration, 0.5, planning.scale)
         found = throw.landing(gravity)
         return -np.inf if found is None else found
 
@@ -231,7 +237,7 @@ def _adjusted(
         for _ in range(12):
             middle = (low + high) / 2
             at = lands(middle)
-            if abs(at - landing) < LANDING_TOLERANCE:
+            if abs(at - landing) < LANDING_TOLERANCE * planning.scale:
                 return ends(middle)
             low, high = (middle, high) if at < landing else (low, middle)
     except PlanningError:  # too weak
@@ -243,11 +249,24 @@ def main(arguments: Sequence[str]) -> int:
     """Prints the swing of a robot as its file takes it."""
     parser = argparse.ArgumentParser(prog="python -m pytest_simbench.robot.swing")
     parser.add_argument("robot", help="a name that pytest --robots lists, or a TOML file")
-    parser.add_argument("--landing", type=float, default=LANDING, help="in x [m] (%(default)s)")
+    parser.add_argument(
+        "--landing",
+        type=float,
+        default=LANDING,
+        help="in x, times the scene's scale [m] (%(default)s)",
+    )
     options = parser.parse_args(arguments)
     try:
+        robot = find(options.robot)
+        scale = grasping_scale_of(robot)
+        size = scale * THROWN.size[0]
+        held = replace(THROWN, size=(size,) * 3, mass=THROWN.mass * scale**3)
         start, end = found_swing(
-            find(options.robot), THROWN, np.array(STANDARD_GRAVITY), options.landing
+            grasping(robot, size, scale),
+            held,
+            np.array(STANDARD_GRAVITY),
+            options.landing * scale,
+            scale,
         )
     except RobotError as error:
         parser.exit(1, f"{error}\n")

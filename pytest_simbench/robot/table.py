@@ -66,6 +66,20 @@ class Table:
         """A finite number of at least `least`."""
         return self._number(key, self._take(key, default), least)
 
+    def some(self, key: str) -> tuple[float, ...]:
+        """A list of at least one finite number."""
+        value = self._take(key)
+        if not isinstance(value, list) or not value:
+            raise self.error(key, "give it a list of numbers")
+        return tuple(self._number(key, item, -1e6) for item in value)
+
+    def tables(self, key: str) -> dict[str, Table]:
+        """A table of tables."""
+        inner = self.table(key)
+        found = {name: inner.table(name) for name in list(inner._left)}
+        inner.close()
+        return found
+
     def each(
         self, key: str, count: int, default: Any = None, *, least: float = -1e6
     ) -> tuple[float, ...]:

@@ -21,7 +21,7 @@ EFFORT_SHARE = 0.9
 
 LANDING_HEIGHT = 0.05
 """Where its free flight crosses this height a cube lands [m]: an edge length above the ground, in
-the middle of the pyramid's front."""
+the middle of the pyramid's front. It goes with the scene's scale."""
 
 SPEED_SHARE = 0.965
 """Largest planned joint velocity of a throw, as a share of the limits. All joints swing in step, so
@@ -42,12 +42,14 @@ class Throw:
         row: of the swing, the first set point with open fingers.
         position: of the tool centre point there, in the world [m].
         velocity: of the tool centre point there, in the world [m/s].
+        landing_height: where the cube's flight ends [m].
     """
 
     timed: Timed
     row: int
     position: FloatArray
     velocity: FloatArray
+    landing_height: float = LANDING_HEIGHT
 
     @property
     def time(self) -> float:
@@ -56,7 +58,7 @@ class Throw:
 
     def landing(self, gravity: FloatArray) -> float | None:
         """Where a cube lands that is let go so, in x [m]."""
-        return landing_x(self.position, self.velocity, gravity)
+        return landing_x(self.position, self.velocity, gravity, self.landing_height)
 
 
 def swing_of(robot: Robot) -> tuple[FloatArray, FloatArray]:
@@ -109,28 +111,38 @@ def feasible_swing(
     return swing(low)
 
 
-def released(model: RobotModel, timed: Timed, duration: float, fraction: float) -> Throw:
-    """The throw that opens the fingers at the first set point after `fraction` of `duration`.
+def released(
+    model: RobotModel, timed: Timed, duration: float, fraction: float, scale: float = 1.0
+) -> Throw:
+    """The throw that opens the fingers at the first set point after `fraction` of `duration`, in a
+    scene of that scale.
 
     The study opens them by the index of the point, too.
     """
     row = min(int(np.ceil(fraction * duration / TICK - 1e-9)), len(timed.position) - 1)
     arm, velocity = timed.position[row], timed.velocity[row]
     position = np.array(model.tool_pose(arm).position)
-    return Throw(timed, row, position, model.tool_velocity(arm, velocity))
+    height = LANDING_HEIGHT * scale
+    return Throw(timed, row, position, model.tool_velocity(arm, velocity), height)
 
 
-def landing_x(position: FloatArray, velocity: FloatArray, gravity: FloatArray) -> float | None:
-    """Where a free body crosses `LANDING_HEIGHT` on its way down, in x [m], or None if it never
-    does: z + v t - g t^2 / 2 = height.
+def landing_x(
+    position: FloatArray,
+    velocity: FloatArray,
+    gravity: FloatArray,
+    height: float = LANDING_HEIGHT,
+) -> float | None:
+    """Where a free body crosses a height on its way down, in x [m], or None if it never does:
+    z + v t - g t^2 / 2 = height.
 
     Args:
         position: [m], (3,).
         velocity: [m/s], (3,).
         gravity: [m/s^2], (3,), pointing down.
+        height: [m].
     """
     g = -float(gravity[2])
-    root = float(velocity[2]) ** 2 + 2 * g * (float(position[2]) - LANDING_HEIGHT)
+    root = float(velocity[2]) ** 2 + 2 * g * (float(position[2]) - height)
     if root < 0:
         return None
     t = (float(velocity[2]) + np.sqrt(root)) / g

@@ -162,7 +162,7 @@ class MotionLimits:
         return np.array(getattr(self, what), dtype=float)
 
 
-ON_THIS_SIDE = ("limits", "swing")
+ON_THIS_SIDE = ("limits", "swing", "stand")
 """What simulators are not told of a robot."""
 
 
@@ -185,6 +185,8 @@ class Robot:
             simulators are not told, and a robot that came over the wire has none.
         swing: arm joints before and after a throw, each (n_arm,) [rad]; None where none is known.
             It stays on this side too.
+        stand: pose of the root link in the tasks on the table; None where it is `base`. It stays on
+            this side too.
         closures: what closes loops of its links; only for engines with the capability `loops`.
     """
 
@@ -199,6 +201,7 @@ class Robot:
     friction: float = 1.0
     limits: MotionLimits | None = field(default=None, compare=False)
     swing: tuple[tuple[float, ...], tuple[float, ...]] | None = field(default=None, compare=False)
+    stand: Pose | None = field(default=None, compare=False)
     closures: tuple[Closure, ...] = ()
 
     def __post_init__(self) -> None:
@@ -208,6 +211,8 @@ class Robot:
             if not isinstance(path, str) or "\0" in path:
                 raise SceneError(f"robot {self.name!r} is described by {path!r}, which is no path")
         check_pose(self.base, f"the base of {self.name!r}")
+        if self.stand is not None:
+            check_pose(self.stand, f"the stand of {self.name!r}")
         check_number(self.friction, f"the friction of {self.name!r}", 0.0)
         names = self.joint_names
         twice = sorted({name for name in names if names.count(name) > 1})

@@ -11,7 +11,7 @@ import numpy as np
 
 from pytest_simbench.client.world import World
 from pytest_simbench.robot.errors import RobotError
-from pytest_simbench.scene import Box, Pose, Robot, Scene
+from pytest_simbench.scene import Box, Pose, Robot, Scene, Vector3
 from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.moments import Moment
 
@@ -166,9 +166,17 @@ def _flat(name: str, value: Any) -> Iterator[tuple[str, Any]]:
         yield name, value
 
 
-def cube(name: str, pose: Pose, colour: tuple[float, float, float, float]) -> Box:
-    """One of the study's cubes."""
-    return Box(name, (CUBE_SIZE,) * 3, pose, mass=CUBE_MASS, colour=colour)
+def cube(
+    name: str, pose: Pose, colour: tuple[float, float, float, float], scale: float = 1.0
+) -> Box:
+    """One of the study's cubes, its edge times `scale`, of the same density."""
+    return Box(name, (CUBE_SIZE * scale,) * 3, pose, mass=CUBE_MASS * scale**3, colour=colour)
+
+
+def scaled(place: Vector3, scale: float) -> Pose:
+    """A place of the study's scene [m] in one of another size."""
+    x, y, z = place
+    return Pose.at(x * scale, y * scale, z * scale)
 
 
 def distance(a: Pose, b: Pose) -> float:

@@ -13,13 +13,15 @@ import coal
 import numpy as np
 
 from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.tasks.base import CUBE_SIZE
 
 WINDOW = 0.05
 """Motion is judged over this time, and causes are sought within it [s]."""
 
 MOTION = 0.002
 """A body moves when its centre has gone farther than this within `WINDOW` [m]: faster than
-40 mm/s. Creep is slower; a cube knocked over is not."""
+40 mm/s. Creep is slower; a cube knocked over is not. For cubes of the study's size; it and `TOUCH`
+go with the edge."""
 
 TOUCH = 0.005
 """Bodies nearer than this touch [m]; what they move between two samples is added."""
@@ -82,14 +84,17 @@ class _Chain:
         self.poses = poses
         self.earlier = np.maximum(np.searchsorted(time, time - WINDOW, side="right") - 1, 0)
         centres = poses[:, :, :3]
-        self.moving = np.linalg.norm(centres - centres[self.earlier], axis=2) > MOTION
+        self._scale = edge / CUBE_SIZE
+        moved = np.linalg.norm(centres - centres[self.earlier], axis=2)
+        self.moving = moved > MOTION * self._scale
         self.strides = np.linalg.norm(np.diff(centres, axis=0, prepend=centres[:1]), axis=2)
         self._box = coal.Box(edge, edge, edge)
 
     def touched(self, a: int, b: int, k: int, since: int = 0) -> bool:
         """Whether two bodies touched within `WINDOW` before sample k."""
+        touch = TOUCH * self._scale
         return any(
-            self._distance(row, a, b) <= TOUCH + self.strides[row, a] + self.strides[row, b]
+            self._distance(row, a, b) <= touch + self.strides[row, a] + self.strides[row, b]
             for row in range(max(int(self.earlier[k]), since), k + 1)
         )
 

@@ -16,6 +16,7 @@ import numpy as np
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.robot.collision import PlanningScene
 from pytest_simbench.robot.errors import PlanningError, Unreachable
+from pytest_simbench.robot.grasping import grasp_of
 from pytest_simbench.robot.kinematics import inverse_kinematics, tool_over, top_down_grasps
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.planning import MotionPlanner
@@ -24,7 +25,8 @@ from pytest_simbench.scene import FloatArray, Pose, Trajectory
 from pytest_simbench.tasks.base import CUBE_SIZE
 
 APPROACH = 0.10
-"""Height above a grasp or a place from which the tool comes straight down [m] (study code)."""
+"""Height above a grasp or a place from which the tool comes straight down [m] (study code). It,
+`IN_HAND` and `PUT_BACK_HEIGHT` go with the scene's scale."""
 
 GRASP_TIME = 0.3
 """From closing the fingers to lifting [s]."""
@@ -73,16 +75,23 @@ class Manipulator:
     Args:
         rng: of the repetition; drives everything random in planning.
         speeds: of its motions.
+        scale: of the scene's lengths over those of the study's.
 
     Attributes:
         world: the simulated world.
         arm: commanded arm joints, (arm,) [rad].
         fingers: commanded finger position [m], of a jaw that turns [rad].
+        grasp: how the hand grasps a cube.
+        approach: `APPROACH`, scaled [m].
         held: name of the cube in the hand, or None.
     """
 
     def __init__(
-        self, world: World, rng: np.random.Generator, speeds: Speeds | None = None
+        self,
+        world: World,
+        rng: np.random.Generator,
+        speeds: Speeds | None = None,
+        scale: float = 1.0,
     ) -> None:
         robot = world.scene.robot
         if robot is None:
@@ -91,9 +100,12 @@ class Manipulator:
         self.gripper = robot.gripper
         self.rng = rng
         self.speeds = speeds or Speeds()
+        self.scale = scale
+        self.approach = APPROACH * scale
         with world.stopwatch.measuring("plan"):
             self.model = RobotModel(robot)
-            self.planning = PlanningScene(self.model, world.scene)
+            self.grasp = grasp_of(robot, CUBE_SIZE * scale, scale)
+            self.planning = PlanningScene(self.model, world.scene, scale)
             self.planner = MotionPlanner(self.model, self.planning, rng, world.scene.gravity)
         self.arm = robot.column("initial_position")[: self.model.arm]
         self.home = self.arm.copy()
@@ -105,20 +117,24 @@ class Manipulator:
         self._released_at = world.time
 
     def pick(self, name: str) -> None:
-        """Grasp a cube from above and lift it by `APPROACH`.
+        """Grasp a cube from above and lift it by `approach`.
 
         Raises:
             PlanningError: it cannot be reached.
             LostCube: it is not in the hand after lifting.
         """
         cube = self.world.pose(name)
-        grasp, above = self._plan_choice(
-            [tool_over(cube, pose.yaw) for pose in top_down_grasps(cube)], ignored=(name,)
-        )
+        tools = [tool_over(cube, pose.yaw) for pose in top_down_grasps(cube)]
+        down, above = self._plan_choice([self._aside(tool) for tool in tools], ignored=(name,))
         self.go_to(above, speed=self.speeds.free)
-        self.move_straight(grasp, speed=self.speeds.contact, ignored=(name,))
+        self.move_straight(down, speed=self.speeds.contact, ignored=(name,))
+        grasp = self._aside(down, back=True)
+        if grasp != down:
+            self.move_straight(grasp, speed=self.speeds.contact, ignored=(name,))
         self.close_hand(around=name, seen=cube)
-        self.move_straight(grasp.translated(z=APPROACH), speed=self.speeds.carry, ignored=(name,))
+        self.move_straight(
+            grasp.translated(z=self.approach), speed=self.speeds.carry, ignored=(name,)
+        )
         self.check_held()
 
     def place(self, target: Pose) -> None:
@@ -293,15 +309,27 @@ class Manipulator:
         return self.world.time - self._released_at
 
     def try_retreat(self) -> str | None:
-        """Straight up from where a cube was let go; a sentence when that is not possible.
+        """Straight up from where a cube was let go, one jaw aside first; a sentence when that is
+        not possible.
 
         The fingers may touch that cube: it may have turned a little between them.
         """
-        above = self.tool.translated(z=APPROACH)
-        return self._attempt(
-            "retreat",
-            lambda: self.move_straight(above, speed=self.speeds.free, ignored=self._released),
-        )
+        return self._attempt("retreat", self._retreat)
+
+    def _retreat(self) -> None:
+        tool = self.tool
+        aside = self._aside(tool)
+        if aside != tool:
+            self.move_straight(aside, speed=self.speeds.contact, ignored=self._released)
+        above = aside.translated(z=self.approach)
+        self.move_straight(above, speed=self.speeds.free, ignored=self._released)
+
+    def _aside(self, tool: Pose, back: bool = False) -> Pose:
+        """Where a hand that grasps at a tool pose comes down and leaves, or back from there."""
+        beside = self.grasp.beside
+        if beside == 0.0:
+            return tool
+        return tool * Pose.at(0.0, beside if back else -beside, 0.0)
 
     def try_go_home(self) -> str | None:
         """Back to the start position; a sentence when that is not possible."""
@@ -313,7 +341,7 @@ class Manipulator:
             return None  # and the hand is open
         problem = None
         if self._in_hand():
-            above = self._origin.translated(z=PUT_BACK_HEIGHT)
+            above = self._origin.translated(z=PUT_BACK_HEIGHT * self.scale)
             problem = self._attempt("put back", lambda: self.place(above))
         if self.held is not None:
             self.open_hand()
@@ -338,7 +366,7 @@ class Manipulator:
             for tool in tools:
                 try:
                     above = inverse_kinematics(
-                        self.model, tool.translated(z=APPROACH), self.home, self.rng
+                        self.model, tool.translated(z=self.approach), self.home, self.rng
                     )
                     at = inverse_kinematics(self.model, tool, above)
                 except Unreachable as error:
@@ -369,7 +397,7 @@ class Manipulator:
         """Take the cubes' present poses over into the planning scene."""
         with self.world.stopwatch.measuring("plan"):
             self.planning.update(self.world.poses())
-            self.planning.opening = self.fingers if self.held is None else CUBE_SIZE / 2
+            self.planning.opening = self.fingers if self.held is None else self.grasp.touching
             if self.held is not None and self.planning.held != self.held:
                 self.planning.attach(self.held, self._grip)
 
@@ -378,4 +406,6 @@ class Manipulator:
             return False
         joints = self.world.joints[0, : self.model.arm]
         tool = np.array(self.model.tool_pose(joints).position)
-        return bool(np.linalg.norm(tool - self.world.pose(self.held).position) < IN_HAND)
+        return bool(
+            np.linalg.norm(tool - self.world.pose(self.held).position) < IN_HAND * self.scale
+        )

@@ -21,9 +21,9 @@ from pytest_simbench.robot.errors import PlanningError, Unreachable
 from pytest_simbench.robot.kinematics import inverse_kinematics, tool_over, tool_path
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import panda
+from pytest_simbench.robot.scale import scale_of
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene, Vector3
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, distance, generators
-from pytest_simbench.tasks.layout import scale_of
 from pytest_simbench.tasks.manipulator import APPROACH, Manipulator
 from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.moments import Moment

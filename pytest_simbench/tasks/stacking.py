@@ -1,4 +1,8 @@
-"""Task 1 of the reference study: 21 cubes on a table, 15 of them to be stacked in 3 towers of 5."""
+"""Task 1 of the reference study: 21 cubes on a table, 15 of them to be stacked in 3 towers of 5.
+
+All lengths here are those of the study's scene. That of a smaller arm is smaller
+(`robot.scale.grasping_scale_of`): places, cubes and thresholds shrink alike.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +14,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import World
+from pytest_simbench.robot.grasping import grasping
 from pytest_simbench.robot.panda import panda
 from pytest_simbench.robot.planning import PlanningError
+from pytest_simbench.robot.scale import grasping_scale_of
 from pytest_simbench.scene import Box, Pose, Robot, Scene
 from pytest_simbench.tasks.base import (
     CUBE_SIZE,
@@ -23,6 +29,7 @@ from pytest_simbench.tasks.base import (
     cube,
     distance,
     generators,
+    scaled,
 )
 from pytest_simbench.tasks.manipulator import FULL_SPEED, LostCube, Manipulator, Speeds
 from pytest_simbench.tasks.metrics import Metric
@@ -61,7 +68,8 @@ class Place:
 
 @dataclass(frozen=True)
 class Stacking(Task):
-    """Stack `towers` towers of `levels` cubes; `study()` does it by the study's rules.
+    """Stack `towers` towers of `levels` cubes; `study()` does it by the study's rules. The lengths
+    are those of the study's scene; a smaller arm has a smaller one (`scale`).
 
     Attributes:
         towers: how many of the three.
@@ -95,14 +103,23 @@ class Stacking(Task):
 
     @property
     def arm(self) -> Robot:
-        """The robot that stacks, its hand closing as the task has it."""
+        """The robot that stacks, on its stand, its hand opening and closing as the task has it."""
         robot = self.robot or panda()
+        if robot.stand is not None:
+            robot = replace(robot, base=robot.stand)
+        robot = grasping(robot, CUBE_SIZE * self.scale, self.scale)
         if self.finger_closed is None:
             return robot
         return replace(robot, gripper=replace(robot.gripper, closed=self.finger_closed))
 
+    @property
+    def scale(self) -> float:
+        """All lengths of the scene over those of the study's: 0.4 for the SO-101."""
+        return grasping_scale_of(self.robot or panda())
+
     def parameters(self) -> dict[str, Any]:
-        return super().parameters() | {"task.finger_closed": self.arm.gripper.closed}
+        told = super().parameters() | {"task.finger_closed": self.arm.gripper.closed}
+        return told if self.scale == 1.0 else told | {"task.scale": self.scale}
 
     @property
     def cubes(self) -> int:
@@ -112,21 +129,26 @@ class Stacking(Task):
     @property
     def metrics(self) -> tuple[Metric, ...]:
         n = self.cubes
+        loose, strict, moved = (
+            f"{100 * limit * self.scale:g} cm"
+            for limit in (STUDY_TOLERANCE, STRICT_DISTANCE, UNTOUCHED_DISTANCE)
+        )
         counted = "the hand has retreated" if self.count_after_retreat else "release"
         return (
             Metric("placed", "placed", kind="share", of=n, study=True,
-                   doc="within 5 cm in x and y of the target, "
+                   doc=f"within {loose} in x and y of the target, "
                        f"{self.check_delay:g} s after {counted}"),
             Metric("at_end", "at the end", kind="share", of=n, study=True,
                    doc=f"the same, {self.settle:g} s after the task ended"),
             Metric("placed_strict", "placed, strict", kind="share", of=n,
-                   doc="within 1 cm in x, y and z of the target and tilted by less than 5 degrees"),
+                   doc=f"within {strict} in x, y and z of the target and tilted by less than "
+                       "5 degrees"),
             Metric("at_end_strict", "at the end, strict", kind="share", of=n,
                    doc=f"the same, {self.settle:g} s after the task ended"),
             Metric("towers", "towers complete", kind="share", of=self.towers,
                    doc="towers all of whose cubes are strictly in place at the end"),
             Metric("untouched_moved", "untouched moved", unit="cubes", better="lower", least=0,
-                   doc="cubes nobody handled that are more than 1 cm away from their start"),
+                   doc=f"cubes nobody handled that are more than {moved} away from their start"),
             Metric("failed_picks", "failed picks", unit="picks", better="lower", least=0,
                    doc="cubes that could not be reached, planned for, or held"),
         )  # fmt: skip
@@ -154,23 +176,37 @@ class Stacking(Task):
         cubes = [
             cube(
                 f"cube_{number:02d}",
-                jitter.disturbed(Pose.at(x, y, TABLE_TOP + CUBE_SIZE / 2), rng),
+                jitter.disturbed(start, rng),
                 BLUE if number % 2 else RED,
+                self.scale,
             )
-            for number, (x, y) in enumerate(GRID, start=1)
+            for number, start in enumerate(self._starts(), start=1)
         ]
-        return Scene("stacking", (TABLE, *cubes), self.arm)
+        return Scene("stacking", (self.table, *cubes), self.arm)
+
+    @property
+    def table(self) -> Box:
+        """The table of the scene's scale."""
+        x, y, z = (self.scale * edge for edge in TABLE.size)
+        return replace(TABLE, size=(x, y, z), pose=scaled(TABLE.pose.position, self.scale))
+
+    def _starts(self) -> list[Pose]:
+        return [scaled((x, y, TABLE_TOP + CUBE_SIZE / 2), self.scale) for x, y in GRID]
 
     def problem(self) -> str | None:
         """The hand is too narrow for the cubes, or a cube or a place out of reach."""
-        starts = [Pose.at(x, y, TABLE_TOP + CUBE_SIZE / 2) for x, y in GRID]
-        ends = [place.pose.translated(z=self.release_height) for place in self.places()]
-        return cannot_handle(self.arm, (TABLE,), [*starts, *ends])
+        drop = self.release_height * self.scale
+        ends = [place.pose.translated(z=drop) for place in self.places()]
+        return cannot_handle(self.arm, (self.table,), [*self._starts(), *ends], self.scale)
 
     def places(self) -> list[Place]:
         """Targets in the order in which they are filled."""
         return [
-            Place(tower, level, Pose.at(*TOWERS[tower], TABLE_TOP + CUBE_SIZE * (level + 0.5)))
+            Place(
+                tower,
+                level,
+                scaled((*TOWERS[tower], TABLE_TOP + CUBE_SIZE * (level + 0.5)), self.scale),
+            )
             for tower in range(self.towers)
             for level in range(self.levels)
         ]
@@ -181,7 +217,7 @@ class Stacking(Task):
             world.wait(0.2)
         start = world.poses()
         unused = [str(name) for name in order_rng.permutation(sorted(start))]
-        manipulator = Manipulator(world, planner_rng, self.speeds)
+        manipulator = Manipulator(world, planner_rng, self.speeds, self.scale)
         picks = _Picks()
         world.mark("start")
         for place in self.places():
@@ -206,7 +242,7 @@ class Stacking(Task):
                 manipulator.pick(name)
             picks.handled.add(name)
             with world.phase(f"place {where}"):
-                manipulator.place(place.pose.translated(z=self.release_height))
+                manipulator.place(place.pose.translated(z=self.release_height * self.scale))
         except (PlanningError, LostCube) as error:
             picks.fail(name, place, error)
             with world.phase(f"recover from {where}"):
@@ -233,7 +269,11 @@ class Stacking(Task):
         stacked, n = picks.stacked, self.cubes
         ends = {name: (place, end[name]) for name, (place, _) in stacked.items()}
         complete = [
-            sum(_strict(place, pose) for place, pose in ends.values() if place.tower == tower)
+            sum(
+                _strict(place, pose, self.scale)
+                for place, pose in ends.values()
+                if place.tower == tower
+            )
             == self.levels
             for tower in range(self.towers)
         ]
@@ -242,13 +282,14 @@ class Stacking(Task):
             for name, pose in end.items()
             if name not in picks.handled
         }
-        moved = {name: d for name, d in untouched.items() if d > UNTOUCHED_DISTANCE}
+        least = UNTOUCHED_DISTANCE * self.scale
+        moved = {name: d for name, d in untouched.items() if d > least}
         return Outcome(
             {
-                "placed": sum(_placed(*item) for item in stacked.values()) / n,
-                "at_end": sum(_placed(*item) for item in ends.values()) / n,
-                "placed_strict": sum(_strict(*item) for item in stacked.values()) / n,
-                "at_end_strict": sum(_strict(*item) for item in ends.values()) / n,
+                "placed": sum(_placed(*item, self.scale) for item in stacked.values()) / n,
+                "at_end": sum(_placed(*item, self.scale) for item in ends.values()) / n,
+                "placed_strict": sum(_strict(*item, self.scale) for item in stacked.values()) / n,
+                "at_end_strict": sum(_strict(*item, self.scale) for item in ends.values()) / n,
                 "towers": sum(complete) / self.towers,
                 "untouched_moved": float(len(moved)),
                 "failed_picks": float(len(picks.failed)),
@@ -290,15 +331,15 @@ class _Picks:
             self.notes.append(problem)
 
 
-def _placed(place: Place, pose: Pose) -> bool:
-    """Within the study's distance, and as it measures: height and order do not matter."""
+def _placed(place: Place, pose: Pose, scale: float = 1.0) -> bool:
+    """Within the study's distance, scaled, and as it measures: height and order do not matter."""
     x, y, _ = np.abs(np.subtract(pose.position, place.pose.position))
-    return bool(x <= STUDY_TOLERANCE and y <= STUDY_TOLERANCE)
+    return bool(x <= STUDY_TOLERANCE * scale and y <= STUDY_TOLERANCE * scale)
 
 
-def _strict(place: Place, pose: Pose) -> bool:
+def _strict(place: Place, pose: Pose, scale: float = 1.0) -> bool:
     offset = np.abs(np.subtract(pose.position, place.pose.position))
-    return bool((offset <= STRICT_DISTANCE).all() and pose.tilt() < STRICT_TILT)
+    return bool((offset <= STRICT_DISTANCE * scale).all() and pose.tilt() < STRICT_TILT)
 
 
 def error_of(target: Pose, pose: Pose) -> Sequence[float]:

@@ -28,7 +28,8 @@ damping makes 0.1 m/s^2. The swing itself accelerates the hand by chance almost 
 does, so this alone does not tell a held cube from a flying one."""
 
 OUT_OF_HAND = 0.06
-"""Farther than this from the tool centre point, a cube is certainly not held [m]."""
+"""Farther than this from the tool centre point, a cube of the study's size is certainly not held
+[m]. It and `UNCLENCHED` go with the scene's scale."""
 
 UNCLENCHED = 0.0005
 """The fingers do not press any more when all have opened by this [m]."""
@@ -47,14 +48,15 @@ class Flight:
     last: int
 
 
-def unclenched(fingers: FloatArray) -> BoolArray:
+def unclenched(fingers: FloatArray, least: float = UNCLENCHED) -> BoolArray:
     """At which samples the fingers do not press any more, (n,).
 
     Args:
         fingers: positions of the finger joints [m], (n, n_fingers); in the first sample
             they hold the cube.
+        least: by which they have opened then [m].
     """
-    return np.asarray((fingers - fingers[0] > UNCLENCHED).all(axis=1))
+    return np.asarray((fingers - fingers[0] > least).all(axis=1))
 
 
 def free_flight(
@@ -96,6 +98,7 @@ class Thrown:
         started: simulated time at which the swing began [s].
         perfect: swing and release of a perfect follower.
         gravity: [m/s^2], (3,).
+        scale: of the scene over the study's.
 
     Attributes:
         motion: the same.
@@ -115,6 +118,7 @@ class Thrown:
         started: float,
         perfect: Throw,
         gravity: FloatArray,
+        scale: float = 1.0,
     ) -> None:
         self.motion = motion
         self._perfect, self._gravity = perfect, gravity
@@ -123,8 +127,9 @@ class Thrown:
         self._position, self._velocity = states[:, :3], states[:, 7:10]
         joints = motion.joints[:, 0]
         tool = np.array([model.tool_pose(row).position for row in joints])
-        apart = np.linalg.norm(self._position - tool, axis=1) > OUT_OF_HAND
-        gone = apart | unclenched(joints[:, model.robot.finger_indices])
+        apart = np.linalg.norm(self._position - tool, axis=1) > OUT_OF_HAND * scale
+        fingers = joints[:, model.robot.finger_indices] * model.finger_lever
+        gone = apart | unclenched(fingers, UNCLENCHED * scale)
         early = apart & (self._time < perfect.time)
         self.lost: str | None = None
         self.free = int(np.argmax(gone)) if gone.any() else len(motion)
@@ -146,8 +151,8 @@ class Thrown:
             return found
         first, last, perfect = self.flight.first, self.flight.last, self._perfect
         position, velocity = self._position[first], self._velocity[first]
-        landing = landing_x(position, velocity, self._gravity)
-        flown = landing_x(self._position[last], self._velocity[last], self._gravity)
+        landing = self._landing(position, velocity)
+        flown = self._landing(self._position[last], self._velocity[last])
         return found | {
             "landing_x": landing,
             "landing_error": _apart(landing, perfect.landing(self._gravity)),
@@ -179,10 +184,12 @@ class Thrown:
                 "reference_velocity": perfect.velocity,
                 "reference_landing_x": perfect.landing(self._gravity),
             }
-            found["flight_landing_x"] = landing_x(
-                self._position[last], self._velocity[last], self._gravity
-            )
+            found["flight_landing_x"] = self._landing(self._position[last], self._velocity[last])
         return found
+
+    def _landing(self, position: FloatArray, velocity: FloatArray) -> float | None:
+        """Where a cube of that state lands, in x [m]."""
+        return landing_x(position, velocity, self._gravity, self._perfect.landing_height)
 
 
 def _apart(a: float | None, b: float | None) -> float | None:

@@ -4,6 +4,9 @@ A cube of the pyramid counts as moved when the thrown cube did it (`impact`); wh
 reason has a metric of its own. How the throw left the hand is told apart from how it flew: the
 landing is computed from the state at the release, and what the simulated flight makes of it is
 the integrator's part.
+
+All lengths here are those of the study's scene. That of a smaller arm is smaller
+(`robot.scale.grasping_scale_of`), and its throw slower: speeds of flights go with the square root.
 """
 
 from __future__ import annotations
@@ -11,15 +14,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.robot.errors import PlanningError, RobotError
+from pytest_simbench.robot.grasping import grasping
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import panda
+from pytest_simbench.robot.scale import grasping_scale_of
 from pytest_simbench.robot.throw import (
+    LANDING_HEIGHT,
     Throw,
     feasible_swing,
     released,
@@ -36,6 +42,7 @@ from pytest_simbench.tasks.base import (
     Task,
     cube,
     generators,
+    scaled,
 )
 from pytest_simbench.tasks.impact import impact
 from pytest_simbench.tasks.manipulator import LostCube, Manipulator, Speeds
@@ -104,27 +111,39 @@ class Throwing(Task):
 
     @property
     def arm(self) -> Robot:
-        """The robot that throws."""
-        return self.robot or panda()
+        """The robot that throws, its tool centre point in the middle of the cube."""
+        robot = self.robot or panda()
+        return grasping(robot, CUBE_SIZE * self.scale, self.scale, wide=True)
+
+    @property
+    def scale(self) -> float:
+        """All lengths of the scene over those of the study's: 0.4 for the SO-101."""
+        return grasping_scale_of(self.robot or panda())
+
+    def parameters(self) -> dict[str, Any]:
+        told = super().parameters()
+        return told if self.scale == 1.0 else told | {"task.scale": self.scale}
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
         by_throw = ", by the thrown cube" if self.by_throw else ""
+        far = f"{100 * STUDY_TOLERANCE * self.scale:g} cm"
+        height = f"z = {LANDING_HEIGHT * self.scale:g}"
         return (
             Metric("moved", "moved", kind="share", of=len(PYRAMID), study=True,
-                   doc=f"cubes of the pyramid off by more than 5 cm, {self.settle:g} s after"
+                   doc=f"cubes of the pyramid off by more than {far}, {self.settle:g} s after"
                        f"{by_throw}"),
             Metric("hit", "hit", kind="yes_no", doc="at least one cube of the pyramid moved"),
             Metric("moved_otherwise", "moved otherwise", unit="cubes", better="lower", least=0,
-                   doc="cubes of the pyramid off by more than 5 cm, not by the thrown cube"),
+                   doc=f"cubes of the pyramid off by more than {far}, not by the thrown cube"),
             Metric("lost_in_transit", "lost in transit", kind="yes_no", better="lower",
                    doc="the cube left the hand before its release"),
             Metric("landing_x", "landing x", unit="m", better=None,
-                   doc="where a ballistic flight from the release crosses z = 0.05"),
+                   doc=f"where a ballistic flight from the release crosses {height}"),
             Metric("landing_error", "landing error", unit="m", better="lower", least=0,
                    doc="distance of that from a perfect follower's"),
             Metric("flight_error", "flight error", unit="m", better="lower", least=0,
-                   doc="distance from that to where the simulated flight crosses z = 0.05"),
+                   doc=f"distance from that to where the simulated flight crosses {height}"),
             Metric("release_speed", "release speed", unit="m/s", better=None,
                    doc="of the cube as its free flight begins"),
             Metric("release_velocity_error", "release velocity error", unit="m/s", better="lower",
@@ -141,7 +160,7 @@ class Throwing(Task):
     @property
     def references(self) -> Mapping[str, float]:  # type: ignore[override]
         """Of a perfect follower, from the trajectory."""
-        throw = perfect_throw(self.arm, self.release_fraction, self.feasible)
+        throw = perfect_throw(self.arm, self.release_fraction, self.feasible, self.scale)
         landing = throw.landing(np.array(STANDARD_GRAVITY))
         assert landing is not None
         return {"landing_x": landing, "release_speed": float(np.linalg.norm(throw.velocity))}
@@ -155,10 +174,11 @@ class Throwing(Task):
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         rng = generators(seed)[0]
-        cubes = [cube("projectile", jitter.disturbed(PROJECTILE, rng), RED)]
+        start = jitter.disturbed(scaled(PROJECTILE.position, self.scale), rng)
+        cubes = [cube("projectile", start, RED, self.scale)]
         for number, (y, z) in enumerate(PYRAMID, start=1):
-            pose = jitter.disturbed(Pose.at(PYRAMID_X, y, z), rng)
-            cubes.append(cube(f"pyramid_{number}", pose, GREEN))
+            pose = jitter.disturbed(scaled((PYRAMID_X, y, z), self.scale), rng)
+            cubes.append(cube(f"pyramid_{number}", pose, GREEN, self.scale))
         return Scene("throwing", tuple(cubes), self.arm)
 
     def problem(self) -> str | None:
@@ -167,13 +187,14 @@ class Throwing(Task):
             swing_of(self.arm)
         except RobotError as error:
             return str(error)
-        return cannot_handle(self.arm, (), [PROJECTILE])
+        start = scaled(PROJECTILE.position, self.scale)
+        return cannot_handle(self.arm, (), [start], self.scale)
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         with world.phase("settle start"):
             world.wait(SETTLE_START)
         before = world.poses()
-        manipulator = Manipulator(world, generators(seed)[2], self.speeds)
+        manipulator = Manipulator(world, generators(seed)[2], self.speeds, self.scale)
         world.mark("start")
         metrics: dict[str, float | None] = {metric.name: None for metric in self.metrics}
         details: dict[str, object] = {}
@@ -194,8 +215,9 @@ class Throwing(Task):
         world.mark("end")
         with world.phase("settle"):
             settling = world.wait(self.settle, log_period=SETTLE_PERIOD)
-        off = [n for n in before if n != "projectile" and _moved(before[n], world.pose(n))]
-        pushed = set() if thrown is None else _moved_by(thrown, settling, world.scene)
+        far = STUDY_TOLERANCE * self.scale
+        off = [n for n in before if n != "projectile" and _moved(before[n], world.pose(n), far)]
+        pushed = set() if thrown is None else _moved_by(thrown, settling, world.scene, self.scale)
         hit = [name for name in off if name in pushed]
         moved = hit if self.by_throw else off
         count(len(moved), len(PYRAMID))
@@ -218,7 +240,9 @@ class Throwing(Task):
         held = world.scene.body("projectile")
         gravity = np.asarray(world.scene.gravity)
         cube = world.scene.free_bodies.index(held)
-        thrown = Thrown(manipulator.model, motion, cube, held, started, perfect, gravity)
+        thrown = Thrown(
+            manipulator.model, motion, cube, held, started, perfect, gravity, self.scale
+        )
         if thrown.flight is not None:
             world.note("release", float(motion.time[thrown.flight.first]))
             if thrown.flight.last < len(motion) - 1:
@@ -227,39 +251,42 @@ class Throwing(Task):
 
 
 @cache
-def perfect_throw(robot: Robot, release_fraction: float, feasible: bool) -> Throw:
+def perfect_throw(
+    robot: Robot, release_fraction: float, feasible: bool, scale: float = 1.0
+) -> Throw:
     """The swing and the release of a perfect follower."""
     model = RobotModel(robot)
     start, goal = swing_of(robot)
-    held = cube("projectile", PROJECTILE, RED)
+    held = cube("projectile", PROJECTILE, RED, scale)
     timed, duration = (
         feasible_swing(model, start, goal, np.array(STANDARD_GRAVITY), held)
         if feasible
         else study_swing(model, start, goal)
     )
-    return released(model, timed, duration, release_fraction)
+    return released(model, timed, duration, release_fraction, scale)
 
 
-def _moved(before: Pose, after: Pose) -> bool:
-    """As the study counts: farther than 5 cm in x or in y."""
+def _moved(before: Pose, after: Pose, far: float = STUDY_TOLERANCE) -> bool:
+    """As the study counts: farther than 5 cm, scaled, in x or in y."""
     x, y, _ = np.abs(np.subtract(after.position, before.position))
-    return bool(x > STUDY_TOLERANCE or y > STUDY_TOLERANCE)
+    return bool(x > far or y > far)
 
 
-def _moved_by(thrown: Thrown, settling: Motion | None, scene: Scene) -> set[str]:
+def _moved_by(thrown: Thrown, settling: Motion | None, scene: Scene, scale: float) -> set[str]:
     """The bodies that the thrown cube moved out of their places; see `impact`."""
     log = Motion.joined([thrown.motion] if settling is None else [thrown.motion, settling])
     names = [body.name for body in scene.free_bodies]
     own = names.index("projectile")
     others = [index for index in range(len(names)) if index != own]
     found = impact(
-        log.time, log.bodies[:, own, :7], log.bodies[:, others, :7], CUBE_SIZE, thrown.free
+        log.time, log.bodies[:, own, :7], log.bodies[:, others, :7], CUBE_SIZE * scale, thrown.free
     )
+    far = STUDY_TOLERANCE * scale
     first, rest, last = (log.bodies[row, others] for row in (0, found.rest, -1))
     return {
         names[others[i]]
         for i in found.caused
-        if _moved(Pose.from_array(first[i]), Pose.from_array(rest[i]))
+        if _moved(Pose.from_array(first[i]), Pose.from_array(rest[i]), far)
         or _carried_most(first[i, :3], rest[i, :3], last[i, :3])
     }
 

@@ -383,5 +383,11 @@ def test_what_a_robot_cannot_do_is_a_sentence(tmp_path: Path) -> None:
     toml = TOML[: TOML.index("[hand]")] + '[hand]\ntool_frame = "grip"\n'
     bare = read_robot(small_arm(tmp_path, toml, URDF.replace('"prismatic"', '"fixed"')))
     assert Stacking(robot=bare).problem() == (
-        "robot 'small' has no hand with two parallel fingers to grasp a cube"
+        "robot 'small' has no hand with two parallel fingers to grasp a cube, nor one with a jaw "
+        "that turns"
+    )
+    so101 = find("so101")
+    shut = replace(so101, gripper=replace(so101.gripper, opened=0.0))
+    assert Stacking(robot=shut).problem() == (
+        "robot 'so101' opens its jaw to 0 rad, too little for a cube of 0.02 m"
     )

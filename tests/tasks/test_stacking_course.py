@@ -81,9 +81,11 @@ def test_the_planner_has_a_generator_of_its_own(monkeypatch: pytest.MonkeyPatch)
     seen: list[dict[str, Any]] = []
 
     class Spy(Manipulator):
-        def __init__(self, world: Any, rng: np.random.Generator, speeds: Speeds) -> None:
+        def __init__(
+            self, world: Any, rng: np.random.Generator, speeds: Speeds, scale: float
+        ) -> None:
             seen.append(rng.bit_generator.state)
-            super().__init__(world, rng, speeds)
+            super().__init__(world, rng, speeds, scale)
 
     monkeypatch.setattr(stacking, "Manipulator", Spy)
     perform(ONE, seed=5)

@@ -1,0 +1,80 @@
+"""A hand with one jaw grasps a cube between two faces, its tool centre point in the middle."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pytest_simbench.robot.collision import PlanningScene
+from pytest_simbench.robot.grasping import CLEARANCE, GRASP_LINK, grasp_of, grasping
+from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.robot.registry import find
+from pytest_simbench.scene import FloatArray, Scene
+
+SO101 = find("so101")
+JAWS = PlanningScene(RobotModel(SO101), Scene("jaws", (), SO101))
+
+
+def test_parallel_fingers_stay_as_they_are() -> None:
+    robot = find("ur5")
+    assert grasping(robot, 0.05, 1.0) is robot
+    grasp = grasp_of(robot, 0.05, 1.0)
+    assert (grasp.touching, grasp.opened, grasp.beside) == (0.025, 0.035, 0.0)
+
+
+@settings(max_examples=5)
+@given(width=st.floats(0.012, 0.035))
+def test_a_jaw_touches_a_cube_that_the_fixed_one_touches(width: float) -> None:
+    robot = grasping(SO101, width, width / 0.05)
+    grasp = grasp_of(robot, width, width / 0.05)
+    assert robot.tool_frame == GRASP_LINK
+    middle = RobotModel(robot).tool_pose(robot.column("initial_position")[:5])
+    face = RobotModel(SO101).tool_pose(SO101.column("initial_position")[:5])
+    assert (face.inverse() * middle).position == pytest.approx((0.0, width / 2, 0.0), abs=1e-9)
+    beside = grasp.beside
+    assert beside == pytest.approx(CLEARANCE * width / 0.05)
+    assert JAWS.gap(grasp.touching, width / 2) == pytest.approx(width, abs=1e-6)
+    assert JAWS.gap(grasp.opened, width / 2) == pytest.approx(width + 2 * beside, abs=1e-6)
+    assert robot.joints[-1].initial_position == robot.gripper.opened == grasp.opened
+    assert robot.limits == SO101.limits
+
+
+def test_the_faces_of_the_so101s_jaws_are_those_of_the_meshes() -> None:
+    """Steps, parallel to each other at 0: those of the fixed jaw lie at 0, -2.0, -3.7, -5.4 and
+    -7.1 mm, those of the other one at 15.8, 17.8 and 19.8 mm. Each slice has one."""
+    fixed, moving = slices(JAWS.model.arm), slices(JAWS.model.arm + 1)
+    faces = sorted(1e3 * float(part[:, 1].max()) for part in fixed)
+    assert faces[:5] == pytest.approx([-7.1, -5.4, -3.7, -2.0, 0.0], abs=0.1)
+    faces = sorted(1e3 * float(part[:, 1].min()) for part in moving)
+    assert faces[0] == pytest.approx(15.8, abs=0.05)
+    assert faces[1:] == pytest.approx([17.8, 18.1, 19.8], abs=0.05)  # 18.1: where it hangs
+
+
+def slices(joint: int) -> list[FloatArray]:
+    """Corners of the shapes of a link in the tool frame at 0 rad, (n, 3) each."""
+    model, geometry = JAWS.model, JAWS._geometry
+    q = np.zeros(len(model.robot.joints))
+    pin.updateGeometryPlacements(model.pin, model.data, geometry, JAWS._exact, q)
+    tool = pin.updateFramePlacement(model.pin, model.data, model.tool)
+    found = []
+    for index in JAWS._links:
+        shape = geometry.geometryObjects[index]
+        if shape.parentJoint == joint:
+            placed = tool.actInv(JAWS._exact.oMg[index])
+            found.append(
+                np.asarray(shape.geometry.points()) @ placed.rotation.T + placed.translation
+            )
+    return found
+
+
+def test_what_the_jaw_is_too_narrow_for_is_left_to_be_told() -> None:
+    narrow = replace(SO101, gripper=replace(SO101.gripper, opened=0.0))
+    assert grasping(narrow, 0.02, 0.4) is narrow
+    wide = grasping(SO101, 0.02, 0.4, wide=True)
+    assert wide.gripper.opened == 1.0 == wide.joints[-1].initial_position
+    assert np.isinf(JAWS.gap(1.0, 0.01))
