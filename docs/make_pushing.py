@@ -1,6 +1,6 @@
 """Makes the tables of docs/pushing.md from docs/data/pushing.csv, which holds every repetition.
 
-python docs/make_pushing.py RUN...    reads run folders into the CSV, then writes the tables
+python docs/make_pushing.py RUN...    adds run folders to the CSV, then writes the tables
 python docs/make_pushing.py           writes the tables
 
 A table stands between `<!-- pushing: ROBOT PROFILE -->` and `<!-- end -->`.
@@ -12,6 +12,7 @@ import csv
 import statistics
 import sys
 from collections import defaultdict
+from collections.abc import Mapping
 from pathlib import Path
 
 from published_runs import SIMULATORS
@@ -31,18 +32,28 @@ NAMES = {**SIMULATORS, "ode": "ODE"}
 
 
 def read(folders: list[str]) -> None:
-    """Run folders into the CSV."""
+    """Run folders into the CSV. A repetition that is in it already is replaced."""
+    names = [metric.name for metric in Pushing().metrics]
+    with DATA.open(newline="", encoding="utf-8") as file:
+        rows = {_key(row): row for row in csv.DictReader(file)}
+    for folder in folders:
+        for record in RunFolder(Path(folder)).read().records:
+            robot = record.robot.get("name", "panda")
+            way = "curve" if record.settings["task.turn"] else "line"
+            told = (record.simulator, engine_version(record), way, record.seed, record.status)
+            values = [record.metrics.get(name) for name in names]
+            cells = ["" if value is None else f"{value:.6g}" for value in values]
+            line = (robot, record.profile, *map(str, told), *cells)
+            row = dict(zip((*HEADER, *names), line, strict=True))
+            rows[_key(row)] = row
     with DATA.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*HEADER, *(metric.name for metric in Pushing().metrics)])
-        for folder in folders:
-            for record in RunFolder(Path(folder)).read().records:
-                robot = record.robot.get("name", "panda")
-                way = "curve" if record.settings["task.turn"] else "line"
-                told = (record.simulator, engine_version(record), way, record.seed, record.status)
-                values = [record.metrics.get(metric.name) for metric in Pushing().metrics]
-                cells = ["" if value is None else f"{value:.6g}" for value in values]
-                writer.writerow([robot, record.profile, *told, *cells])
+        writer = csv.DictWriter(file, (*HEADER, *names), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows.values())
+
+
+def _key(row: Mapping[str, str]) -> tuple[str, ...]:
+    return tuple(row[name] for name in ("robot", "profile", "simulator", "way", "seed"))
 
 
 def table(robot: str, profile: str) -> str:
