@@ -57,8 +57,8 @@ class PyBullet(Simulator):
         engine="Bullet",
         language="C++",
         tested_version="3.2.7",
-        oldest_version="3.2.6",
-        companions={"3.2.6": ("numpy<2",), "3.2.7": ("numpy",)},  # what it was compiled for
+        oldest_version="3.2.2",  # before 3.2.6 there are no wheels for Python 3.11
+        companions={"3.2.2": ("numpy<2",), "3.2.7": ("numpy",)},  # what it was compiled for
         capabilities=frozenset(
             {
                 Capability.WINDOW,
