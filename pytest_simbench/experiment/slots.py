@@ -131,8 +131,12 @@ def slot(address: str, test: str, stop: Callable[[], bool]) -> Iterator[bool]:
         connection.settimeout(LOOK_PERIOD)
         granted = b""
         while not (granted or stop()):
-            with suppress(TimeoutError):
+            try:
                 granted = connection.recv(1)
-                if not granted:
-                    raise gone
+            except TimeoutError:
+                continue
+            except OSError:  # it was accepted by nobody any more
+                raise gone from None
+            if not granted:
+                raise gone
         yield bool(granted)

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from pytest_simbench.plugin import cluster, options
-from pytest_simbench.plugin.variants import Variant
 
 if TYPE_CHECKING:
     from pytest_simbench.experiment.case import Case
     from pytest_simbench.experiment.experiment import Experiment
+    from pytest_simbench.plugin.variants import Variant
 
     CaseOf = Callable[[pytest.Item, Variant, dict[str, Any]], Case]
 
@@ -42,6 +42,7 @@ def _of(item: pytest.Item, case_of: CaseOf) -> Iterator[Experiment]:
     """The experiment of a test of one repetition, if it tells and runs without a window."""
     from pytest_simbench.experiment.experiment import Experiment
     from pytest_simbench.plugin.marks import number_mark
+    from pytest_simbench.plugin.variants import Variant
     from pytest_simbench.simulator import SimulatorError
     from pytest_simbench.tasks.base import Task
 

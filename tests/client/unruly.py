@@ -204,7 +204,8 @@ class Aborts(_AtTime):
 
 class Parent(MuJoCo):
     """Starts processes that want to stay: a child, one with another session and parent, and one
-    that has thrown its environment away as well. Their ids are in the file of `UNRULY`."""
+    that has thrown its environment away as well. Their ids are in the file of `UNRULY`, in this
+    order."""
 
     def load(self, scene: Scene) -> None:
         super().load(scene)
@@ -214,14 +215,18 @@ class Parent(MuJoCo):
         )
         with open(os.environ["UNRULY"], "ab") as ids:
             subprocess.Popen([sys.executable, "-c", sleep], stdout=ids)
-            for environment in (None, {}):
+            for number, environment in enumerate((None, {}), 1):
+                self._wait_for(number)
                 subprocess.run(
                     [sys.executable, "-c", daemon + sleep],
                     stdout=ids,
                     env=environment,
                     check=True,
                 )
-        while Path(os.environ["UNRULY"]).read_text().count("\n") < 3:
+        self._wait_for(3)
+
+    def _wait_for(self, number: int) -> None:
+        while Path(os.environ["UNRULY"]).read_text().count("\n") < number:
             time.sleep(0.01)
 
 

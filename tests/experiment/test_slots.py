@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import subprocess
 import sys
 import threading
@@ -82,3 +83,16 @@ def test_who_waits_hears_that_the_run_is_gone(slots: Slots) -> None:
             pass
     with pytest.raises(ExecutorError, match="is gone"), slot(slots.address, "x", lambda: False):
         pass
+
+
+def test_who_was_heard_by_nobody_hears_that_the_run_is_gone() -> None:
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind("")  # an address of its own, that of Linux's abstract names
+        listener.listen()
+        address = listener.getsockname()[1:].decode()
+        threading.Timer(0.1, listener.close).start()
+        with (
+            pytest.raises(ExecutorError, match="is gone"),
+            slot(address, "mine", lambda: False),
+        ):
+            pass
