@@ -17,11 +17,24 @@ from pytest_simbench.simulator.shapes import write_obj
 dartpy = lazy_import("dartpy")
 
 
-def add_ground(world: Any, friction: float, restitution: float) -> Any:
-    """The body of the plane z = 0, made in the world."""
+SLAB = (100.0, 100.0, 1.0)
+"""Edges of a ground that is a box [m]; no room of a scene goes so far."""
+
+
+def add_ground(world: Any, friction: float, restitution: float, slab: bool = False) -> Any:
+    """The body of the plane z = 0, made in the world.
+
+    Args:
+        slab: make it a box below z = 0. DART's own detector tells one contact of a box on a plane,
+            on which it rocks and sinks, and four of a box on a box.
+    """
     skeleton = dartpy.dynamics.Skeleton("ground")
     _, body = skeleton.createWeldJointAndBodyNodePair()
-    shape = body.createShapeNode(dartpy.dynamics.PlaneShape([0.0, 0.0, 1.0], 0.0))
+    if slab:
+        shape = body.createShapeNode(dartpy.dynamics.BoxShape(np.array(SLAB)))
+        shape.setRelativeTranslation([0.0, 0.0, -SLAB[2] / 2])
+    else:
+        shape = body.createShapeNode(dartpy.dynamics.PlaneShape([0.0, 0.0, 1.0], 0.0))
     set_surface(shape, friction, restitution)
     skeleton.setMobile(False)
     world.addSkeleton(skeleton)

@@ -59,7 +59,8 @@ class ReadBack:
         """Every quantity that DART tells, by its name."""
         plane = self.ground.getShapeNode(0)
         surface = plane.getDynamicsAspect()
-        height = plane.getShape().getOffset() + plane.getWorldTransform().translation()[2]
+        top = plane.getShape().getSize()[2] / 2 if _is_box(plane) else plane.getShape().getOffset()
+        height = top + plane.getWorldTransform().translation()[2]
         reported: dict[str, Any] = {
             "gravity": self.world.getGravity(),
             "timestep": self.world.getTimeStep(),

@@ -1,6 +1,12 @@
 """Contacts: ODE names pairs that may touch, and the caller makes a joint of each contact point.
 
 It calls back for each pair, here into Python. What this costs stands in docs/engines/ode.md.
+
+A mesh gives a contact for each of its triangles, and so the same one many times where triangles
+meet. ODE leaves those out itself, but only where the product of both normals is 1 to the last bit
+(`GenerateContact` in collision_trimesh_box.cpp), which the rounding of a normal decides. Equal
+contacts make equal rows, and ODE's solver gives up on those: all rows that it has not come to, of
+drives and of contacts, are then without force for a step. So they are left out here.
 """
 
 from __future__ import annotations
@@ -16,7 +22,7 @@ import numpy as np
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.simulator import lazy_import
 
-from .library import library
+from .library import Mesh, library
 
 ode = lazy_import("ode")
 
@@ -35,6 +41,13 @@ TOUCHES = {
 
 SLIPS = 1e-4
 """Slower contacts stick [m/s]; they have no direction worth the name."""
+
+APART = 1e-5
+"""Contacts of a mesh that are nearer to each other, along each axis, are one [m], where their
+normals are `ALIKE`."""
+
+ALIKE = 0.99
+"""Cosine of the angle below which two normals are one."""
 
 
 @dataclass
@@ -145,6 +158,8 @@ class Contacts:
         if not ((one is not None and one.isEnabled()) or (other is not None and other.isEnabled())):
             return  # both asleep, or one asleep upon what never moves
         contacts = self._collide(first, second)
+        if len(contacts) > 1 and (isinstance(first, Mesh) or isinstance(second, Mesh)):
+            contacts = distinct(contacts)
         if len(contacts) > self.most:
             contacts.sort(key=_depth, reverse=True)
             del contacts[self.most :]
@@ -194,6 +209,22 @@ def _slip(contact: Any, one: Any, other: Any) -> tuple[float, float, float] | No
     x, y, z = (s - across * n for s, n in zip(slip, normal, strict=True))
     speed = math.sqrt(x * x + y * y + z * z)
     return (x / speed, y / speed, z / speed) if speed > SLIPS else None
+
+
+def distinct(contacts: list[Any]) -> list[Any]:
+    """One contact of each place and normal, the deepest, in the order of their depth."""
+    kept: list[Any] = []
+    seen: list[tuple[float, ...]] = []
+    for contact in sorted(contacts, key=_depth, reverse=True):
+        (x, y, z), (u, v, w), *_ = contact.getContactGeomParams()
+        for a, b, c, d, e, f in seen:
+            near = abs(x - a) <= APART and abs(y - b) <= APART and abs(z - c) <= APART
+            if near and u * d + v * e + w * f > ALIKE:
+                break
+        else:
+            kept.append(contact)
+            seen.append((x, y, z, u, v, w))
+    return kept
 
 
 def _depth(contact: Any) -> float:

@@ -13,11 +13,23 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar
 
+import numpy as np
 from pytest_simbench.sims.ode.adapter import ODE, ODESettings
-from pytest_simbench.sims.ode.library import HI_STOP, MOST_FORCE, SOFTNESS, body_id, library
+from pytest_simbench.sims.ode.contacts import distinct
+from pytest_simbench.sims.ode.library import (
+    HI_STOP,
+    MOST_FORCE,
+    SOFTNESS,
+    Mesh,
+    body_id,
+    library,
+    place,
+)
 
 from pytest_simbench.scene import Pose, Scene
-from pytest_simbench.simulator import Settings
+from pytest_simbench.simulator import Settings, lazy_import
+
+ode = lazy_import("ode")
 
 
 @dataclass(frozen=True)
@@ -56,6 +68,36 @@ class Mortal(ODE):
         alive = sum(shape() is not None for shape in shapes)
         gc.enable()
         return alive
+
+
+class Tip(ODE):
+    """Counts as contacts how many a box has of the tip of a cone in it, the most over some turns of
+    both. The cone's 40 triangles meet in the tip, 0.1 mm deep."""
+
+    filtered = True
+
+    def contact_count(self) -> int:
+        turns = 2 * np.pi * np.arange(40) / 40
+        rim = np.stack([0.01 * np.cos(turns), 0.01 * np.sin(turns), np.full(40, 0.01)], axis=1)
+        triangles = np.stack([np.zeros((40, 3)), np.roll(rim, -1, axis=0), rim], axis=1)
+        cone, box = Mesh(ode.SimpleSpace(), triangles), ode.GeomBox(None, (0.1, 0.1, 0.1))
+        most = 0
+        for turn in np.linspace(0.0, np.pi / 2, 100):
+            w, x, y, z = np.cos(turn / 2), *(np.sin(turn / 2) * np.array([2.0, 3.0, 6.0]) / 7)
+            turned = Pose((0.0, 0.0, 0.0), (w, x, y, z))
+            place(cone, turned)
+            place(box, turned * Pose.at(0.0, 0.0, -0.0499))
+            contacts = ode.collide(cone, box)
+            kept = distinct(contacts) if self.filtered else contacts
+            deep = [c for c in kept if c.getContactGeomParams()[2] > 0.5e-4]
+            most = max(most, len(deep))
+        return most
+
+
+class RawTip(Tip):
+    """The same, as ODE tells them."""
+
+    filtered = False
 
 
 def part(s: Any, name: str) -> Any:

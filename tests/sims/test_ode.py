@@ -6,19 +6,22 @@ from __future__ import annotations
 import json
 import subprocess
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pytest_simbench.sims.ode.adapter import ODE
+from pytest_simbench.sims.ode.contacts import APART, distinct
 
 from pytest_simbench.client.environments import interpreter
 from pytest_simbench.client.world import World
 from pytest_simbench.scene import FloatArray, Robot, Trajectory
 from pytest_simbench.testing import scenes
 
-from .ode_faults import Mortal
+from .ode_faults import Mortal, RawTip, Tip
 from .worlds import Worlds
 
 
@@ -149,3 +152,46 @@ def test_webots_motors_lag(worlds: Worlds, drive: str, behind: float) -> None:
     goal[0] += 0.5
     to(world, goal, 1.0)
     assert goal[0] - world.joints[0, 0] == pytest.approx(0.5 * behind, abs=2e-3)
+
+
+@pytest.mark.parametrize(("kind", "alike"), [(Tip, 1), (RawTip, 40)])
+def test_a_corner_of_a_mesh_is_one_contact(kind: type[Tip], alike: int) -> None:
+    """ODE tells it once for each triangle, where a normal is rounded so. Of such contacts its
+    solver gave up, and the SO-101's jaw flung a cube away."""
+    with Worlds(kind) as worlds:
+        assert worlds.load(scenes.arm_alone(scenes.arm())).contact_count() == alike
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A contact, as pyode tells one."""
+
+    place: tuple[float, float, float]
+    normal: tuple[float, float, float]
+    depth: float
+
+    def getContactGeomParams(self) -> tuple[object, ...]:
+        return self.place, self.normal, self.depth, None, None
+
+    def stands_for(self, other: Touch) -> bool:
+        """Whether the other one adds nothing: near, with the same normal, not deeper."""
+        near = np.abs(np.subtract(self.place, other.place)).max() <= APART
+        return bool(near and self.normal == other.normal and self.depth >= other.depth)
+
+
+touches = st.builds(
+    Touch,
+    st.tuples(*[st.sampled_from([0.0, 0.4 * APART, 0.8 * APART, 3 * APART])] * 3),
+    st.sampled_from([(0.0, 0.0, 1.0), (1.0, 0.0, 0.0)]),
+    st.floats(0.0, 1e-3),
+)
+
+
+@given(st.lists(touches, max_size=12))
+def test_what_is_left_stands_for_all(contacts: list[Touch]) -> None:
+    kept = distinct(contacts)
+    assert all(any(one.stands_for(other) for one in kept) for other in contacts)
+    assert not any(
+        a.stands_for(b) for k, a in enumerate(kept) for m, b in enumerate(kept) if k != m
+    )
+    assert [one.depth for one in kept] == sorted((one.depth for one in kept), reverse=True)
