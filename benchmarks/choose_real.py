@@ -46,18 +46,27 @@ GRIDS: Mapping[str, Mapping[str, tuple[Any, ...]]] = {
 """Settings that decide how a contact gives way, and few values of each, around those of `tuned`."""
 
 MORE: Mapping[str, tuple[Mapping[str, Any], ...]] = {
-    "drake": tuple(
-        {"timestep": 0.001, **changes}
-        for changes in (
-            {"point_stiffness": 3e5}, {"point_stiffness": 1e5}, {"relaxation_time": 0.003},
-            {"corner_radius": 0.004}, {"timestep": 0.0005},
-            {"approximation": "lagged", "hunt_crossley_dissipation": 1.0},
-            {"corner_radius": 0.0, "compliance": "compliant",
-             "contact_model": "hydroelastic_with_fallback"},
-        )
+    "drake": (
+        *(
+            {"timestep": 0.001, **changes}
+            for changes in (
+                {"point_stiffness": 3e5}, {"point_stiffness": 1e5}, {"relaxation_time": 0.003},
+                {"corner_radius": 0.004}, {"timestep": 0.0005},
+                {"approximation": "lagged", "hunt_crossley_dissipation": 1.0},
+                {"corner_radius": 0.0, "compliance": "compliant",
+                 "contact_model": "hydroelastic_with_fallback"},
+            )
+        ),
+        *(
+            {"timestep": step, "point_stiffness": stiffness, "relaxation_time": relaxation}
+            for step in (0.001, 0.0005)
+            for stiffness in (1e4, 3e4, 1e5, 3e5)
+            for relaxation in (0.0003, 0.001, 0.003)
+        ),
     ),
 }  # fmt: skip
-"""Single changes that were tried besides."""
+"""What was tried besides. Drake has no restitution, but soft contacts that dissipate little bounce:
+the last ones."""
 
 
 def candidates(simulator: str) -> Iterator[dict[str, Any]]:

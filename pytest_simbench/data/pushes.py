@@ -4,7 +4,6 @@ Leitner, *Quantifying the Reality Gap in Robotic Manipulation Tasks*, ICRA 2019)
 from __future__ import annotations
 
 import hashlib
-import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -222,33 +221,3 @@ def _table(content: bytes, path: str) -> tuple[FloatArray, FloatArray, FloatArra
     except (ValueError, IndexError) as error:
         raise DataError(f"{path} is no table of a run: {error}") from None
     return time, poses[0], poses[1]
-
-
-def described(urdf: Path, finger_angle: float) -> str:
-    """The arm's description as engines can be given it: joints that turn without end get the limits
-    that stand beside them, and the fingers are held at an angle [rad].
-
-    Raises:
-        DataError: no URDF.
-    """
-    try:
-        root = ET.parse(urdf).getroot()
-    except (OSError, ET.ParseError) as error:
-        raise DataError(f"{urdf} is no robot description: {error}") from None
-    for joint in root.findall("joint"):
-        if joint.get("type") == "continuous":
-            joint.set("type", "revolute")
-        name = joint.get("name", "")
-        if "finger" in name and "tip" not in name:
-            _hold(joint, finger_angle)
-    return ET.tostring(root, encoding="unicode")
-
-
-def _hold(joint: ET.Element, angle: float) -> None:
-    """Make a revolute joint about its z axis a fixed one at an angle [rad]."""
-    joint.set("type", "fixed")
-    origin = joint.find("origin")
-    assert origin is not None
-    turn = Rotation.from_euler("xyz", [float(part) for part in origin.get("rpy", "").split()])
-    turned = turn * Rotation.from_euler("z", angle)
-    origin.set("rpy", " ".join(repr(float(part)) for part in turned.as_euler("xyz")))

@@ -32,10 +32,9 @@ INERTIA = 8.1e-4
 Two other values are in print: 6.167e-4 is that of a cube of 0.10 m, 8.1e-3 a misprint."""
 
 FRICTION = 0.18
-"""Coulomb coefficient of acrylic on that table, and below Newton's coefficient of restitution: the
-values that were fitted to these tosses (Pfrommer, Halm, Posa 2020; Acosta, Yang, Posa 2022)."""
-
-RESTITUTION = 0.125
+"""Coulomb coefficient of acrylic on that table: the value that was fitted to these tosses
+(Pfrommer, Halm, Posa 2020; Acosta, Yang, Posa 2022). They fitted a restitution of 0.125 too, which
+the task leaves out: not all engines have it."""
 
 COLUMNS = 13
 """Of a state: position 3, quaternion 4, linear velocity 3, angular velocity 3."""

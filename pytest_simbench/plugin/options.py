@@ -92,9 +92,9 @@ OPTIONS = (
            "your own in that interpreter", [], "--sim", "NAME"),
     Option("--sim-install-missing", Flag(), "before the run, make the environments that the "
            "simulators of --sim need and that are not there", False),
-    Option("--sim-robot", File(), "robot that does the tasks: a name (pytest --robots), a robot "
-           "file that ends in .toml, or all built-in ones (default: panda)", None, "--robot",
-           "NAME|FILE|all"),
+    Option("--sim-robot", File("a name (pytest --robots), a robot file, or all"),
+           "robot that does the tasks: a name (pytest --robots), a robot file that ends in .toml, "
+           "or all built-in ones (default: panda)", None, "--robot", "NAME|FILE|all"),
     Option("--sim-history", LastReleases(), "run the last N releases of a simulator, each in an "
            "environment of its own that is made where it is missing; :minor, the last of each "
            "minor version; what an earlier history here has recorded is not run again",

@@ -295,13 +295,20 @@ class Bisection(Kind):
         return Span(found[1], found[2], found[3], texts[1])
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class File(Kind):
-    """A path, of which this machine's file system could have a file."""
+    """A path, of which this machine's file system could have a file.
+
+    Attributes:
+        form: what may be given, for messages.
+    """
+
+    form: str = "a path"
 
     def read(self, texts: Sequence[str]) -> str:
         path = texts[-1]
         if not path.strip():
-            raise BadValue(path, "give a path")
+            raise BadValue(path, f"give {self.form}")
         if "\0" in path:
             raise BadValue(path, "a path holds no NUL character")
         try:

@@ -9,6 +9,7 @@ from itertools import product
 import coal
 import numpy as np
 import pinocchio as pin
+from scipy.spatial import ConvexHull
 
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.scene import Body, FloatArray, Pose, Scene
@@ -55,8 +56,7 @@ class PlanningScene:
         )
         for shape in geometry.geometryObjects:
             if isinstance(shape.geometry, coal.BVHModelBase):
-                shape.geometry.buildConvexRepresentation(False)
-                shape.geometry = shape.geometry.convex
+                shape.geometry = convex_hull(np.asarray(shape.geometry.vertices()))
         self._links = list(range(len(geometry.geometryObjects)))
         geometry.addAllCollisionPairs()
         if robot.srdf:
@@ -225,6 +225,28 @@ class PlanningScene:
                         return objects[first].name, objects[second].name
                 return "robot", "obstacle"
         return None
+
+
+def convex_hull(points: FloatArray) -> coal.Convex:
+    """The hull of points as a shape, with the points in its corners alone.
+
+    Coal's own (`buildConvexRepresentation`) keeps those within as corners without neighbours. Its
+    search for the farthest corner ends there: with the UR5's links it missed 119 of 368 contacts.
+
+    Args:
+        points: (n, 3) [m].
+    """
+    hull = ConvexHull(points)
+    number = np.zeros(len(points), dtype=int)
+    number[hull.vertices] = np.arange(len(hull.vertices))
+    corners, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for corner in points[hull.vertices]:
+        corners.append(corner)
+    for face, outward in zip(hull.simplices, hull.equations[:, :3], strict=True):
+        a, b, c = points[face]
+        turned = np.cross(b - a, c - a) @ outward < 0.0
+        faces.append(coal.Triangle(*map(int, number[face[::-1] if turned else face])))
+    return coal.Convex(corners, faces)
 
 
 def _below(placement: pin.SE3, shape: coal.CollisionGeometry, above: float) -> FloatArray:

@@ -8,6 +8,7 @@ score: what is left is contact.
 from __future__ import annotations
 
 import math
+import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache
@@ -19,11 +20,14 @@ from scipy.signal import savgol_filter
 
 from pytest_simbench.client.world import World
 from pytest_simbench.data import pushes
+from pytest_simbench.data.errors import DataError
 from pytest_simbench.data.pushes import PUSH, ArmRun, ArmRuns
 from pytest_simbench.data.tosses import Half
+from pytest_simbench.robot.adapting import bound_joints, lock_joints
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.tracking import track
 from pytest_simbench.scene import Box, FloatArray, Gripper, Joint, Pose, Robot, Scene, Trajectory
+from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.robot_files import keep
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task
 from pytest_simbench.tasks.metrics import Metric
@@ -35,6 +39,7 @@ HEIGHT = 0.055
 """Of the arm's base above the table [m]: measured with all joints at 0."""
 
 JOINTS = tuple(f"m1n6s300_joint_{k}" for k in range(1, 7))
+FINGERS = tuple(f"m1n6s300_joint_finger_{k}" for k in range(1, 4))
 TOOL = "m1n6s300_link_6"
 
 BEFORE_PUSH = np.radians([0.0, -60.0, 65.0, 90.0, 0.0, 0.0])
@@ -207,10 +212,29 @@ def calibrated(runs: ArmRuns) -> str:
     return f"{PUSH} {numbers}"
 
 
+def described(urdf: Path, finger_angle: float) -> str:
+    """The arm's description as engines can be given it, with its fingers held at an angle [rad].
+
+    Raises:
+        DataError: no URDF.
+    """
+    try:
+        root = ET.parse(urdf).getroot()
+        bound_joints(root)
+        lock_joints(root, dict.fromkeys(FINGERS, finger_angle))
+    except (OSError, ET.ParseError, DescriptionError) as error:
+        raise DataError(f"{urdf} is no robot description: {error}") from None
+    return ET.tostring(root, encoding="unicode")
+
+
 @cache
 def arm(urdf: Path, finger_angle: float, start: tuple[float, ...]) -> Robot:
-    """The Mico2 with held fingers; on what it stands is not seen."""
-    described = keep(pushes.described(urdf, finger_angle), {})
+    """The Mico2 with held fingers; on what it stands is not seen.
+
+    Raises:
+        DataError: no URDF.
+    """
+    description = keep(described(urdf, finger_angle), {})
     joints = (
         Joint(name, STIFFNESS, DAMPING, EFFORT, ARMATURE, at)
         for name, at in zip(JOINTS, start, strict=True)
@@ -218,7 +242,7 @@ def arm(urdf: Path, finger_angle: float, start: tuple[float, ...]) -> Robot:
     packages = {"kinova_description": str(urdf.parent)}
     hand = Gripper((), 0.0, 0.0, 0.0)
     base = Pose.at(0.0, 0.0, HEIGHT)
-    return Robot("mico", str(described), packages, "", tuple(joints), hand, TOOL, base)
+    return Robot("mico", str(description), packages, "", tuple(joints), hand, TOOL, base)
 
 
 @cache

@@ -1,8 +1,7 @@
-"""Runs of an arm: read, halved, described for engines, converted from the source's tables."""
+"""Runs of an arm: read, halved, converted from the source's tables."""
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,11 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from pytest_simbench.data import DataError, pushes
 
-URDF = """<robot name="arm">
-  <joint name="turns" type="continuous"><limit lower="-6" upper="6"/></joint>
-  <joint name="arm_joint_finger_1" type="revolute"><origin rpy="0.1 0.2 0.3" xyz="0 0 1"/></joint>
-  <joint name="arm_joint_finger_tip_1" type="fixed"><origin rpy="0 0 0" xyz="0 0 1"/></joint>
-</robot>"""
+URDF = "<robot/>"
 
 
 def poses(rows: int, seed: int) -> np.ndarray:
@@ -67,18 +62,6 @@ def test_tables_become_what_is_read_and_every_second_pair_is_held_out(folder: Pa
     assert [r.number for r in found.of("CubeExp", "held_out")] == [2, 3]
     assert (folder / "mico_push" / "meshes" / "a.STL").read_bytes() == b"mesh"
     assert found == pushes.read(folder)
-
-
-def test_the_arm_is_described_as_engines_take_it(folder: Path) -> None:
-    found = pushes.read(folder)
-    assert found is not None
-    joints = list(ET.fromstring(pushes.described(found.urdf, 0.5)))
-    assert [joint.get("type") for joint in joints] == ["revolute", "fixed", "fixed"]
-    before, after = (
-        Rotation.from_euler("xyz", [float(part) for part in text.split()])
-        for text in ("0.1 0.2 0.3", joints[1].find("origin").get("rpy"))  # type: ignore[union-attr]
-    )
-    assert (before.inv() * after).as_rotvec() == pytest.approx([0.0, 0.0, 0.5])
 
 
 def test_a_folder_without_runs_is_none(tmp_path: Path) -> None:

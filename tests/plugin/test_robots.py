@@ -196,6 +196,11 @@ def test_a_robot_that_is_none(pytester: pytest.Pytester, value: str, message: st
     run(pytester, ret=4).stderr.fnmatch_lines([message])
 
 
+def test_a_robot_that_is_not_named(pytester: pytest.Pytester) -> None:
+    message = "*--robot='': give a name (pytest --robots), a robot file, or all"
+    run(pytester, "--robot=", ret=4).stderr.fnmatch_lines([message])
+
+
 def test_the_list_of_robots(pytester: pytest.Pytester) -> None:
     path = small_arm(pytester.path)
     result = run(pytester, "--robots", f"--robot={path}")

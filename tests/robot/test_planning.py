@@ -46,6 +46,23 @@ def test_same_seed_same_plan(model: RobotModel, ready: FloatArray) -> None:
     assert not np.array_equal(first, other)
 
 
+def test_a_search_does_not_look_at_its_ends_again(
+    model: RobotModel, ready: FloatArray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """OMPL waits for ever for a goal that it finds invalid, and a touch of nothing may waver."""
+    looks: list[bytes] = []
+    real = PlanningScene.collision
+
+    def wavering(scene: PlanningScene, arm: FloatArray) -> tuple[str, str] | None:
+        seen = arm.tobytes() in looks[:2]  # the start and the goal, which come first
+        looks.append(arm.tobytes())
+        return ("hand", "wall") if seen else real(scene, arm)
+
+    monkeypatch.setattr(PlanningScene, "collision", wavering)
+    assert around_the_wall(model, ready, 3)[1]
+    assert len(looks) > 2
+
+
 def test_fingers_open_at_the_release(planner: MotionPlanner) -> None:
     for feasible in (True, False):
         trajectory, throw = planner.throw(

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from pytest_simbench.data import DataMissing, read
+from pytest_simbench.data import DataError, DataMissing, read
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
@@ -13,6 +17,34 @@ from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import panda
 from pytest_simbench.robot.tracking import track
 from pytest_simbench.tasks import ArmPushing
+from pytest_simbench.tasks.arm_pushing import described
+
+URDF = """<robot name="arm">
+  <joint name="m1n6s300_joint_1" type="continuous"><limit lower="-6" upper="6"/></joint>
+  <joint name="m1n6s300_joint_finger_1" type="revolute">
+    <origin rpy="0.1 0.2 0.3" xyz="0 0 1"/><axis xyz="0 0 1"/>
+  </joint>
+  <joint name="m1n6s300_joint_finger_tip_1" type="fixed"><origin rpy="0 0 0" xyz="0 0 1"/></joint>
+</robot>"""
+
+
+def test_the_arm_is_described_as_engines_take_it(tmp_path: Path) -> None:
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(URDF)
+    joints = list(ET.fromstring(described(urdf, 0.5)))
+    assert [joint.get("type") for joint in joints] == ["revolute", "fixed", "fixed"]
+    before, after = (
+        Rotation.from_euler("xyz", [float(part) for part in text.split()])
+        for text in ("0.1 0.2 0.3", joints[1].find("origin").get("rpy"))  # type: ignore[union-attr]
+    )
+    assert (before.inv() * after).as_rotvec() == pytest.approx([0.0, 0.0, 0.5])
+
+
+def test_what_is_no_urdf_is_told(tmp_path: Path) -> None:
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text("<robot>")
+    with pytest.raises(DataError, match="no robot description"):
+        described(urdf, 0.5)
 
 
 def test_a_tool_is_tracked_to_a_micrometre_and_held_joints_stay() -> None:
