@@ -55,6 +55,8 @@ IN_TIME: dict[str, tuple[str, Capability | None]] = {
     "contact forces have the wrong sign": ("weight_is_told", Capability.CONTACT_FORCES),
     "contact forces lack friction": ("friction_is_told", Capability.CONTACT_FORCES),
     "a loop is open": ("loops_stay_closed", Capability.LOOPS),
+    "links that are to collide do not": ("links_collide_when_asked", Capability.SELF_COLLIDE),
+    "links that one joint joins collide": ("links_collide_when_asked", Capability.SELF_COLLIDE),
     "joint wrenches are in the link's axes": ("joint_loads_are_told", Capability.JOINT_WRENCHES),
 }
 """The law that finds a fault of what happens in time, and the capability that it needs."""
@@ -82,6 +84,10 @@ MEASURED = {
 """The law of the kit that measures a quantity which an engine does not tell, first match."""
 
 
+NEEDING = {Capability.SELF_COLLIDE: "links_collide_when_asked"}
+"""The law that finds a fault of what only some engines can."""
+
+
 HAS_NONE = (" has no ", " have no ", "neither ")
 """In a deviation's reason: the engine lacks the thing, so it cannot be wrong there."""
 
@@ -106,7 +112,7 @@ def cells(subject: Subject) -> dict[str, str]:
     print(subject.name, file=sys.stderr, flush=True)
     return {
         name: cell(subject, fault, found)
-        for faults in rounds()
+        for faults in rounds(subject.cls.info.capabilities)
         for found in [planted(subject, faults.values())]
         for name, fault in faults.items()
     }
@@ -115,6 +121,8 @@ def cells(subject: Subject) -> dict[str, str]:
 def cell(subject: Subject, fault: Fault, found: ParityResult) -> str:
     if fault.quantity in found.wrong:
         return "parity"
+    if fault.quantity in found.untold and fault.needs in NEEDING:
+        return by_law(subject, NEEDING[fault.needs])
     return silent(subject, fault.quantity) if fault.quantity in found.untold else "**missed**"
 
 
@@ -152,7 +160,7 @@ def column(subject: Subject) -> dict[str, str]:
     """What finds each fault in one engine, by the fault in plain words."""
     found = cells(subject)
     return {
-        **{fault.what: found[name] for name, fault in FAULTS.items()},
+        **{fault.what: found.get(name, UNCLAIMED) for name, fault in FAULTS.items()},
         **{what: looked_up(subject, quantity) for what, quantity in IN_THE_ENGINE.items()},
         **{what: in_time(subject, *law) for what, law in IN_TIME.items()},
     }

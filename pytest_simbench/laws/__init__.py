@@ -21,6 +21,7 @@ from pytest_simbench.laws.contact import (
     TippingSlope,
     Tower,
 )
+from pytest_simbench.laws.domino import DominoWave
 from pytest_simbench.laws.driven import BallOnBelt, BeltSpeed
 from pytest_simbench.laws.drives import (
     EffortLimit,
@@ -111,7 +112,7 @@ LAWS: tuple[Law, ...] = (
     PendulumEnergyDrift(), DoublePendulum(),
     DoublePendulumEnergy(), SwingingSlider(), SphericalPendulum(), StepResponse(),
     SpringAndDamper(), EffortLimit(), Tracking(), Sag(), FeedForward(),
-    FourBarClosure(), FourBarSwing(), PendulumForce(), PendulumTorque(),
+    FourBarClosure(), FourBarSwing(), DominoWave(), PendulumForce(), PendulumTorque(),
     PushForce(), PushStraight(), PushTurns(), PushTips(),
 )  # fmt: skip
 """All of them, by phenomenon."""

@@ -78,13 +78,24 @@ def mechanism(
     base: Pose | None = None,
     friction: float = 1.0,
     closures: tuple[Closure, ...] = (),
+    self_collide: bool = False,
+    shape: Vector3 | None = None,
 ) -> Robot:
     """Parts that hang on each other, and the first on the mount, fixed in the world at `base`.
+
+    Args:
+        name: of the robot.
+        parts: parents first.
+        base: of the mount; None: 2 m above the origin.
+        friction, closures, self_collide: see `scene.Robot`.
+        shape: edges of a box about the mount's origin that collides [m]; None: nothing does.
 
     Raises:
         ValueError: a part hangs on one that does not come before it.
     """
-    links = [f'<link name="{MOUNT}"/>']
+    links = [
+        f'<link name="{MOUNT}">{_collision(shape)}</link>' if shape else f'<link name="{MOUNT}"/>'
+    ]
     joints = []
     places = {MOUNT: MOUNT}
     above = MOUNT
@@ -100,7 +111,7 @@ def mechanism(
         links.append(
             f'<link name="{part.link}"><inertial><origin xyz="{_spaced(part.centre)}"/>'
             f'<mass value="{part.mass!r}"/><inertia ixx="{x!r}" iyy="{y!r}" izz="{z!r}" '
-            f'ixy="0" ixz="0" iyz="0"/></inertial>{_collision(part)}</link>'
+            f'ixy="0" ixz="0" iyz="0"/></inertial>{_collision(part.shape, part.centre)}</link>'
         )
         joints.append(
             f'<joint name="{part.name}" type="{kind}"><parent link="{above}"/>'
@@ -121,15 +132,16 @@ def mechanism(
         base=base or Pose.at(0.0, 0.0, 2.0),
         friction=friction,
         closures=closures,
+        self_collide=self_collide,
     )
 
 
-def _collision(part: Part) -> str:
-    if part.shape is None:
+def _collision(shape: Vector3 | None, centre: Vector3 = (0.0, 0.0, 0.0)) -> str:
+    if shape is None:
         return ""
     return (
-        f'<collision><origin xyz="{_spaced(part.centre)}"/><geometry>'
-        f'<box size="{_spaced(part.shape)}"/></geometry></collision>'
+        f'<collision><origin xyz="{_spaced(centre)}"/><geometry>'
+        f'<box size="{_spaced(shape)}"/></geometry></collision>'
     )
 
 

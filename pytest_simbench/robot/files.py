@@ -140,6 +140,7 @@ class _Reader:
             friction=table.number("friction", 1.0, least=0.0),
             swing=swing,
             stand=stand,
+            self_collide=table.flag("self_collide", False),
         )
         table.close()
         robot = _with_files(robot, hand, srdf)

@@ -66,6 +66,13 @@ class Table:
         """A finite number of at least `least`."""
         return self._number(key, self._take(key, default), least)
 
+    def flag(self, key: str, default: bool) -> bool:
+        """Yes or no."""
+        value = self._take(key, default)
+        if not isinstance(value, bool):
+            raise self.error(key, f"{value!r:.60} is neither true nor false")
+        return value
+
     def some(self, key: str) -> tuple[float, ...]:
         """A list of at least one finite number."""
         value = self._take(key)

@@ -188,6 +188,8 @@ class Robot:
         stand: pose of the root link in the tasks on the table; None where it is `base`. It stays on
             this side too.
         closures: what closes loops of its links; only for engines with the capability `loops`.
+        self_collide: whether its links collide with each other (SDF's word); two that one joint
+            joins never do. Only for engines with the capability `self_collide`.
     """
 
     name: str
@@ -203,6 +205,7 @@ class Robot:
     swing: tuple[tuple[float, ...], tuple[float, ...]] | None = field(default=None, compare=False)
     stand: Pose | None = field(default=None, compare=False)
     closures: tuple[Closure, ...] = ()
+    self_collide: bool = False
 
     def __post_init__(self) -> None:
         check_name(self.name, "a robot")
@@ -250,12 +253,15 @@ class Robot:
         return np.array([getattr(joint, attribute) for joint in self.joints], dtype=float)
 
     def to_wire(self) -> dict[str, Any]:
-        """As plain data; a robot without loops names none, as before robots could have some."""
+        """As plain data; a robot without loops, or whose links pass through each other, names
+        neither, as before robots could have them."""
         told = {key: value for key, value in self.__dict__.items() if key not in ON_THIS_SIDE}
         closures = [closure.to_wire() for closure in told.pop("closures")]
+        colliding = {"self_collide": True} if told.pop("self_collide") else {}
         return {
             **told,
             **({"closures": closures} if closures else {}),
+            **colliding,
             "packages": dict(self.packages),
             "joints": [joint.to_wire() for joint in self.joints],
             "gripper": self.gripper.to_wire(),

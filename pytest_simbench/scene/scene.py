@@ -109,7 +109,7 @@ class Scene:
     @property
     def words(self) -> frozenset[str]:
         """What is in it: `box`, `sphere`, `cylinder`, `capsule`, `convex_mesh`, `restitution`,
-        `damping`, `wrench`, `prescribed`, `loop`."""
+        `damping`, `wrench`, `prescribed`, `loop`, `self_collide`."""
         bodies = self.bodies
         found = {
             "restitution": self.ground_restitution or any(body.restitution for body in bodies),
@@ -117,6 +117,7 @@ class Scene:
             "wrench": any(body.wrenches for body in bodies),
             "prescribed": bool(self.prescribed_bodies),
             "loop": self.robot is not None and bool(self.robot.closures),
+            "self_collide": self.robot is not None and self.robot.self_collide,
         }
         kinds = {body.kind for body in bodies}
         return frozenset(kinds | {word for word, there in found.items() if there})

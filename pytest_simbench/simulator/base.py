@@ -28,7 +28,8 @@ class Simulator(ABC):
     next one; what acts on bodies from outside is told before each step (`push`, `lead`). Free
     bodies are always given in the order of `scene.free_bodies`, joints in the order of
     `scene.robot.joints`. Joint drives obey the law in `scene.Joint`; where the engine has a native
-    drive, it is used. Links of the robot do not collide with each other, everything else does.
+    drive, it is used. Links of the robot collide with each other only where
+    the robot has `self_collide` (`simulator.self_collision`), everything else does.
 
     Attributes:
         info: facts about the engine, its capabilities and its deviations.

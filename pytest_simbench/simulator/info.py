@@ -25,6 +25,8 @@ class Capability(StrEnum):
     CONTACT_FORCES = "contact_forces"
     LOOPS = "loops"
     """Links may close loops, see `scene.Closure`."""
+    SELF_COLLIDE = "self_collide"
+    """Links of a robot may collide with each other, see `scene.Robot`."""
     JOINT_WRENCHES = "joint_wrenches"
     """It tells what each joint transmits."""
     DETERMINISTIC = "deterministic"

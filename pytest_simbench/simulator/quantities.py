@@ -27,9 +27,9 @@ is the link `base`, whose frame is the world's.
 - gravity of a body or link: the share of the scene's gravity that it feels, 1.
 - dynamic: 1 if forces can move the body, else 0; a prescribed one is moved by none.
 - velocity: of the centre of mass, then angular, in the world frame, (6,) [m/s, rad/s].
-- touches: the shares of ground, bodies and links that it can collide with, (3,). Links do not
-  collide with links; what can never meet (fixed things) is left out of count; 0 where
-  nothing is left.
+- touches: the shares of ground, bodies and links that it can collide with, (3,). Links collide
+  with links where the robot has `self_collide`, but for those that one joint joins; what can never
+  meet (fixed things) is left out of count; 0 where nothing is left.
 - axis: velocity of the joint's child link at unit joint speed, angular before linear, in that
   link's frame, (6,).
 - damping of a joint: of its drive and all else that resists in proportion to velocity; friction:
@@ -50,6 +50,7 @@ import numpy as np
 from pytest_simbench.scene import Box, ConvexMesh, FloatArray, Robot, Scene
 from pytest_simbench.simulator.kinematics import link_poses, motion_subspace
 from pytest_simbench.simulator.loops import reduced
+from pytest_simbench.simulator.self_collision import links_collide
 from pytest_simbench.simulator.settings import Settings
 from pytest_simbench.simulator.shapes import DIRECTIONS, outlines, reach, shape_points
 from pytest_simbench.simulator.urdf import PreparedRobot
@@ -85,8 +86,7 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
             quantities[f"body/{body.name}/damping"] = body.damping
     if prepared is not None:
         quantities |= _robot_quantities(prepared.robot, prepared)
-    robots = _links(prepared)
-    quantities |= touches(scene, prepared, lambda a, b: not (a in robots and b in robots))
+    quantities |= touches(scene, prepared, lambda a, b: _collide(prepared, a, b))
     own = {f"body/{body.name}/damping" for body in scene.free_bodies if body.damping.any()}
     for pattern, value in settings.quantities().items():
         named = {name for name in quantities if fnmatchcase(name, pattern)}
@@ -162,6 +162,14 @@ def touches(
         f"{name}/touches": np.array([share(name, group) for group in groups])
         for name in [*bodies, *links]
     }
+
+
+def _collide(prepared: PreparedRobot | None, a: str, b: str) -> bool:
+    """Whether two of "ground", `body/NAME` and `link/NAME` are to collide."""
+    first, second = a.removeprefix("link/"), b.removeprefix("link/")
+    if prepared is None or first == a or second == b:
+        return True
+    return links_collide(prepared, first, second)
 
 
 def _links(prepared: PreparedRobot | None) -> list[str]:

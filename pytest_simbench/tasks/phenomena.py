@@ -17,7 +17,7 @@ PHENOMENA = (
     "pushing",
 )
 """In the order of tables; `joints` with their drives, `mechanisms` what not every simulator can be
-asked: loops of links, and what a joint transmits."""
+asked: loops of links, links that collide, and what a joint transmits."""
 
 PHENOMENON = "task.phenomenon"
 """Where a record's settings say that it is of a law, and of which phenomenon."""

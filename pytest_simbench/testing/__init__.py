@@ -20,6 +20,7 @@ from pytest_simbench.testing import (
     interaction,
     parity,
     physics,
+    self_collision,
     state,
 )
 from pytest_simbench.testing.checks import CHECKS, Check
@@ -43,5 +44,6 @@ __all__ = [
     "interaction",
     "parity",
     "physics",
+    "self_collision",
     "state",
 ]

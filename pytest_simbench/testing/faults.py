@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from pytest_simbench.scene import (
     Scene,
     Sphere,
 )
+from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.mesh_check import TRIANGLE
 from pytest_simbench.simulator.shapes import mesh_points
 from pytest_simbench.testing import scenes
@@ -40,11 +41,13 @@ class Fault:
         what: in plain words.
         quantity: that must be found to differ.
         plant: makes the faulty scene of the true one; files go into the folder.
+        needs: the capability without which an engine cannot be wrong in this way.
     """
 
     what: str
     quantity: str
     plant: Plant
+    needs: Capability | None = None
 
 
 TURNED, SPIN = Pose.at(0.5, 0.1, 0.315, yaw=0.4), (0.7, -0.5, 0.4)
@@ -283,6 +286,12 @@ FAULTS: dict[str, Fault] = {
     "stiffness": _driven("the drive of joint 4 is 10 % stiffer", stiffness=1.1),
     "drive_damping": _driven("the drive of joint 4 damps 10 % more", damping=1.1),
     "effort_limit": _driven("joint 4 has twice its effort limit", effort_limit=2.0),
+    "self_collide": Fault(
+        "the robot's links collide with each other",
+        "link/panda_link4/touches",
+        of_robot(self_collide=True),
+        Capability.SELF_COLLIDE,
+    ),
     "squeeze": Fault(
         "the fingers squeeze twice as strongly",
         "joint/panda_finger_joint1/effort_limit",
@@ -354,13 +363,15 @@ FAULTS: dict[str, Fault] = {
 """By short names."""
 
 
-def rounds() -> list[dict[str, Fault]]:
-    """`FAULTS` in as few worlds as there are faults of one quantity: worlds may be dear to build.
+def rounds(capabilities: Collection[Capability]) -> list[dict[str, Fault]]:
+    """`FAULTS` of an engine in as few worlds as there are of one quantity: worlds may be dear to
+    build.
 
     No two of a round concern one quantity, so each must be seen beside the others.
     """
     found: list[dict[str, Fault]] = []
-    for name, fault in FAULTS.items():
+    possible = (item for item in FAULTS.items() if item[1].needs in (None, *capabilities))
+    for name, fault in possible:
         for group in found:
             if fault.quantity not in {other.quantity for other in group.values()}:
                 group[name] = fault

@@ -79,7 +79,8 @@ def planted_faults_are_seen(subject: Subject) -> None:
     With another robot than the Panda the faults are those of `testing.robot_faults`.
     """
     missed = []
-    for faults in [robot_faults(subject.robot)] if subject.robot else rounds():
+    robot, capabilities = subject.robot, subject.cls.info.capabilities
+    for faults in [robot_faults(robot)] if robot else rounds(capabilities):
         found = planted(subject, faults.values())
         for name, fault in faults.items():
             if fault.quantity not in found.wrong and fault.quantity not in found.untold:

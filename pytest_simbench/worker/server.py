@@ -31,6 +31,7 @@ from pytest_simbench.simulator.parity import check
 from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.simulator.robot_check import check_names
 from pytest_simbench.simulator.robot_files import received
+from pytest_simbench.simulator.self_collision import check_self_collision
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.worker.acting import Acting
 from pytest_simbench.worker.state import check_following, check_log, check_start, checked_state
@@ -133,6 +134,7 @@ class Server:
         world = Scene.from_wire(received(scene))
         check_names(world)
         check_loops(simulator.info, world)
+        check_self_collision(simulator.info, world)
         simulator.load(world)
         self.scene = world
         acting = Acting.of(simulator, world)

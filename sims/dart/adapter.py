@@ -81,6 +81,7 @@ class DART(Simulator):
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
                 Capability.LOOPS,
+                Capability.SELF_COLLIDE,
                 Capability.JOINT_WRENCHES,
                 Capability.DETERMINISTIC,
             }
@@ -164,6 +165,7 @@ class DART(Simulator):
             path = Path(folder) / "robot.urdf"
             path.write_text(_with_mimic(prepared), encoding="utf-8")
             self._robot = skeleton = loader.parseSkeleton(str(path))
+        skeleton.setSelfCollisionCheck(robot.self_collide)  # but for links that a joint joins
         for body in skeleton.getBodyNodes():
             for shape in body.getShapeNodes():
                 if shape.hasCollisionAspect():

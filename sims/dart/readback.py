@@ -146,7 +146,11 @@ class ReadBack:
         if not all(shape.getCollisionAspect().isCollidable() for shape in shapes):
             return False
         if first.getSkeleton() is second.getSkeleton() or a[:4] == b[:4] == "link":
-            return bool(first.getSkeleton().isEnabledSelfCollisionCheck())
+            skeleton = first.getSkeleton()
+            return bool(
+                skeleton.isEnabledSelfCollisionCheck()
+                and (skeleton.isEnabledAdjacentBodyCheck() or not _adjacent(first, second))
+            )
         return True
 
     def _body(self, name: str) -> Any:
@@ -154,6 +158,12 @@ class ReadBack:
         if kind == "ground":
             return self.ground
         return self.bodies[rest] if kind == "body" else self.robot.getBodyNode(rest)
+
+
+def _adjacent(first: Any, second: Any) -> bool:
+    """Whether one joint joins two bodies."""
+    above = (first.getParentBodyNode(), second.getParentBodyNode())
+    return second is above[0] or first is above[1]
 
 
 def _colliding(body: Any) -> list[Any]:

@@ -82,6 +82,7 @@ class Drake(Simulator):
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
                 Capability.LOOPS,
+                Capability.SELF_COLLIDE,
                 Capability.JOINT_WRENCHES,
                 Capability.DETERMINISTIC,
             }

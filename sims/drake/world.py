@@ -20,6 +20,7 @@ from pytest_simbench.scene import (
 )
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, Settings, heavy, lazy_import
 from pytest_simbench.simulator.loops import reduced
+from pytest_simbench.simulator.self_collision import joined
 from pytest_simbench.simulator.shapes import mesh_points
 from pytest_simbench.simulator.urdf import Link, Shape
 
@@ -275,8 +276,13 @@ class World:
         manager = self.scene_graph.collision_filter_manager()
         apart = []
         if self.prepared is not None:
-            frames = [self.plant.GetBodyFrameIdOrThrow(b.index()) for b in self.links.values()]
-            apart.append(geometry.GeometrySet(frames))
+            groups = [frozenset(self.links)]  # names of links that do not collide
+            if self.prepared.robot.self_collide:
+                groups = list(joined(self.prepared))
+            for group in groups:
+                bodies = [self.links[name].index() for name in group]
+                frames = [self.plant.GetBodyFrameIdOrThrow(index) for index in bodies]
+                apart.append(geometry.GeometrySet(frames))
         if self._spheres:  # they carry flat faces; one on top of another would roll off
             apart.append(geometry.GeometrySet(self._spheres))
         led = [made for body in self.scene.prescribed_bodies for made in self.shapes[body.name]]

@@ -82,6 +82,7 @@ class Genesis(Simulator):
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
                 Capability.LOOPS,
+                Capability.SELF_COLLIDE,
                 Capability.DETERMINISTIC,
             }
         ),
@@ -135,7 +136,8 @@ class Genesis(Simulator):
             self.settings, timestep=1.0, substeps=1, constraint_timeconst=1.0, impedance=(0.9, 0.95)
         )
         forces = scene.words & {"wrench"}  # whose kernels are others
-        kind = (options, several, scene.robot is not None, bool(scene.free_bodies), forces)
+        robot = None if scene.robot is None else scene.robot.self_collide
+        kind = (options, several, robot, bool(scene.free_bodies), forces)
         if kind in self.compiled:
             return
         self.load(scene)
@@ -192,6 +194,8 @@ class Genesis(Simulator):
                     geom.set_sol_params(values)
         frictions = {self._boxes[box.name]: box.friction for box in scene.bodies}
         frictions[self._ground] = scene.ground_friction
+        if scene.robot is not None:
+            frictions[self._robot] = scene.robot.friction
         for entity, friction in frictions.items():
             if friction < LEAST_FRICTION:
                 for geom in entity.geoms:

@@ -68,7 +68,8 @@ def new_world(scene: Scene, settings: GenesisSettings, *, window: bool) -> Any:
     return genesis.Scene(
         sim_options=options.SimOptions(dt=s.timestep, substeps=s.substeps, gravity=scene.gravity),
         rigid_options=options.RigidOptions(
-            enable_self_collision=False,  # of a robot; boxes are entities of their own
+            # of a robot, but for links that a joint joins; boxes are entities of their own
+            enable_self_collision="self_collide" in scene.words,
             integrator=getattr(genesis.integrator, s.integrator),
             friction_cone=getattr(genesis.friction_cone, s.friction_cone),
             impratio=s.impratio or None,

@@ -49,13 +49,14 @@ from .heavy import leave_out
 from .loops import close_loops
 from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack
+from .self_collision import part_joined
 from .touching import contact_forces, joint_wrenches
 
 mujoco = lazy_import("mujoco")
 
 ROBOT, WORLD, LED = 1, 2, 4
-"""Collision groups: the robot's links touch everything but each other; prescribed bodies touch what
-they can move."""
+"""Collision groups: the robot's links touch everything but, unless asked, each other; prescribed
+bodies touch what they can move."""
 
 LINK_COLOUR, GROUND_COLOUR = (0.9, 0.9, 0.9, 1.0), (0.5, 0.5, 0.5, 1.0)
 
@@ -109,6 +110,7 @@ class MuJoCo(Simulator):
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
                 Capability.LOOPS,
+                Capability.SELF_COLLIDE,
                 Capability.JOINT_WRENCHES,
                 Capability.DETERMINISTIC,
             }
@@ -156,13 +158,16 @@ class MuJoCo(Simulator):
         self._set_options(spec, scene)
         if scene.robot is not None and self.prepared is not None:
             for geom in spec.geoms:
-                self._set_surface(geom, scene.robot.friction, 0.0, ROBOT, 0)
+                links = ROBOT if scene.robot.self_collide else 0
+                self._set_surface(geom, scene.robot.friction, 0.0, ROBOT, links)
                 geom.rgba = LINK_COLOUR
             for joint in scene.robot.joints:
                 _add_drive(spec, joint)
             for pair in scene.robot.gripper.couplings:
                 _couple_fingers(spec, *pair)
             close_loops(spec, reduced(self.prepared))
+            if scene.robot.self_collide:
+                part_joined(spec, self.prepared)
         ground = spec.worldbody.add_geom(
             name="ground",
             type=mujoco.mjtGeom.mjGEOM_PLANE,

@@ -72,6 +72,7 @@ class Newton(Simulator):
                 Capability.CONTACT_FORCES,
                 Capability.JOINT_WRENCHES,
                 Capability.LOOPS,
+                Capability.SELF_COLLIDE,
                 Capability.DETERMINISTIC,
             }
         ),

@@ -120,7 +120,9 @@ def _add_robot(builder: Any, prepared: PreparedRobot, surface: Any) -> None:
     robot = prepared.robot
     builder.default_shape_cfg = surface
     builder.add_urdf(
-        prepared.to_urdf(), parse_visuals_as_colliders=True, enable_self_collisions=False
+        prepared.to_urdf(),
+        parse_visuals_as_colliders=True,
+        enable_self_collisions=robot.self_collide,  # but for links that a joint joins
     )
     builder.default_shape_cfg = newton.ModelBuilder.ShapeConfig()
     joints = names(builder.joint_label)

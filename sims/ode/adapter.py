@@ -29,6 +29,7 @@ from pytest_simbench.simulator import (
     lazy_import,
 )
 from pytest_simbench.simulator.loops import reduced
+from pytest_simbench.simulator.self_collision import joined
 
 from . import world as build
 from .axes import Axis
@@ -128,6 +129,7 @@ class ODE(Simulator):
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
                 Capability.LOOPS,
+                Capability.SELF_COLLIDE,
                 Capability.JOINT_WRENCHES,
                 Capability.DETERMINISTIC,
             }
@@ -204,6 +206,8 @@ class ODE(Simulator):
         robot, s = prepared.robot, self.settings
         self.world.setAutoDisableFlag(False)  # of bodies made from here on: a motor wakes nobody
         self._links = build.add_links(self.world, self.contacts.space, prepared)
+        for pair in joined(prepared) if robot.self_collide else ():
+            self.contacts.apart.add(frozenset(id(self._links[name].surface) for name in pair))
         self._axes = build.add_joints(self.world, prepared, self._links)
         build.put_links(prepared, self._links, {j.name: j.initial_position for j in robot.joints})
         for joint in robot.joints:

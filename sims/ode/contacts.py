@@ -38,6 +38,9 @@ TOUCHES = {
 }
 """What a category collides with: all but links with links, and what never moves with its like."""
 
+LINKS = BASE | LINK
+"""What links collide with too, where those of a robot collide with each other."""
+
 
 SLIPS = 1e-4
 """Slower contacts stick [m/s]; they have no direction worth the name."""
@@ -87,11 +90,11 @@ class Part:
         """Of ODE; None for what is fixed."""
         return self.surface.body
 
-    def add(self, geom: Any, category: int) -> None:
-        """Make a geom one of its shapes."""
+    def add(self, geom: Any, category: int, also: int = 0) -> None:
+        """Make a geom one of its shapes; `also` are categories that it collides with besides."""
         geom.attribs["surface"] = self.surface
         library().dGeomSetCategoryBits(geom._id(), category)
-        library().dGeomSetCollideBits(geom._id(), TOUCHES[category])
+        library().dGeomSetCollideBits(geom._id(), TOUCHES[category] | also)
         self.geoms.append(geom)
 
 
@@ -110,12 +113,14 @@ class Contacts:
         space: that all geoms are in.
         made: the joints of the last step, each with both surfaces; they stay until the next one, so
             that their forces can be asked for.
+        apart: pairs of surfaces that do not collide, by their ids.
     """
 
     def __init__(self, world: Any, erp: float, cfm: float, most: int, along: bool) -> None:
         self.world, self.erp, self.cfm, self.most, self.along = world, erp, cfm, most, along
         self.space = ode.SimpleSpace()
         self.made: list[tuple[Any, Surface, Surface]] = []
+        self.apart: set[frozenset[int]] = set()
         self._group = ode.JointGroup()
         # Not left to Python, which destroys worlds and joints in any order.
         weakref.finalize(self, _empty, self._group, self.made)
@@ -154,6 +159,8 @@ class Contacts:
 
     def _near(self, _: Any, first: Any, second: Any) -> None:
         a, b = first.attribs["surface"], second.attribs["surface"]
+        if self.apart and frozenset((id(a), id(b))) in self.apart:
+            return
         one, other = a.body, b.body
         if not ((one is not None and one.isEnabled()) or (other is not None and other.isEnabled())):
             return  # both asleep, or one asleep upon what never moves

@@ -195,7 +195,10 @@ class ReadBack:
         return next(part for part in self.links.values() if part.body is axis.child)
 
     def _can_touch(self, a: str, b: str) -> bool:
-        pairs = [(x, y) for x in self._named(a).geoms for y in self._named(b).geoms]
+        one, other = self._named(a), self._named(b)
+        if frozenset((id(one.surface), id(other.surface))) in self.contacts.apart:
+            return False
+        pairs = [(x, y) for x in one.geoms for y in other.geoms]
         return all(_collide(x._id(), y._id()) for x, y in pairs)
 
     def _named(self, name: str) -> Part:

@@ -32,7 +32,7 @@ from pytest_simbench.simulator.mesh_check import TRIANGLE
 from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
 
 from .axes import Axis
-from .contacts import BASE, FIXED, FREE, GROUND, LINK, Part, Surface
+from .contacts import BASE, FIXED, FREE, GROUND, LINK, LINKS, Part, Surface
 from .library import Convex, Mesh, place, set_damping
 
 ode = lazy_import("ode")
@@ -99,7 +99,7 @@ def _add_link(world: Any, space: Any, link: Link, pose: Pose, prepared: Prepared
     for shape in link.shapes:
         geom = _geom(space, shape)
         place(geom, (pose if fixed else frame) * shape.pose, part.body)
-        part.add(geom, BASE if fixed else LINK)
+        part.add(geom, BASE if fixed else LINK, LINKS if prepared.robot.self_collide else 0)
     return part
 
 

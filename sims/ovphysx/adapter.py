@@ -116,6 +116,7 @@ class OvPhysX(Simulator):
                 Capability.SAVE_RESTORE,
                 Capability.CONTACT_FORCES,
                 Capability.LOOPS,
+                Capability.SELF_COLLIDE,
                 Capability.JOINT_WRENCHES,
             }
         ),

@@ -179,7 +179,7 @@ class Stage:
         ]
         root = [
             f"rel physics:body1 = <{link_path(names.index(prepared.root))}>",
-            "bool physxArticulation:enabledSelfCollisions = false",
+            f"bool physxArticulation:enabledSelfCollisions = {str(robot.self_collide).lower()}",
             *self._lines["physxArticulation"],
         ]
         schemas = ("PhysicsArticulationRootAPI", "PhysxArticulationAPI")

@@ -34,12 +34,13 @@ from pytest_simbench.simulator import (
 )
 from pytest_simbench.simulator.kinematics import motion_subspace
 from pytest_simbench.simulator.loops import reduced
+from pytest_simbench.simulator.self_collision import joined
 from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
 
 from .loads import wrench
 from .loops import close_loop
 from .readback import ReadBack
-from .world import ROBOT, PyBulletSettings, add_body, set_surface
+from .world import ROBOT, WORLD, PyBulletSettings, add_body, set_surface
 
 pybullet = lazy_import("pybullet")
 
@@ -68,6 +69,7 @@ class PyBullet(Simulator):
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
                 Capability.LOOPS,
+                Capability.SELF_COLLIDE,
                 Capability.JOINT_WRENCHES,
                 Capability.DETERMINISTIC,
             }
@@ -197,7 +199,8 @@ class PyBullet(Simulator):
             self._robot = pybullet.loadURDF(
                 str(prepared.write_urdf(folder)),
                 useFixedBase=True,
-                flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
+                flags=pybullet.URDF_USE_INERTIA_FROM_FILE
+                | (pybullet.URDF_USE_SELF_COLLISION if robot.self_collide else 0),
                 physicsClientId=c,
             )
         infos = [
@@ -209,7 +212,19 @@ class PyBullet(Simulator):
         self._links[prepared.root] = -1
         self._joints = [index[name] for name in robot.joint_names]
         for link in range(-1, len(infos)):
-            set_surface(c, self._robot, self.settings, robot.friction, link=link, group=ROBOT)
+            set_surface(
+                c,
+                self._robot,
+                self.settings,
+                robot.friction,
+                link=link,
+                group=ROBOT,
+                touches=WORLD | ROBOT if robot.self_collide else WORLD,
+            )
+        if robot.self_collide:
+            for pair in joined(prepared):
+                numbers = (self._links[name] for name in pair)
+                pybullet.setCollisionFilterPair(self._robot, self._robot, *numbers, 0, c)
         for joint, drive in zip(self._joints, robot.joints, strict=True):
             pybullet.resetJointState(self._robot, joint, drive.initial_position, physicsClientId=c)
         for joint in self._joints:

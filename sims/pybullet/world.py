@@ -14,7 +14,7 @@ from pytest_simbench.simulator import NotSupportedError, Settings, lazy_import
 pybullet = lazy_import("pybullet")
 
 ROBOT, WORLD = 1, 2
-"""Collision groups: the robot's links touch everything but each other."""
+"""Collision groups: the robot's links touch everything but, unless asked, each other."""
 
 
 @dataclass(frozen=True)
@@ -99,8 +99,9 @@ def set_surface(
     *,
     link: int = -1,
     group: int = WORLD,
+    touches: int = WORLD | ROBOT,
 ) -> None:
-    """Surface and damping of a body or link, and what it touches."""
+    """Surface and damping of a body or link, its collision group and those that it touches."""
     s, c = settings, client
     linear, angular = s.linear_damping, s.angular_damping
     if damping is not None and damping.any():
@@ -131,8 +132,7 @@ def set_surface(
             ),
             physicsClientId=c,
         )
-    mask = WORLD if group == ROBOT else WORLD | ROBOT
-    pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=c)
+    pybullet.setCollisionFilterGroupMask(body, link, group, touches, physicsClientId=c)
 
 
 def _shape(body: Body) -> tuple[int, dict[str, Any], float | None]:

@@ -115,6 +115,7 @@ class SAPIEN(Simulator):
                 Capability.CONTACT_COUNT,
                 Capability.CONTACT_FORCES,
                 Capability.LOOPS,
+                Capability.SELF_COLLIDE,
                 Capability.JOINT_WRENCHES,
                 Capability.DETERMINISTIC,
             }
@@ -223,8 +224,9 @@ class SAPIEN(Simulator):
             path = prepared.write_urdf(folder)
             _drop_visuals(path)
             builder = loader.load_file_as_articulation_builder(str(path))
+        touches = WORLD | ROBOT if robot.self_collide else WORLD  # never two that a joint joins
         for link in builder.link_builders:
-            link.collision_groups = [ROBOT, WORLD, 0, 0]
+            link.collision_groups = [ROBOT, touches, 0, 0]
         self._robot = builder.build(fix_root_link=True)
         self._links = {link.name: link for link in self._robot.links}
         for link in self._robot.links:

@@ -90,8 +90,15 @@ class ReadBack:
     def _can_touch(self, a: str, b: str) -> bool:
         """By PhysX's filter as SAPIEN sets it: groups of 0, 1 name classes, of 2 exceptions."""
         links = a.startswith("link/") and b.startswith("link/")
+        if links and self._joined(a, b):
+            return False
         found = [_compatible(x, y) for x in self._groups(a) for y in self._groups(b)]
         return any(found) if links else bool(found) and all(found)
+
+    def _joined(self, a: str, b: str) -> bool:
+        """Whether one joint joins two links, which PhysX then lets pass through each other."""
+        first, second = (self.links[name.partition("/")[2]] for name in (a, b))
+        return first.parent is second or second.parent is first
 
     def _groups(self, name: str) -> list[Sequence[int]]:
         kind, _, rest = name.partition("/")

@@ -140,6 +140,12 @@ def left_open(scene: Scene) -> Scene:
     return replace(scene, robot=replace(scene.robot, closures=()))
 
 
+def passing_through(scene: Scene) -> Scene:
+    """Links of the robot do not touch each other."""
+    assert scene.robot is not None
+    return replace(scene, robot=replace(scene.robot, self_collide=False))
+
+
 FAULTS: dict[str, Fault] = {
     **dict.fromkeys(("free_fall", "fall_speed", "oblique_gravity", "projectile"), heavier),
     "damped_fall": bodies(lambda body: replace(body, linear_damping=2 * body.linear_damping)),
@@ -197,6 +203,7 @@ FAULTS: dict[str, Fault] = {
     "effort_limit": drives(effort_limit=1.5),
     "tracking": drives(stiffness=0.01),
     "four_bar_closure": left_open,
+    "domino_wave": passing_through,
     **dict.fromkeys(("four_bar_swing", "pendulum_force", "pendulum_torque"), heavier),
     "push_force": rougher(1.5),
     "push_straight": moved(y=0.02),

@@ -71,6 +71,10 @@ IN_TOML = {
     "a stiffness below zero": (swap("2000.0", "-2000.0"), r"stiffness: -2000.0 is no number of at"),
     "a damping that is no number": (swap("150.0]", "nan]"), r"damping: nan is no number of at le"),
     "a word for a number": (swap("8.0", '"fast"'), r"acceleration: 'fast' is no number of at leas"),
+    "a word for yes": (
+        swap("[arm]", 'self_collide = "yes"\n[arm]'),
+        r"self_collide: 'yes' is neither true nor false",
+    ),
     "yes for a number": (swap("8.0", "true"), r"acceleration: True is no number of at least"),
     "a ready position out of the limits": (
         swap("0.4, 1.2]", "0.4, 2.6]"),

@@ -35,6 +35,7 @@ def test_a_file_says_everything(tmp_path: Path) -> None:
     assert robot.tool_frame == "grip"
     assert robot.base == Pose.at(0.1, 0.0, 0.2)
     assert robot.friction == 1.0
+    assert not robot.self_collide
     limits = robot.limits
     assert limits is not None
     assert limits.velocity == (2, 2, 2)  # the URDF's
@@ -46,12 +47,14 @@ def test_a_file_says_everything(tmp_path: Path) -> None:
 
 def test_what_a_file_says_besides(tmp_path: Path) -> None:
     more = TOML.replace(
-        "[arm]", "yaw = 1.5\nfriction = 0.6\n[arm]\njerk = 50\nlevers = [1, 0.9, 0.5]"
+        "[arm]",
+        "yaw = 1.5\nfriction = 0.6\nself_collide = true\n[arm]\njerk = 50\nlevers = [1, 0.9, 0.5]",
     )
     more = more.replace("[arm]\n", "[arm]\nvelocity = [1, 1.5, 2]\neffort = 40\narmature = 0.02\n")
     robot = read_robot(small_arm(tmp_path, more.replace("[hand]", "[hand]\nspeed = 0.1")))
     assert robot.base == Pose.at(0.1, 0.0, 0.2, yaw=1.5)
     assert robot.friction == 0.6
+    assert robot.self_collide
     assert robot.column("effort_limit")[:3].tolist() == [40, 40, 40]
     assert robot.column("armature")[:3].tolist() == [0.02] * 3
     limits = robot.limits

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from pytest_simbench.scene import Pose
-from pytest_simbench.simulator import PreparedRobot, Settings
+from pytest_simbench.simulator import Capability, PreparedRobot, Settings
 from pytest_simbench.simulator.memory import remembering
 from pytest_simbench.testing.faults import FAULTS, rounds, true_scene
 
@@ -54,9 +54,14 @@ def test_it_is_put_back_after_an_error() -> None:
 
 
 def test_rounds_hold_every_fault_once_and_no_quantity_twice() -> None:
-    groups = rounds()
+    groups = rounds(list(Capability))
     assert sorted(name for group in groups for name in group) == sorted(FAULTS)
     for group in groups:
         quantities = [fault.quantity for fault in group.values()]
         assert len(quantities) == len(set(quantities))
     assert len(groups) == 2
+
+
+def test_rounds_leave_out_what_an_engine_cannot_be_wrong_in() -> None:
+    names = {name for group in rounds(()) for name in group}
+    assert set(FAULTS) - names == {"self_collide"}

@@ -48,6 +48,8 @@ FAULTS: list[tuple[type[Simulator], str]] = [
     (wrong.NoContacts, "contacts_counted"),
     (wrong_robots.OpenLoop, "loops_stay_closed"),
     (wrong_robots.StuckLoop, "loops_stay_closed"),
+    (wrong_robots.PassingLinks, "links_collide_when_asked"),
+    (wrong_robots.JoinedLinksCollide, "links_collide_when_asked"),
     (wrong_robots.LinkAxes, "joint_loads_are_told"),
     (wrong_robots.OnTheLinkAbove, "joint_loads_are_told"),
     (wrong_robots.AboutCentres, "joint_loads_are_told"),

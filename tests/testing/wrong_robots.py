@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
-from pytest_simbench.sims.mujoco.adapter import MuJoCo
+from pytest_simbench.sims.mujoco.adapter import ROBOT, MuJoCo
 
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import Deviation, NotSupportedError, SimulatorInfo
@@ -212,6 +212,18 @@ class OpenLoop(Lying):
 class StuckLoop(Lying):
     def tamper(self) -> None:
         self.model.dof_damping[:] = 1e3
+
+
+class PassingLinks(Lying):
+    def tamper(self) -> None:
+        self.model.geom_conaffinity[self.model.geom_contype == ROBOT] = 0
+
+
+class JoinedLinksCollide(Lying):
+    """Links collide with the one that they hang on."""
+
+    def tamper(self) -> None:
+        self.model.exclude_signature[:] = 0
 
 
 class LinkAxes(MuJoCo):
