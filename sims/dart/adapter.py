@@ -15,8 +15,9 @@ from __future__ import annotations
 import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -42,7 +43,6 @@ from pytest_simbench.simulator.loops import ends, reduced
 
 from .bodies import add_body, add_ground, set_surface
 from .readback import ReadBack
-from .settings import DARTSettings, set_options
 
 dartpy = lazy_import("dartpy")
 
@@ -50,14 +50,31 @@ State = tuple[float, list[tuple[FloatArray, FloatArray, FloatArray]], FloatArray
 """Time, positions, velocities and accelerations of each skeleton, the command."""
 
 
-TUNED = DARTSettings(
-    detector="ode",
-    solver="nsgs",
-    tolerance=1e-4,
-    position_gain=0.5,
-    mesh_detector="dart",
-    mesh_solver="dantzig",
-)
+@dataclass(frozen=True)
+class DARTSettings(Settings):
+    """DART's options; defaults are the engine's own.
+
+    Attributes:
+        timestep: [s]; DART's default.
+        detector: collision detector; DART's default is `fcl`, Gazebo's is `ode`.
+        solver: `dantzig` (pivoting, friction pyramid), `pgs` (projected Gauss-Seidel, friction
+            pyramid) or `nsgs` (block Gauss-Seidel, Coulomb's cone).
+        sweeps: largest number of passes of `pgs` and `nsgs`, DART's default for `nsgs`.
+        tolerance: where they stop earlier; for `nsgs` the violation of the law of contact [m/s].
+        position_gain: share of the position error that the drives correct in a step; the default
+            is that of gz_ros2_control, DART has none.
+        sleeping: whether bodies at rest are frozen.
+        split_impulse: correct penetrations by a velocity of their own.
+    """
+
+    timestep: float = 0.001
+    detector: Literal["fcl", "ode", "bullet", "dart"] = "fcl"
+    solver: Literal["dantzig", "pgs", "nsgs"] = "dantzig"
+    sweeps: int = 100
+    tolerance: float = 1e-5
+    position_gain: float = 0.1
+    sleeping: bool = True
+    split_impulse: bool = False
 
 
 class DART(Simulator):
@@ -123,8 +140,8 @@ class DART(Simulator):
     )
     profiles: ClassVar[Mapping[str, Settings]] = {
         "default": DARTSettings(),
-        "tuned": TUNED,
-        "real": TUNED,
+        "tuned": DARTSettings(detector="ode", solver="nsgs", tolerance=1e-4, position_gain=0.5),
+        "real": DARTSettings(detector="ode", solver="nsgs", tolerance=1e-4, position_gain=0.5),
     }
     chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
         "tuned": (SeedsSeen("throwing", 100, 100), SeedsSeen("stacking", 100, 100)),
@@ -138,22 +155,44 @@ class DART(Simulator):
 
     def load(self, scene: Scene) -> None:
         self.scene = scene
-        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         self.world = world = dartpy.simulation.World()
-        world.setGravity(np.array(scene.gravity))
-        methods = self.settings.methods(self.prepared)
-        set_options(world, self.settings, methods)
-        self._ground = add_ground(
-            world, scene.ground_friction, scene.ground_restitution, methods.detector == "dart"
-        )
+        self._set_options(world, scene)
+        slab = self.settings.detector == "dart"
+        self._ground = add_ground(world, scene.ground_friction, scene.ground_restitution, slab)
         self._bodies = {box.name: add_body(world, box) for box in scene.bodies}
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
         self._led = [self._bodies[box.name] for box in scene.prescribed_bodies]
         self._robot: Any = None
+        self.prepared = None
         self._base = np.empty(0)
-        if self.prepared is not None:
+        if scene.robot is not None:
+            self.prepared = PreparedRobot(scene.robot)
             self._load_robot(self.prepared)
         self._viewer = self._open_window() if self.gui else None
+
+    def _set_options(self, world: Any, scene: Scene) -> None:
+        s, constraint = self.settings, dartpy.constraint
+        world.setTimeStep(s.timestep)
+        world.setGravity(np.array(scene.gravity))
+        kinds = dartpy.simulation.CollisionDetectorType
+        world.setCollisionDetector(getattr(kinds, s.detector.upper()))
+        sleep = world.getDeactivationOptions()
+        sleep.mEnabled = s.sleeping
+        world.setDeactivationOptions(sleep)
+        solver = world.getConstraintSolver()
+        solver.setSplitImpulseEnabled(s.split_impulse)
+        if s.solver == "pgs":  # dartpy makes none, but DART keeps one to fall back on
+            pgs = solver.getSecondaryBoxedLcpSolver()
+            options = constraint.PgsBoxedLcpSolverOption()
+            options.mMaxIteration = s.sweeps
+            options.mDeltaXThreshold = options.mRelativeDeltaXTolerance = s.tolerance
+            pgs.setOption(options)
+            solver.setSecondaryBoxedLcpSolver(None)
+            solver.setBoxedLcpSolver(pgs)
+        elif s.solver == "nsgs":
+            options = constraint.NsgsFrictionSolver.Options()
+            options.maxSweeps, options.tolerance = s.sweeps, s.tolerance
+            solver.setBoxedLcpSolver(constraint.NsgsFrictionSolver(options))
 
     def _load_robot(self, prepared: PreparedRobot) -> None:
         robot, dynamics, utils = prepared.robot, dartpy.dynamics, dartpy.utils

@@ -1,4 +1,4 @@
-"""DART with meshes on the fingers: other contacts, another solver, and a ground that carries."""
+"""DART's own detector: few contacts of meshes on fingers, and a ground that carries."""
 
 from __future__ import annotations
 
@@ -23,6 +23,9 @@ pytest.importorskip("dartpy")
 EDGE, MASS = 0.02, 0.0064
 """Of the cube that the SO-101 stacks [m, kg]."""
 
+OWN = {"detector": "dart", "solver": "dantzig"}
+"""Settings with which it does."""
+
 
 def world(scene: Scene, profile: str = "tuned", **changes: Any) -> DART:
     simulator = DART(changed(DART.profiles[profile], changes, "dart"))
@@ -32,33 +35,6 @@ def world(scene: Scene, profile: str = "tuned", **changes: Any) -> DART:
 
 def small_cube(pose: Pose) -> Box:
     return Box("cube", (EDGE,) * 3, pose, MASS)
-
-
-def methods(simulator: DART) -> tuple[str, str]:
-    """What DART says that it finds contacts by and solves with."""
-    solver = simulator.world.getConstraintSolver()
-    return solver.getCollisionDetector().getType(), type(solver.getBoxedLcpSolver()).__name__
-
-
-@pytest.mark.parametrize(
-    ("name", "profile", "expected"),
-    [
-        ("panda", "tuned", ("ode", "NsgsFrictionSolver")),
-        ("ur5", "tuned", ("ode", "NsgsFrictionSolver")),
-        ("so101", "tuned", ("dart", "DantzigBoxedLcpSolver")),
-        ("so101", "default", ("fcl", "DantzigBoxedLcpSolver")),
-    ],
-)
-def test_meshes_on_fingers_choose_the_methods(
-    name: str, profile: str, expected: tuple[str, str]
-) -> None:
-    assert methods(world(scenes.arm_alone(known_robot(name)), profile)) == expected
-
-
-def test_the_fields_are_switched() -> None:
-    robot = known_robot("so101")
-    simulator = world(scenes.arm_alone(robot), mesh_detector=None, mesh_solver=None)
-    assert methods(simulator) == ("ode", "NsgsFrictionSolver")
 
 
 def held() -> tuple[Scene, Robot]:
@@ -83,15 +59,15 @@ def most_contacts(simulator: DART, robot: Robot, seconds: float) -> int:
 
 
 def test_a_jaw_of_meshes_has_few_contacts_and_holds() -> None:
-    """With the detector `ode` it had hundreds: a second of the grip took minutes."""
+    """With the detector `ode` it has hundreds: a second of the grip takes minutes."""
     scene, robot = held()
-    simulator = world(scene)
+    simulator = world(scene, **OWN)
     before = simulator.body_state()[0]
     assert 0 < most_contacts(simulator, robot, 1.0) <= 50
     after = simulator.body_state()[0]
     assert np.linalg.norm(after[:3] - before[:3]) < 0.002
     assert np.linalg.norm(after[7:10]) < 1e-3
-    assert most_contacts(world(scene, mesh_detector="ode"), robot, 0.03) > 100
+    assert most_contacts(world(scene), robot, 0.03) > 100
 
 
 @pytest.mark.parametrize(("slab", "contacts", "stands"), [(True, 4, True), (False, 1, False)])
@@ -117,7 +93,7 @@ def test_a_cube_under_another_stands_on_a_slab(
 def test_the_ground_is_a_slab_where_cubes_would_sink() -> None:
     """A cube beside the SO-101 stays where it was put."""
     cube = small_cube(Pose.at(0.5, 0.0, EDGE / 2))
-    simulator = world(Scene("beside", (cube,), known_robot("so101")))
+    simulator = world(Scene("beside", (cube,), known_robot("so101")), **OWN)
     for _ in range(1000):
         simulator.step()
     assert simulator.body_state()[0, 2] == pytest.approx(EDGE / 2, abs=1e-4)
