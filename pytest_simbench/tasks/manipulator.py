@@ -14,8 +14,9 @@ from typing import TypeVar
 import numpy as np
 
 from pytest_simbench.client.world import Motion, World
+from pytest_simbench.robot.choosing import Choice, choose
 from pytest_simbench.robot.collision import PlanningScene
-from pytest_simbench.robot.errors import PlanningError, Unreachable
+from pytest_simbench.robot.errors import PlanningError
 from pytest_simbench.robot.grasping import grasp_of
 from pytest_simbench.robot.kinematics import inverse_kinematics, tool_over, top_down_grasps
 from pytest_simbench.robot.model import RobotModel
@@ -336,9 +337,10 @@ class Manipulator:
         return self._attempt("go home", lambda: self.go_to(self.home, speed=self.speeds.free))
 
     def recover(self) -> str | None:
-        """After a failure: put a held cube back where it came from, and open the hand."""
+        """After a failure: put a held cube back where it came from, open the hand, and leave what
+        it stands too near to."""
         if self.held is None:
-            return None  # and the hand is open
+            return self._leave()  # and the hand is open
         problem = None
         if self._in_hand():
             above = self._origin.translated(z=PUT_BACK_HEIGHT * self.scale)
@@ -347,6 +349,15 @@ class Manipulator:
             self.open_hand()
         return problem or self.try_retreat()
 
+    def _leave(self) -> str | None:
+        """Straight up where something stands too near to plan from here."""
+        self._refresh()
+        touching = self.planning.collision(self.arm)
+        if touching is None:
+            return None
+        self._released = tuple(name for name in touching if name in self.world.poses())
+        return self.try_retreat()
+
     def _attempt(self, what: str, motion: Callable[[], None]) -> str | None:
         try:
             motion()
@@ -354,35 +365,14 @@ class Manipulator:
             return f"could not {what}: {error}"
         return None
 
-    def _plan_choice(
-        self, tools: list[Pose], ignored: tuple[str, ...] = ()
-    ) -> tuple[Pose, FloatArray]:
-        """The tool pose among equivalent ones that needs the least joint travel and is free, and
-        the arm joints `APPROACH` above it."""
+    def _plan_choice(self, tools: list[Pose], ignored: tuple[str, ...] = ()) -> Choice:
+        """The tool pose among equivalent ones to go to, and the arm joints `APPROACH` above it."""
         self._refresh()
-        with self.world.stopwatch.measuring("plan"):
-            found: list[tuple[float, Pose, FloatArray]] = []
-            reason: PlanningError = Unreachable("unreachable")
-            for tool in tools:
-                try:
-                    above = inverse_kinematics(
-                        self.model, tool.translated(z=self.approach), self.home, self.rng
-                    )
-                    at = inverse_kinematics(self.model, tool, above)
-                except Unreachable as error:
-                    reason = error
-                    continue
-                for arm, margin in ((at, False), (above, True)):
-                    touching = self.planning.collision(arm, ignored=ignored, margin=margin)
-                    if touching is not None:
-                        reason = PlanningError(f"in collision: {' and '.join(touching)}")
-                        break
-                else:
-                    found.append((float(np.abs(above - self.arm).max()), tool, above))
-            if not found:
-                raise reason
-            _, tool, above = min(found, key=lambda option: option[0])
-            return tool, above
+        return self._planned(
+            lambda: choose(
+                self.planning, tools, self.approach, self.home, self.arm, self.rng, ignored
+            )
+        )
 
     def _move_fingers(self, target: float, hold: float) -> None:
         self.follow(

@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 sys.path.append(str(DOCS))  # for the scripts, which are no package
 
+import make_arms  # noqa: E402
 import make_pushing  # noqa: E402
 import make_reality  # noqa: E402
 import make_results  # noqa: E402
@@ -39,6 +40,14 @@ def test_the_tables_of_pushing_are_up_to_date() -> None:
     told = "run `python docs/make_pushing.py`"
     assert make_pushing.PAGE.read_text("utf-8") == make_pushing.page(), told
     assert make_pushing.page().count("| ODE |") == 5  # tuned, default, UR5, xArm 7, SO-101
+
+
+def test_the_tables_of_other_arms_are_up_to_date_and_of_new_seeds() -> None:
+    told = "run `python docs/make_arms.py`"
+    assert make_arms.PAGE.read_text("utf-8") == make_arms.page(), told
+    lines = make_arms.lines()
+    assert {line["robot"] for line in lines} == {"ur5", "xarm7", "so101"}
+    assert {line["seed"] for line in lines} == {str(920001 + k) for k in range(10)}
 
 
 def test_the_tables_of_laws_are_up_to_date() -> None:

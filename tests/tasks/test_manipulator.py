@@ -273,6 +273,21 @@ def test_after_a_failure_the_next_cube_can_be_taken() -> None:
     assert arm.process.poses["cube_04"].position == pytest.approx([0.5, 0, 0.325], abs=1e-5)
 
 
+def test_recovering_leaves_a_cube_that_stands_too_near_to_plan_from() -> None:
+    arm = Arm()
+    manipulator = arm.manipulator
+    over = arm.process.scene.body(CUBE).pose.translated(z=0.06)
+    manipulator.go_to_pose(tool_over(over, 0.0), speed=0.5)
+    x, y, z = manipulator.tool.position
+    arm.process.poses["cube_12"] = Pose.at(x, y + 0.085, z)  # in the air, beside a fingertip
+    arm.world.wait(0.1)
+    with pytest.raises(PlanningError, match="start in collision"):
+        manipulator.pick("cube_03")
+    assert manipulator.recover() is None
+    assert manipulator.tool.position == pytest.approx([x, y, z + 0.10], abs=1e-4)
+    manipulator.pick("cube_03")
+
+
 def test_a_retreat_may_touch_the_cube_it_let_go_but_nothing_else() -> None:
     arm = Arm()
     arm.manipulator.pick(CUBE)
