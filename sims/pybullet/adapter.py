@@ -37,6 +37,7 @@ from pytest_simbench.simulator.loops import reduced
 from pytest_simbench.simulator.self_collision import joined
 from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
 
+from .anchors import Anchors
 from .loads import wrench
 from .loops import close_loop
 from .readback import ReadBack
@@ -177,6 +178,7 @@ class PyBullet(Simulator):
         self._part_from_still(scene)
         self.prepared = None
         self._robot = -1
+        self._anchors: Anchors | None = None
         self._couplings: list[int] = []
         self._closures: list[int] = []
         self._joints: list[int] = []
@@ -221,6 +223,8 @@ class PyBullet(Simulator):
                 group=ROBOT,
                 touches=WORLD | ROBOT if robot.self_collide else WORLD,
             )
+        if self.settings.friction_anchor:
+            self._anchors = Anchors(c, self._robot, self.settings.timestep)
         if robot.self_collide:
             for pair in joined(prepared):
                 numbers = (self._links[name] for name in pair)
@@ -302,7 +306,10 @@ class PyBullet(Simulator):
             pybullet.resetBaseVelocity(body, row[7:10] - falls, row[10:], c)
 
     def step(self) -> None:
-        pybullet.stepSimulation(self.client)
+        if self._anchors is None:
+            pybullet.stepSimulation(self.client)
+        else:
+            self._anchors.step()
         self._steps += 1
 
     @property
@@ -325,12 +332,16 @@ class PyBullet(Simulator):
         states = pybullet.getJointStates(self._robot, self._joints, physicsClientId=self.client)
         return np.array([[state[0] for state in states], [state[1] for state in states]])
 
-    def save(self) -> tuple[int, int, tuple[FloatArray, ...] | None]:
-        return pybullet.saveState(physicsClientId=self.client), self._steps, self._commanded
+    def save(self) -> tuple[Any, ...]:
+        anchors = self._anchors.save() if self._anchors else None
+        made = pybullet.saveState(physicsClientId=self.client)
+        return made, self._steps, self._commanded, anchors
 
-    def restore(self, state: tuple[int, int, tuple[FloatArray, ...] | None]) -> None:
-        pybullet.restoreState(stateId=state[0], physicsClientId=self.client)
-        self._steps, commanded = state[1], state[2]
+    def restore(self, state: tuple[Any, ...]) -> None:
+        made, self._steps, commanded, anchors = state
+        pybullet.restoreState(stateId=made, physicsClientId=self.client)
+        if self._anchors is not None and anchors is not None:
+            self._anchors.restore(anchors)
         if commanded is not None:  # motor targets are not part of Bullet's state
             self.command(*commanded)
 
