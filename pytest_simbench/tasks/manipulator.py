@@ -1,77 +1,29 @@
-"""One arm in one world: plan, send, follow, look again.
-
-`pick`, `place` and `throw` are made of the verbs that a task may use too: `go_to`, `go_to_pose`,
-`move_straight`, `move_along`, `follow`, `close_hand`, `open_hand`. Waiting is the world's:
-`world.wait`.
-"""
+"""The arm that picks, places and throws cubes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import TypeVar
+from collections.abc import Callable
 
 import numpy as np
 
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.robot.choosing import Choice, choose
-from pytest_simbench.robot.collision import PlanningScene
 from pytest_simbench.robot.errors import PlanningError
-from pytest_simbench.robot.grasping import grasp_of
-from pytest_simbench.robot.kinematics import inverse_kinematics, tool_over, top_down_grasps
-from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.planning import MotionPlanner
+from pytest_simbench.robot.kinematics import tool_over, top_down_grasps
 from pytest_simbench.robot.throw import Throw
-from pytest_simbench.scene import FloatArray, Pose, Trajectory
-from pytest_simbench.tasks.base import CUBE_SIZE
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.tasks.arm import Arm, LostCube, Speeds
 
 APPROACH = 0.10
-"""Height above a grasp or a place from which the tool comes straight down [m] (study code). It,
-`IN_HAND` and `PUT_BACK_HEIGHT` go with the scene's scale."""
-
-GRASP_TIME = 0.3
-"""From closing the fingers to lifting [s]."""
-
-RELEASE_TIME = 0.2
-"""From opening the fingers to retreating [s]."""
-
-IN_HAND = 0.04
-"""A cube whose centre is farther than this from the tool centre point is not held [m]."""
+"""Height above a grasp or a place from which the tool comes straight down [m] (study code). It
+and `PUT_BACK_HEIGHT` go with the scene's scale."""
 
 PUT_BACK_HEIGHT = 0.005
 """How far above where it came from a cube is let go that could not be placed [m]."""
 
-T = TypeVar("T")
 
-
-@dataclass(frozen=True)
-class Speeds:
-    """Shares of the joint velocity limits at which the arm moves.
-
-    Attributes:
-        free: with an empty hand.
-        carry: with a cube in the hand.
-        contact: straight down to a cube, or with one to its place.
-    """
-
-    free: float = 1.0
-    carry: float = 0.6
-    contact: float = 0.3
-
-
-FULL_SPEED = Speeds(1.0, 1.0, 1.0)
-"""As the study moved (code: no velocity scaling)."""
-
-
-class LostCube(Exception):
-    """The cube is not in the hand where it should be; the message is the counted reason."""
-
-
-class Manipulator:
-    """The arm, its planner and what it holds.
-
-    Motions start from the commanded set points, as a controller's do, and are planned against the
-    cubes as the simulator has them now.
+class Manipulator(Arm):
+    """An arm with what the tasks do to cubes.
 
     Args:
         rng: of the repetition; drives everything random in planning.
@@ -79,12 +31,8 @@ class Manipulator:
         scale: of the scene's lengths over those of the study's.
 
     Attributes:
-        world: the simulated world.
-        arm: commanded arm joints, (arm,) [rad].
-        fingers: commanded finger position [m], of a jaw that turns [rad].
-        grasp: how the hand grasps a cube.
         approach: `APPROACH`, scaled [m].
-        held: name of the cube in the hand, or None.
+        home: where the arm begins, (arm,) [rad].
     """
 
     def __init__(
@@ -94,28 +42,9 @@ class Manipulator:
         speeds: Speeds | None = None,
         scale: float = 1.0,
     ) -> None:
-        robot = world.scene.robot
-        if robot is None:
-            raise ValueError(f"scene {world.scene.name!r} has no robot")
-        self.world = world
-        self.gripper = robot.gripper
-        self.rng = rng
-        self.speeds = speeds or Speeds()
-        self.scale = scale
+        super().__init__(world, rng, speeds, scale)
         self.approach = APPROACH * scale
-        with world.stopwatch.measuring("plan"):
-            self.model = RobotModel(robot)
-            self.grasp = grasp_of(robot, CUBE_SIZE * scale, scale)
-            self.planning = PlanningScene(self.model, world.scene, scale)
-            self.planner = MotionPlanner(self.model, self.planning, rng, world.scene.gravity)
-        self.arm = robot.column("initial_position")[: self.model.arm]
         self.home = self.arm.copy()
-        self.fingers = self.gripper.opened
-        self.held: str | None = None
-        self._released: tuple[str, ...] = ()
-        self._origin = Pose()
-        self._grip = Pose()
-        self._released_at = world.time
 
     def pick(self, name: str) -> None:
         """Grasp a cube from above and lift it by `approach`.
@@ -176,138 +105,6 @@ class Manipulator:
         self.held = None
         self.planning.detach()
         return self.follow(trajectory, log_period=0.0), perfect
-
-    def go_to(self, goal: FloatArray, *, speed: float) -> None:
-        """Collision-free motion to arm joints `goal`, (arm,) [rad].
-
-        Args:
-            speed: share of the joint velocity limits.
-
-        Raises:
-            PlanningError: start or goal touch something, or no way was found.
-        """
-        self._refresh()
-        self.follow(
-            self._planned(lambda: self.planner.move_to(self.arm, goal, self.fingers, speed=speed))
-        )
-
-    def go_to_pose(self, tool: Pose, *, speed: float) -> None:
-        """Collision-free motion of the tool centre point to a pose in the world.
-
-        `robot.kinematics.tool_over` gives the pose of a tool that points down.
-
-        Args:
-            speed: share of the joint velocity limits.
-
-        Raises:
-            PlanningError: the pose is out of reach, touches something, or no way was found.
-        """
-        self._refresh()
-        goal = self._planned(
-            lambda: inverse_kinematics(
-                self.model, tool, self.arm, self.rng,
-                wanted=lambda arm: self.planning.collision(arm) is None,
-            )
-        )  # fmt: skip
-        self.go_to(goal, speed=speed)
-
-    def move_straight(self, tool: Pose, *, speed: float, ignored: tuple[str, ...] = ()) -> None:
-        """Motion of the tool centre point along a straight line to a pose in the world.
-
-        Args:
-            speed: share of the joint velocity limits.
-            ignored: names of bodies that may be touched, for instance the one to be pushed.
-
-        Raises:
-            PlanningError: the line leaves the workspace, or something else is in the way.
-        """
-        self._refresh()
-        self.follow(
-            self._planned(
-                lambda: self.planner.move_linear(
-                    self.arm, tool, self.fingers, ignored=ignored, speed=speed
-                )
-            )
-        )
-
-    def move_along(
-        self,
-        poses: Sequence[Pose],
-        *,
-        tool_speed: float,
-        ignored: tuple[str, ...] = (),
-        log_period: float | None = None,
-    ) -> Motion | None:
-        """Motion of the tool centre point through poses in the world, without a stop.
-
-        Args:
-            poses: about 1 cm from each other.
-            tool_speed: mean speed of the tool centre point [m/s].
-            ignored: names of bodies that may be touched, for instance the one to be pushed.
-            log_period: as of `follow`.
-
-        Raises:
-            PlanningError: the path leaves the workspace, or something else is in the way.
-        """
-        self._refresh()
-        trajectory = self._planned(
-            lambda: self.planner.move_along(
-                self.arm, poses, self.fingers, tool_speed=tool_speed, ignored=ignored
-            )
-        )
-        return self.follow(trajectory, log_period=log_period)
-
-    def follow(self, trajectory: Trajectory, *, log_period: float | None = None) -> Motion | None:
-        """Follow a trajectory of one's own; it must begin at the commanded set points.
-
-        Args:
-            log_period: between samples of the motion [s]; 0: each step, None: no samples.
-        """
-        motion = self.world.follow(trajectory, log_period=log_period)
-        self.arm = trajectory.position[-1, : self.model.arm].copy()
-        if self.gripper.joints:
-            self.fingers = float(trajectory.position[-1, -1])
-        return motion
-
-    def close_hand(self, around: str | None = None, seen: Pose | None = None) -> None:
-        """Close the fingers, and wait for `GRASP_TIME`.
-
-        Args:
-            around: name of the body between them: from now on it is `held`, and is planned for.
-            seen: its pose before the hand came; by default where it is before the fingers close.
-        """
-        if around is not None and seen is None:
-            seen = self.world.pose(around)
-        self._move_fingers(self.gripper.closed, GRASP_TIME)
-        if around is not None and seen is not None:
-            self.held, self._origin = around, seen
-            self._grip = self.tool.inverse() * seen
-
-    def open_hand(self) -> None:
-        """Open the fingers, let go of what they hold, and wait for `RELEASE_TIME`."""
-        self._released_at = self.world.time
-        self._released = (self.held,) if self.held else self._released
-        self.held = None
-        self.planning.detach()
-        self._move_fingers(self.gripper.opened, RELEASE_TIME)
-
-    @property
-    def tool(self) -> Pose:
-        """Pose of the tool centre point in the world, as commanded."""
-        return self.model.tool_pose(self.arm)
-
-    def check_held(self) -> None:
-        """See to it that the body in the hand is still there.
-
-        Raises:
-            LostCube: it is not.
-        """
-        if not self._in_hand():
-            raise LostCube(f"{self.held} is not in the hand")
-
-    def time_since_release(self) -> float:
-        """Simulated seconds since the fingers were told to open."""
-        return self.world.time - self._released_at
 
     def try_retreat(self) -> str | None:
         """Straight up from where a cube was let go, one jaw aside first; a sentence when that is
@@ -372,30 +169,4 @@ class Manipulator:
             lambda: choose(
                 self.planning, tools, self.approach, self.home, self.arm, self.rng, ignored
             )
-        )
-
-    def _move_fingers(self, target: float, hold: float) -> None:
-        self.follow(
-            self._planned(lambda: self.planner.move_fingers(self.arm, self.fingers, target, hold))
-        )
-
-    def _planned(self, plan: Callable[[], T]) -> T:
-        with self.world.stopwatch.measuring("plan"):
-            return plan()
-
-    def _refresh(self) -> None:
-        """Take the cubes' present poses over into the planning scene."""
-        with self.world.stopwatch.measuring("plan"):
-            self.planning.update(self.world.poses())
-            self.planning.opening = self.fingers if self.held is None else self.grasp.touching
-            if self.held is not None and self.planning.held != self.held:
-                self.planning.attach(self.held, self._grip)
-
-    def _in_hand(self) -> bool:
-        if self.held is None:
-            return False
-        joints = self.world.joints[0, : self.model.arm]
-        tool = np.array(self.model.tool_pose(joints).position)
-        return bool(
-            np.linalg.norm(tool - self.world.pose(self.held).position) < IN_HAND * self.scale
         )

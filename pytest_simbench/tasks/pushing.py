@@ -23,8 +23,9 @@ from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import panda
 from pytest_simbench.robot.scale import scale_of
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene, Vector3
+from pytest_simbench.tasks.arm import Arm
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, distance, generators
-from pytest_simbench.tasks.manipulator import APPROACH, Manipulator
+from pytest_simbench.tasks.manipulator import APPROACH
 from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.moments import Moment
 from pytest_simbench.tasks.sliding import smallest_turning_radius
@@ -189,7 +190,7 @@ class Pushing(Task):
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         with world.phase("settle start"):
             world.wait(0.2)
-        hand = Manipulator(world, generators(seed)[2])
+        hand = Arm(world, generators(seed)[2])
         first, *others = self.tools()
         pushed: Motion | None = None
         details: dict[str, object] = {}

@@ -19,6 +19,7 @@ from pytest_simbench.robot.panda import panda
 from pytest_simbench.robot.planning import PlanningError
 from pytest_simbench.robot.scale import grasping_scale_of
 from pytest_simbench.scene import Box, Pose, Robot, Scene
+from pytest_simbench.tasks.arm import FULL_SPEED, LostCube, Speeds
 from pytest_simbench.tasks.base import (
     CUBE_SIZE,
     STUDY_TOLERANCE,
@@ -31,7 +32,7 @@ from pytest_simbench.tasks.base import (
     generators,
     scaled,
 )
-from pytest_simbench.tasks.manipulator import FULL_SPEED, LostCube, Manipulator, Speeds
+from pytest_simbench.tasks.manipulator import Manipulator
 from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.reach import cannot_handle
 

@@ -33,6 +33,7 @@ from pytest_simbench.robot.throw import (
     swing_of,
 )
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Pose, Robot, Scene
+from pytest_simbench.tasks.arm import LostCube, Speeds
 from pytest_simbench.tasks.base import (
     CUBE_SIZE,
     STUDY_TOLERANCE,
@@ -45,7 +46,7 @@ from pytest_simbench.tasks.base import (
     scaled,
 )
 from pytest_simbench.tasks.impact import impact
-from pytest_simbench.tasks.manipulator import LostCube, Manipulator, Speeds
+from pytest_simbench.tasks.manipulator import Manipulator
 from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.moments import Moment
 from pytest_simbench.tasks.reach import cannot_handle

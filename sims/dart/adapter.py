@@ -15,9 +15,8 @@ from __future__ import annotations
 import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -29,10 +28,8 @@ from pytest_simbench.scene import (
 from pytest_simbench.simulator import (
     FOLLOWER,
     Capability,
-    DataSeen,
     Deviation,
     PreparedRobot,
-    SeedsSeen,
     Seen,
     Settings,
     Simulator,
@@ -43,38 +40,12 @@ from pytest_simbench.simulator.loops import ends, reduced
 
 from .bodies import add_body, add_ground, set_surface
 from .readback import ReadBack
+from .settings import CHOSEN_ON, PROFILES, DARTSettings
 
 dartpy = lazy_import("dartpy")
 
 State = tuple[float, list[tuple[FloatArray, FloatArray, FloatArray]], FloatArray]
 """Time, positions, velocities and accelerations of each skeleton, the command."""
-
-
-@dataclass(frozen=True)
-class DARTSettings(Settings):
-    """DART's options; defaults are the engine's own.
-
-    Attributes:
-        timestep: [s]; DART's default.
-        detector: collision detector; DART's default is `fcl`, Gazebo's is `ode`.
-        solver: `dantzig` (pivoting, friction pyramid), `pgs` (projected Gauss-Seidel, friction
-            pyramid) or `nsgs` (block Gauss-Seidel, Coulomb's cone).
-        sweeps: largest number of passes of `pgs` and `nsgs`, DART's default for `nsgs`.
-        tolerance: where they stop earlier; for `nsgs` the violation of the law of contact [m/s].
-        position_gain: share of the position error that the drives correct in a step; the default
-            is that of gz_ros2_control, DART has none.
-        sleeping: whether bodies at rest are frozen.
-        split_impulse: correct penetrations by a velocity of their own.
-    """
-
-    timestep: float = 0.001
-    detector: Literal["fcl", "ode", "bullet", "dart"] = "fcl"
-    solver: Literal["dantzig", "pgs", "nsgs"] = "dantzig"
-    sweeps: int = 100
-    tolerance: float = 1e-5
-    position_gain: float = 0.1
-    sleeping: bool = True
-    split_impulse: bool = False
 
 
 class DART(Simulator):
@@ -138,19 +109,8 @@ class DART(Simulator):
         ),
         install_size_mb=80,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = {
-        "default": DARTSettings(),
-        "tuned": DARTSettings(detector="ode", solver="nsgs", tolerance=1e-4, position_gain=0.5),
-        "real": DARTSettings(detector="ode", solver="nsgs", tolerance=1e-4, position_gain=0.5),
-    }
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
-        "tuned": (SeedsSeen("throwing", 100, 100), SeedsSeen("stacking", 100, 100)),
-        "real": (
-            SeedsSeen("throwing", 100, 100),
-            SeedsSeen("stacking", 100, 100),
-            DataSeen("cube_tosses", 0, 564, 6),
-        ),
-    }
+    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
+    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
     settings: DARTSettings
 
     def load(self, scene: Scene) -> None:

@@ -37,9 +37,7 @@ from numpy.typing import NDArray
 from pytest_simbench.scene import FloatArray, Robot, Scene
 from pytest_simbench.simulator import (
     Capability,
-    DataSeen,
     Deviation,
-    SeedsSeen,
     Seen,
     Settings,
     Simulator,
@@ -50,7 +48,8 @@ from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
 
 from . import releases
 from .readback import ReadBack
-from .world import DrakeSettings, World, transform
+from .settings import CHOSEN_ON, PROFILES, DrakeSettings
+from .world import World, transform
 
 analysis = lazy_import("pydrake.systems.analysis")
 framework = lazy_import("pydrake.systems.framework")
@@ -120,35 +119,8 @@ class Drake(Simulator):
         ),
         install_size_mb=310,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = {
-        "default": DrakeSettings(),
-        "tuned": DrakeSettings(
-            timestep=0.002,
-            contact_model="point",
-            approximation="sap",
-            relaxation_time=0.01,
-            corner_radius=0.001,
-            pad_radius=0.003,
-            shrink=1e-4,
-        ),
-        "real": DrakeSettings(
-            timestep=0.001,
-            contact_model="point",
-            approximation="sap",
-            relaxation_time=0.01,
-            corner_radius=0.001,
-            pad_radius=0.003,
-            shrink=1e-4,
-        ),
-    }
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
-        "tuned": (SeedsSeen("throwing", 2121, 2130), SeedsSeen("stacking", 100, 100)),
-        "real": (
-            SeedsSeen("throwing", 2121, 2130),
-            SeedsSeen("stacking", 100, 100),
-            DataSeen("cube_tosses", 0, 564, 6),
-        ),
-    }
+    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
+    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
     settings: DrakeSettings
 
     def load(self, scene: Scene) -> None:

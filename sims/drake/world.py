@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -18,13 +17,14 @@ from pytest_simbench.scene import (
     Scene,
     Sphere,
 )
-from pytest_simbench.simulator import NotSupportedError, PreparedRobot, Settings, heavy, lazy_import
+from pytest_simbench.simulator import NotSupportedError, PreparedRobot, heavy, lazy_import
 from pytest_simbench.simulator.loops import reduced
 from pytest_simbench.simulator.self_collision import joined
 from pytest_simbench.simulator.shapes import mesh_points
 from pytest_simbench.simulator.urdf import Link, Shape
 
 from . import releases
+from .settings import DrakeSettings
 from .shapes import (
     corner_centres,
     fitting_radius,
@@ -42,43 +42,6 @@ LIGHT = (0.85, 0.85, 0.85, 1.0)
 
 VERTEX_RADIUS = 1e-6
 """Of the spheres at the vertices of free meshes [m]: they stick out by no more than that."""
-
-
-@dataclass(frozen=True)
-class DrakeSettings(Settings):
-    """Drake's options; defaults are those of its MultibodyPlantConfig and SceneGraphConfig.
-
-    Attributes:
-        timestep: of the discrete update [s].
-        contact_model: points, or hydroelastic surfaces where both shapes have a compliance.
-        approximation: of the discrete contact problem, each solved by SAP.
-        near_rigid_threshold: SAP softens contacts stiffer than this allows, for conditioning.
-        stiction_tolerance: slip below which `lagged` and `similar` regularise friction [m/s].
-        compliance: of every surface; `undefined` leaves the pair to point contact.
-        hydroelastic_modulus: [Pa].
-        point_stiffness: of a contact point [N/m].
-        hunt_crossley_dissipation: of `lagged` and `similar` [s/m].
-        relaxation_time: of `sap`'s linear dissipation [s].
-        corner_radius: of the spheres in the corners of free boxes [m]; 0: none, plain boxes.
-        pad_radius: of the spheres behind the fingers' gripping faces [m]; 0: none.
-        shrink: what a free box with corner spheres loses on each face [m].
-    """
-
-    timestep: float = 0.001
-    contact_model: Literal["point", "hydroelastic", "hydroelastic_with_fallback"] = (
-        "hydroelastic_with_fallback"
-    )
-    approximation: Literal["sap", "similar", "lagged"] = "lagged"
-    near_rigid_threshold: float = 1.0
-    stiction_tolerance: float = 1e-4
-    compliance: Literal["undefined", "rigid", "compliant"] = "undefined"
-    hydroelastic_modulus: float = 1e7
-    point_stiffness: float = 1e6
-    hunt_crossley_dissipation: float = 50.0
-    relaxation_time: float = 0.1
-    corner_radius: float = 0.0
-    pad_radius: float = 0.0
-    shrink: float = 0.0
 
 
 class World:

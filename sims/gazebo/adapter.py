@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -33,6 +32,7 @@ from .drives import Drives
 from .readback import ReadBack
 from .sdf import Physics, is_lone, robot_model, world_text
 from .server import Server, new_name
+from .settings import CHOSEN_ON, PROFILES, GazeboSettings
 from .window import Window
 from .wrenches import Wrenches
 
@@ -41,30 +41,6 @@ PACKAGES = ("python3-numpy", "gz-harmonic")
 
 ARCHIVE = "https://gazebosim.org/docs/harmonic/install_ubuntu"
 """Says how that archive is made known to apt."""
-
-
-@dataclass(frozen=True)
-class GazeboSettings(Settings):
-    """Gazebo's options; defaults are its own.
-
-    Attributes:
-        timestep: [s]; SDF's default.
-        engine: physics engine, a plugin of Gazebo's.
-        detector: collision detector of dartsim; Gazebo's default is `ode`.
-        solver: of dartsim: `dantzig` (pivoting) or `pgs` (projected Gauss-Seidel, 30 passes).
-        position_gain: share of the position error that the drives correct in a step; the default
-            is that of gz_ros2_control, Gazebo has none.
-        torsional_friction: what bullet-featherstone holds against a spin about a contact's normal,
-            as a share of the normal force; a pair has about twice as much [m]. SDF's default is 1,
-            so nothing can be turned on the ground. dartsim has none.
-    """
-
-    timestep: float = 0.001
-    engine: Literal["dartsim", "bullet-featherstone"] = "dartsim"
-    detector: Literal["ode", "fcl", "bullet", "dart"] = "ode"
-    solver: Literal["dantzig", "pgs"] = "dantzig"
-    position_gain: float = 0.1
-    torsional_friction: float = 1.0
 
 
 class Gazebo(Simulator):
@@ -142,20 +118,8 @@ class Gazebo(Simulator):
         environment={"GZ_IP": "127.0.0.1"},
         install_size_mb=1500,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = {
-        "default": GazeboSettings(),
-        "tuned": GazeboSettings(
-            engine="bullet-featherstone", position_gain=0.5, torsional_friction=0.0
-        ),
-    }
-    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = {
-        "tuned": (
-            SeedsSeen("throwing", 2022, 2023),
-            SeedsSeen("stacking", 2022, 2022),
-            SeedsSeen("pushing", 920001, 920002),
-            SeedsSeen("pushing_curve", 920001, 920002),
-        ),
-    }
+    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
+    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = CHOSEN_ON
     settings: GazeboSettings
     _window: Window | None = None
 

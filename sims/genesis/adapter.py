@@ -22,10 +22,8 @@ from numpy.typing import NDArray
 from pytest_simbench.scene import FloatArray, Scene, rotation_matrix
 from pytest_simbench.simulator import (
     Capability,
-    DataSeen,
     Deviation,
     PreparedRobot,
-    SeedsSeen,
     Seen,
     Settings,
     Simulator,
@@ -44,9 +42,9 @@ from .engine import (
 )
 from .readback import ReadBack
 from .releases import OLDEST, centre_of_mass, contact_parameters, of_collider
+from .settings import CHOSEN_ON, PROFILES, GenesisSettings
 from .world import (
     LEAST_FRICTION,
-    GenesisSettings,
     add_body,
     add_camera,
     add_robot,
@@ -100,25 +98,8 @@ class Genesis(Simulator):
         install_size_mb=3700,
         language="Python (Quadrants)",
     )
-    profiles: ClassVar[Mapping[str, Settings]] = {
-        "default": GenesisSettings(),
-        "tuned": GenesisSettings(
-            timestep=0.002,
-            constraint_timeconst=0.004,
-            friction_cone="elliptic",
-            box_box_detection=True,
-        ),
-        "real": GenesisSettings(
-            timestep=0.002,
-            constraint_timeconst=0.004,
-            friction_cone="elliptic",
-            box_box_detection=True,
-        ),
-    }
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
-        "tuned": (SeedsSeen("throwing", 100, 101),),
-        "real": (SeedsSeen("throwing", 100, 101), DataSeen("cube_tosses", 0, 564, 6)),
-    }
+    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
+    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
     settings: GenesisSettings
     world: Any = None
     compiled: ClassVar[set[tuple[Any, ...]]] = set()

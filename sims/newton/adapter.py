@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from pytest_simbench.scene import FloatArray, Scene, rotation_matrix
 from pytest_simbench.simulator import (
     Capability,
-    DataSeen,
     Deviation,
     PreparedRobot,
     Seen,
@@ -38,7 +37,8 @@ from ..mujoco.heavy import leave_out
 from ..mujoco.pictures import DISABLED, camera, renderer
 from ..mujoco.readback import Numbers, ReadBack
 from ..mujoco.touching import contact_forces, joint_wrenches
-from .world import NewtonSettings, build_model, make_solver, names
+from .settings import CHOSEN_ON, PROFILES, NewtonSettings
+from .world import build_model, make_solver, names
 
 LED = 1 << 20
 """Collision group of prescribed bodies, which Newton gives nobody."""
@@ -99,30 +99,8 @@ class Newton(Simulator):
         install_size_mb=900,
         environment=DISABLED,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = {
-        "default": NewtonSettings(),
-        "tuned": NewtonSettings(
-            timestep=0.001,
-            cone="elliptic",
-            condim=4,
-            ke=250000.0,
-            kd=1000.0,
-            solimp=(0.99, 0.9999, 0.001),
-            gap=0.0,
-        ),
-        "real": NewtonSettings(
-            timestep=0.001,
-            cone="elliptic",
-            condim=4,
-            ke=62500.0,
-            kd=1000.0,
-            solimp=(0.99, 0.9999, 0.001),
-            gap=0.0,
-        ),
-    }
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
-        "real": (DataSeen("cube_tosses", 0, 564, 6),)
-    }
+    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
+    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
     settings: NewtonSettings
 
     _compiled: ClassVar[set[bool]] = set()

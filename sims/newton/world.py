@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -18,40 +17,14 @@ from pytest_simbench.scene import (
     Scene,
     Sphere,
 )
-from pytest_simbench.simulator import PreparedRobot, Settings, heavy, lazy_import
+from pytest_simbench.simulator import PreparedRobot, heavy, lazy_import
 from pytest_simbench.simulator.loops import reduced
+
+from .settings import NewtonSettings
 
 newton = lazy_import("newton")
 wp = lazy_import("warp")
 mujoco = lazy_import("mujoco")
-
-
-@dataclass(frozen=True)
-class NewtonSettings(Settings):
-    """Options of SolverMuJoCo; defaults are the engine's own.
-
-    Attributes:
-        timestep: [s]; Newton's examples of SolverMuJoCo mostly take 1/60 s in 10 substeps.
-        integrator: of MuJoCo; Newton's default is `implicitfast`.
-        cone: friction cone.
-        impratio: ratio of friction to normal constraint impedance.
-        condim: dimension of the contact space: 3 sliding, 4 with torsional friction.
-        ke: contact stiffness [N/m]; SolverMuJoCo makes of it and `kd` MuJoCo's time constant of
-            contacts, 2 / kd [s], and damping ratio, kd / (2 sqrt(ke)).
-        kd: contact damping [N s/m].
-        solimp: contact impedance: minimum, maximum, width [m].
-        gap: distance within which contacts are looked for [m]; Newton's default is 0.1.
-    """
-
-    timestep: float = 1 / 600
-    integrator: Literal["euler", "implicit", "implicitfast", "rk4"] = "implicitfast"
-    cone: Literal["pyramidal", "elliptic"] = "pyramidal"
-    impratio: float = 1.0
-    condim: Literal[3, 4, 6] = 3
-    ke: float = 2500.0
-    kd: float = 100.0
-    solimp: tuple[float, float, float] = (0.9, 0.95, 0.001)
-    gap: float = 0.1
 
 
 def build_model(scene: Scene, prepared: PreparedRobot | None, settings: NewtonSettings) -> Any:

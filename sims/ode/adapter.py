@@ -10,18 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
-    DataSeen,
     Deviation,
     NotSupportedError,
     PreparedRobot,
-    SeedsSeen,
     Seen,
     Settings,
     Simulator,
@@ -34,9 +32,10 @@ from pytest_simbench.simulator.self_collision import joined
 from . import world as build
 from .axes import Axis
 from .contacts import Contacts, Part
-from .drives import Drive, Drives
+from .drives import Drives
 from .library import body_id, library, library_path, turn, turned
 from .readback import ReadBack
+from .settings import CHOSEN_ON, PROFILES, ODESettings
 
 ode = lazy_import("ode")
 
@@ -44,46 +43,6 @@ PACKAGES = ("python3-numpy", "python3-pyode")
 
 SEED = 0
 """Of ODE's own random numbers, by which quickStep shuffles its rows; 0 is where they begin."""
-
-
-@dataclass(frozen=True)
-class ODESettings(Settings):
-    """ODE's options; defaults are Webots' own (WorldInfo, ContactProperties, Motor, R2023b).
-
-    Attributes:
-        timestep: [s]; Webots' default of 32 ms is longer than tasks allow, this is half of it.
-        solver: `step` (all rows at once, Dantzig), which Webots takes, or `quickstep` (iterative).
-        iterations: of `quickstep`; 20 is ODE's default.
-        erp, cfm: of all joints: share of their error that is corrected in a step, and softness.
-        contact_erp, contact_cfm: the same of contacts.
-        contacts: the most of a pair of shapes that count, the deepest.
-        friction: in two directions that ODE chooses (`pyramid`), or along the slip alone where a
-            contact slips (`slip`).
-        drive: `velocity` motors with Webots' P controller, or `spring`: the scene's drive law.
-        position_gain: P of `velocity` [1/s].
-        sleeping: whether boxes at rest for 1 s (0.01 m/s, 0.01 rad/s) are left out.
-    """
-
-    timestep: float = 0.016
-    solver: Literal["step", "quickstep"] = "step"
-    iterations: int = 20
-    erp: float = 0.2
-    cfm: float = 1e-5
-    contact_erp: float = 0.2
-    contact_cfm: float = 1e-3
-    contacts: int = 10
-    friction: Literal["pyramid", "slip"] = "pyramid"
-    drive: Drive = "velocity"
-    position_gain: float = 10.0
-    sleeping: bool = True
-
-    def quantities(self) -> Mapping[str, Any]:
-        if self.drive == "spring":
-            return {}
-        # v + CFM effort = P (q* - q), read as the law of a drive whose d acts on v alone
-        stiffness = self.position_gain / self.cfm
-        damping = 1 / self.cfm - self.timestep * stiffness
-        return {"joint/*/stiffness": stiffness, "joint/*/damping": damping}
 
 
 @dataclass(frozen=True)
@@ -146,23 +105,8 @@ class ODE(Simulator):
         ),
         install_size_mb=40,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = {
-        "default": ODESettings(),
-        "tuned": ODESettings(
-            timestep=0.002,
-            contact_cfm=1e-5,
-            drive="spring",
-        ),
-        "real": ODESettings(timestep=0.001, contact_cfm=1e-3, drive="spring", friction="slip"),
-    }
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
-        "tuned": (SeedsSeen("throwing", 100, 101), SeedsSeen("stacking", 100, 100)),
-        "real": (
-            SeedsSeen("throwing", 100, 101),
-            SeedsSeen("stacking", 100, 100),
-            DataSeen("cube_tosses", 0, 564, 6),
-        ),
-    }
+    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
+    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
     settings: ODESettings
 
     def load(self, scene: Scene) -> None:

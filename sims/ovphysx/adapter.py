@@ -19,8 +19,7 @@ not quite that of the uninterrupted run.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,11 +27,9 @@ from numpy.typing import NDArray
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import (
     Capability,
-    DataSeen,
     Deviation,
     NotSupportedError,
     PreparedRobot,
-    SeedsSeen,
     Seen,
     Settings,
     Simulator,
@@ -45,55 +42,11 @@ from . import stage as usd
 from .loads import wrenches
 from .readback import read_back
 from .session import Session
+from .settings import CHOSEN_ON, PROFILES, OvPhysXSettings
 
 ovphysx_types = lazy_import("ovphysx.types")
 
 _Saved = tuple[int, dict[str, NDArray[np.float32]], tuple[FloatArray, FloatArray] | None]
-
-
-@dataclass(frozen=True)
-class OvPhysXSettings(Settings):
-    """PhysX's options; defaults are those of its USD schemas.
-
-    `tuned` takes a short step with few iterations, which lets an impact through: with many, a
-    pyramid takes it as one block. What that costs the drives is told in docs/engines/ovphysx.md.
-
-    Attributes:
-        timestep: [s]; 1/60 is what PhysxSceneAPI says.
-        solver: temporal or projected Gauss-Seidel.
-        body_iterations: position iterations of free bodies.
-        arm_iterations: those of the articulation. The largest number of all counts for the whole
-            scene: with 4 for the arm, 1, 2 and 4 for the bodies give the same bits.
-        velocity_iterations: of both.
-        linear_damping, angular_damping: of bodies and links [1/s].
-        sleeping: whether bodies at rest are frozen.
-        max_depenetration_velocity: with which bodies that overlap are pushed apart [m/s].
-        contact_offset: distance at which contacts are made [m]; None lets PhysX choose by size.
-        rest_offset: distance at which they rest [m]; None lets PhysX choose.
-        friction_offset_threshold: distance below which a contact has friction [m].
-        friction_correlation_distance: below which contacts share a friction anchor [m].
-        forces_every_iteration: apply gravity in each position iteration instead of once a step.
-        contact_last: solve the articulation's contacts after everything else.
-        threads: workers of PhysX; 0 computes in the calling thread. Its own default is 8, which
-            computes the same bits, five times as slowly in a scene this small.
-    """
-
-    timestep: float = 1.0 / 60.0
-    solver: Literal["TGS", "PGS"] = "TGS"
-    body_iterations: int = 16
-    arm_iterations: int = 32
-    velocity_iterations: int = 1
-    linear_damping: float = 0.0
-    angular_damping: float = 0.05
-    sleeping: bool = True
-    max_depenetration_velocity: float = 3.0
-    contact_offset: float | None = None
-    rest_offset: float | None = None
-    friction_offset_threshold: float = 0.04
-    friction_correlation_distance: float = 0.025
-    forces_every_iteration: bool = True
-    contact_last: bool = False
-    threads: int = 0
 
 
 class OvPhysX(Simulator):
@@ -171,32 +124,8 @@ class OvPhysX(Simulator):
         caches={"WARP_CACHE_PATH": "warp"},
         install_size_mb=1100,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = {
-        "default": OvPhysXSettings(),
-        "tuned": OvPhysXSettings(
-            timestep=0.002,
-            body_iterations=4,
-            arm_iterations=4,
-            angular_damping=0.0,
-            sleeping=False,
-        ),
-        "real": OvPhysXSettings(
-            timestep=0.001,
-            body_iterations=4,
-            arm_iterations=4,
-            angular_damping=0.0,
-            sleeping=False,
-            max_depenetration_velocity=0.1,  # docs/reality.md
-        ),
-    }
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
-        "tuned": (SeedsSeen("throwing", 100, 119),),
-        "real": (
-            SeedsSeen("throwing", 100, 119),
-            DataSeen("cube_tosses", 0, 564, 6),
-            DataSeen("arm_pushes", 1, 33, 4),
-        ),
-    }
+    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
+    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
     settings: OvPhysXSettings
 
     def load(self, scene: Scene) -> None:

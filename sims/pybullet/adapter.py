@@ -21,10 +21,8 @@ from numpy.typing import NDArray
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
-    DataSeen,
     Deviation,
     PreparedRobot,
-    SeedsSeen,
     Seen,
     Settings,
     Simulator,
@@ -41,7 +39,8 @@ from .anchors import Anchors
 from .loads import wrench
 from .loops import close_loop
 from .readback import ReadBack
-from .world import ROBOT, WORLD, PyBulletSettings, add_body, set_surface
+from .settings import CHOSEN_ON, PROFILES, PyBulletSettings
+from .world import ROBOT, WORLD, add_body, set_surface
 
 pybullet = lazy_import("pybullet")
 
@@ -112,36 +111,8 @@ class PyBullet(Simulator):
         ),
         install_size_mb=100,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = {
-        "default": PyBulletSettings(),
-        "tuned": PyBulletSettings(
-            ordered_pairs=True,
-            position_gain=0.3,
-            linear_damping=0.0,
-            angular_damping=0.0,
-            solver_residual=0.0,
-            friction_anchor=True,
-            contact_erp=0.2,
-        ),
-        "real": PyBulletSettings(
-            ordered_pairs=True,
-            position_gain=0.3,
-            linear_damping=0.0,
-            angular_damping=0.0,
-            solver_residual=0.0,
-            friction_anchor=True,
-            contact_erp=0.08,
-            timestep=0.001,
-        ),
-    }
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {
-        "tuned": (SeedsSeen("throwing", 2022, 2041), SeedsSeen("stacking", 2024, 2024)),
-        "real": (
-            SeedsSeen("throwing", 2022, 2041),
-            SeedsSeen("stacking", 2024, 2024),
-            DataSeen("cube_tosses", 0, 564, 6),
-        ),
-    }
+    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
+    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
     settings: PyBulletSettings
 
     def load(self, scene: Scene) -> None:

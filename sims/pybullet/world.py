@@ -3,54 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, FloatArray, Sphere
-from pytest_simbench.simulator import NotSupportedError, Settings, lazy_import
+from pytest_simbench.simulator import NotSupportedError, lazy_import
+
+from .settings import PyBulletSettings
 
 pybullet = lazy_import("pybullet")
 
 ROBOT, WORLD = 1, 2
 """Collision groups: the robot's links touch everything but, unless asked, each other."""
-
-
-@dataclass(frozen=True)
-class PyBulletSettings(Settings):
-    """PyBullet's options; defaults are the engine's own, found by comparing tumbling boxes bit for
-    bit with an engine whose parameters were never set (contact ERP 0.08, friction cone on).
-
-    Attributes:
-        timestep: [s]; 1/240 is what PyBullet's guide recommends to keep.
-        solver_iterations: of the constraint solver.
-        solver_residual: residual below which it stops earlier.
-        position_gain, velocity_gain: of the joint motors, see the module's docstring.
-        linear_damping, angular_damping: of free bodies [1/s].
-        contact_erp: share of a penetration that is corrected in a step.
-        friction_erp: the same for friction anchors.
-        cone_friction: implicit friction cone instead of the pyramid.
-        spinning_friction: torsional friction coefficient of the cubes [m].
-        friction_anchor: tie contacts of the robot to where they first touched, by friction_erp.
-        sleeping: whether bodies at rest are frozen.
-        ordered_pairs: sort the overlapping pairs before each step.
-    """
-
-    timestep: float = 1.0 / 240.0
-    solver_iterations: int = 50
-    solver_residual: float = 1e-7
-    position_gain: float = 0.1
-    velocity_gain: float = 1.0
-    linear_damping: float = 0.04
-    angular_damping: float = 0.04
-    contact_erp: float = 0.08
-    friction_erp: float = 0.2
-    cone_friction: bool = True
-    spinning_friction: float = 0.0
-    friction_anchor: bool = False
-    sleeping: bool = False
-    ordered_pairs: bool = False
 
 
 def _single(number: float) -> float:

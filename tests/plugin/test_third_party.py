@@ -15,7 +15,8 @@ ADAPTER = '''
 
 from dataclasses import replace
 
-from pytest_simbench.sims.mujoco.adapter import MuJoCo, MuJoCoSettings
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
+from pytest_simbench.sims.mujoco.settings import MuJoCoSettings
 
 
 class Elsewhere(MuJoCo):

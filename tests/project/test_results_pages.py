@@ -79,7 +79,7 @@ def test_no_profile_was_chosen_on_a_published_seed() -> None:
             seeds[line["simulator"]].add(int(line["seed"]))
     seen = [
         (path.parent.name, range(int(first), int(last) + 1))
-        for path in (ROOT / "sims").glob("*/adapter.py")
+        for path in (ROOT / "sims").glob("*/settings.py")
         for first, last in re.findall(
             r'SeedsSeen\("\w+", (\d+), (\d+)\)', path.read_text(encoding="utf-8")
         )

@@ -13,7 +13,8 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
 from pytest_simbench.sims.gazebo import adapter
-from pytest_simbench.sims.gazebo.adapter import Gazebo, GazeboSettings
+from pytest_simbench.sims.gazebo.adapter import Gazebo
+from pytest_simbench.sims.gazebo.settings import GazeboSettings
 
 from pytest_simbench.scene import Scene
 from pytest_simbench.simulator import Settings

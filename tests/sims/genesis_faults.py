@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 from pytest_simbench.sims.genesis.adapter import Genesis
 from pytest_simbench.sims.genesis.engine import array_of
-from pytest_simbench.sims.genesis.world import GenesisSettings
+from pytest_simbench.sims.genesis.settings import GenesisSettings
 
 from pytest_simbench.scene import Scene
 from pytest_simbench.simulator import Settings

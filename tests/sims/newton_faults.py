@@ -11,7 +11,8 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from pytest_simbench.sims.newton.adapter import Newton, NewtonSettings
+from pytest_simbench.sims.newton.adapter import Newton
+from pytest_simbench.sims.newton.settings import NewtonSettings
 
 from pytest_simbench.scene import Scene
 from pytest_simbench.simulator import Settings

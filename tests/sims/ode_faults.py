@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
-from pytest_simbench.sims.ode.adapter import ODE, ODESettings
+from pytest_simbench.sims.ode.adapter import ODE
 from pytest_simbench.sims.ode.contacts import distinct
 from pytest_simbench.sims.ode.library import (
     HI_STOP,
@@ -25,6 +25,7 @@ from pytest_simbench.sims.ode.library import (
     library,
     place,
 )
+from pytest_simbench.sims.ode.settings import ODESettings
 
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.simulator import Settings, lazy_import

@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pytest_simbench.sims.sapien.adapter import SAPIEN, SAPIENSettings
+from pytest_simbench.sims.sapien.adapter import SAPIEN
+from pytest_simbench.sims.sapien.settings import SAPIENSettings
 
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene
 from pytest_simbench.simulator import ParityError, PreparedRobot

@@ -13,7 +13,8 @@ import time
 from multiprocessing.connection import Connection, Listener
 from typing import Any
 
-from pytest_simbench.sims.mujoco.adapter import MuJoCo, MuJoCoSettings
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
+from pytest_simbench.sims.mujoco.settings import MuJoCoSettings
 
 from pytest_simbench.scene import Scene
 

@@ -15,7 +15,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pytest_simbench.sims.mujoco.adapter import MuJoCo, MuJoCoSettings
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
+from pytest_simbench.sims.mujoco.settings import MuJoCoSettings
 
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import Capability, Settings, SimulatorError, SimulatorInfo

@@ -6,7 +6,8 @@ import math
 from typing import Any
 
 import pytest
-from pytest_simbench.sims.mujoco.adapter import MuJoCo, MuJoCoSettings
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
+from pytest_simbench.sims.mujoco.settings import MuJoCoSettings
 
 from pytest_simbench.simulator import SettingsError
 from pytest_simbench.simulator.registry import adapter, registered

@@ -14,8 +14,9 @@ from pytest_simbench.robot.panda import READY
 from pytest_simbench.robot.planning import MotionPlanner
 from pytest_simbench.scene import Box, Pose, Scene, Trajectory
 from pytest_simbench.tasks import Jitter, Stacking
+from pytest_simbench.tasks.arm import FULL_SPEED, LostCube, Speeds
 from pytest_simbench.tasks.base import generators
-from pytest_simbench.tasks.manipulator import FULL_SPEED, LostCube, Manipulator, Speeds
+from pytest_simbench.tasks.manipulator import Manipulator
 from tests.tasks.scripted import Mishap, ScriptedProcess, ScriptedWorld, drop, move, put, slip
 
 CUBE = "cube_11"

@@ -10,8 +10,9 @@ import pytest
 
 from pytest_simbench.robot.panda import READY
 from pytest_simbench.tasks import Jitter, Stacking, stacking
+from pytest_simbench.tasks.arm import Speeds
 from pytest_simbench.tasks.base import generators
-from pytest_simbench.tasks.manipulator import Manipulator, Speeds
+from pytest_simbench.tasks.manipulator import Manipulator
 from tests.tasks.scripted import (
     Mishap,
     drop,

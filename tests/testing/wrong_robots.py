@@ -6,7 +6,8 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
-from pytest_simbench.sims.mujoco.adapter import ROBOT, MuJoCo
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
+from pytest_simbench.sims.mujoco.world import ROBOT
 
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import Deviation, NotSupportedError, SimulatorInfo

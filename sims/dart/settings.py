@@ -1,0 +1,52 @@
+"""DART's settings, its profiles, and on what they were chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from pytest_simbench.simulator import DataSeen, SeedsSeen, Seen, Settings
+
+
+@dataclass(frozen=True)
+class DARTSettings(Settings):
+    """DART's options; defaults are the engine's own.
+
+    Attributes:
+        timestep: [s]; DART's default.
+        detector: collision detector; DART's default is `fcl`, Gazebo's is `ode`.
+        solver: `dantzig` (pivoting, friction pyramid), `pgs` (projected Gauss-Seidel, friction
+            pyramid) or `nsgs` (block Gauss-Seidel, Coulomb's cone).
+        sweeps: largest number of passes of `pgs` and `nsgs`, DART's default for `nsgs`.
+        tolerance: where they stop earlier; for `nsgs` the violation of the law of contact [m/s].
+        position_gain: share of the position error that the drives correct in a step; the default
+            is that of gz_ros2_control, DART has none.
+        sleeping: whether bodies at rest are frozen.
+        split_impulse: correct penetrations by a velocity of their own.
+    """
+
+    timestep: float = 0.001
+    detector: Literal["fcl", "ode", "bullet", "dart"] = "fcl"
+    solver: Literal["dantzig", "pgs", "nsgs"] = "dantzig"
+    sweeps: int = 100
+    tolerance: float = 1e-5
+    position_gain: float = 0.1
+    sleeping: bool = True
+    split_impulse: bool = False
+
+
+PROFILES: Mapping[str, Settings] = {
+    "default": DARTSettings(),
+    "tuned": DARTSettings(detector="ode", solver="nsgs", tolerance=1e-4, position_gain=0.5),
+    "real": DARTSettings(detector="ode", solver="nsgs", tolerance=1e-4, position_gain=0.5),
+}
+
+CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
+    "tuned": (SeedsSeen("throwing", 100, 100), SeedsSeen("stacking", 100, 100)),
+    "real": (
+        SeedsSeen("throwing", 100, 100),
+        SeedsSeen("stacking", 100, 100),
+        DataSeen("cube_tosses", 0, 564, 6),
+    ),
+}

@@ -1,0 +1,50 @@
+"""Gazebo's settings, its profiles, and on what they were chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from pytest_simbench.simulator import SeedsSeen, Settings
+
+
+@dataclass(frozen=True)
+class GazeboSettings(Settings):
+    """Gazebo's options; defaults are its own.
+
+    Attributes:
+        timestep: [s]; SDF's default.
+        engine: physics engine, a plugin of Gazebo's.
+        detector: collision detector of dartsim; Gazebo's default is `ode`.
+        solver: of dartsim: `dantzig` (pivoting) or `pgs` (projected Gauss-Seidel, 30 passes).
+        position_gain: share of the position error that the drives correct in a step; the default
+            is that of gz_ros2_control, Gazebo has none.
+        torsional_friction: what bullet-featherstone holds against a spin about a contact's normal,
+            as a share of the normal force; a pair has about twice as much [m]. SDF's default is 1,
+            so nothing can be turned on the ground. dartsim has none.
+    """
+
+    timestep: float = 0.001
+    engine: Literal["dartsim", "bullet-featherstone"] = "dartsim"
+    detector: Literal["ode", "fcl", "bullet", "dart"] = "ode"
+    solver: Literal["dantzig", "pgs"] = "dantzig"
+    position_gain: float = 0.1
+    torsional_friction: float = 1.0
+
+
+PROFILES: Mapping[str, Settings] = {
+    "default": GazeboSettings(),
+    "tuned": GazeboSettings(
+        engine="bullet-featherstone", position_gain=0.5, torsional_friction=0.0
+    ),
+}
+
+CHOSEN_ON: Mapping[str, tuple[SeedsSeen, ...]] = {
+    "tuned": (
+        SeedsSeen("throwing", 2022, 2023),
+        SeedsSeen("stacking", 2022, 2022),
+        SeedsSeen("pushing", 920001, 920002),
+        SeedsSeen("pushing_curve", 920001, 920002),
+    ),
+}

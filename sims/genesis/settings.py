@@ -1,0 +1,70 @@
+"""Genesis's settings, its profiles, and on what they were chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from pytest_simbench.simulator import DataSeen, SeedsSeen, Seen, Settings
+
+
+@dataclass(frozen=True)
+class GenesisSettings(Settings):
+    """Genesis' options; defaults are the engine's own, `RigidOptions` and `SimOptions`.
+
+    Attributes:
+        timestep: [s].
+        substeps: steps of the solver in one time step.
+        precision: of all floating-point numbers, in bits.
+        integrator: `approximate_implicitfast` adds the drives' damping to the mass matrix for good,
+            `implicitfast` only while integrating velocities.
+        friction_cone: shape of the friction cone.
+        impratio: ratio of friction to normal constraint impedance; 0 leaves it to the engine, which
+            takes 100 with the elliptic cone and 1 with the pyramid.
+        constraint_timeconst: of contacts [s], at least two steps of the solver.
+        impedance: of contacts: smallest, largest.
+        iterations: largest number, of the constraint solver.
+        tolerance: at which it stops; 0 leaves it to the engine (1e-5, in 64 bits 1e-8).
+        noslip_iterations: of the friction post-processing, for the pyramid only.
+        box_box_detection: two boxes are collided by an algorithm of their own.
+        gjk: collide other convex shapes by GJK instead of MPR.
+    """
+
+    timestep: float = 0.01
+    substeps: int = 1
+    precision: Literal["32", "64"] = "32"
+    integrator: Literal["approximate_implicitfast", "implicitfast", "Euler"] = (
+        "approximate_implicitfast"
+    )
+    friction_cone: Literal["pyramidal", "elliptic"] = "pyramidal"
+    impratio: float = 0.0
+    constraint_timeconst: float = 0.01
+    impedance: tuple[float, float] = (0.9, 0.95)
+    iterations: int = 50
+    tolerance: float = 0.0
+    noslip_iterations: int = 0
+    box_box_detection: bool = False
+    gjk: bool = False
+
+
+PROFILES: Mapping[str, Settings] = {
+    "default": GenesisSettings(),
+    "tuned": GenesisSettings(
+        timestep=0.002,
+        constraint_timeconst=0.004,
+        friction_cone="elliptic",
+        box_box_detection=True,
+    ),
+    "real": GenesisSettings(
+        timestep=0.002,
+        constraint_timeconst=0.004,
+        friction_cone="elliptic",
+        box_box_detection=True,
+    ),
+}
+
+CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
+    "tuned": (SeedsSeen("throwing", 100, 101),),
+    "real": (SeedsSeen("throwing", 100, 101), DataSeen("cube_tosses", 0, 564, 6)),
+}

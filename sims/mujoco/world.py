@@ -1,0 +1,201 @@
+"""The scene as a model of MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.scene import (
+    Body,
+    Box,
+    Capsule,
+    ConvexMesh,
+    Cylinder,
+    Joint,
+    Scene,
+    Sphere,
+)
+from pytest_simbench.simulator import NotSupportedError, PreparedRobot, heavy, lazy_import
+from pytest_simbench.simulator.loops import reduced
+
+from . import releases
+from .bounces import direct
+from .loops import close_loops
+from .self_collision import part_joined
+from .settings import MuJoCoSettings
+
+mujoco = lazy_import("mujoco")
+
+ROBOT, WORLD, LED = 1, 2, 4
+"""Collision groups: the robot's links touch everything but, unless asked, each other; prescribed
+bodies touch what they can move."""
+
+LINK_COLOUR, GROUND_COLOUR = (0.9, 0.9, 0.9, 1.0), (0.5, 0.5, 0.5, 1.0)
+
+
+_INTEGRATORS = {
+    "Euler": "mjINT_EULER",
+    "RK4": "mjINT_RK4",
+    "implicit": "mjINT_IMPLICIT",
+    "implicitfast": "mjINT_IMPLICITFAST",
+}
+
+
+def build(scene: Scene, prepared: PreparedRobot | None, settings: MuJoCoSettings) -> Any:
+    """The compiled model; its names are the scene's. `prepared` is the scene's robot."""
+    spec = mujoco.MjSpec()
+    if prepared is not None:
+        spec = mujoco.MjSpec.from_string(_urdf(prepared))
+    _set_options(spec, scene, settings)
+    if prepared is not None:
+        _equip(spec, prepared, settings)
+    ground = spec.worldbody.add_geom(
+        name="ground",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[0, 0, 0.5],
+        rgba=GROUND_COLOUR,
+    )
+    touches = WORLD | ROBOT
+    _set_surface(ground, settings, scene.ground_friction, scene.ground_restitution, WORLD, touches)
+    most = heavy(scene)
+    for body in scene.bodies:
+        _add_body(spec, body, settings, most)
+    spec.worldbody.add_light(pos=[0.5, 0, 3], dir=[0, 0, -1])
+    return spec.compile()
+
+
+def _equip(spec: Any, prepared: PreparedRobot, settings: MuJoCoSettings) -> None:
+    """Surfaces, drives, couplings, loops, and which links of the robot collide."""
+    robot = prepared.robot
+    for geom in spec.geoms:
+        links = ROBOT if robot.self_collide else 0
+        _set_surface(geom, settings, robot.friction, 0.0, ROBOT, links)
+        geom.rgba = LINK_COLOUR
+    for joint in robot.joints:
+        _add_drive(spec, joint)
+    for pair in robot.gripper.couplings:
+        _couple_fingers(spec, *pair)
+    close_loops(spec, reduced(prepared))
+    if robot.self_collide:
+        part_joined(spec, prepared)
+
+
+def _set_options(spec: Any, scene: Scene, settings: MuJoCoSettings) -> None:
+    option = spec.option
+    option.timestep = settings.timestep
+    option.integrator = getattr(mujoco.mjtIntegrator, _INTEGRATORS[settings.integrator])
+    option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
+    option.impratio = settings.impratio
+    option.noslip_iterations = settings.noslip_iterations
+    option.gravity = scene.gravity
+    # On a state that is not finite MuJoCo would start over from its initial state, silently.
+    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+
+
+def _set_surface(
+    geom: Any,
+    settings: MuJoCoSettings,
+    friction: float,
+    restitution: float,
+    group: int,
+    touches: int,
+) -> None:
+    geom.friction[0] = friction
+    geom.condim = settings.condim
+    bouncing = restitution and direct(restitution, settings.timestep)
+    geom.solref[:2] = bouncing or settings.solref
+    geom.solimp[:3] = settings.solimp
+    geom.contype, geom.conaffinity = group, touches
+
+
+def _add_body(spec: Any, part: Body, settings: MuJoCoSettings, most: float) -> None:
+    """`most`: mass and moments of a prescribed body [kg, kg m^2]."""
+    body = spec.worldbody.add_body(
+        name=part.name, pos=part.pose.position, quat=part.pose.quaternion
+    )
+    kind, size = _geom(part)
+    mesh = {}
+    if isinstance(part, ConvexMesh):
+        spec.add_mesh(name=f"{part.name}/mesh", uservert=np.ravel(part.vertices))
+        mesh = {"meshname": f"{part.name}/mesh"}
+    geom = body.add_geom(
+        name=part.name,
+        type=getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"),
+        size=[*size, 0.0, 0.0, 0.0][:3],
+        rgba=part.colour,
+        **mesh,
+    )
+    _set_surface(geom, settings, part.friction, part.restitution, WORLD, WORLD | ROBOT)
+    if not isinstance(part, Box | ConvexMesh):
+        # contacts of a round shape neither roll nor spin with friction
+        geom.condim, geom.priority = 3, 1
+    if part.prescribed:
+        geom.contype, geom.conaffinity = LED, ROBOT
+        _set_inertia(body, most, (most,) * 3)
+        body.gravcomp = 1.0
+        body.add_freejoint(name=f"{part.name}/free")
+    elif not part.fixed:
+        geom.conaffinity |= LED
+        geom.mass = part.mass
+        if part.moments is not None or mesh:
+            _set_inertia(body, part.mass, part.inertia().tolist())
+        body.add_freejoint(name=f"{part.name}/free")
+
+
+def _geom(body: Body) -> tuple[str, list[float]]:
+    """MuJoCo's kind of a body's shape, and its size: half edges, or radius and half length."""
+    match body:
+        case Box():
+            return "BOX", [edge / 2 for edge in body.size]
+        case Sphere():
+            return "SPHERE", [body.radius]
+        case Cylinder():
+            return "CYLINDER", [body.radius, body.length / 2]
+        case Capsule():
+            return "CAPSULE", [body.radius, body.length / 2]
+        case ConvexMesh():
+            return "MESH", []
+    raise NotSupportedError(f"mujoco has no {type(body).__name__}")
+
+
+def _set_inertia(body: Any, mass: float, moments: Sequence[float]) -> None:
+    """About its origin, along its axes."""
+    body.mass, body.inertia, body.explicitinertial = mass, moments, True
+    body.ipos, body.iquat = [0, 0, 0], [1, 0, 0, 0]
+
+
+def _urdf(prepared: PreparedRobot) -> str:
+    """The reduced URDF with MuJoCo's compiler element: paths kept, visuals dropped."""
+    compiler = (
+        '<mujoco><compiler strippath="false" discardvisual="true" fusestatic="false"/></mujoco>'
+    )
+    return prepared.to_urdf().replace("</robot>", f"{compiler}</robot>")
+
+
+def _add_drive(spec: Any, joint: Joint) -> None:
+    drive = spec.add_actuator(
+        name=joint.name,
+        target=joint.name,
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+        forcelimited=True,
+        forcerange=[-joint.effort_limit, joint.effort_limit],
+    )
+    drive.gainprm[0] = joint.stiffness
+    drive.biasprm[1], drive.biasprm[2] = -joint.stiffness, -joint.damping
+    releases.joint(spec, joint.name).armature = joint.armature
+
+
+def _couple_fingers(spec: Any, first: str, second: str) -> None:
+    """Hold two fingers at equal positions, by a constraint as stiff as the step allows."""
+    spec.add_equality(
+        type=mujoco.mjtEq.mjEQ_JOINT,
+        objtype=mujoco.mjtObj.mjOBJ_JOINT,
+        name1=second,
+        name2=first,
+        data=releases.equality_data(mujoco, [0.0, 1.0]),
+        solref=[2 * spec.option.timestep, 1.0],
+    )

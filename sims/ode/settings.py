@@ -1,0 +1,71 @@
+"""ODE's settings, its profiles, and on what they were chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from pytest_simbench.simulator import DataSeen, SeedsSeen, Seen, Settings
+
+from .drives import Drive
+
+
+@dataclass(frozen=True)
+class ODESettings(Settings):
+    """ODE's options; defaults are Webots' own (WorldInfo, ContactProperties, Motor, R2023b).
+
+    Attributes:
+        timestep: [s]; Webots' default of 32 ms is longer than tasks allow, this is half of it.
+        solver: `step` (all rows at once, Dantzig), which Webots takes, or `quickstep` (iterative).
+        iterations: of `quickstep`; 20 is ODE's default.
+        erp, cfm: of all joints: share of their error that is corrected in a step, and softness.
+        contact_erp, contact_cfm: the same of contacts.
+        contacts: the most of a pair of shapes that count, the deepest.
+        friction: in two directions that ODE chooses (`pyramid`), or along the slip alone where a
+            contact slips (`slip`).
+        drive: `velocity` motors with Webots' P controller, or `spring`: the scene's drive law.
+        position_gain: P of `velocity` [1/s].
+        sleeping: whether boxes at rest for 1 s (0.01 m/s, 0.01 rad/s) are left out.
+    """
+
+    timestep: float = 0.016
+    solver: Literal["step", "quickstep"] = "step"
+    iterations: int = 20
+    erp: float = 0.2
+    cfm: float = 1e-5
+    contact_erp: float = 0.2
+    contact_cfm: float = 1e-3
+    contacts: int = 10
+    friction: Literal["pyramid", "slip"] = "pyramid"
+    drive: Drive = "velocity"
+    position_gain: float = 10.0
+    sleeping: bool = True
+
+    def quantities(self) -> Mapping[str, Any]:
+        if self.drive == "spring":
+            return {}
+        # v + CFM effort = P (q* - q), read as the law of a drive whose d acts on v alone
+        stiffness = self.position_gain / self.cfm
+        damping = 1 / self.cfm - self.timestep * stiffness
+        return {"joint/*/stiffness": stiffness, "joint/*/damping": damping}
+
+
+PROFILES: Mapping[str, Settings] = {
+    "default": ODESettings(),
+    "tuned": ODESettings(
+        timestep=0.002,
+        contact_cfm=1e-5,
+        drive="spring",
+    ),
+    "real": ODESettings(timestep=0.001, contact_cfm=1e-3, drive="spring", friction="slip"),
+}
+
+CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
+    "tuned": (SeedsSeen("throwing", 100, 101), SeedsSeen("stacking", 100, 100)),
+    "real": (
+        SeedsSeen("throwing", 100, 101),
+        SeedsSeen("stacking", 100, 100),
+        DataSeen("cube_tosses", 0, 564, 6),
+    ),
+}

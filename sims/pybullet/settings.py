@@ -1,0 +1,77 @@
+"""PyBullet's settings, its profiles, and on what they were chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pytest_simbench.simulator import DataSeen, SeedsSeen, Seen, Settings
+
+
+@dataclass(frozen=True)
+class PyBulletSettings(Settings):
+    """PyBullet's options; defaults are the engine's own, found by comparing tumbling boxes bit for
+    bit with an engine whose parameters were never set (contact ERP 0.08, friction cone on).
+
+    Attributes:
+        timestep: [s]; 1/240 is what PyBullet's guide recommends to keep.
+        solver_iterations: of the constraint solver.
+        solver_residual: residual below which it stops earlier.
+        position_gain, velocity_gain: of the joint motors, see the module's docstring.
+        linear_damping, angular_damping: of free bodies [1/s].
+        contact_erp: share of a penetration that is corrected in a step.
+        friction_erp: the same for friction anchors.
+        cone_friction: implicit friction cone instead of the pyramid.
+        spinning_friction: torsional friction coefficient of the cubes [m].
+        friction_anchor: tie contacts of the robot to where they first touched, by friction_erp.
+        sleeping: whether bodies at rest are frozen.
+        ordered_pairs: sort the overlapping pairs before each step.
+    """
+
+    timestep: float = 1.0 / 240.0
+    solver_iterations: int = 50
+    solver_residual: float = 1e-7
+    position_gain: float = 0.1
+    velocity_gain: float = 1.0
+    linear_damping: float = 0.04
+    angular_damping: float = 0.04
+    contact_erp: float = 0.08
+    friction_erp: float = 0.2
+    cone_friction: bool = True
+    spinning_friction: float = 0.0
+    friction_anchor: bool = False
+    sleeping: bool = False
+    ordered_pairs: bool = False
+
+
+PROFILES: Mapping[str, Settings] = {
+    "default": PyBulletSettings(),
+    "tuned": PyBulletSettings(
+        ordered_pairs=True,
+        position_gain=0.3,
+        linear_damping=0.0,
+        angular_damping=0.0,
+        solver_residual=0.0,
+        friction_anchor=True,
+        contact_erp=0.2,
+    ),
+    "real": PyBulletSettings(
+        ordered_pairs=True,
+        position_gain=0.3,
+        linear_damping=0.0,
+        angular_damping=0.0,
+        solver_residual=0.0,
+        friction_anchor=True,
+        contact_erp=0.08,
+        timestep=0.001,
+    ),
+}
+
+CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
+    "tuned": (SeedsSeen("throwing", 2022, 2041), SeedsSeen("stacking", 2024, 2024)),
+    "real": (
+        SeedsSeen("throwing", 2022, 2041),
+        SeedsSeen("stacking", 2024, 2024),
+        DataSeen("cube_tosses", 0, 564, 6),
+    ),
+}
