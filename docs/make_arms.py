@@ -37,6 +37,7 @@ SHOWN = {
         "moved": "moved %",
         "lost_in_transit": "lost",
         "landing_x": "landing x",
+        "limits": "limits %",
     },
 }
 IDENTITY = ("robot", "task", "profile", "simulator", "changed", "seed")
@@ -109,7 +110,7 @@ def _order(key: tuple[str, ...]) -> tuple[int, int, str]:
 def _cell(run: Run, name: str) -> str:
     if METRICS[run.task][name].kind == "value":
         mean = run.mean(name)
-        return "-" if mean is None else f"{mean:.3f}"
+        return "-" if mean is None else f"{mean:.{3 if abs(mean) < 10 else 0}f}"
     return run.cell(name)
 
 

@@ -280,7 +280,7 @@ class PyBullet(Simulator):
         if self._anchors is None:
             pybullet.stepSimulation(self.client)
         else:
-            self._anchors.step()
+            self._anchors.step(self._steps)
         self._steps += 1
 
     @property

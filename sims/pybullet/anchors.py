@@ -35,25 +35,27 @@ class Anchors:
         self._client = client
         self._robot = robot
         self._every = max(1, round(PERIOD / timestep))
-        self._steps = 0
         self._made: dict[int, FloatArray] = {}  # a link's rotation when its anchors were made
 
-    def step(self) -> None:
-        """Step the simulation, without anchors on links that have turned."""
-        turned = self._turned() if self._steps % self._every == 0 else []
-        self._steps += 1
+    def step(self, number: int) -> None:
+        """Step the simulation, without anchors on links that have turned.
+
+        Args:
+            number: of steps before this one.
+        """
+        turned = self._turned() if number % self._every == 0 else []
         for link in turned:
             self._anchor(link, False)
         pybullet.stepSimulation(self._client)
         for link in turned:
             self._anchor(link, True)
 
-    def save(self) -> tuple[int, dict[int, FloatArray]]:
+    def save(self) -> dict[int, FloatArray]:
         """What `restore` takes."""
-        return self._steps, dict(self._made)
+        return dict(self._made)
 
-    def restore(self, state: tuple[int, dict[int, FloatArray]]) -> None:
-        self._steps, self._made = state[0], dict(state[1])
+    def restore(self, state: dict[int, FloatArray]) -> None:
+        self._made = dict(state)
 
     def _turned(self) -> list[int]:
         """The links whose normals have turned too far."""
