@@ -32,19 +32,7 @@ from pytest_simbench.laws.drives import (
     Tracking,
 )
 from pytest_simbench.laws.forces import RestForce, TowerForce
-from pytest_simbench.laws.free import (
-    DampedFall,
-    FallSpeed,
-    FreeFall,
-    FreeTop,
-    ObliqueGravity,
-    Projectile,
-    Spin,
-    TumbleEnergy,
-    TumbleEnergyDrift,
-    TumbleMomentum,
-    TumbleMomentumDrift,
-)
+from pytest_simbench.laws.free import DampedFall, FallSpeed, FreeFall, ObliqueGravity, Projectile
 from pytest_simbench.laws.hands import (
     GripHolds,
     GripSlips,
@@ -83,6 +71,14 @@ from pytest_simbench.laws.sliding import (
     SlideY,
     StoppingDistance,
     StoppingDistanceDiagonal,
+)
+from pytest_simbench.laws.spinning import (
+    FreeTop,
+    Spin,
+    TumbleEnergy,
+    TumbleEnergyDrift,
+    TumbleMomentum,
+    TumbleMomentumDrift,
 )
 from pytest_simbench.laws.sticking import (
     Carried,

@@ -8,8 +8,9 @@ from typing import ClassVar
 
 from pytest_simbench.client.world import World
 from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, watch
-from pytest_simbench.laws.free import WEIGHTLESS, FreeTop
+from pytest_simbench.laws.free import WEIGHTLESS
 from pytest_simbench.laws.friction import acceleration, tilted
+from pytest_simbench.laws.spinning import FreeTop
 from pytest_simbench.scene import Body, Cylinder, Pose, Scene, Sphere
 
 RADIUS = 0.05

@@ -1,0 +1,244 @@
+"""Laws of bodies that turn freely: nothing touches them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from pytest_simbench.client.world import World
+from pytest_simbench.laws.base import LONG, Law, Reading, Watched, rounding, watch
+from pytest_simbench.laws.free import FREE, WEIGHTLESS, rotation_of
+from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Vector3
+
+
+@dataclass(frozen=True)
+class Spin(Law):
+    """A body that nobody touches keeps spinning about a principal axis: w is constant (Euler).
+    Tolerance: rounding, for every consistent method keeps a constant."""
+
+    name = "spin"
+    phenomenon = FREE
+    quantity: ClassVar[str] = "angular velocity"
+    unit: ClassVar[str] = "rad/s"
+
+    spin: float = 5.0
+    seconds: float = 1.0
+
+    def build(self) -> Scene:
+        body = Box(
+            "body",
+            (0.1, 0.2, 0.3),
+            Pose.at(0.0, 0.0, 2.0),
+            1.0,
+            angular_velocity=(0.0, 0.0, self.spin),
+        )
+        return Scene(self.name, (body,), gravity=WEIGHTLESS)
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        return Reading(
+            float(seen.bodies[-1, 0, 12]), self.spin, rounding(2 * self.spin, seen.steps)
+        )
+
+
+@dataclass(frozen=True)
+class FreeTop(Law):
+    """A symmetric body turns about its own axis while the axis turns about the constant angular
+    momentum L, at |L| / I1 (Landau, Lifshitz, Mechanics, section 33): the angle between its
+    attitude and that after t is 0. Tolerance: its angular velocity w is late by one step all the
+    time, |dw/dt| t dt, and the turn by one, |w| dt."""
+
+    name = "free_top"
+    phenomenon = FREE
+    quantity: ClassVar[str] = "angle from the attitude"
+    unit: ClassVar[str] = "rad"
+
+    size: Vector3 = (0.1, 0.1, 0.4)
+    omega: Vector3 = (2.0, 0.0, 6.0)
+    seconds: float = 1.0
+
+    def build(self) -> Scene:
+        body = Box("body", self.size, Pose.at(0.0, 0.0, 2.0), 1.0, angular_velocity=self.omega)
+        return Scene(self.name, (body,), gravity=WEIGHTLESS)
+
+    def attitude(self, t: float) -> Rotation:
+        """After a time [s]."""
+        moments = self.build().bodies[0].inertia()
+        momentum = moments * self.omega
+        axial = self.omega[2] * (1 - moments[2] / moments[0])
+        turn = Rotation.from_rotvec(momentum / moments[0] * t)
+        return turn * Rotation.from_rotvec([0.0, 0.0, axial * t])
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        t = float(seen.t[-1])
+        off = (rotation_of(seen.bodies[-1, 0, 3:7]) * self.attitude(t).inv()).magnitude()
+        moments = self.build().bodies[0].inertia()
+        momentum = moments * self.omega
+        change = float(np.linalg.norm(np.cross(momentum / moments[0], self.omega)))
+        allowed = (change * t + float(np.linalg.norm(self.omega))) * seen.dt
+        return Reading(float(off), 0.0, allowed + rounding(1.0, seen.steps))
+
+
+class _Tumble(Law):
+    """A body that turns about its middle principal axis, almost: it turns over again and again
+    (Dzhanibekov; Poinsot 1834)."""
+
+    phenomenon = FREE
+
+    size: ClassVar[Vector3] = (0.3, 0.2, 0.05)
+    omega: ClassVar[Vector3] = (0.05, 6.0, 0.05)
+
+    seconds: float
+
+    def build(self) -> Scene:
+        body = Box("body", self.size, Pose.at(0.0, 0.0, 2.0), 1.0, angular_velocity=self.omega)
+        return Scene(self.name, (body,), gravity=WEIGHTLESS)
+
+    @property
+    def inertia(self) -> FloatArray:
+        """Principal moments [kg m^2], (3,)."""
+        return self.build().bodies[0].inertia()
+
+    def fastest(self, seconds: float) -> tuple[FloatArray, FloatArray]:
+        """Angular velocity in the body's frame [rad/s] and its second derivative, exactly, (n, 3)
+        each."""
+        i = self.inertia
+
+        def change(omega: FloatArray) -> FloatArray:
+            return np.asarray(np.cross(i * omega, omega) / i)
+
+        times = np.linspace(0.0, seconds, 400)
+        found = solve_ivp(
+            lambda _, w: change(w), (0.0, seconds), self.omega, "DOP853", times,
+            rtol=1e-10, atol=1e-12,
+        ).y.T  # fmt: skip
+        second = [(np.cross(i * change(w), w) + np.cross(i * w, change(w))) / i for w in found]
+        return found, np.array(second)
+
+    def late(self, dt: float, seconds: float) -> float:
+        """By what share of itself the angular velocity may be off: the step times the sum of its
+        second derivative."""
+        omega, second = self.fastest(seconds)
+        total = float(np.linalg.norm(second, axis=1).mean()) * seconds
+        return dt * total / float(np.linalg.norm(omega, axis=1).mean())
+
+
+@dataclass(frozen=True)
+class TumbleEnergy(_Tumble):
+    """A body that turns over keeps its rotational energy, w I w / 2, wherever it stands. Tolerance:
+    twice what the angular velocity is off by, as a share: the step times the sum of |d2w/dt2|."""
+
+    name = "tumble_energy"
+    quantity: ClassVar[str] = "change of the energy"
+    unit: ClassVar[str] = "%"
+
+    seconds: float = 4.0
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        rows = seen.bodies[:, 0]
+        omega = rotation_of(rows[:, 3:7]).inv().apply(rows[:, 10:])
+        start = float(self.inertia @ np.square(self.omega)) / 2
+        worst = float(np.abs(np.square(omega) @ self.inertia / 2 / start - 1).max())
+        allowed = 2 * self.late(seen.dt, self.seconds) + rounding(2.0, seen.steps)
+        return Reading(100 * worst, 0.0, 100 * allowed)
+
+
+@dataclass(frozen=True)
+class TumbleMomentum(_Tumble):
+    """It keeps its angular momentum L too, in size and direction. Tolerance: as a share of |L|,
+    what the angular velocity is off by, and the turn within one step, |w| dt."""
+
+    name = "tumble_momentum"
+    quantity: ClassVar[str] = "change of the angular momentum"
+    unit: ClassVar[str] = "%"
+
+    seconds: float = 4.0
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        start = self.inertia * self.omega
+        rows = seen.bodies[:, 0]
+        turn = rotation_of(rows[:, 3:7])
+        now = turn.apply(self.inertia * turn.inv().apply(rows[:, 10:]))
+        worst = float(np.linalg.norm(now - start, axis=1).max() / np.linalg.norm(start))
+        fastest = float(np.linalg.norm(self.omega))
+        allowed = self.late(seen.dt, self.seconds) + fastest * seen.dt + rounding(2.0, seen.steps)
+        return Reading(100 * worst, 0.0, 100 * allowed)
+
+
+class _TumbleDrift(_Tumble):
+    """The same for a minute, three times slower: 6 turns over. A first-order method adds to energy
+    and momentum in each step, and does not take it back: at 6 rad/s it may lose all that there is
+    in a minute, at any usual step, and nothing could be asked of it."""
+
+    omega: ClassVar[Vector3] = (2 / 120, 2.0, 2 / 120)
+    study_timeout: ClassVar[float] = LONG
+
+    def rates(self) -> tuple[FloatArray, FloatArray]:
+        """Angular velocity and acceleration in the body's frame, exactly, at even times, (n, 3)."""
+        omega, _ = self.fastest(self.seconds)
+        i = self.inertia
+        return omega, np.asarray(np.cross(i * omega, omega) / i)
+
+    def spun(self, seen: Watched) -> FloatArray:
+        """Angular velocity in the body's frame as it was seen, (n, 3)."""
+        rows = seen.bodies[:, 0]
+        return np.asarray(rotation_of(rows[:, 3:7]).inv().apply(rows[:, 10:]))
+
+
+@dataclass(frozen=True)
+class TumbleEnergyDrift(_TumbleDrift):
+    """A body that turns over for a minute keeps its rotational energy E = w I w / 2 (Euler's
+    equations I w' = I w x w: w I w' = 0). Tolerance: explicit Euler adds w' I w' dt^2 / 2 to it in
+    each step, implicit Euler takes as much away; late by one step is twice that, dt times the sum
+    of w' I w' over the time, as a share of E. The protocol `smoke` takes 3 s."""
+
+    name = "tumble_energy_drift"
+    quantity: ClassVar[str] = "change of the energy"
+    unit: ClassVar[str] = "%"
+
+    seconds: float = 60.0
+
+    def smoke(self) -> TumbleEnergyDrift:
+        return replace(self, seconds=3.0)
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        start = float(self.inertia @ np.square(self.omega)) / 2
+        found = np.square(self.spun(seen)) @ self.inertia / 2
+        _, rate = self.rates()
+        share = float((np.square(rate) @ self.inertia).mean()) * self.seconds / start
+        allowed = share * seen.dt + rounding(2.0, seen.steps)
+        return Reading(100 * float(np.abs(found / start - 1).max()), 0.0, 100 * allowed)
+
+
+@dataclass(frozen=True)
+class TumbleMomentumDrift(_TumbleDrift):
+    """It keeps the size of its angular momentum I w (Euler: I w (I w)' = 0). Tolerance: explicit
+    Euler adds |I w'|^2 dt^2 to its square in each step, implicit Euler takes as much away, a half
+    of that to its size; late by one step is twice that, dt times the sum of |I w'|^2 over the time,
+    as a share of |I w|^2. The protocol `smoke` takes 3 s."""
+
+    name = "tumble_momentum_drift"
+    quantity: ClassVar[str] = "change of the angular momentum's size"
+    unit: ClassVar[str] = "%"
+
+    seconds: float = 60.0
+
+    def smoke(self) -> TumbleMomentumDrift:
+        return replace(self, seconds=3.0)
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, self.seconds)
+        start = float(np.linalg.norm(self.inertia * self.omega))
+        found = np.linalg.norm(self.inertia * self.spun(seen), axis=1)
+        _, rate = self.rates()
+        share = float(np.square(self.inertia * rate).sum(axis=1).mean()) * self.seconds / start**2
+        allowed = share * seen.dt + rounding(2.0, seen.steps)
+        return Reading(100 * float(np.abs(found / start - 1).max()), 0.0, 100 * allowed)
