@@ -76,12 +76,12 @@ def test_no_profile_was_chosen_on_a_published_seed() -> None:
     seeds = defaultdict(set)
     for task in (*published_runs.TASKS, "pushing"):
         for line in csv.DictReader((DOCS / "data" / f"{task}.csv").open(encoding="utf-8")):
-            seeds[line["simulator"]].add(int(line["seed"]))
+            seeds[line["simulator"], task].add(int(line["seed"]))
     seen = [
-        (path.parent.name, range(int(first), int(last) + 1))
+        ((path.parent.name, task), range(int(first), int(last) + 1))
         for path in (ROOT / "sims").glob("*/settings.py")
-        for first, last in re.findall(
-            r'SeedsSeen\("\w+", (\d+), (\d+)\)', path.read_text(encoding="utf-8")
+        for task, first, last in re.findall(
+            r'SeedsSeen\("(\w+)", (\d+), (\d+)\)', path.read_text(encoding="utf-8")
         )
     ]
     assert len(seen) >= len(make_results.SIMULATORS)
