@@ -1,5 +1,5 @@
 """Makes the tables of docs/truth.md from docs/data/truth.csv, which holds every law of every run,
-and from docs/data/sweep.csv, which holds laws over time steps.
+and those of it and of docs/data/sweep.md from docs/data/sweep.csv: laws over time steps.
 
 python docs/make_truth.py RUN...            reads run folders into truth.csv, whose other lines
                                             stay, then writes the tables
@@ -32,6 +32,7 @@ from pytest_simbench.tasks.phenomena import PHENOMENA, PHENOMENON
 
 DOCS = Path(__file__).resolve().parent
 DATA, PAGE = DOCS / "data" / "truth.csv", DOCS / "truth.md"
+PAGES = (PAGE, DOCS / "data" / "sweep.md")
 SWEEP, PICTURES = DOCS / "data" / "sweep.csv", DOCS / "pictures"
 DRAWN = "free motion"
 """Whose pictures are on the page."""
@@ -187,9 +188,9 @@ def _list() -> str:
     return "\n".join(lines)
 
 
-def page() -> str:
-    """The page with its tables."""
-    return filled(PAGE, "truth", part)
+def page(path: Path = PAGE) -> str:
+    """A page with its tables."""
+    return filled(path, "truth", part)
 
 
 if __name__ == "__main__":
@@ -198,4 +199,5 @@ if __name__ == "__main__":
         draw()
     elif sys.argv[1:]:
         read(sys.argv[1:])
-    PAGE.write_text(page(), "utf-8")
+    for path in PAGES:
+        path.write_text(page(path), "utf-8")
