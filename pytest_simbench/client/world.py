@@ -24,6 +24,10 @@ from pytest_simbench.simulator.robot_files import with_content
 TRACE_PERIOD = 0.02
 """Between two samples of a trace [s]: 50 Hz. A task's own log is thinned to that."""
 
+PART = 2.0
+"""A sampled wait is asked for in parts of this simulated time [s]: the worker holds the samples of
+one. Those of a minute took 27 MB there, which looked like the simulator's memory."""
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -101,6 +105,7 @@ class World:
         with self.phase("load"), self.stopwatch.measuring("load"):
             answer = process.request("load", scene=self._wire(), parity=parity)
         self.excused: list[str] = answer["excused"]
+        self._timestep = float(answer["timestep"])
         self._take(answer)
         self._enter("task")  # between the phases that the task names
         self._after_phase = after_phase
@@ -176,12 +181,27 @@ class World:
 
     def _move(self, operation: str, log_period: float | None, **arguments: Any) -> Motion | None:
         period = log_period if log_period is not None else self._trace_period
-        answer = self.process.request(operation, log_period=period, **arguments)
-        motion = Motion(**answer["log"]) if answer["log"] else None
-        if motion is not None and self._trace_period is not None and len(motion):
-            self.trace.append(self._thinned(motion))  # also where it ends in what cannot be
+        requests = [arguments]
+        if operation == "wait" and period is not None:
+            requests = [{"duration": part} for part in self._parts(arguments["duration"], period)]
+        motions = []
+        for request in requests:
+            answer = self.process.request(operation, log_period=period, **request)
+            motion = Motion(**answer["log"]) if answer["log"] else None
+            if motion is not None and self._trace_period is not None and len(motion):
+                self.trace.append(self._thinned(motion))  # also where it ends in what cannot be
+            if motion is not None and log_period is not None:
+                motions.append(motion)
         self._take(answer)
-        return motion if log_period is not None else None
+        return Motion.joined(motions) if motions else None
+
+    def _parts(self, duration: float, period: float) -> list[float]:
+        """A sampled wait in parts of whole steps and samples [s]."""
+        step = self._timestep
+        steps, every = max(1, round(duration / step)), max(1, round(period / step))
+        most = every * max(1, round(PART / (every * step)))
+        whole, rest = divmod(steps, most)
+        return [most * step] * whole + [rest * step] * (rest > 0)
 
     def _thinned(self, motion: Motion) -> Motion:
         """A denser log, reduced to about `TRACE_PERIOD`."""

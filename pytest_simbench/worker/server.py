@@ -150,7 +150,11 @@ class Server:
             excused = check(expected, simulator.read_back(), declared, info.name)
         if simulator.gui:
             simulator.refresh_window()
-        return {"excused": excused, **self.do_state()}
+        return {
+            "excused": excused,
+            "timestep": simulator.settings.timestep,
+            **self.do_state(),
+        }
 
     def do_read_back(self, remember: dict[str, Any] | None = None) -> dict[str, Any]:
         """What the engine says; the adapter made to remember another scene meanwhile, if given."""

@@ -47,3 +47,22 @@ def test_what_went_wrong_is_in_it(case: Case) -> None:
         world.wait(0.4)
     process.close()
     assert Motion.joined(world.trace).bodies[-1, 0, 0] > 5.0
+
+
+def test_a_long_wait_is_kept_out_of_the_simulators_memory(case: Case) -> None:
+    """60 MB of samples: the worker sends them as it goes, else its peak would be the trace's."""
+    places = [Pose.at(0.5 * (k % 16), 0.5 * (k // 16), 2.0) for k in range(256)]
+    cubes = tuple(cube(f"c{k}", place, (1.0,) * 4) for k, place in enumerate(places))
+    scene = Scene("s", cubes, gravity=(0.0, 0.0, 0.0), room=(20.0, 20.0, 4.0))
+    peaks = []
+    for period in (None, 0.02):
+        process = WorkerProcess(case.launch("x"), Where(case.simulator, case.mode))
+        process.construct(changes={"timestep": 0.01})
+        world = World(process, scene, trace_period=period)
+        world.wait(45.0)
+        peaks.append(world.stats()["peak_rss_mb"])
+        process.close()
+    motion = Motion.joined(world.trace)
+    np.testing.assert_allclose(motion.time, np.arange(1, 2251) * 0.02)
+    assert motion.bodies.nbytes > 55e6
+    assert peaks[1] - peaks[0] < 20.0

@@ -116,7 +116,7 @@ class ScriptedProcess:
         self.commanded = self.position
         self.poses = {body.name: body.pose for body in self.scene.free_bodies}
         self.velocities = {name: np.zeros(6) for name in self.poses}
-        return {"excused": [], **self.do_state()}
+        return {"excused": [], "timestep": self.timestep, **self.do_state()}
 
     def do_state(self) -> dict[str, Any]:
         return {"time": self.time, "joints": self._joints(), "bodies": self._bodies()}

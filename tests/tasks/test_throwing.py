@@ -59,7 +59,7 @@ def test_a_perfect_throw() -> None:
     assert values(outcome) == {"moved": 2 / 6, "hit": 1.0, "moved_otherwise": 0.0}
     assert outcome.details["moved"] == ["pyramid_4", "pyramid_6"]
     assert process.counts == [(2, 6)]
-    (settled,) = (asked for asked in process.asked if asked.phase == "settle")
+    settled, *_ = (asked for asked in process.asked if asked.phase == "settle")
     assert process.marks == pytest.approx({"start": 1.0, "end": settled.began})
     metrics = outcome.metrics
     assert metrics["lost_in_transit"] == 0.0
@@ -287,7 +287,7 @@ def test_it_is_counted_a_minute_after() -> None:
     outcome, process = thrown(Mishap("settle", 59.9, move("pyramid_1", y=-0.1)), task=Throwing())
     assert outcome.metrics["moved_otherwise"] == 1.0
     settle = [asked for asked in process.asked if asked.phase == "settle"]
-    assert [asked.duration for asked in settle] == [60.0]
+    assert sum(asked.duration for asked in settle) == pytest.approx(60.0)
 
 
 def test_it_may_be_counted_at_once() -> None:

@@ -144,7 +144,7 @@ def test_a_loaded_world(ask: Asked) -> None:
     ask.construct()
     ask("compile", scene=SCENE.to_wire())
     answer = ask.load()
-    assert set(answer) == {"time", "joints", "bodies", "excused"}
+    assert set(answer) == {"time", "joints", "bodies", "excused", "timestep"}
     assert (answer["time"], answer["joints"].shape, answer["excused"]) == (0.0, (2, 0), [])
     assert answer["bodies"].tolist() == [[0.5, 0, 0.5, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0]]
     assert Hosted.calls == [("compile", "one"), ("load", "one")]
