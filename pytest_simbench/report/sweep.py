@@ -38,6 +38,9 @@ Texts = Callable[[Swept, Line], list[str]]
 WIDE = 4
 """Panels beside each other in a picture."""
 
+NOTHING = "no error to draw"
+"""Of a law that every simulator keeps exactly, or that none finished."""
+
 SHOWN = 3
 """Failures that the terminal tells without `-v`."""
 
@@ -182,8 +185,11 @@ def draw(found: Sequence[Swept], phenomenon: str, over: str) -> Any:
             steps = sorted(law.tolerances)
             axis.plot([1e3 * h for h in steps], [law.tolerances[h] for h in steps], color="0.6",
                       lw=4, alpha=0.5, zorder=0, label="tolerance")  # fmt: skip
-        axis.set_xscale("log")
-        axis.set_yscale("log", nonpositive="mask")
+        if any(len(line.get_xdata()) for line in axis.lines):
+            axis.set_xscale("log")
+            axis.set_yscale("log", nonpositive="mask")
+        else:  # which has no logarithm
+            axis.text(0.5, 0.5, NOTHING, transform=axis.transAxes, ha="center", fontsize="small")
         for side in (axis.xaxis, axis.yaxis):  # matplotlib's own labels are formulas
             side.set_major_formatter("{x:g}")
             side.set_minor_formatter("")

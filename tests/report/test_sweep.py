@@ -112,3 +112,10 @@ def test_pictures_lie_in_the_run_folder(tmp_path: Path) -> None:
         "sweep_free_motion_cost.png",
     ]
     assert all(path.stat().st_size > 5000 for path in paths)
+
+
+@pytest.mark.parametrize("error", [0.0, None])
+def test_a_law_without_an_error_to_draw_has_its_panel(tmp_path: Path, error: float | None) -> None:
+    """One simulator that is exact, or fails, at every step."""
+    paths = sweep.write_pictures(tmp_path, found([law("a", h, error) for h in (1e-3, 2e-3)]))
+    assert [path.stat().st_size > 1000 for path in paths] == [True, True]
