@@ -30,6 +30,7 @@ from pytest_simbench.report.sheet import sheets as sheets_of
 from pytest_simbench.report.summary import PHASES, TaskSummary, at_own_steps, summarise
 from pytest_simbench.report.truth import others
 from pytest_simbench.tasks.metrics import COSTS
+from pytest_simbench.worker.text import named
 
 MARKDOWN_NAME = "report.md"
 CSV_NAME = "report.csv"
@@ -139,6 +140,8 @@ def write_files(
             problems.append(str(error))
         except OSError as error:
             failed.append(f"pictures: {_unwritable(folder, error)}")
+        except Exception as error:  # a fault of ours, which costs the pictures and no table
+            failed.append(f"the pictures could not be drawn: {named(error)}")
     told_of = {found.title: found.sentences() for found in histories}
     names = [picture.name for picture in pictures]
     text = markdown.render_run(summaries, names, told_of, sweeps)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.report import markdown
+from pytest_simbench.report import files, markdown
 from pytest_simbench.report.figures import FiguresUnavailable, write_figures
 from pytest_simbench.report.files import Written, csv_of, write_files
 from pytest_simbench.report.matrix import with_wins
@@ -119,6 +119,21 @@ def test_without_matplotlib_one_line_says_so(
     assert "no pictures: matplotlib is missing; pip install" in page
     assert '<figure class="picture">' not in page
     assert not list(tmp_path.glob("*.png"))
+
+
+def test_a_fault_of_the_drawing_costs_the_pictures_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> list[Path]:
+        raise ValueError("no logarithm")
+
+    monkeypatch.setattr(files.sweep, "write_pictures", broken)
+    records = throwing_run()
+    written = write_files(tmp_path, summarise(records, METRICS), records)
+    assert written.problems == ("the pictures could not be drawn: ValueError: no logarithm",)
+    assert not written.complete
+    assert (tmp_path / "report.md").exists()
+    assert (tmp_path / "report.html").exists()
 
 
 def test_what_draws_and_writes_is_imported_only_then() -> None:
