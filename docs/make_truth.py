@@ -8,7 +8,7 @@ python docs/make_truth.py                   writes the tables
 
 A table stands between `<!-- truth: PART PROFILE -->` and `<!-- end -->`; PART is `sentences`,
 `phenomena`, `laws` or `list`, and with the word `sweep` in place of a profile `steps`, `orders`
-(of free motion), `cheapest` (all phenomena) or `failures`.
+(of free motion), `cheapest` (all phenomena), `broken` or `failures`.
 """
 
 from __future__ import annotations
@@ -166,6 +166,8 @@ def _sweep(name: str) -> str:
     if name == "failures":
         failed = [table for title, table in tables.items() if title.startswith("what failed")]
         return "\n".join(map(markdown.table, failed)) or "Nothing failed."
+    if name == "broken":
+        return markdown.table(tables[sweep.BROKEN])
     if name == "orders":
         return markdown.table(tables[f"{DRAWN}: order of convergence"])
     texts = [

@@ -38,6 +38,9 @@ Texts = Callable[[Swept, Line], list[str]]
 WIDE = 4
 """Panels beside each other in a picture."""
 
+BROKEN = f"laws that no step keeps with the error that {1e3 * REFERENCE:g} ms may cost"
+"""Title of their table."""
+
 NOTHING = "no error to draw"
 """Of a law that every simulator keeps exactly, or that none finished."""
 
@@ -65,7 +68,8 @@ def table(found: Sequence[Swept]) -> list[Column]:
 
 def details(found: Sequence[Swept]) -> list[tuple[str, list[Column]]]:
     """For each phenomenon its laws by simulators: the order, the cheapest step that keeps the law
-    with its own tolerance, and with that of `REFERENCE`; then what failed."""
+    with its own tolerance, and with that of `REFERENCE`; then what no step helps, and what failed.
+    """
     kinds: list[tuple[str, Texts]] = [
         ("order of convergence", lambda law, line: [_order(line.order)]),
         ("cheapest step that keeps the law, CPU s/sim s",
@@ -78,19 +82,34 @@ def details(found: Sequence[Swept]) -> list[tuple[str, list[Column]]]:
         of = [law for law in found if law.phenomenon == phenomenon]
         for title, texts in kinds:
             tables.append((f"{phenomenon}: {title}", _by_law(of, texts)))
-    failed = failures(found)
-    if failed:
-        headings = ("simulator", "law", "steps", "message")
-        tables.append(
-            (
-                "what failed at a time step",
-                [
-                    Column(heading, [[row[k]] for row in failed], left=True, wrap=k == 3)
-                    for k, heading in enumerate(headings)
-                ],
-            )
-        )
+    for title, headings, rows in (
+        (BROKEN, ("simulator", "laws"), broken(found)),
+        ("what failed at a time step", ("simulator", "law", "steps", "message"), failures(found)),
+    ):
+        if rows:
+            last = len(headings) - 1
+            columns = [
+                Column(heading, [[row[k]] for row in rows], left=True, wrap=k == last)
+                for k, heading in enumerate(headings)
+            ]
+            tables.append((title, columns))
     return tables
+
+
+def broken(found: Sequence[Swept]) -> list[tuple[str, str]]:
+    """The laws that a simulator keeps at none of its steps, held against the error that `REFERENCE`
+    may cost: no smaller step helps there."""
+    told = []
+    for who, name in labels(found).items():
+        lines = [(law, line) for law in found for line in law.lines if line.who == who]
+        laws = [
+            law.law
+            for law, line in lines
+            if not math.isnan(law.allowed) and line.cheapest_within(law.allowed) is None
+        ]
+        if laws:
+            told.append((name, ", ".join(laws)))
+    return told
 
 
 def failures(found: Sequence[Swept]) -> list[tuple[str, str, str, str]]:

@@ -52,13 +52,23 @@ def test_the_table_tells_the_step_to_take() -> None:
 
 def test_every_law_has_its_order_and_its_cheapest_steps() -> None:
     tables = dict(sweep.details(found()))
-    order, kept, within, failures = tables.values()
+    order, kept, within, broken, failures = tables.values()
     assert [c.cells for c in order] == [[["fall"]], [["1.00 [1.00, 1.00]"]], [["0.00"]]]
     assert [c.cells for c in kept] == [[["fall"]], [["2ms", "0.0050"]], [["none"]]]
     assert [c.cells for c in within] == [[["fall"]], [["1ms", "0.010"]], [["none"]]]
+    assert [c.cells for c in broken] == [[["ode"]], [["fall"]]]
     assert [c.cells for c in failures] == [
         [["ode"]], [["fall"]], [["2ms"]], [["it left the room"]]
     ]  # fmt: skip
+
+
+def test_laws_that_no_step_helps_are_named() -> None:
+    """1 ms may cost 0.01 here: one is better at its smallest step, the other at none."""
+    records = [*RECORDS, *(law("dart", h, 0.02 * h / 0.001) for h in STEPS)]
+    assert sweep.broken(found(records)) == [("ode", "fall")]
+    assert sweep.BROKEN == "laws that no step keeps with the error that 1 ms may cost"
+    assert sweep.BROKEN in dict(sweep.details(found(records)))
+    assert sweep.BROKEN not in dict(sweep.details(found([law("a", h, 0.0) for h in STEPS])))
 
 
 def test_profiles_are_told_apart() -> None:
