@@ -232,16 +232,16 @@ def against_study(runs: Runs, task: str, metrics: Sequence[str]) -> str:
     return table(("simulator", "repetitions", *titles(task, metrics)), rows)
 
 
-def single_rules(runs: Runs, profile: str, task: str, metrics: Sequence[str]) -> str:
+def single_rules(runs: Runs, task: str, metrics: Sequence[str]) -> str:
     """docs/study.md: one rule of the study at a time."""
     rows = [
-        [SIMULATORS[simulator], RULES[rules], run.repetitions, *map(run.cell, metrics)]
+        [f"{SIMULATORS[simulator]} `{profile}`", RULES[rules], *map(run.cell, metrics)]
+        for profile in PROFILES
         for simulator in SIMULATORS
         for (rules, *rest), run in runs.items()
         if rest == [profile, task, simulator] and _single(runs, profile, task, simulator)
     ]
-    headings = ("simulator", "rules", "repetitions", *titles(task, metrics))
-    return table(headings, rows, 2) if rows else NOTHING
+    return table(("simulator", "rules", *titles(task, metrics)), rows, 2) if rows else NOTHING
 
 
 def titles(task: str, metrics: Sequence[str]) -> list[str]:
@@ -291,9 +291,9 @@ TABLES: dict[str, Callable[[Runs], str]] = {
     "study throwing": lambda runs: against_study(
         runs, "throwing", ("hit", "moved", "moved_otherwise", "lost_in_transit", "limits")
     ),
-    "rules stacking": lambda runs: single_rules(runs, "default", "stacking", STACKING[:5]),
+    "rules stacking": lambda runs: single_rules(runs, "stacking", STACKING[:5]),
     "rules throwing": lambda runs: single_rules(
-        runs, "tuned", "throwing", ("hit", "moved", "moved_otherwise", "landing_x", "limits")
+        runs, "throwing", ("hit", "moved", "moved_otherwise", "landing_x", "limits")
     ),
 }
 
