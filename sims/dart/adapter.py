@@ -20,11 +20,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from pytest_simbench.scene import (
-    FloatArray,
-    Scene,
-    rotation_matrix,
-)
+from pytest_simbench.scene import FloatArray, Scene, rotation_matrix
 from pytest_simbench.simulator import (
     FOLLOWER,
     Capability,

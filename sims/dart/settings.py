@@ -36,17 +36,17 @@ class DARTSettings(Settings):
     split_impulse: bool = False
 
 
+TUNED = DARTSettings(detector="ode", solver="nsgs", tolerance=1e-4, position_gain=0.5)
+
 PROFILES: Mapping[str, Settings] = {
     "default": DARTSettings(),
-    "tuned": DARTSettings(detector="ode", solver="nsgs", tolerance=1e-4, position_gain=0.5),
-    "real": DARTSettings(detector="ode", solver="nsgs", tolerance=1e-4, position_gain=0.5),
+    "tuned": TUNED,
+    "real": TUNED,
 }
 
+SEEDS = (SeedsSeen("throwing", 100, 100), SeedsSeen("stacking", 100, 100))
+
 CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
-    "tuned": (SeedsSeen("throwing", 100, 100), SeedsSeen("stacking", 100, 100)),
-    "real": (
-        SeedsSeen("throwing", 100, 100),
-        SeedsSeen("stacking", 100, 100),
-        DataSeen("cube_tosses", 0, 564, 6),
-    ),
+    "tuned": SEEDS,
+    "real": (*SEEDS, DataSeen("cube_tosses", 0, 564, 6)),
 }

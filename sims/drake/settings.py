@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from pytest_simbench.simulator import DataSeen, SeedsSeen, Seen, Settings
@@ -46,33 +46,25 @@ class DrakeSettings(Settings):
     shrink: float = 0.0
 
 
+TUNED = DrakeSettings(
+    timestep=0.002,
+    contact_model="point",
+    approximation="sap",
+    relaxation_time=0.01,
+    corner_radius=0.001,
+    pad_radius=0.003,
+    shrink=1e-4,
+)
+
 PROFILES: Mapping[str, Settings] = {
     "default": DrakeSettings(),
-    "tuned": DrakeSettings(
-        timestep=0.002,
-        contact_model="point",
-        approximation="sap",
-        relaxation_time=0.01,
-        corner_radius=0.001,
-        pad_radius=0.003,
-        shrink=1e-4,
-    ),
-    "real": DrakeSettings(
-        timestep=0.001,
-        contact_model="point",
-        approximation="sap",
-        relaxation_time=0.01,
-        corner_radius=0.001,
-        pad_radius=0.003,
-        shrink=1e-4,
-    ),
+    "tuned": TUNED,
+    "real": replace(TUNED, timestep=0.001),
 }
 
+SEEDS = (SeedsSeen("throwing", 2121, 2130), SeedsSeen("stacking", 100, 100))
+
 CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
-    "tuned": (SeedsSeen("throwing", 2121, 2130), SeedsSeen("stacking", 100, 100)),
-    "real": (
-        SeedsSeen("throwing", 2121, 2130),
-        SeedsSeen("stacking", 100, 100),
-        DataSeen("cube_tosses", 0, 564, 6),
-    ),
+    "tuned": SEEDS,
+    "real": (*SEEDS, DataSeen("cube_tosses", 0, 564, 6)),
 }

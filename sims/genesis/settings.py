@@ -49,30 +49,25 @@ class GenesisSettings(Settings):
     gjk: bool = False
 
 
+TUNED = GenesisSettings(
+    timestep=0.002,
+    constraint_timeconst=0.004,
+    friction_cone="elliptic",
+)
+
 PROFILES: Mapping[str, Settings] = {
     "default": GenesisSettings(),
-    "tuned": GenesisSettings(
-        timestep=0.002,
-        constraint_timeconst=0.004,
-        friction_cone="elliptic",
-    ),
-    "real": GenesisSettings(
-        timestep=0.002,
-        constraint_timeconst=0.004,
-        friction_cone="elliptic",
-    ),
+    "tuned": TUNED,
+    "real": TUNED,
 }
 
+SEEDS = (
+    SeedsSeen("throwing", 100, 101),
+    SeedsSeen("stacking", 100, 100),
+    SeedsSeen("pushing", 920008, 920008),
+)
+
 CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
-    "tuned": (
-        SeedsSeen("throwing", 100, 101),
-        SeedsSeen("stacking", 100, 100),
-        SeedsSeen("pushing", 920008, 920008),
-    ),
-    "real": (
-        SeedsSeen("throwing", 100, 101),
-        SeedsSeen("stacking", 100, 100),
-        SeedsSeen("pushing", 920008, 920008),
-        DataSeen("cube_tosses", 0, 564, 6),
-    ),
+    "tuned": SEEDS,
+    "real": (*SEEDS, DataSeen("cube_tosses", 0, 564, 6)),
 }

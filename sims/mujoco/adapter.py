@@ -15,10 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.scene import (
-    FloatArray,
-    Scene,
-)
+from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.simulator import (
     Capability,

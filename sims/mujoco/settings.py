@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from pytest_simbench.simulator import DataSeen, SeedsSeen, Seen, Settings
@@ -35,29 +35,23 @@ class MuJoCoSettings(Settings):
     noslip_iterations: int = 0
 
 
+TUNED = MuJoCoSettings(
+    timestep=0.001,
+    cone="elliptic",
+    condim=4,
+    solref=(0.002, 1.0),
+    solimp=(0.99, 0.9999, 0.001),
+)
+
 PROFILES: Mapping[str, Settings] = {
     "default": MuJoCoSettings(),
-    "tuned": MuJoCoSettings(
-        timestep=0.001,
-        cone="elliptic",
-        condim=4,
-        solref=(0.002, 1.0),
-        solimp=(0.99, 0.9999, 0.001),
-    ),
-    "real": MuJoCoSettings(
-        timestep=0.001,
-        cone="elliptic",
-        condim=4,
-        solref=(0.004, 2.0),
-        solimp=(0.99, 0.9999, 0.001),
-    ),
+    "tuned": TUNED,
+    "real": replace(TUNED, solref=(0.004, 2.0)),
 }
 
+SEEDS = (SeedsSeen("throwing", 1, 1), SeedsSeen("stacking", 1, 1))
+
 CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
-    "tuned": (SeedsSeen("throwing", 1, 1), SeedsSeen("stacking", 1, 1)),
-    "real": (
-        SeedsSeen("throwing", 1, 1),
-        SeedsSeen("stacking", 1, 1),
-        DataSeen("cube_tosses", 0, 564, 6),
-    ),
+    "tuned": SEEDS,
+    "real": (*SEEDS, DataSeen("cube_tosses", 0, 564, 6)),
 }

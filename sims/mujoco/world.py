@@ -34,7 +34,6 @@ bodies touch what they can move."""
 
 LINK_COLOUR, GROUND_COLOUR = (0.9, 0.9, 0.9, 1.0), (0.5, 0.5, 0.5, 1.0)
 
-
 _INTEGRATORS = {
     "Euler": "mjINT_EULER",
     "RK4": "mjINT_RK4",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from pytest_simbench.simulator import DataSeen, Seen, Settings
@@ -37,26 +37,20 @@ class NewtonSettings(Settings):
     gap: float = 0.1
 
 
+TUNED = NewtonSettings(
+    timestep=0.001,
+    cone="elliptic",
+    condim=4,
+    ke=250000.0,
+    kd=1000.0,
+    solimp=(0.99, 0.9999, 0.001),
+    gap=0.0,
+)
+
 PROFILES: Mapping[str, Settings] = {
     "default": NewtonSettings(),
-    "tuned": NewtonSettings(
-        timestep=0.001,
-        cone="elliptic",
-        condim=4,
-        ke=250000.0,
-        kd=1000.0,
-        solimp=(0.99, 0.9999, 0.001),
-        gap=0.0,
-    ),
-    "real": NewtonSettings(
-        timestep=0.001,
-        cone="elliptic",
-        condim=4,
-        ke=62500.0,
-        kd=1000.0,
-        solimp=(0.99, 0.9999, 0.001),
-        gap=0.0,
-    ),
+    "tuned": TUNED,
+    "real": replace(TUNED, ke=62500.0),
 }
 
 CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {"real": (DataSeen("cube_tosses", 0, 564, 6),)}

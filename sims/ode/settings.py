@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from pytest_simbench.simulator import DataSeen, SeedsSeen, Seen, Settings
@@ -51,21 +51,21 @@ class ODESettings(Settings):
         return {"joint/*/stiffness": stiffness, "joint/*/damping": damping}
 
 
+TUNED = ODESettings(
+    timestep=0.002,
+    contact_cfm=1e-5,
+    drive="spring",
+)
+
 PROFILES: Mapping[str, Settings] = {
     "default": ODESettings(),
-    "tuned": ODESettings(
-        timestep=0.002,
-        contact_cfm=1e-5,
-        drive="spring",
-    ),
-    "real": ODESettings(timestep=0.001, contact_cfm=1e-3, drive="spring", friction="slip"),
+    "tuned": TUNED,
+    "real": replace(TUNED, timestep=0.001, contact_cfm=1e-3, friction="slip"),
 }
 
+SEEDS = (SeedsSeen("throwing", 100, 101), SeedsSeen("stacking", 100, 100))
+
 CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
-    "tuned": (SeedsSeen("throwing", 100, 101), SeedsSeen("stacking", 100, 100)),
-    "real": (
-        SeedsSeen("throwing", 100, 101),
-        SeedsSeen("stacking", 100, 100),
-        DataSeen("cube_tosses", 0, 564, 6),
-    ),
+    "tuned": SEEDS,
+    "real": (*SEEDS, DataSeen("cube_tosses", 0, 564, 6)),
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from pytest_simbench.simulator import DataSeen, SeedsSeen, Seen, Settings
@@ -54,30 +54,23 @@ class OvPhysXSettings(Settings):
     threads: int = 0
 
 
+TUNED = OvPhysXSettings(
+    timestep=0.002,
+    body_iterations=4,
+    arm_iterations=4,
+    angular_damping=0.0,
+    sleeping=False,
+)
+
 PROFILES: Mapping[str, Settings] = {
     "default": OvPhysXSettings(),
-    "tuned": OvPhysXSettings(
-        timestep=0.002,
-        body_iterations=4,
-        arm_iterations=4,
-        angular_damping=0.0,
-        sleeping=False,
-    ),
-    "real": OvPhysXSettings(
-        timestep=0.001,
-        body_iterations=4,
-        arm_iterations=4,
-        angular_damping=0.0,
-        sleeping=False,
-        max_depenetration_velocity=0.1,  # docs/reality.md
-    ),
+    "tuned": TUNED,
+    "real": replace(TUNED, timestep=0.001, max_depenetration_velocity=0.1),  # docs/reality.md
 }
 
+SEEDS = (SeedsSeen("throwing", 100, 119),)
+
 CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
-    "tuned": (SeedsSeen("throwing", 100, 119),),
-    "real": (
-        SeedsSeen("throwing", 100, 119),
-        DataSeen("cube_tosses", 0, 564, 6),
-        DataSeen("arm_pushes", 1, 33, 4),
-    ),
+    "tuned": SEEDS,
+    "real": (*SEEDS, DataSeen("cube_tosses", 0, 564, 6), DataSeen("arm_pushes", 1, 33, 4)),
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pytest_simbench.simulator import DataSeen, SeedsSeen, Seen, Settings
 
@@ -44,34 +44,25 @@ class PyBulletSettings(Settings):
     ordered_pairs: bool = False
 
 
+TUNED = PyBulletSettings(
+    ordered_pairs=True,
+    position_gain=0.3,
+    linear_damping=0.0,
+    angular_damping=0.0,
+    solver_residual=0.0,
+    friction_anchor=True,
+    contact_erp=0.2,
+)
+
 PROFILES: Mapping[str, Settings] = {
     "default": PyBulletSettings(),
-    "tuned": PyBulletSettings(
-        ordered_pairs=True,
-        position_gain=0.3,
-        linear_damping=0.0,
-        angular_damping=0.0,
-        solver_residual=0.0,
-        friction_anchor=True,
-        contact_erp=0.2,
-    ),
-    "real": PyBulletSettings(
-        ordered_pairs=True,
-        position_gain=0.3,
-        linear_damping=0.0,
-        angular_damping=0.0,
-        solver_residual=0.0,
-        friction_anchor=True,
-        contact_erp=0.08,
-        timestep=0.001,
-    ),
+    "tuned": TUNED,
+    "real": replace(TUNED, timestep=0.001, contact_erp=0.08),
 }
 
+SEEDS = (SeedsSeen("throwing", 2022, 2041), SeedsSeen("stacking", 2024, 2024))
+
 CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
-    "tuned": (SeedsSeen("throwing", 2022, 2041), SeedsSeen("stacking", 2024, 2024)),
-    "real": (
-        SeedsSeen("throwing", 2022, 2041),
-        SeedsSeen("stacking", 2024, 2024),
-        DataSeen("cube_tosses", 0, 564, 6),
-    ),
+    "tuned": SEEDS,
+    "real": (*SEEDS, DataSeen("cube_tosses", 0, 564, 6)),
 }
