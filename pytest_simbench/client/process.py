@@ -16,6 +16,7 @@ from packaging.utils import canonicalize_version
 from pytest_simbench import __version__
 from pytest_simbench.client import bootstrap, reaper
 from pytest_simbench.client.connection import Connection, RemoteError
+from pytest_simbench.client.crowding import crowding
 from pytest_simbench.client.errors import (
     REMOTE_ERRORS,
     EngineFailed,
@@ -118,9 +119,14 @@ class WorkerProcess:
             "packages": self._packages(),
         }
 
+    @property
+    def _elsewhere(self) -> bool:
+        spec = self.launch.spec
+        return spec is not None and not spec.startswith("popen")
+
     def _packages(self) -> dict[str, str]:
         """Where the packages that the worker needs lie: this one, the adapters, a third party's."""
-        if self.launch.spec and not self.launch.spec.startswith("popen"):
+        if self._elsewhere:
             return {}  # another host has its own installation
         names = {"pytest_simbench", "pytest_simbench.sims"}
         names.add(self.launch.adapter.partition(":")[0].split(".")[0])
@@ -254,7 +260,7 @@ class WorkerProcess:
             f"the worker gave no sign of life for {limit:g} s and was killed; raise "
             "--sim-stall-timeout if the engine is only slow"
         )
-        return self._ended_by(WorkerHung, what)
+        return self._ended_by(WorkerHung, what + self._crowding())
 
     def _not_started(self, limit: float) -> WorkerError:
         return self._ended_by(
@@ -266,7 +272,10 @@ class WorkerProcess:
             "the repetition took longer than its time-out and was ended; raise --sim-timeout if "
             "the simulator is only slow"
         )
-        return self._ended_by(RepetitionTimeout, what)
+        return self._ended_by(RepetitionTimeout, what + self._crowding())
+
+    def _crowding(self) -> str:
+        return "" if self._elsewhere or self.pid is None else crowding(self.pid)
 
     def _start_text(self, reason: str) -> str:
         interpreter = self.launch.spec or self.launch.python or "this interpreter"

@@ -251,7 +251,7 @@ class RemoteRepetition:
         """The record that a node sent, with what only this side knows; its files are written."""
         assert self._node is not None
         record = Record.from_json(answer["record"], f"the answer of {self._node.name}")
-        details = {**record.details, **({"lost": self._lost} if self._lost else {})}
+        details = {**record.details, **({"lost_nodes": self._lost} if self._lost else {})}
         of_robot = self._shared(self.experiment).of_robot
         stem = file_stem(self.experiment, self.number)
         self._keep(str(details.get("log") or ""), "logs", answer["log"])
@@ -288,7 +288,7 @@ class RemoteRepetition:
             settings=found,
             versions={},
             error=Failure(type(error).__name__, what, self.where.phase),
-            details={"lost": self._lost} if self._lost else {},
+            details={"lost_nodes": self._lost} if self._lost else {},
             seconds={"total": seconds},
             host={"node": self._node.name} if self._node else {},
         )

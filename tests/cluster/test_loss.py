@@ -91,7 +91,7 @@ def records(folder: Path) -> dict[int, dict[str, Any]]:
 def alike(record: dict[str, Any]) -> dict[str, Any]:
     """What must be the same wherever it ran."""
     host = {k: v for k, v in record["host"].items() if k != "node"}
-    details = {k: v for k, v in record["details"].items() if k != "lost"}
+    details = {k: v for k, v in record["details"].items() if k != "lost_nodes"}
     kept = {k: v for k, v in record.items() if k not in TIMES}
     return {**kept, "host": host, "details": details}
 
@@ -130,10 +130,14 @@ def test_a_process_killed_a_machine_cut_off_and_one_added(
     assert found.keys() == expected.keys()
     lost = found.pop(FULL)
     assert (lost["status"], lost["error"]["type"]) == ("failed", "NodeLost")
-    assert len(lost["details"]["lost"]) == 2
+    assert len(lost["details"]["lost_nodes"]) == 2
     assert "it cannot: No space left on device, then on" in lost["error"]["message"]
     assert {s: alike(r) for s, r in found.items()} == {s: alike(expected[s]) for s in found}
-    again = {seed: r["details"]["lost"] for seed, r in found.items() if "lost" in r["details"]}
+    again = {
+        seed: r["details"]["lost_nodes"]
+        for seed, r in found.items()
+        if "lost_nodes" in r["details"]
+    }
     assert "its process ended, or its network is gone" in again[2024][0]
     assert any("b: " in texts[0] for texts in again.values())
     assert "d" in {r["host"]["node"] for r in found.values()}
@@ -155,8 +159,8 @@ def test_what_a_node_has_found_is_lost_with_it(machines: Machines, case: Case) -
     pool.close()
     assert isinstance(error, NodeLost), error
     assert record.status == "failed"
-    assert len(record.details["lost"]) == 2
-    assert all("its process ended" in told for told in record.details["lost"])
+    assert len(record.details["lost_nodes"]) == 2
+    assert all("its process ended" in told for told in record.details["lost_nodes"])
 
 
 def test_several_tests_at_once_and_a_release_that_one_node_has(

@@ -1,0 +1,76 @@
+"""A worker that is late on a full machine says so."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from pytest_simbench.client.crowding import crowding, scheduled
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.repetition import Repetition
+from tests.tiny import Falling
+
+
+@contextmanager
+def one_core_for(others: int) -> Iterator[None]:
+    """This process and its children have one core, which `others` processes use without rest.
+
+    Each is in a session of its own: Linux shares a core out among sessions (`man 7 sched`).
+    """
+    cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(cores)})
+    command = [sys.executable, "-c", "while True: pass"]
+    hogs = [subprocess.Popen(command, start_new_session=True) for _ in range(others)]
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, cores)
+        for hog in hogs:
+            hog.kill()
+            hog.wait()
+
+
+def threads(proc: Path, *stats: str) -> None:
+    for number, stat in enumerate(stats):
+        folder = proc / "7" / "task" / str(number)
+        folder.mkdir(parents=True)
+        (folder / "schedstat").write_text(stat)
+
+
+def test_a_late_worker_on_a_full_core_says_so(case: Case) -> None:
+    with one_core_for(4):
+        late = replace(case, timeout=4.0)
+        record, _ = Repetition(Experiment(late, Falling(1e6)), 1).run()
+    assert record.error is not None
+    assert record.error.type == "RepetitionTimeout"
+    assert "waited" in record.error.message
+    assert "--sim-jobs" in record.error.message
+
+
+def test_all_threads_count(tmp_path: Path) -> None:
+    threads(tmp_path, "3000000000 500000000 12\n", "1000000000 1500000000 5\n")
+    assert scheduled(7, tmp_path) == (4.0, 2.0)
+
+
+@pytest.mark.parametrize("stat", ["", "nothing"])
+def test_a_kernel_that_does_not_tell_is_no_full_machine(tmp_path: Path, stat: str) -> None:
+    threads(tmp_path, stat)
+    assert scheduled(7, tmp_path) == (0.0, 0.0)
+    assert scheduled(8, tmp_path) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(("waited", "told"), [(2.4, False), (2.6, True)])
+def test_a_little_waiting_is_not_told(
+    monkeypatch: pytest.MonkeyPatch, waited: float, told: bool
+) -> None:
+    """A fifth of the time is the limit: 2.5 of 12.5 s."""
+    monkeypatch.setattr("pytest_simbench.client.crowding.scheduled", lambda pid: (10.0, waited))
+    assert bool(crowding(7)) is told
