@@ -17,7 +17,7 @@ import csv
 import re
 import statistics
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -63,9 +63,10 @@ def cost(run: Run | None, name: str = "cpu_cost") -> str:
     return "-" if found is None else cells.number(found, 2)
 
 
-def peak(run: Run) -> str:
-    """Of the memory [MB]."""
-    return f"{max(run.values('ram_peak').values()):.0f}"
+def peak(*runs: Run | None) -> str:
+    """Of the memory [MB], over the repetitions that ended well."""
+    found = [value for run in runs if run for value in run.values("ram_peak").values()]
+    return f"{max(found):.0f}" if found else "-"
 
 
 def page_link(simulator: str) -> str:
@@ -87,7 +88,7 @@ def overview(runs: Runs) -> str:
             *(throw.cell(metric) if throw else "-" for metric in ("hit", "moved")),
             landing(throw)[0] if throw else "-",
             f"{cost(stack)}, {cost(throw)}",
-            str(max(int(peak(run)) for run in (stack, throw) if run)),
+            peak(stack, throw),
         ])  # fmt: skip
     headings = ("simulator", "placed %", "at the end %", "strict %", "throws that hit", "moved %",
                 "landing x", "CPU s per s", "RAM MB")  # fmt: skip
@@ -214,22 +215,29 @@ def against_study(runs: Runs, task: str, metrics: Sequence[str]) -> str:
         if (rules, at) == ("ours", task) and ("study", profile, task, simulator) in runs
     ]
     tested = [
-        [compare_by_seed(ours.values(name), study.values(name)).p_value for name in metrics]
+        [_p_value(ours.values(name), study.values(name)) for name in metrics]
         for *_, ours, study in pairs
     ]
     corrected = iter(holm([p for row in tested for p in row]))
     rows = []
     for profile, simulator, ours, study in pairs:
-        row = [f"{SIMULATORS[simulator]} `{profile}`", f"{len(ours.lines)}, {len(study.lines)}"]
+        apart = "; " if "failed" in ours.repetitions + study.repetitions else ", "
+        repetitions = apart.join((ours.repetitions, study.repetitions))
+        row = [f"{SIMULATORS[simulator]} `{profile}`", repetitions]
         for name in metrics:
             metric = METRICS[task][name]
-            means = [run.mean(name) or 0.0 for run in (ours, study)]
-            texts = [cells.metric_value(mean, metric) for mean in means]
+            means = [run.mean(name) for run in (ours, study)]
+            texts = ["-" if mean is None else cells.metric_value(mean, metric) for mean in means]
             sure = next(corrected) <= 0.05 and texts[0] != texts[1]
             text = texts[0] if texts[0] == texts[1] else " → ".join(texts)
             row.append(f"**{text}**" if sure else text)
         rows.append(row)
     return table(("simulator", "repetitions", *titles(task, metrics)), rows)
+
+
+def _p_value(ours: Mapping[int, float], study: Mapping[int, float]) -> float:
+    """Of a difference; 1 where one side has no value."""
+    return compare_by_seed(ours, study).p_value if ours and study else 1.0
 
 
 def single_rules(runs: Runs, task: str, metrics: Sequence[str]) -> str:

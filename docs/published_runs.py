@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pytest_simbench.records.record import Record
+from pytest_simbench.records.record import Failure, Record
 from pytest_simbench.report import cells
 from pytest_simbench.report.pooling import spread
 from pytest_simbench.tasks import Stacking, Throwing
@@ -37,7 +37,7 @@ RULES = {
 }
 """Ours, the study's, and ours with one rule of the study's."""
 
-IDENTITY = ("rules", "profile", "simulator", "version", "commit", "seed", "status")
+IDENTITY = ("rules", "profile", "simulator", "version", "commit", "seed", "status", "cause")
 PARTS = {
     "stacking": ("spare_places",),
     "throwing": ("flight_x", "limits_velocity", "limits_acceleration", "limits_torque"),
@@ -126,6 +126,7 @@ def _line(record: Record, rules: str, commit: str) -> dict[str, str]:
         **{"rules": rules, "profile": record.profile, "simulator": record.simulator},
         **{"version": record.versions.get(record.simulator, ""), "commit": commit},
         **{"seed": record.seed, "status": record.status, **record.metrics},
+        **{"cause": record.error.cause if record.error else ""},
         **{name: record.cost(name) for name in COST_NAMES},
     }
     if record.task == "stacking":
@@ -169,6 +170,7 @@ def _record(task: str, number: int, line: dict[str, str]) -> Record:
     metrics = {name: _exact(task, name, float(line[name])) for name in names}
     wall, cpu = 1 / value.get("rtf", 1.0), value.get("cpu_cost", 0.0)
     stepping = {"simulated": 1.0, "wall": wall, "cpu": cpu}
+    cause, _, phase = line["cause"].partition(" in ")
     return Record(
         test=task,
         task=task,
@@ -178,6 +180,7 @@ def _record(task: str, number: int, line: dict[str, str]) -> Record:
         repetition=number,
         seed=int(line["seed"]),
         status=line["status"],  # type: ignore[arg-type]
+        error=Failure(cause, phase=phase) if cause else None,
         metrics=metrics,
         stepping=stepping if "rtf" in value else {},
         timeline={name: value[name] for name in ("start", "end") if name in value},

@@ -107,6 +107,8 @@ def draw(summary: TaskSummary, name: str, *, titled: bool = True) -> Any:
     from matplotlib.figure import Figure
 
     rows = [row for row in summary.rows if row.finished]
+    if rows and name == "metrics":  # who failed each time belongs beside the others
+        rows = [row for row in summary.rows if row.finished or row.failed]
     if name == "phases":
         rows = [row for row in rows if row.by_phase]
     if not rows:
@@ -122,11 +124,19 @@ def draw(summary: TaskSummary, name: str, *, titled: bool = True) -> Any:
     figure = Figure(figsize=size, layout="constrained")
     axes = figure.subplots(1, panels, sharey=True, squeeze=False)[0]
     fill(axes, summary, rows)
-    axes[0].set_yticks(range(len(rows)), map(for_figure, short_labels(rows)))
+    labels = [for_figure(label) for label in short_labels(rows)]
+    if name == "metrics":
+        labels = [label + _failed(row) for label, row in zip(labels, rows, strict=True)]
+    axes[0].set_yticks(range(len(rows)), labels)
     axes[0].set_ylim(len(rows) - 0.5, -0.5)
     if titled:
         figure.suptitle(_title(summary, rows, what), fontsize="medium")
     return figure
+
+
+def _failed(row: Row) -> str:
+    """What a mean does not show: it is one of the repetitions that ended well."""
+    return f"\n{row.failed} of {row.failed + row.finished} failed" if row.failed else ""
 
 
 def _title(summary: TaskSummary, rows: Sequence[Row], what: str) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.report import files, markdown
-from pytest_simbench.report.figures import FiguresUnavailable, write_figures
+from pytest_simbench.report.figures import FiguresUnavailable, draw, drawing, write_figures
 from pytest_simbench.report.files import Written, csv_of, write_files
 from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.summary import summarise
@@ -53,6 +53,18 @@ def test_markdown_tables_are_rectangular_whatever_a_message_holds() -> None:
 
 def test_markdown_of_nothing() -> None:
     assert markdown.render_run([]) == "No repetition was recorded.\n"
+
+
+def test_a_picture_of_means_tells_what_failed() -> None:
+    pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
+    lost = [failed("WorkerHung", "load", "no answer", simulator="drake", repetition=1)]
+    (summary,) = summarise([*stacking_run(), *lost], METRICS, ends=two_errors)
+    with drawing():
+        (axis, *_) = draw(summary, "metrics").axes
+        labels = [label.get_text() for label in axis.get_yticklabels()]
+        (times,) = draw(summary, "times").axes
+    assert labels == ["drake\n1 of 1 failed", "mujoco", "pybullet\n3 of 20 failed"]
+    assert [label.get_text() for label in times.get_yticklabels()] == ["mujoco", "pybullet"]
 
 
 def test_csv_has_one_line_per_repetition() -> None:
