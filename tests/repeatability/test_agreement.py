@@ -170,7 +170,7 @@ def test_engines_with_the_same_law_agree_until_things_collide(
         {"durations": np.zeros(3)},
         {"durations": None},
     ],
-    ids=str,
+    ids=lambda wrong: next(iter(wrong)),
 )
 def test_a_file_with_something_else_in_it(tmp_path: Path, wrong: dict[str, object]) -> None:
     path = tmp_path / "a.npz"
