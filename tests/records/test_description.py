@@ -89,6 +89,12 @@ def test_something_else_is_one_sentence(data: Any, message: str) -> None:
     assert len(str(caught.value)) < 300
 
 
+def test_a_file_of_a_newer_version_is_known_by_what_this_one_writes() -> None:
+    metric = Metric("placed", "placed", kind="share", of=15)
+    for written in (TaskDescription("t", (metric,)), Threshold("a", "placed", 0.5)):
+        assert written.to_dict()["schema"] == 1
+
+
 anything = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner),

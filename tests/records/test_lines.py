@@ -204,6 +204,17 @@ def test_damage_loses_nothing_else_and_is_repaired(tmp_path: Path, kind: str, pl
     assert RunFolder(tmp_path).repair() == ()
 
 
+def test_each_damaged_file_is_kept_beside_the_earlier_ones(tmp_path: Path) -> None:
+    path, damaged = tmp_path / RECORDS, []
+    for k in range(3):
+        with path.open("ab") as file:
+            file.write(b"garbage\n" + record(k).to_json().encode() + b"\n")
+        damaged.append(path.read_bytes())
+        RunFolder(tmp_path).repair()
+    kept = [path.with_name(f"{path.name}.damaged-{number}") for number in (1, 2, 3)]
+    assert [file.read_bytes() for file in kept] == damaged
+
+
 @given(st.binary(max_size=40), st.integers(0, 3))
 def test_any_bytes_between_records_lose_none_of_them(garbage: bytes, at: int) -> None:
     lines = [record(k).to_json().encode() + b"\n" for k in range(4)]

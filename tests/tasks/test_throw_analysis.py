@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pytest_simbench.scene import FloatArray
-from pytest_simbench.tasks.throw_analysis import free_flight, unclenched
+from pytest_simbench.tasks.throw_analysis import _apart, free_flight, unclenched
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])
 
@@ -54,3 +54,12 @@ def test_two_samples_are_no_flight() -> None:
     rows = np.array([[0.0, 0, 0], 0.1 * GRAVITY])
     assert free_flight(time, rows, np.ones(2, bool), GRAVITY) is None
     assert math.isclose(rows[1, 2], -0.980665)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "apart"), [(1.2, 1.5, 0.3), (None, 1.5, None), (1.2, None, None), (None, None, None)]
+)
+def test_a_flight_that_lands_nowhere_is_no_distance_from_another(
+    a: float | None, b: float | None, apart: float | None
+) -> None:
+    assert _apart(a, b) == (apart if apart is None else pytest.approx(apart))

@@ -84,6 +84,11 @@ def test_the_scene_starts_as_the_toss_did_and_is_not_disturbed() -> None:
     assert (box.inertia() == 8.1e-4).all()
 
 
+def test_smoke_is_the_first_few_of_the_same_half() -> None:
+    task = Tossing(FLIGHTS, half="tuning")
+    assert task.smoke() == Tossing(FLIGHTS, half="tuning", most=5)
+
+
 def test_records_name_the_tosses_by_their_digest() -> None:
     parameters = Tossing(FLIGHTS).parameters()
     assert parameters["task.tosses"] == FLIGHTS.digest

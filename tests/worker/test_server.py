@@ -63,7 +63,13 @@ class Asked:
 
 @pytest.fixture
 def ask(monkeypatch: pytest.MonkeyPatch) -> Iterator[Asked]:
-    for name, value in {"calls": [], "instances": [], "raises": [], "built": {}}.items():
+    for name, value in {
+        "calls": [],
+        "instances": [],
+        "raises": [],
+        "built": {},
+        "touching": [],
+    }.items():
         monkeypatch.setattr(Hosted, name, value)
     for variable in Hosted.info.environment:
         monkeypatch.delenv(variable, raising=False)
@@ -173,6 +179,14 @@ def test_what_was_built_is_held_against_the_scene(ask: Asked) -> None:
     assert ask.load(parity=False)["excused"] == []
 
 
+def test_a_deviation_of_other_shapes_excuses_nothing(ask: Asked) -> None:
+    """The adapter declares one of the mass of cylinders, and the scene has none."""
+    ask.construct()
+    Hosted.built.update({"body/cube/mass": None})
+    kind, message = ask.error("load", scene=SCENE.to_wire(), parity=True)
+    assert (kind, "body/cube/mass" in message) == ("ParityError", True)
+
+
 def test_a_world_that_starts_elsewhere_is_found(ask: Asked, monkeypatch: Any) -> None:
     ask.construct()
     monkeypatch.setattr(Hosted, "body_state", lambda self: np.zeros((1, 13)))
@@ -243,6 +257,20 @@ def test_contacts_and_pictures(ask: Asked) -> None:
     ask.load()
     assert ask("contact_count") == 7
     assert ask("render", width=4, height=3).shape == (3, 4, 3)
+
+
+def test_forces_of_a_pair_are_one_sum_on_the_first_by_name(ask: Asked) -> None:
+    ask.construct()
+    ask.load()
+    one, two, three = np.arange(1.0, 7.0), np.full(6, 10.0), np.full(6, 0.5)
+    Hosted.touching.extend([
+        ("cube", "table", one), ("table", "cube", two), ("cube", "table", three), ("a", "b", one),
+    ])  # fmt: skip
+    (first, second, wrench), other = ask("contact_forces")
+    assert (first, second) == ("cube", "table")
+    assert wrench == pytest.approx(one - two + three)
+    assert other[:2] == ["a", "b"] or other[:2] == ("a", "b")
+    assert other[2] == pytest.approx(one)
 
 
 def test_statistics(ask: Asked) -> None:
@@ -330,6 +358,22 @@ def test_every_error_is_an_answer(
     assert type(error).__name__ in log
     Hosted.raises.clear()
     assert ask("wait", duration=0.1, log_period=None)["time"] == pytest.approx(0.1)
+
+
+def test_an_error_is_an_answer_though_the_log_cannot_be_written(
+    ask: Asked, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Full:
+        def write(self, text: str) -> int:
+            raise OSError(28, "No space left on device")
+
+        flush = None
+
+    ask.construct()
+    ask.load()
+    Hosted.raises.append(ValueError("so"))
+    monkeypatch.setattr(sys, "stderr", Full())
+    assert ask.error("wait", duration=0.1, log_period=None) == ("EngineError", "ValueError: so")
 
 
 def test_the_log_holds_a_long_traceback_cut(ask: Asked, capsys: pytest.CaptureFixture[str]) -> None:
