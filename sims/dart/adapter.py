@@ -34,7 +34,7 @@ from pytest_simbench.simulator import (
 )
 from pytest_simbench.simulator.loops import ends, reduced
 
-from .bodies import add_body, add_ground, set_surface
+from .bodies import ONE_CONTACT_ON_A_PLANE, add_body, add_ground, set_surface
 from .readback import ReadBack
 from .settings import CHOSEN_ON, PROFILES, DARTSettings
 
@@ -113,7 +113,7 @@ class DART(Simulator):
         self.scene = scene
         self.world = world = dartpy.simulation.World()
         self._set_options(world, scene)
-        slab = self.settings.detector == "dart"
+        slab = self.settings.detector in ONE_CONTACT_ON_A_PLANE
         self._ground = add_ground(world, scene.ground_friction, scene.ground_restitution, slab)
         self._bodies = {box.name: add_body(world, box) for box in scene.bodies}
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
