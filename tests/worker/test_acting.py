@@ -97,3 +97,9 @@ def test_a_prescribed_body_is_neither_free_of_its_motion_nor_fixed() -> None:
 def test_a_turn_about_any_axis_keeps_the_quaternion_a_unit() -> None:
     row = prescribed(BELT.changed(angular_velocity=(0.3, -1.0, 2.0)), 7.3)
     assert np.linalg.norm(row[3:7]) == pytest.approx(1.0)
+
+
+def test_what_only_slides_keeps_its_orientation() -> None:
+    turned = Pose.at(0.0, 0.0, 0.5, yaw=0.3)
+    row = prescribed(BELT.changed(angular_velocity=(0.0, 0.0, 0.0), pose=turned), 2.0)
+    assert row == pytest.approx([1.0, 0.0, 0.5, *turned.quaternion, 0.5, 0, 0, 0, 0, 0])

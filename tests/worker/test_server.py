@@ -259,6 +259,20 @@ def test_contacts_and_pictures(ask: Asked) -> None:
     assert ask("render", width=4, height=3).shape == (3, 4, 3)
 
 
+def test_a_film_is_of_whole_steps_and_of_the_size_asked_for(ask: Asked) -> None:
+    ask.construct()
+    ask.load()
+    assert ask("film", period=0.0085, width=4, height=3) == pytest.approx(0.008)
+    ask("wait", duration=0.016, log_period=None)
+    frames = [sent["frame"] for sent in ask.sent if "frame" in sent]
+    assert [frame["time"] for frame in frames] == pytest.approx([0.008, 0.016])
+    assert [unpack(frame["picture"]).shape for frame in frames] == [(3, 4, 3)] * 2
+    ask.sent.clear()
+    assert ask("film", period=None, width=4, height=3) is None
+    ask("wait", duration=0.016, log_period=None)
+    assert ask.sent == []
+
+
 def test_forces_of_a_pair_are_one_sum_on_the_first_by_name(ask: Asked) -> None:
     ask.construct()
     ask.load()
