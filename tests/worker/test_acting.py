@@ -8,6 +8,7 @@ import pytest
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, SceneError, Wrench
 from pytest_simbench.simulator import NotSupportedError
 from pytest_simbench.worker.acting import Acting, prescribed
+from pytest_simbench.worker.stepping import Stepper
 
 from .toys import Toy
 
@@ -54,6 +55,14 @@ def told(scene: Scene, steps: int) -> Told:
 def test_a_force_is_told_while_it_acts_and_once_that_it_ended() -> None:
     # steps of 2 ms; the first is told whatever acts, since nobody knows what was before
     assert told(PULLED, 8).pushed == pytest.approx([0.0, 0.5, 1.0, 0.5, 0.0])
+
+
+def test_it_is_told_in_each_step_of_a_wait() -> None:
+    simulator = Told()
+    acting = Acting.of(simulator, PULLED)
+    simulator.pushed.clear()
+    Stepper(simulator, lambda at: None, acting).wait(0.016, None)
+    assert simulator.pushed == pytest.approx([0.0, 0.5, 1.0, 0.5, 0.0])
 
 
 def test_a_motion_goes_on_from_the_simulators_time() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import subprocess
 import sys
@@ -69,6 +70,17 @@ def test_the_control_takes_its_share_and_no_more() -> None:
     runs = control.runs
     control.keep_up(1e6)  # steps that take forever do not keep the engine waiting
     assert control.runs == runs + MOST_AT_ONCE
+
+
+def test_all_runs_are_summed() -> None:
+    """By a clock on which each run takes 4 ms, 1 ms of it waiting."""
+    ticks = itertools.count()
+    control = Control(lambda: (0.004 * (tick := next(ticks)), 0.001 * tick))  # type: ignore[arg-type]
+    for stepping in range(1, 9):
+        control.keep_up(stepping)
+    assert control.runs > 3
+    assert control.wall == pytest.approx(0.004 * control.runs)
+    assert control.waited == pytest.approx(0.001 * control.runs)
 
 
 def test_the_record_gets_means_of_single_runs() -> None:
