@@ -13,29 +13,40 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.client.crowding import crowding, scheduled
+from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.tasks.base import Count, Outcome
 from tests.tiny import Falling
 
 
 @contextmanager
-def one_core_for(others: int) -> Iterator[None]:
-    """This process and its children have one core, which `others` processes use without rest.
+def core_shared_with(others: int, pid: int) -> Iterator[None]:
+    """A process's main thread has one core, which `others` processes use without rest.
 
     Each is in a session of its own: Linux shares a core out among sessions (`man 7 sched`).
     """
-    cores = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {min(cores)})
-    command = [sys.executable, "-c", "while True: pass"]
+    cores = os.sched_getaffinity(pid)
+    os.sched_setaffinity(pid, {min(cores)})
+    command = ["taskset", "-c", str(min(cores)), sys.executable, "-c", "while True: pass"]
     hogs = [subprocess.Popen(command, start_new_session=True) for _ in range(others)]
     try:
         yield
     finally:
-        os.sched_setaffinity(0, cores)
         for hog in hogs:
             hog.kill()
             hog.wait()
+
+
+class Crowded(Falling):
+    """Falls for ever, on a core that is shared with four others once the world is there."""
+
+    def perform(self, world: World, seed: int, count: Count) -> Outcome:
+        assert world.process.pid is not None
+        with core_shared_with(4, world.process.pid), world.phase("fall"):
+            world.wait(1e6)
+        return Outcome()
 
 
 def threads(proc: Path, *stats: str) -> None:
@@ -46,11 +57,9 @@ def threads(proc: Path, *stats: str) -> None:
 
 
 def test_a_late_worker_on_a_full_core_says_so(case: Case) -> None:
-    with one_core_for(4):
-        late = replace(case, timeout=4.0)
-        record, _ = Repetition(Experiment(late, Falling(1e6)), 1).run()
+    record, _ = Repetition(Experiment(replace(case, timeout=8.0), Crowded()), 1).run()
     assert record.error is not None
-    assert record.error.type == "RepetitionTimeout"
+    assert (record.error.type, record.error.phase) == ("RepetitionTimeout", "fall")
     assert "waited" in record.error.message
     assert "--sim-jobs" in record.error.message
 
