@@ -40,11 +40,11 @@ from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.summary import summarise
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, cube
-from pytest_simbench.tasks.metrics import Metric
 
 STALL, TIMEOUT, MEMORY = 5.0, 15.0, 200.0
 """Limits of every repetition: silence [s], time from launch [s], memory [MB]."""

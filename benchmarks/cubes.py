@@ -29,11 +29,11 @@ from pytest_simbench.client.world import World  # noqa: E402
 from pytest_simbench.experiment.case import Case  # noqa: E402
 from pytest_simbench.experiment.experiment import Experiment  # noqa: E402
 from pytest_simbench.experiment.repetition import Repetition  # noqa: E402
+from pytest_simbench.records.metrics import Metric  # noqa: E402
 from pytest_simbench.scene import Pose, Scene  # noqa: E402
 from pytest_simbench.tasks import Jitter, Outcome, Stacking, Task  # noqa: E402
 from pytest_simbench.tasks.base import CUBE_SIZE, Count, cube  # noqa: E402
 from pytest_simbench.tasks.manipulator import Manipulator, tool_over, top_down_grasps  # noqa: E402
-from pytest_simbench.tasks.metrics import Metric  # noqa: E402
 
 NUMBERS = (21, 42, 84, 126, 168, 210)
 ROW = 14

@@ -18,9 +18,9 @@ from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, cube
-from pytest_simbench.tasks.metrics import Metric
 
 
 @dataclass(frozen=True)

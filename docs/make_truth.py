@@ -20,15 +20,15 @@ from pathlib import Path
 
 from tables import engine_version, filled
 
+from pytest_simbench.ground.text import for_markdown
 from pytest_simbench.laws import LAW, LAWS
 from pytest_simbench.measure.sweep import Swept, sweeps
 from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.records.phenomena import PHENOMENA, PHENOMENON
 from pytest_simbench.records.record import OWN_TIMESTEP, Failure, Record
-from pytest_simbench.records.text import for_markdown
 from pytest_simbench.report import markdown, sweep, truth
 from pytest_simbench.report.figures import drawing
 from pytest_simbench.report.summary import TaskSummary, summarise
-from pytest_simbench.tasks.phenomena import PHENOMENA, PHENOMENON
 
 DOCS = Path(__file__).resolve().parent
 DATA, PAGE = DOCS / "data" / "truth.csv", DOCS / "truth.md"

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pytest_simbench.records.metrics import COSTS, Metric
 from pytest_simbench.records.record import Failure, Record
 from pytest_simbench.report import cells
 from pytest_simbench.report.pooling import spread
 from pytest_simbench.tasks import Stacking, Throwing
-from pytest_simbench.tasks.metrics import COSTS, Metric
 
 DATA = Path(__file__).resolve().parent / "data"
 TASKS = {"stacking": Stacking(), "throwing": Throwing()}

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from pytest_simbench.client.world import World
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, cube, generators
-from pytest_simbench.tasks.metrics import Metric
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
 

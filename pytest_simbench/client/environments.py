@@ -19,9 +19,9 @@ from pathlib import Path
 
 from pytest_simbench.client import installing, package_index
 from pytest_simbench.client.system import SystemPython
+from pytest_simbench.ground.versions import RELEASE, VersionedName
 from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.info import SimulatorInfo, alternatives, importable, no_module
-from pytest_simbench.simulator.versions import RELEASE, VersionedName
 
 MARKER = "simbench.json"
 VARIABLE = "SIMBENCH_ENVIRONMENTS"

@@ -34,8 +34,8 @@ from pytest_simbench.client.errors import (
 from pytest_simbench.client.frame import Frame
 from pytest_simbench.client.launch import Constructed, Launch
 from pytest_simbench.client.logs import shorten_log, tail_of_log
+from pytest_simbench.ground.versions import RELEASE, VersionedName
 from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.simulator.versions import RELEASE, VersionedName
 from pytest_simbench.worker.text import named, readable
 from pytest_simbench.worker.wire import pack, unpack
 

@@ -23,9 +23,9 @@ from pathlib import Path
 
 from pytest_simbench import __version__
 from pytest_simbench.client.environments import existing, missing, outside
+from pytest_simbench.ground.versions import RELEASE, VersionedName
 from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.registry import adapter, problem, registered
-from pytest_simbench.simulator.versions import RELEASE, VersionedName
 
 SLOTS = "simbench"
 DISPLAY, GPU, VULKAN = "display", "gpu", "vulkan"

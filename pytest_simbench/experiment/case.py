@@ -12,7 +12,7 @@ from pytest_simbench.client.display import Displays
 from pytest_simbench.client.environments import Environment, interpreter
 from pytest_simbench.client.launch import Launch
 from pytest_simbench.experiment.protocol import PROTOCOLS, Protocol
-from pytest_simbench.records.names import file_name
+from pytest_simbench.ground.names import file_name
 from pytest_simbench.records.series import short
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator.registry import adapter, address

@@ -20,8 +20,8 @@ import numpy as np
 from pytest_simbench.client.environments import interpreter, missing
 from pytest_simbench.client.tape import ARRAYS, Operation
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.records.names import file_name
-from pytest_simbench.records.text import in_one_line
+from pytest_simbench.ground.names import file_name
+from pytest_simbench.ground.text import in_one_line
 from pytest_simbench.robot.registry import BUILT_IN as ROBOTS
 from pytest_simbench.scene import Scene
 from pytest_simbench.simulator.errors import SimulatorError

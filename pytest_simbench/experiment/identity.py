@@ -17,7 +17,7 @@ from pytest_simbench import __version__
 from pytest_simbench.client.environments import outside
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.records.names import file_name
+from pytest_simbench.ground.names import file_name
 from pytest_simbench.records.record import Record, Status
 from pytest_simbench.records.series import short
 from pytest_simbench.scene import MotionLimits, Pose, Robot

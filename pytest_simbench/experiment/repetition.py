@@ -33,7 +33,7 @@ from pytest_simbench.recordings import film
 from pytest_simbench.recordings.trace import FOLDER, Trace
 from pytest_simbench.records.record import OWN_TIMESTEP, Failure, Record, Status
 from pytest_simbench.simulator import DescriptionError
-from pytest_simbench.simulator.choices import seeds_seen
+from pytest_simbench.simulator.registry import seeds_seen
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.worker.stepping import CHECK_PERIOD
 from pytest_simbench.worker.text import LONGEST, named, readable, told

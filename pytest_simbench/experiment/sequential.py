@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from pytest_simbench.measure.intervals import Interval
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.verdicts import ERROR, Claim, Judgement, judge
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
-from pytest_simbench.tasks.metrics import Metric
 
 FIRST_LOOK = 10
 """Repetitions before the first look: fewer say nothing of their own spread."""

@@ -13,7 +13,6 @@ docstring."""
 
 from __future__ import annotations
 
-import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,11 +21,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import Motion, World
+from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.phenomena import PHENOMENON
+from pytest_simbench.records.readings import LAW as LAW
+from pytest_simbench.records.readings import Reading as Reading
+from pytest_simbench.records.readings import rounding as rounding
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task
-from pytest_simbench.tasks.metrics import Metric
-from pytest_simbench.tasks.phenomena import PHENOMENON
 
 GRAVITY = 9.80665
 """[m/s^2] (ISO 80000-3)."""
@@ -34,15 +36,6 @@ GRAVITY = 9.80665
 LONG = 1200.0
 """Time-out of a law over a minute or more of simulated time [s]: an engine that takes 1 s for each
 takes 4 at a step four times smaller, on a machine that does more than this."""
-
-LAW = "law"
-"""Key of a record's details that holds what was read, see `Law.perform`."""
-
-
-def rounding(scale: float, steps: int) -> float:
-    """What single precision may add up to in so many steps on a number of that size: half of the
-    last digit, 2^-24 (IEEE 754), in each of the eight operations that a step is taken to have."""
-    return scale * steps * 8 * 2.0**-24
 
 
 def stillness(dt: float, scale: float, contacts: int = 1) -> float:
@@ -58,37 +51,6 @@ def stillness(dt: float, scale: float, contacts: int = 1) -> float:
     return contacts * GRAVITY * dt**2 + rounding(scale, 1)
 
 
-@dataclass(frozen=True)
-class Reading:
-    """What an engine did, and what is right, in the law's unit.
-
-    Attributes:
-        value: measured.
-        exact: by the law.
-        tolerance: by the step; above 0.
-
-    Raises:
-        ValueError: a number that is none, or a tolerance of 0.
-    """
-
-    value: float
-    exact: float
-    tolerance: float
-
-    def __post_init__(self) -> None:
-        if not all(map(math.isfinite, (self.value, self.exact))) or not self.tolerance > 0:
-            raise ValueError(f"nothing can be read from {self}")
-
-    @property
-    def error(self) -> float:
-        return abs(self.value - self.exact)
-
-    @property
-    def ratio(self) -> float:
-        """Error over tolerance; at most 1 where the law is kept."""
-        return self.error / self.tolerance
-
-
 class Law(Task):
     """One law. Subclasses are frozen dataclasses; formula, source and tolerance in the docstring.
 
@@ -96,7 +58,7 @@ class Law(Task):
     that is deterministic.
 
     Attributes:
-        phenomenon: one of `tasks.phenomena.PHENOMENA`.
+        phenomenon: one of `records.phenomena.PHENOMENA`.
         quantity: what is measured, for instance "height fallen".
         unit: of it.
         needs: what a simulator must be able to do; others are skipped, with the reason.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pytest_simbench.measure.limits import FAILURES
 from pytest_simbench.measure.power import alike_rate, least_supported, passing_rate
 from pytest_simbench.measure.verdicts import confidence
-from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.records.metrics import Metric
 
 
 def main() -> None:

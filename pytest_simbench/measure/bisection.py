@@ -8,7 +8,7 @@ from pytest_simbench.measure.comparison import MeanDifference, compare_by_seed
 from pytest_simbench.measure.limits import FAILURES
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.speed import without_speed
-from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.records.metrics import Metric
 
 
 def first_worse(number: int, is_worse: Callable[[int], bool]) -> int:

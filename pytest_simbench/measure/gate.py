@@ -30,9 +30,9 @@ from pytest_simbench.measure.limits import FAILURES, Limit
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.speed import POWER, without_speed
 from pytest_simbench.records.configuration import differences
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import by_test
-from pytest_simbench.tasks.metrics import Metric
 
 
 @dataclass(frozen=True)

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from pytest_simbench.ground.versions import RELEASE, VersionedName, release_numbers
 from pytest_simbench.measure.change_points import ChangePoint, change_points
 from pytest_simbench.measure.limits import FAILURES
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.speed import without_speed
+from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.phenomena import PHENOMENON
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import grouped, series
-from pytest_simbench.simulator.versions import RELEASE, VersionedName, release_numbers
-from pytest_simbench.tasks.metrics import Metric
-from pytest_simbench.tasks.phenomena import PHENOMENON
 
 FEWEST = 3
 """Releases that make a history; two are compared by verdicts."""

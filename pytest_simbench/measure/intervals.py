@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.records.metrics import Metric
 
 CONFIDENCE = 0.95
 """Confidence of every interval unless said otherwise."""

@@ -11,12 +11,12 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from pytest_simbench.ground.versions import BUILD, RELEASE, VersionedName, release_numbers
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
+from pytest_simbench.records.metrics import significant
+from pytest_simbench.records.phenomena import PHENOMENA, PHENOMENON
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import grouped, series
-from pytest_simbench.simulator.versions import BUILD, RELEASE, VersionedName, release_numbers
-from pytest_simbench.tasks.metrics import significant
-from pytest_simbench.tasks.phenomena import PHENOMENA, PHENOMENON
 
 FEWEST = 2
 """Releases that make a history: what changed between two is a fact."""

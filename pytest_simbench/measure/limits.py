@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from pytest_simbench.tasks.metrics import COSTS, Metric, UnknownMetric, significant
+from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric, significant
 
 FAILURES = Metric(
     "failures", "failed repetitions", better="lower", kind="yes_no", doc="1 for each that failed"

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from pytest_simbench.measure.comparison import ALPHA, Equivalence, equivalence
 from pytest_simbench.records.configuration import text
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import RowKey, series, told
-from pytest_simbench.tasks.metrics import Metric
 
 MARGIN = 0.05
 """Shares that differ by less than this count as the same: not a whole cube of 15."""

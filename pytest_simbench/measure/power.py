@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval, proportion
-from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.records.metrics import Metric
 
 MOST = 10_000
 """Repetitions beyond which a claim is called out of reach: the truth is at its threshold."""

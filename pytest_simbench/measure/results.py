@@ -18,9 +18,9 @@ from pytest_simbench.measure.verdicts import (
     confidence,
     judge,
 )
+from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import grouped
-from pytest_simbench.tasks.metrics import COSTS, Metric, UnknownMetric
 
 
 class InconclusiveWarning(UserWarning):

@@ -17,13 +17,12 @@ from statistics import fmean
 
 import numpy as np
 
-from pytest_simbench.laws import LAW
-from pytest_simbench.laws.base import rounding
 from pytest_simbench.measure.convergence import Convergence, convergence
+from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.phenomena import PHENOMENON
+from pytest_simbench.records.readings import LAW, rounding
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import RowKey, configurations, grouped
-from pytest_simbench.tasks.metrics import Metric
-from pytest_simbench.tasks.phenomena import PHENOMENON
 
 REFERENCE = 1e-3
 """[s]. An accuracy is that which this step may cost."""

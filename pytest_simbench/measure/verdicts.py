@@ -13,7 +13,7 @@ from typing import Literal
 
 from pytest_simbench.measure.intervals import CONFIDENCE, FEWEST, Interval
 from pytest_simbench.measure.power import further_repetitions
-from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.records.metrics import Metric
 
 ERROR = 1 - CONFIDENCE
 """Probability that a verdict is wrong, at most."""

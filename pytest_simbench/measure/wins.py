@@ -10,8 +10,8 @@ from typing import Any
 from pytest_simbench.measure.comparison import ALPHA, MeanDifference, compare_by_seed
 from pytest_simbench.measure.intervals import FEWEST, varies
 from pytest_simbench.measure.limits import FAILURES
+from pytest_simbench.records.metrics import COSTS, Metric
 from pytest_simbench.records.record import Record
-from pytest_simbench.tasks.metrics import COSTS, Metric
 
 COMPARED_COSTS = ("rtf", "cpu_cost", "ram")
 """Of the costs those that belong to the simulator alone: the others hold planning and start-up."""

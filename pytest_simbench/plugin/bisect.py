@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.client import package_index
+from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.measure.bisection import (
     between,
     difference,
@@ -27,11 +28,10 @@ from pytest_simbench.plugin import options
 from pytest_simbench.plugin.history import folder_of
 from pytest_simbench.plugin.values import Span, shown
 from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.records.metrics import Metric, UnknownMetric
 from pytest_simbench.records.series import series
-from pytest_simbench.records.text import for_terminal
 from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.tasks.metrics import Metric, UnknownMetric
 
 
 def bisect(config: pytest.Config) -> int:

@@ -9,6 +9,7 @@ from importlib.metadata import version
 import pytest
 
 from pytest_simbench.client.environments import interpreter, outside
+from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.plugin import options, recording, spellings
 from pytest_simbench.plugin.bisect import bisect
 from pytest_simbench.plugin.data import download
@@ -16,7 +17,6 @@ from pytest_simbench.plugin.environments import install, list_environments, unin
 from pytest_simbench.plugin.merge import merge_runs, report_runs
 from pytest_simbench.plugin.selection import Selection
 from pytest_simbench.plugin.session import session_of
-from pytest_simbench.records.text import for_terminal
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.registry import adapter, known, problem, registered, registry

@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.ground.text import for_terminal
+from pytest_simbench.ground.versions import base_name
 from pytest_simbench.measure.gate import GateReport, run_gate, side_by_side
 from pytest_simbench.measure.limits import Limit, LimitError, parse_limits
 from pytest_simbench.plugin import options
@@ -20,10 +22,8 @@ from pytest_simbench.records.baseline import (
 )
 from pytest_simbench.records.configuration import other_meanings
 from pytest_simbench.records.folder import Reading
-from pytest_simbench.records.text import for_terminal
+from pytest_simbench.records.metrics import Metric, UnknownMetric
 from pytest_simbench.report.changes import render_markdown, render_terminal
-from pytest_simbench.simulator.versions import base_name
-from pytest_simbench.tasks.metrics import Metric, UnknownMetric
 
 Beside = tuple[str, Sequence[str]]
 """A simulator, and others that are compared with it."""

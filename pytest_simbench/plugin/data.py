@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.plugin import options
-from pytest_simbench.records.text import for_terminal
 
 
 def folder(config: pytest.Config) -> Path:

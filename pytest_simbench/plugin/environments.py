@@ -6,9 +6,9 @@ import pytest
 
 from pytest_simbench.client.environments import Environment, default_folder, existing, remove
 from pytest_simbench.client.installing import size_mb
+from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.plugin import options
 from pytest_simbench.plugin.simulator_names import progress
-from pytest_simbench.records.text import for_terminal
 from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.registry import adapter
 

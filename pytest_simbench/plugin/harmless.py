@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from pytest_simbench.records.text import for_terminal
+from pytest_simbench.ground.text import for_terminal
 
 LONGEST_LINE = 20_000
 """Characters of a line in a failing test's report: diffs of long values are wanted there."""

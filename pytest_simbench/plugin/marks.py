@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.ground.versions import covers
 from pytest_simbench.plugin import options
 from pytest_simbench.plugin.selection import Selection
 from pytest_simbench.plugin.values import BadValue, shown
 from pytest_simbench.plugin.variants import Variant
 from pytest_simbench.simulator import registry
 from pytest_simbench.simulator.info import Capability
-from pytest_simbench.simulator.versions import covers
 
 NOTHING = pytest.param(
     Variant("none", "headless", ""),

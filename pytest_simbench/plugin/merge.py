@@ -17,13 +17,13 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.experiment.identity import file_stem_of
+from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.plugin import options, recording
 from pytest_simbench.records.folder import RECORDS, TASKS, Reading, RunFolder
 from pytest_simbench.records.merging import Merged, MergeError, merge, merge_tasks
 from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import Record, RecordError
-from pytest_simbench.records.text import for_terminal
 from pytest_simbench.report import history, repeatability, sweep
 from pytest_simbench.report.brief import render_brief
 from pytest_simbench.report.changes import render_terminal

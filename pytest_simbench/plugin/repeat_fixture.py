@@ -14,6 +14,7 @@ from pytest_simbench.experiment.executor import ExecutorError
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.sequential import Plan, SequentialResultSet
+from pytest_simbench.ground.text import in_one_line
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.plugin import options, recording
 from pytest_simbench.plugin.arguments import can_do
@@ -24,7 +25,6 @@ from pytest_simbench.plugin.run import Run
 from pytest_simbench.plugin.session import session_of
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.text import in_one_line
 from pytest_simbench.tasks.base import Task
 
 

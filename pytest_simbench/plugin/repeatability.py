@@ -16,9 +16,9 @@ from pytest_simbench.client.errors import DisplayError
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.handle import SimulatorHandle
+from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.plugin.arguments import can_do
 from pytest_simbench.records.repeatability import NAME, Line, append
-from pytest_simbench.records.text import for_terminal
 from pytest_simbench.repeatability import search, stability
 from pytest_simbench.repeatability.agreement import FOLDER, Sample
 from pytest_simbench.repeatability.episode import Episodes

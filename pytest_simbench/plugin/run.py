@@ -20,6 +20,7 @@ from pytest_simbench.experiment.executor import Executor, LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.sharing import SharingExecutor
 from pytest_simbench.experiment.slots import Slots
+from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.plugin import cluster, options, recording, thresholds
 from pytest_simbench.plugin.compare import Comparison
 from pytest_simbench.plugin.history import elsewhere, folder_of
@@ -30,7 +31,6 @@ from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import NAME
-from pytest_simbench.records.text import for_terminal
 from pytest_simbench.report import markdown, sweep
 from pytest_simbench.report.brief import render_brief
 from pytest_simbench.report.files import write_outcome, write_report

@@ -9,6 +9,7 @@ import pytest
 
 from pytest_simbench.client import environments
 from pytest_simbench.cluster.offers import Node, unmet
+from pytest_simbench.ground.versions import base_name
 from pytest_simbench.plugin import cluster, options
 from pytest_simbench.plugin.history import releases_of
 from pytest_simbench.plugin.interpreters import checked_specification, interpreter_path
@@ -19,7 +20,6 @@ from pytest_simbench.scene import Robot
 from pytest_simbench.simulator import registry
 from pytest_simbench.simulator.errors import SettingsError, SimulatorError
 from pytest_simbench.simulator.settings import Settings
-from pytest_simbench.simulator.versions import base_name
 
 MODES = ("headless", "gui")
 

@@ -11,11 +11,11 @@ import pytest
 
 from pytest_simbench.client.environments import Environment, outside
 from pytest_simbench.client.system import OLDEST, look_into
+from pytest_simbench.ground.versions import BUILD, RELEASE, VersionedName, base_name
 from pytest_simbench.plugin.interpreters import interpreter_path
 from pytest_simbench.plugin.values import shown
 from pytest_simbench.simulator.info import no_module
 from pytest_simbench.simulator.registry import adapter, check_names
-from pytest_simbench.simulator.versions import BUILD, RELEASE, VersionedName, base_name
 
 LABEL = re.compile(r"[A-Za-z0-9](?:[\w.+-]{0,58}\w)?", re.ASCII)
 

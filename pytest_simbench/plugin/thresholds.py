@@ -10,8 +10,8 @@ from collections.abc import Iterable, Mapping
 
 from pytest_simbench.measure.limits import FAILURES, LimitError, check_gate
 from pytest_simbench.records.folder import Reading
+from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric
 from pytest_simbench.repeatability.stability import KEPT
-from pytest_simbench.tasks.metrics import COSTS, Metric, UnknownMetric
 
 OF_EVERY_TASK = (*COSTS, FAILURES, KEPT)
 """What thresholds may be of besides the metrics of tasks."""

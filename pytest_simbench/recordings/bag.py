@@ -22,9 +22,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pytest_simbench.ground.text import for_terminal, in_one_line
 from pytest_simbench.recordings.figure import relative
 from pytest_simbench.recordings.trace import Trace
-from pytest_simbench.records.text import for_terminal, in_one_line
 from pytest_simbench.scene import Body, FloatArray, Pose, Solid
 
 if TYPE_CHECKING:

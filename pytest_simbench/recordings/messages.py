@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from pytest_simbench.records.text import in_one_line
+from pytest_simbench.ground.text import in_one_line
 from pytest_simbench.scene import FloatArray, Pose, Solid
 
 NANOSECONDS = 10**9

@@ -5,20 +5,30 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from math import isfinite
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, Protocol, get_args
 
 from pytest_simbench.records import checked
+from pytest_simbench.records.metrics import Better, Kind, Metric
 from pytest_simbench.records.record import plain
-from pytest_simbench.tasks.metrics import Better, Kind, Metric
-
-if TYPE_CHECKING:
-    from pytest_simbench.tasks.base import Task
 
 SCHEMA = 1
 
 
 class TaskDescriptionError(ValueError):
     """What is no description; the message says where, and what is wrong with it."""
+
+
+class Describing(Protocol):
+    """What can be described: a task."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]: ...
+
+    @property
+    def references(self) -> Mapping[str, float]: ...
 
 
 @dataclass(frozen=True)
@@ -36,7 +46,7 @@ class TaskDescription:
     references: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, task: Task) -> TaskDescription:
+    def of(cls, task: Describing) -> TaskDescription:
         """What a task says of itself; a reference that is no finite number is none."""
         known = {name: value for name, value in task.references.items() if isfinite(value)}
         return cls(task.name, tuple(task.metrics), known)

@@ -18,19 +18,16 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pytest_simbench.records import lines
-from pytest_simbench.records.description import TaskDescription, Threshold
+from pytest_simbench.records.description import Describing, TaskDescription, Threshold
 from pytest_simbench.records.lines import DAMAGED, LARGEST_LINE, Found, LinesFile, UnreadableError
 from pytest_simbench.records.lock import FolderLock
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.records.series import settled
-
-if TYPE_CHECKING:
-    from pytest_simbench.tasks.base import Task
-    from pytest_simbench.tasks.metrics import Metric
 
 RECORDS = "records.jsonl"
 TASKS = "tasks.jsonl"
@@ -182,7 +179,7 @@ class RunFolder:
         with self._lock:
             self.own += records
 
-    def describe(self, task: Task | TaskDescription) -> None:
+    def describe(self, task: Describing | TaskDescription) -> None:
         """Write what a task's numbers mean, unless the folder says so already."""
         found = task if isinstance(task, TaskDescription) else TaskDescription.of(task)
         with self._lock:

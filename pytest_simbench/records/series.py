@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import NamedTuple, TypeVar
 
+from pytest_simbench.ground.versions import VersionedName, release_numbers
 from pytest_simbench.records.configuration import (
     Told,
     Use,
@@ -15,7 +16,6 @@ from pytest_simbench.records.configuration import (
     values,
 )
 from pytest_simbench.records.record import Record
-from pytest_simbench.simulator.versions import VersionedName, release_numbers
 
 TWIN = equal_to("twin")
 

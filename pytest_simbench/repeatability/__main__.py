@@ -12,7 +12,7 @@ from pathlib import Path
 from pytest_simbench.client.errors import WorkerError
 from pytest_simbench.experiment.example import Example, ExampleError, read_example
 from pytest_simbench.experiment.handle import SimulatorHandle
-from pytest_simbench.records.text import for_terminal, in_one_line
+from pytest_simbench.ground.text import for_terminal, in_one_line
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

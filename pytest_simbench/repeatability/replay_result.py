@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pytest_simbench.records.metrics import significant
 from pytest_simbench.repeatability.episode import Episode
 from pytest_simbench.repeatability.motions import Difference
-from pytest_simbench.tasks.metrics import significant
 
 
 @dataclass(frozen=True)

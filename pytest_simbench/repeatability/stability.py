@@ -10,6 +10,7 @@ from typing import Any
 from pytest_simbench.measure.intervals import Interval, interval, proportion
 from pytest_simbench.measure.results import InconclusiveWarning
 from pytest_simbench.measure.verdicts import Verdict, at_least, confidence, judge
+from pytest_simbench.records.metrics import Metric, significant
 from pytest_simbench.repeatability.attack import Attack, Perturbations
 from pytest_simbench.repeatability.episode import Episodes
 from pytest_simbench.repeatability.motions import gaps
@@ -21,7 +22,6 @@ from pytest_simbench.repeatability.perturbation import (
 )
 from pytest_simbench.repeatability.search import bounds_in_words
 from pytest_simbench.tasks import Moment
-from pytest_simbench.tasks.metrics import Metric, significant
 
 SENSITIVITY_TIMES = (0.1, 1.0, 5.0, 20.0)
 """Seconds after the task began at which sensitivity is told."""

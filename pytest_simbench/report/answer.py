@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pytest_simbench.measure.intervals import FEWEST
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.report import cells
 from pytest_simbench.report.summary import Row, TaskSummary
-from pytest_simbench.tasks.metrics import Metric
 
 NAMED = 3
 """How many simulators a sentence names; the table below has them all."""

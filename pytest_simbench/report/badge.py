@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 
+from pytest_simbench.ground.text import in_one_line
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.text import in_one_line
 
 LABEL = "simulators"
 

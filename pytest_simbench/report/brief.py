@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pytest_simbench.records.text import for_terminal, in_one_line
+from pytest_simbench.ground.text import for_terminal, in_one_line
 from pytest_simbench.report import cells, columns, truth
 from pytest_simbench.report.answer import short_labels
 from pytest_simbench.report.grid import GAP, Column, fill, render

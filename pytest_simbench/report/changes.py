@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from pytest_simbench.ground.text import for_markdown, for_terminal
 from pytest_simbench.measure.gate import Change, GateReport
 from pytest_simbench.records.series import short
-from pytest_simbench.records.text import for_markdown, for_terminal
 from pytest_simbench.report import markdown
 from pytest_simbench.report.grid import Column, fill, render
 

@@ -13,14 +13,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from pytest_simbench.records.names import file_name
+from pytest_simbench.ground.names import file_name
+from pytest_simbench.ground.text import for_figure
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.paths import write_whole
-from pytest_simbench.records.text import for_figure
 from pytest_simbench.report.answer import short_labels
 from pytest_simbench.report.cells import unit
 from pytest_simbench.report.pooling import merged_order
 from pytest_simbench.report.summary import Row, TaskSummary
-from pytest_simbench.tasks.metrics import Metric
 
 DPI = 120
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")

@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
 
+from pytest_simbench.ground.text import for_csv, for_terminal
 from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.records.folder import Reading, RunFolder
+from pytest_simbench.records.metrics import COSTS
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.text import for_csv, for_terminal
 from pytest_simbench.report import history, markdown, sweep
 from pytest_simbench.report import outcome as outcome_of
 from pytest_simbench.report.badge import badge
@@ -29,7 +30,6 @@ from pytest_simbench.report.sheet import sheet_name
 from pytest_simbench.report.sheet import sheets as sheets_of
 from pytest_simbench.report.summary import PHASES, TaskSummary, at_own_steps, summarise
 from pytest_simbench.report.truth import others
-from pytest_simbench.tasks.metrics import COSTS
 from pytest_simbench.worker.text import named
 
 MARKDOWN_NAME = "report.md"
@@ -214,7 +214,7 @@ def csv_of(records: Sequence[Record]) -> str:
     """One line for each repetition; an empty cell where a record has no value.
 
     Columns: what identifies it, its error, `metrics.<name>`, `cost.<name>` (see
-    `tasks.metrics.COSTS`) and `seconds.<phase>`.
+    `records.metrics.COSTS`) and `seconds.<phase>`.
     """
     metrics = list(dict.fromkeys(name for record in records for name in record.metrics))
     file = io.StringIO(newline="")

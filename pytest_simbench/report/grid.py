@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from pytest_simbench.records.text import for_terminal, in_one_line
+from pytest_simbench.ground.text import for_terminal, in_one_line
 
 GAP = 2
 """Blank columns between two columns of a table."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from pytest_simbench.records.text import LONGEST_LABEL, in_one_line
+from pytest_simbench.ground.text import LONGEST_LABEL, in_one_line
+from pytest_simbench.records.metrics import COSTS, Metric
 from pytest_simbench.report import cells
 from pytest_simbench.report.answer import NAMED, Standing, short_labels, standing
 from pytest_simbench.report.pooling import Spread
 from pytest_simbench.report.summary import Row, TaskSummary
-from pytest_simbench.tasks.metrics import COSTS, Metric
 
 OUTCOMES = 2
 """Metrics of a task without metrics of the study that the second sentence names."""

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from pytest_simbench.ground.names import file_name
+from pytest_simbench.ground.text import for_figure
 from pytest_simbench.measure.history import Course, History, histories
 from pytest_simbench.measure.intervals import interval
 from pytest_simbench.measure.law_history import LawHistory, law_histories
 from pytest_simbench.records.folder import Reading
-from pytest_simbench.records.names import file_name
-from pytest_simbench.records.text import for_figure
 from pytest_simbench.report.figures import COLOURS, drawing, heading, save
 from pytest_simbench.report.law_history import draw_laws
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from pytest_simbench.ground.text import for_figure
 from pytest_simbench.measure.law_history import LawHistory, Reached, times
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
-from pytest_simbench.records.text import for_figure
 
 STEPS = (
     (KEPT, "#d9e6f2", "kept"),

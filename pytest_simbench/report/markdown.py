@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from pytest_simbench.ground.text import for_markdown
 from pytest_simbench.measure.sweep import Swept
-from pytest_simbench.records.text import for_markdown
 from pytest_simbench.report import columns, sweep, truth
 from pytest_simbench.report.answer import sentences
 from pytest_simbench.report.grid import Column, capital

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pytest_simbench.measure.intervals import interval
-from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.records.metrics import Metric
 
 Ends = Callable[[Sequence[float], Metric], tuple[float, float]]
 """Gives the lower and upper end of the interval of a metric's mean; infinite where not known."""

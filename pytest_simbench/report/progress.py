@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from pytest_simbench.records.text import in_one_line
+from pytest_simbench.ground.text import in_one_line
 
 REDRAW_SECONDS = 0.1
 """A terminal line is redrawn at most this often: faster than the eye follows costs only CPU."""

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from pytest_simbench.ground.text import for_markdown, for_terminal, in_one_line
+from pytest_simbench.records.metrics import significant
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.repeatability import Line, read
-from pytest_simbench.records.text import for_markdown, for_terminal, in_one_line
 from pytest_simbench.repeatability.agreement import LIMITS, Agreement, agreements
 from pytest_simbench.repeatability.motions import GROWTH_TIMES
 from pytest_simbench.repeatability.replay_result import Again
 from pytest_simbench.report.grid import Column, fill, render
 from pytest_simbench.report.markdown import table
-from pytest_simbench.tasks.metrics import significant
 
 Table = tuple[str, str, list[Column]]
 """Title, how to read it, columns."""

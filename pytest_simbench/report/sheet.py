@@ -12,11 +12,11 @@ from pathlib import Path
 from statistics import fmean
 
 from pytest_simbench.experiment.identity import file_stem_of
+from pytest_simbench.ground.names import file_name
+from pytest_simbench.ground.text import for_figure
 from pytest_simbench.recordings.album import FOLDER, Album
-from pytest_simbench.records.names import file_name
 from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.text import for_figure
 from pytest_simbench.report.figures import drawing
 
 CELL = (2.0, 1.5)

@@ -12,6 +12,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from pytest_simbench.measure.wins import Win
+from pytest_simbench.records.choices import published_again
+from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.phenomena import PHENOMENON
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import grouped, series
 from pytest_simbench.report.pooling import (
@@ -24,9 +27,6 @@ from pytest_simbench.report.pooling import (
     pooled_by_phase,
     spread,
 )
-from pytest_simbench.simulator.choices import published_again
-from pytest_simbench.tasks.metrics import Metric
-from pytest_simbench.tasks.phenomena import PHENOMENON
 
 PHASES = ("launch", "compile", "load", "plan", "step", "other")
 """Where the wall time of a repetition goes, in order."""

@@ -7,16 +7,16 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from pytest_simbench.ground.names import file_name
+from pytest_simbench.ground.text import for_figure, for_terminal
 from pytest_simbench.measure.convergence import Convergence
 from pytest_simbench.measure.sweep import REFERENCE, Choice, Line, Point, Swept, choice, sweeps
 from pytest_simbench.records.folder import Reading
-from pytest_simbench.records.names import file_name
+from pytest_simbench.records.phenomena import ordered
 from pytest_simbench.records.series import step_text
-from pytest_simbench.records.text import for_figure, for_terminal
 from pytest_simbench.report import cells
 from pytest_simbench.report.figures import drawing, line_style, save
 from pytest_simbench.report.grid import Column, fill, render
-from pytest_simbench.tasks.phenomena import ordered
 
 TITLE = "the same laws over time steps"
 

@@ -1,7 +1,7 @@
 """What an adapter implements, its settings, capabilities and report of the world it built."""
 
+from pytest_simbench.records.choices import DataSeen, SeedsSeen, Seen
 from pytest_simbench.simulator.base import Simulator
-from pytest_simbench.simulator.choices import DataSeen, SeedsSeen, Seen
 from pytest_simbench.simulator.errors import (
     DescriptionError,
     DivergedError,

@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_simbench.records.choices import Seen
 from pytest_simbench.scene import FloatArray, Scene
-from pytest_simbench.simulator.choices import Seen
 from pytest_simbench.simulator.errors import NotSupportedError
 from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.settings import Settings

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 class SimulatorError(Exception):
     """Base of every error raised on behalf of a simulator. Its message may quote any file or log:
-    whoever shows it makes it harmless (`records.text`)."""
+    whoever shows it makes it harmless (`ground.text`)."""
 
 
 class SettingsError(SimulatorError):

@@ -8,9 +8,9 @@ from enum import StrEnum
 from fnmatch import fnmatchcase
 from importlib.util import find_spec
 
+from pytest_simbench.ground.versions import BUILD, VersionedName, release_numbers
 from pytest_simbench.scene import Robot, Scene
 from pytest_simbench.simulator.errors import SimulatorError
-from pytest_simbench.simulator.versions import BUILD, VersionedName, release_numbers
 
 
 class Capability(StrEnum):

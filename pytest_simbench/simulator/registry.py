@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -9,11 +10,12 @@ from functools import cache
 from importlib.metadata import Distribution, EntryPoint, distributions
 from typing import Any
 
+from pytest_simbench.ground.versions import VersionedName, base_name
+from pytest_simbench.records.choices import Seen
 from pytest_simbench.simulator.base import Simulator
 from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.settings import Settings, changed, profile
-from pytest_simbench.simulator.versions import VersionedName, base_name
 
 GROUP = "pytest_simbench.simulators"
 """Entry-point group in which adapters register, `name = "package.module:Class"`."""
@@ -175,3 +177,13 @@ def settings_of(name: str, profile_name: str, changes: Mapping[str, Any]) -> Set
         SettingsError: it has no such profile, or cannot take a change.
     """
     return changed(profile(adapter(name).profiles, profile_name, name), changes, name)
+
+
+def seeds_seen(adapter: str, profile: str) -> tuple[Seen, ...]:
+    """What the adapter `module:Class` says of a profile; nothing where it says nothing."""
+    module, _, name = adapter.partition(":")
+    try:
+        declared = getattr(importlib.import_module(module), name).chosen_on
+    except (ImportError, AttributeError):  # an adapter that only its own interpreter can import
+        return ()
+    return tuple(declared.get(profile, ()))

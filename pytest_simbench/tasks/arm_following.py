@@ -20,6 +20,7 @@ from pytest_simbench.client.world import World
 from pytest_simbench.data import pushes
 from pytest_simbench.data.pushes import COMMANDS, FREE, PUSH, ArmRun, ArmRuns, Command
 from pytest_simbench.data.tosses import Half
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene, Trajectory
 from pytest_simbench.tasks.arm_pushing import (
@@ -37,7 +38,6 @@ from pytest_simbench.tasks.arm_pushing import (
     yaw,
 )
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task
-from pytest_simbench.tasks.metrics import Metric
 
 CONTROL_PERIOD, GAIN, FASTEST = 0.05, 10.0, math.radians(30.0)
 """Of the source's control law: each period [s] a joint's velocity becomes the gain [1/s] times what

@@ -23,6 +23,7 @@ from pytest_simbench.data import pushes
 from pytest_simbench.data.errors import DataError
 from pytest_simbench.data.pushes import PUSH, ArmRun, ArmRuns
 from pytest_simbench.data.tosses import Half
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.robot.adapting import bound_joints, lock_joints
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.tracking import track
@@ -30,7 +31,6 @@ from pytest_simbench.scene import Box, FloatArray, Gripper, Joint, Pose, Robot, 
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.robot_files import keep
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task
-from pytest_simbench.tasks.metrics import Metric
 
 CUBE_SIZE, CUBE_MASS = 0.075, 0.0884
 """[m], [kg] (the source)."""

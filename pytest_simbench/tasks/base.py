@@ -10,9 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import World
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.robot.errors import RobotError
 from pytest_simbench.scene import Box, Pose, Robot, Scene, Vector3
-from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.moments import Moment
 
 CUBE_SIZE = 0.05

@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import Motion, World
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.robot.collision import PlanningScene
 from pytest_simbench.robot.errors import PlanningError, Unreachable
 from pytest_simbench.robot.kinematics import inverse_kinematics, tool_over, tool_path
@@ -26,7 +27,6 @@ from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene, Vector3
 from pytest_simbench.tasks.arm import Arm
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, distance, generators
 from pytest_simbench.tasks.manipulator import APPROACH
-from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.moments import Moment
 from pytest_simbench.tasks.sliding import smallest_turning_radius
 

@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import World
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.robot.grasping import grasping
 from pytest_simbench.robot.panda import panda
 from pytest_simbench.robot.planning import PlanningError
@@ -33,7 +34,6 @@ from pytest_simbench.tasks.base import (
     scaled,
 )
 from pytest_simbench.tasks.manipulator import Manipulator
-from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.reach import cannot_handle
 
 TABLE_TOP = 0.30

@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import Motion, World
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.robot.errors import PlanningError, RobotError
 from pytest_simbench.robot.grasping import grasping
 from pytest_simbench.robot.model import RobotModel
@@ -47,7 +48,6 @@ from pytest_simbench.tasks.base import (
 )
 from pytest_simbench.tasks.impact import impact
 from pytest_simbench.tasks.manipulator import Manipulator
-from pytest_simbench.tasks.metrics import Metric
 from pytest_simbench.tasks.moments import Moment
 from pytest_simbench.tasks.reach import cannot_handle
 from pytest_simbench.tasks.throw_analysis import Thrown

@@ -17,9 +17,9 @@ from scipy.spatial.transform import Rotation, Slerp
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.data import tosses as cube
 from pytest_simbench.data.tosses import Half, Toss, Tosses
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, FloatArray, Scene
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task
-from pytest_simbench.tasks.metrics import Metric
 
 SMALLEST = 5
 """Tosses of the smallest version."""

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from pytest_simbench.client.world import World
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.tasks.base import CUBE_SIZE, Count, Jitter, Outcome, Task, cube, distance
-from pytest_simbench.tasks.metrics import Metric
 
 STANDING_DISTANCE = 0.01
 """A cube farther than this from its place when the scene was built has fallen [m]."""

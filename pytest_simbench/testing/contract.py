@@ -12,10 +12,10 @@ from contextlib import contextmanager
 import numpy as np
 
 from pytest_simbench.client.errors import WorkerError
+from pytest_simbench.ground.versions import base_name
 from pytest_simbench.scene import Pose, Trajectory
 from pytest_simbench.simulator import Capability, Settings
 from pytest_simbench.simulator.settings import changed
-from pytest_simbench.simulator.versions import base_name
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
 from pytest_simbench.testing.robots import any_robot, finger_unit

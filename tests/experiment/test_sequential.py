@@ -14,8 +14,8 @@ from pytest_simbench.measure import intervals
 from pytest_simbench.measure.results import InconclusiveWarning
 from pytest_simbench.measure.verdicts import ERROR, Verdict, at_least
 from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
-from pytest_simbench.tasks.metrics import Metric
 from tests.records.build import METRICS, failed, record
 
 PLAN = Plan.up_to(160)

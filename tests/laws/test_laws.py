@@ -10,10 +10,10 @@ import pytest
 from pytest_simbench.client.environments import missing
 from pytest_simbench.laws import LAW, LAWS, Law, Reading
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
+from pytest_simbench.records.phenomena import PHENOMENA, PHENOMENON
 from pytest_simbench.scene import Scene
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks.base import Jitter, Outcome
-from pytest_simbench.tasks.phenomena import PHENOMENA, PHENOMENON
 from pytest_simbench.testing.subject import Subject
 
 from .faults import FAULTS

@@ -16,7 +16,7 @@ from scipy.stats import binom
 
 from pytest_simbench.measure.intervals import FEWEST, interval, proportion
 from pytest_simbench.measure.verdicts import Verdict, at_least, at_most, confidence, judge
-from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.records.metrics import Metric
 
 Draw = Callable[[np.random.Generator, int], NDArray[np.float64]]
 SHARE = Metric("placed", "placed", kind="share", of=15)

@@ -19,7 +19,7 @@ from pytest_simbench.measure.intervals import (
     skewed_t,
     varies,
 )
-from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.records.metrics import Metric
 
 SHARE = Metric("placed", "placed", kind="share", of=15)
 YES_NO = Metric("hit", "hit", kind="yes_no")

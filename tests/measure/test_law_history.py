@@ -8,8 +8,8 @@ import pytest
 
 from pytest_simbench.measure.history import histories
 from pytest_simbench.measure.law_history import LawHistory, law_histories
+from pytest_simbench.records.phenomena import PHENOMENON
 from pytest_simbench.records.record import Record
-from pytest_simbench.tasks.phenomena import PHENOMENON
 from tests.records.build import failed, record
 
 RELEASES = ("1.2", "1.9", "1.10", "2.0")

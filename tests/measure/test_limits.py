@@ -16,7 +16,7 @@ from pytest_simbench.measure.limits import (
     check_threshold,
     parse_limits,
 )
-from pytest_simbench.tasks.metrics import COSTS, Metric, UnknownMetric
+from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric
 from tests.records.build import METRICS
 
 PLACED, _, ERROR, _ = METRICS

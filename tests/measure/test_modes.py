@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pytest_simbench.measure.modes import MARGIN, ModeComparison, compare_modes
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
-from pytest_simbench.tasks.metrics import Metric
 
 PLACED = Metric("placed", "placed", kind="share", of=15, better="higher", study=True)
 

@@ -18,7 +18,7 @@ from pytest_simbench.measure.power import (
     repetitions_for_proportion,
     repetitions_to_detect,
 )
-from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.records.metrics import Metric
 
 COUNT = Metric("picks", "picks")
 HIT = Metric("hit", "hit", kind="yes_no")

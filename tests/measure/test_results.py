@@ -9,7 +9,7 @@ import pytest
 from pytest_simbench.measure.intervals import interval, proportion
 from pytest_simbench.measure.results import InconclusiveWarning, ResultSet
 from pytest_simbench.measure.verdicts import at_least
-from pytest_simbench.tasks.metrics import UnknownMetric
+from pytest_simbench.records.metrics import UnknownMetric
 from tests.records.build import METRICS, failed, record, records
 
 

@@ -9,9 +9,9 @@ import pytest
 
 from pytest_simbench.laws import LAW
 from pytest_simbench.measure.sweep import Swept, choice, sweeps, tolerance_at
+from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.phenomena import PHENOMENON
 from pytest_simbench.records.record import OWN_TIMESTEP, Failure, Record
-from pytest_simbench.tasks.metrics import Metric
-from pytest_simbench.tasks.phenomena import PHENOMENON
 
 METRICS = {"fall": (Metric("error", "error", "m", "lower"),)}
 STEPS = (0.004, 0.002, 0.001, 0.0005)

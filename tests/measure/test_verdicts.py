@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from pytest_simbench.measure.intervals import Interval, interval, proportion
 from pytest_simbench.measure.verdicts import Verdict, at_least, at_most, confidence, judge
-from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.records.metrics import Metric
 
 
 def between(low: float, high: float) -> Interval:

@@ -16,7 +16,7 @@ import pytest
 
 import pytest_simbench.tasks  # noqa: F401 - pytester would import native modules a second time
 from pytest_simbench.records.description import TaskDescription
-from pytest_simbench.tasks.metrics import Metric
+from pytest_simbench.records.metrics import Metric
 
 TEST = """
     import os

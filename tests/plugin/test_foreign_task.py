@@ -17,7 +17,7 @@ PACKAGE = '''
 
     from pytest_simbench.scene import Pose, Scene
     from pytest_simbench.tasks.base import Outcome, Task, cube
-    from pytest_simbench.tasks.metrics import Metric
+    from pytest_simbench.records.metrics import Metric
 
     @dataclass(frozen=True)
     class Pouring(Task):

@@ -18,7 +18,7 @@ HOLDING = '''
     from pytest_simbench.robot.panda import panda
     from pytest_simbench.scene import Robot, Scene
     from pytest_simbench.tasks.base import Outcome, Task
-    from pytest_simbench.tasks.metrics import Metric
+    from pytest_simbench.records.metrics import Metric
 
     @dataclass(frozen=True)
     class Holding(Task):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Failure, Record
-from pytest_simbench.tasks.metrics import Metric
 
 METRICS = (
     Metric("placed", "placed", kind="share", of=15, study=True),

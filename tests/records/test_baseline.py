@@ -17,8 +17,8 @@ from pytest_simbench.records.baseline import (
 )
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record, RecordError
-from pytest_simbench.tasks.metrics import Metric
 
 from .build import failed, record
 

@@ -17,8 +17,8 @@ from pytest_simbench.records.configuration import (
     other_meanings,
 )
 from pytest_simbench.records.description import TaskDescription
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
-from pytest_simbench.tasks.metrics import Metric
 
 from .build import failed, record
 

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.records.description import TaskDescription, TaskDescriptionError, Threshold
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.tasks import LeaningTowers, Stacking, Throwing
-from pytest_simbench.tasks.metrics import Metric
 
 METRIC = {"name": "x", "title": "X"}
 

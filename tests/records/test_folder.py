@@ -14,9 +14,9 @@ import pytest
 from pytest_simbench.records.description import TaskDescription, Threshold
 from pytest_simbench.records.folder import RECORDS, TASKS, THRESHOLDS, RunFolder
 from pytest_simbench.records.lines import LARGEST_LINE
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.paths import FolderError
 from pytest_simbench.records.record import RecordError
-from pytest_simbench.tasks.metrics import Metric
 
 from .build import failed, record
 

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.merging import MergeError, merge, merge_tasks
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
-from pytest_simbench.tasks.metrics import Metric
 
 from .build import record
 

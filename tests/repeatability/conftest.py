@@ -12,11 +12,11 @@ from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.handle import SimulatorHandle
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.repeatability.episode import Episodes
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.tasks import Jitter, LeaningTowers
 from pytest_simbench.tasks.base import Count, Outcome, Task, cube, generators
-from pytest_simbench.tasks.metrics import Metric
 from tests.conftest import ADAPTERS
 
 WHITE = (1.0, 1.0, 1.0, 1.0)

@@ -14,12 +14,12 @@ import numpy as np
 
 from pytest_simbench.client.tape import Operation, Tape
 from pytest_simbench.client.world import Motion
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.repeatability.episode import Episode
 from pytest_simbench.repeatability.perturbation import Perturbation
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene
 from pytest_simbench.tasks import LeaningTowers
 from pytest_simbench.tasks.base import Outcome
-from pytest_simbench.tasks.metrics import Metric
 
 METRICS = (
     Metric("standing", "standing", kind="share", of=4),

@@ -7,8 +7,8 @@ import statistics
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Failure, Record
-from pytest_simbench.tasks.metrics import Metric
 
 STACKING = (
     Metric("placed", "placed", "", "higher", "share", 15, study=True),

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from pytest_simbench.measure.comparison import MeanDifference
 from pytest_simbench.measure.wins import Win
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.report.answer import sentences, short_labels
 from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.pooling import Spread
 from pytest_simbench.report.summary import Row, TaskSummary, summarise
-from pytest_simbench.tasks.metrics import Metric
 
 from .samples import METRICS, record, stacking_run, throwing_run, two_errors
 

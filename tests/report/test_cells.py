@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.report.cells import interval, metric_value, number
 from pytest_simbench.report.pooling import spread
-from pytest_simbench.tasks.metrics import Metric
 
 LATE = Metric("late", "late", unit="s")
 CUBES = Metric("moved", "moved", unit="cubes")

@@ -15,11 +15,11 @@ from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.measure.limits import Limit
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import Reading, RunFolder
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.repeatability import Line, append
 from pytest_simbench.report import changes, markdown, tables
 from pytest_simbench.report.files import summaries_of, write_report
 from pytest_simbench.report.repeatability import write_tables
-from pytest_simbench.tasks.metrics import Metric
 from tests.hostile import assert_harmless_markdown, assert_harmless_terminal
 
 from .samples import METRICS, REFERENCES, record, stacking_run, throwing_run

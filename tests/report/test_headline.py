@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.report.headline import headline
 from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.summary import TaskSummary, summarise
-from pytest_simbench.tasks.metrics import Metric
 
 from .samples import METRICS, record, stacking_run, throwing_run
 from .test_answer import SCORE, task

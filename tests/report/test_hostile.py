@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.measure.gate import run_gate
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Failure, Record
 from pytest_simbench.records.repeatability import Line
 from pytest_simbench.report import changes, markdown, tables
@@ -21,7 +22,6 @@ from pytest_simbench.report.repeatability import render_markdown, render_termina
 from pytest_simbench.report.repeatability import tables as repeatability_tables
 from pytest_simbench.report.summary import summarise
 from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.tasks.metrics import Metric
 from tests.hostile import (
     HOSTILE,
     assert_harmless_csv,

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.measure.results import ResultSet
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.summary import summarise
-from pytest_simbench.tasks.metrics import Metric
 
 from .samples import METRICS, REFERENCES, STACKING, failed, record, stacking_run, throwing_run
 

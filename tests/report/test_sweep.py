@@ -8,13 +8,13 @@ import pytest
 
 from pytest_simbench.laws import LAW
 from pytest_simbench.measure.sweep import Swept, sweeps
+from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.phenomena import PHENOMENON
 from pytest_simbench.records.record import OWN_TIMESTEP, Record
 from pytest_simbench.report import markdown, sweep
 from pytest_simbench.report.page.context import page
 from pytest_simbench.report.page.render import render
 from pytest_simbench.report.summary import at_own_steps, summarise
-from pytest_simbench.tasks.metrics import Metric
-from pytest_simbench.tasks.phenomena import PHENOMENON
 
 from .samples import failed, record
 

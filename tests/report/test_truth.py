@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.phenomena import PHENOMENON
 from pytest_simbench.records.record import Record
 from pytest_simbench.report import markdown, truth
 from pytest_simbench.report.brief import render_brief
@@ -11,8 +13,6 @@ from pytest_simbench.report.page.context import page
 from pytest_simbench.report.page.render import render
 from pytest_simbench.report.summary import TaskSummary, summarise
 from pytest_simbench.report.tables import render_run
-from pytest_simbench.tasks.metrics import Metric
-from pytest_simbench.tasks.phenomena import PHENOMENON
 
 from .samples import METRICS, failed, record, stacking_run
 

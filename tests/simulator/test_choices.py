@@ -9,17 +9,12 @@ import pytest
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.records.choices import DataSeen, SeedsSeen, published_again
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.markdown import render_task as written
 from pytest_simbench.report.summary import summarise
 from pytest_simbench.report.tables import render_task
-from pytest_simbench.simulator.choices import (
-    DataSeen,
-    SeedsSeen,
-    published_again,
-    seeds_seen,
-)
-from pytest_simbench.simulator.registry import adapter, registered
+from pytest_simbench.simulator.registry import adapter, registered, seeds_seen
 from tests.report.samples import METRICS, record
 from tests.tiny import Falling
 

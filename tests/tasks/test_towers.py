@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.tasks import Jitter, LeaningTowers
 from pytest_simbench.tasks.base import CUBE_MASS, CUBE_SIZE
-from pytest_simbench.tasks.metrics import Metric
 from tests.tasks.scripted import Mishap, move, perform
 
 

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from pytest_simbench.measure.limits import FAILURES
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.report import cells
 from pytest_simbench.report.answer import short_labels, standing
 from pytest_simbench.report.grid import Column, capital
 from pytest_simbench.report.headline import cost_of
 from pytest_simbench.report.pooling import Sampled, Spread
 from pytest_simbench.report.summary import Row, TaskSummary
-from pytest_simbench.tasks.metrics import Metric
 
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import series, step_text
-from pytest_simbench.records.text import for_terminal
 from pytest_simbench.report import columns, repeatability, sweep, truth
 from pytest_simbench.report.answer import sentences
 from pytest_simbench.report.changes import DIFFERENT

@@ -9,8 +9,8 @@ from functools import partial
 from typing import Any
 from xml.etree import ElementTree
 
+from pytest_simbench.ground.names import digest
 from pytest_simbench.measure.sweep import Swept
-from pytest_simbench.records.names import digest
 from pytest_simbench.report import sweep
 from pytest_simbench.report.figures import FiguresUnavailable, draw, drawing
 from pytest_simbench.report.summary import TaskSummary

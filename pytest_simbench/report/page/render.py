@@ -12,7 +12,7 @@ from jinja2 import BaseLoader, Environment, StrictUndefined
 from markupsafe import Markup
 
 from pytest_simbench import __version__
-from pytest_simbench.records.text import for_terminal
+from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.report.page.context import Page
 
 _LOG = re.compile(r"logs/[A-Za-z0-9_=-][A-Za-z0-9_.=-]*\.log")

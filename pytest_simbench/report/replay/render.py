@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.ground.text import in_one_line
 from pytest_simbench.recordings.bag import METAL
 from pytest_simbench.recordings.figure import Figure, Mesh
 from pytest_simbench.recordings.trace import Trace, TraceError
-from pytest_simbench.records.text import in_one_line
 from pytest_simbench.report.replay.groups import Group
 from pytest_simbench.report.replay.motion import SCALE, packed
 from pytest_simbench.scene import Body, Box, Pose, Solid

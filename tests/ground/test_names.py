@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.records.names import file_name
+from pytest_simbench.ground.names import file_name
 
 texts = st.text(st.characters(exclude_categories=()), max_size=300)
 near = st.text(st.sampled_from("aAbB/_.-: "), max_size=6)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.tasks.metrics import COSTS, Metric, UnknownMetric, significant
+from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric, significant
 
 
 def test_a_share_says_of_how_many() -> None:

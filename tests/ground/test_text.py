@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from pytest_simbench.records.text import (
+from pytest_simbench.ground.text import (
     BLANK,
     LONGEST_LABEL,
     LONGEST_LINE,

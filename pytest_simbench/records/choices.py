@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -69,16 +68,6 @@ Seen = SeedsSeen | DataSeen
 
 def _seen(data: Mapping[str, Any]) -> Seen:
     return DataSeen(**data) if "data" in data else SeedsSeen(**data)
-
-
-def seeds_seen(adapter: str, profile: str) -> tuple[Seen, ...]:
-    """What the adapter `module:Class` says of a profile; nothing where it says nothing."""
-    module, _, name = adapter.partition(":")
-    try:
-        declared = getattr(importlib.import_module(module), name).chosen_on
-    except (ImportError, AttributeError):  # an adapter that only its own interpreter can import
-        return ()
-    return tuple(declared.get(profile, ()))
 
 
 def published_again(

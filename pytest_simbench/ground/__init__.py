@@ -1,0 +1,1 @@
+"""What everybody needs: versions of simulators, names of files, text that is safe to show."""
