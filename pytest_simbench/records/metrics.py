@@ -91,6 +91,17 @@ class Metric:
             return self.resolution
         return RESOLUTIONS.get(self.unit, 0.0) if self.kind == "value" else 0.0
 
+    @property
+    def crashed(self) -> float | None:
+        """What a crashed repetition counts with: the worst that a share or a yes/no metric can be.
+
+        None where there is no worst value (lengths, times) or no good direction: such a metric is
+        told of those repetitions that finished.
+        """
+        if not self.bounded or self.better is None:
+            return None
+        return 0.0 if self.better == "higher" else 1.0
+
     def to_wire(self) -> dict[str, Any]:
         """Plain data: the arguments that make it again."""
         return {item.name: getattr(self, item.name) for item in fields(self)}

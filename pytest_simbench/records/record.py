@@ -9,6 +9,7 @@ from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, Literal, get_args
 
 from pytest_simbench.records import checked
+from pytest_simbench.records.metrics import COSTS, Metric
 
 SCHEMA = 1
 
@@ -103,6 +104,19 @@ class Record:
     def swept(self) -> bool:
         """Whether it was made at another time step than its profile's own."""
         return OWN_TIMESTEP in self.details
+
+    def value(self, metric: Metric) -> float | None:
+        """What it counts with at a metric of its task, or at a cost; None where it has no value.
+
+        A crashed repetition counts with the worst value, where the metric has one
+        (`Metric.crashed`), but by the study's rules (`--protocol paper`), which leave it out. The
+        costs of a crashed repetition are none.
+        """
+        if self.status == "ok":
+            found = self.metrics.get(metric.name)
+            return self.cost(metric.name) if found is None and metric in COSTS else found
+        counts = self.status == "failed" and self.protocol != "paper"
+        return metric.crashed if counts else None
 
     def cost(self, name: str) -> float | None:
         """One of `metrics.COSTS` by name, or None where the record does not hold it."""
