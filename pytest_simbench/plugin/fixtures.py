@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from pytest_simbench.measure.results import ResultSet
     from pytest_simbench.plugin.repeatability import Perturber
     from pytest_simbench.plugin.run import Run
-    from pytest_simbench.plugin.variants import Variant, named
+    from pytest_simbench.plugin.variants import Variant
     from pytest_simbench.repeatability.replay_result import Replay
     from pytest_simbench.scene import Robot, Scene
     from pytest_simbench.tasks.base import Task
@@ -151,6 +151,7 @@ def simbench_case(
 def case_of(item: pytest.Item, variant: Variant, settings: dict[str, Any]) -> Case:
     """The case of a test, with the settings that it changes."""
     from pytest_simbench.plugin.marks import number_mark
+    from pytest_simbench.plugin.variants import named
 
     given = options.value(item.config, "sim_timeout")
     own = variant.id_with(len(session_of(item.config).selection.profiles))
