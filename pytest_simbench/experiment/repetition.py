@@ -265,6 +265,7 @@ class Repetition:
             metrics=outcome.metrics,
             details=outcome.details,
             notes=notes,
+            reasons=outcome.reasons,
             seconds=seconds,
             stepping=stepping,
             timeline={} if self._world is None else self._world.timeline,
