@@ -64,7 +64,7 @@ class Outcome:
                 "changes": [_change(change) for change in report.changes],
                 "others": [_change(change) for change in report.others],
             }
-        write_whole(folder / NAME, json.dumps(found).encode())
+        write_whole(folder, NAME, json.dumps(found).encode())
 
     @classmethod
     def read(cls, folder: Path) -> tuple[Outcome, str]:
