@@ -185,6 +185,8 @@ class ResultSet:
     def assert_between(self, name: str, low: float, high: float) -> None:
         """Fail when the true mean is outside `low`..`high`; shares are in 0..1."""
         __tracebackhide__ = True
+        for value in (low, high):
+            check_threshold(self.metric(name), value)
         if low > high:
             raise ValueError(f"{name} cannot lie between {low:g} and {high:g}: low is above high")
         self._assert(name, at_least(low), at_most(high))
