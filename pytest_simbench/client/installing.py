@@ -89,8 +89,8 @@ def install(folder: Path, requirements: Sequence[str], tell: Tell) -> None:
         ]  # fmt: skip
     else:
         variables = {}
-        pip = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-        commands = [[sys.executable, "-m", "venv", str(folder)], [*pip, *requirements]]
+        pip = [python, "-P", "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+        commands = [[sys.executable, "-P", "-m", "venv", str(folder)], [*pip, *requirements]]
     began = time.monotonic()
     for command in commands:
         _run(command, variables, lambda: tell(progress(folder, time.monotonic() - began)))

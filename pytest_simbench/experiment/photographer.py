@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 
+from pytest_simbench.client.errors import WorkerError
 from pytest_simbench.experiment.camera import Camera
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import file_stem
@@ -58,5 +59,8 @@ def photograph(experiment: Experiment, *, pictures: bool = True, video: bool = F
             taken.write(case.folder, names[0])
         except OSError as wrong:
             error = error or wrong
-    problem = camera.problem if error is None else named(error)
+    problem = camera.problem
+    if error is not None:  # without the log's last lines, and their traceback
+        what = error.what if isinstance(error, WorkerError) else ""
+        problem = f"{type(error).__name__}: {what}" if what else named(error)
     return f"{case.simulator}: pictures end early: {problem}" if problem else ""

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import platform
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 from pytest_simbench.client.errors import (
@@ -29,6 +25,7 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import file_stem, record_of, settings
 from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.workers import IdleWorkers
+from pytest_simbench.ground.host import host
 from pytest_simbench.recordings import film
 from pytest_simbench.recordings.trace import FOLDER, Trace
 from pytest_simbench.records.notes import Notes
@@ -236,6 +233,7 @@ class Repetition:
         self, outcome: Outcome, error: BaseException | None, resources: dict[str, Any]
     ) -> Record:
         case, total = self.case, self.stopwatch.elapsed()
+        python = self._process.python_version if self._process else ""
         stepping = self._stats.get("stepping", {})
         seconds = {
             k: self.stopwatch.seconds.get(k, 0.0) for k in ("launch", "compile", "load", "plan")
@@ -257,10 +255,7 @@ class Repetition:
             self.number,
             status=_status(error),
             settings=self._constructed.settings or settings(case),
-            versions={
-                **({"python": self._process.python_version} if self._process else {}),
-                **self._constructed.versions,
-            },
+            versions={**({"python": python} if python else {}), **self._constructed.versions},
             error=None if error is None else _failure(error, self.where),
             metrics=outcome.metrics,
             details=outcome.details,
@@ -353,17 +348,3 @@ def _failure(error: BaseException, where: Where) -> Failure:
         message = readable(error.what, 2 * LONGEST)  # shortened where it arose
         return Failure(type(error).__name__, message, error.phase, error.log_tail)
     return Failure(readable(type(error).__name__), told(error), where.phase)
-
-
-@cache
-def host() -> dict[str, Any]:
-    """The machine, as far as it bears on times."""
-    model = platform.processor() or platform.machine()
-    try:
-        for line in Path("/proc/cpuinfo").read_text().splitlines():
-            if line.startswith("model name"):
-                model = line.partition(":")[2].strip()
-                break
-    except OSError:
-        pass
-    return {"system": platform.system(), "cpu": model, "cores": os.cpu_count() or 0}
