@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
-from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.scene import Body, FloatArray, Scene
 from pytest_simbench.simulator.quantities import expected_quantities
+from tests.laws.faults import bodies, bouncier, drives, heavier, rougher
 
 FINGERS = ("panda_leftfinger", "panda_rightfinger")
 
@@ -115,8 +117,8 @@ Lie = Callable[[Scene], Scene]
 
 
 class Copied(MuJoCo):
-    """Builds another world than the scene, and reads back a copy of what the scene asked for; only
-    where things are, and how fast, is the engine's."""
+    """Builds another world than the scene, and reads back a copy of what the scene asked for. Only
+    where things are is the engine's, so that it follows each step."""
 
     lie: ClassVar[Lie] = staticmethod(lambda scene: scene)
 
@@ -130,5 +132,50 @@ class Copied(MuJoCo):
         return self.copy | {name: now[name] for name in self.copy if name.endswith(live)}
 
 
-def copied(lie: Lie) -> type[Copied]:
-    return type("Copied", (Copied,), {"lie": staticmethod(lie), "__module__": __name__})
+def of_bodies(**factors: float) -> Lie:
+    """Values of all bodies, multiplied."""
+
+    def of(body: Body) -> Body:
+        return replace(body, **{key: k * getattr(body, key) for key, k in factors.items()})
+
+    return bodies(of)
+
+
+def with_inertia(scene: Scene) -> Scene:
+    """Bodies are harder to turn by half."""
+
+    def of(body: Body) -> Body:
+        moments = tuple((1.5 * body.inertia()).tolist())
+        return body if body.prescribed else replace(body, moments=moments)
+
+    return bodies(of)(scene)
+
+
+def of_drives(**factors: float) -> Lie:
+    change = drives(**factors)
+    return lambda scene: scene if scene.robot is None else change(scene)
+
+
+ECHOES: dict[str, tuple[Lie, str]] = {
+    "gravity": (heavier, "free_fall"),
+    "mass": (of_bodies(mass=2.0), "force_acts_for_its_time"),
+    "inertia": (with_inertia, "torque_acts_for_its_time"),
+    "friction": (rougher(0.8), "slides_above_mu"),
+    "restitution": (bouncier(0.8), "bounces_as_restitution_says"),
+    "body_damping": (of_bodies(linear_damping=2.0), "damps_as_the_scene_says"),
+    "stiffness": (of_drives(stiffness=0.8), "static_hold"),
+    "drive_damping": (of_drives(damping=0.6), "drives_are_springs"),
+    "effort_limit": (of_drives(effort_limit=1.5), "every_effort_limit_counts"),
+    "armature": (of_drives(armature=0.5), "limp_arm_falls"),
+}
+"""What a copy hides: another value of a quantity, and the law that feels it."""
+
+
+def echo(quantity: str) -> type[Copied]:
+    """A copy that hides it; workers find it by the name of its class."""
+    lie = {"lie": staticmethod(ECHOES[quantity][0]), "__module__": __name__}
+    return type(f"Copied_{quantity}", (Copied,), lie)
+
+
+for _quantity in ECHOES:
+    globals()[f"Copied_{_quantity}"] = echo(_quantity)
