@@ -144,7 +144,8 @@ class Throwing(Task):
             Metric("landing_error", "landing error", unit="m", better="lower", least=0,
                    doc="distance of that from a perfect follower's"),
             Metric("flight_error", "flight error", unit="m", better="lower", least=0,
-                   doc=f"distance from that to where the simulated flight crosses {height}"),
+                   doc="distance from that to where the simulated flight, up to its first contact, "
+                       f"crosses {height}"),
             Metric("release_speed", "release speed", unit="m/s", better=None,
                    doc="of the cube as its free flight begins"),
             Metric("release_velocity_error", "release velocity error", unit="m/s", better="lower",
@@ -242,11 +243,8 @@ class Throwing(Task):
         )
         parts = (swing, world.wait(AFTER_THROW, log_period=0.0))
         motion = Motion.joined([part for part in parts if part is not None])
-        held = world.scene.body("projectile")
-        gravity = np.asarray(world.scene.gravity)
-        cube = world.scene.free_bodies.index(held)
         thrown = Thrown(
-            manipulator.model, motion, cube, held, started, perfect, gravity, self.scale
+            manipulator.model, motion, world.scene, "projectile", started, perfect, self.scale
         )
         if thrown.flight is not None:
             world.note("release", float(motion.time[thrown.flight.first]))
