@@ -6,6 +6,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+FIRST_SEED = 10_001
+"""Of a run that names no seed. No profile of any adapter was chosen on the hundred thousand seeds
+from here on, and none of them is published."""
+
 DeclaredSample = tuple[str, int] | None
 """Data set and number of the measured motion that a repetition was held against, if it was."""
 

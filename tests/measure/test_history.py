@@ -69,7 +69,7 @@ def test_a_release_that_fails_is_named_with_its_message() -> None:
     found = [*release("1", 1.0), *release("2", 1.0), *broken]
     (history,) = histories(found, {"stacking": METRICS})
     assert history.sentences()[-1] == (
-        "3: 4 of 4 repetitions failed, most often WorkerHung in settle: no answer for 30 s"
+        "3: 4 of 4 repetitions crashed, most often WorkerHung in settle: no answer for 30 s"
     )
 
 
