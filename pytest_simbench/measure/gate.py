@@ -35,7 +35,7 @@ from pytest_simbench.measure.speed import POWER, without_speed
 from pytest_simbench.records.configuration import differences
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import by_test, grouped
+from pytest_simbench.records.series import RowKey, by_test, grouped
 
 
 @dataclass(frozen=True)
@@ -207,15 +207,19 @@ def side_by_side(
 
     Args:
         records: of the run.
-        name: of the simulator, whose records are given again under the name of each other one.
+        name: of the simulator, whose records are given again as those of each other one: with its
+            name, and the id of its test of the same function, variant, mode and profile. Where the
+            other has no such test they keep the id that they have.
         others: the names of these.
     """
     records, others = list(records), list(others)
+    tests = {RowKey.of(record): record.test for record in records}
     before = [
-        replace(record, simulator=other, test=record.test.replace(f"{name}-", f"{other}-", 1))
+        replace(record, simulator=other, test=tests.get(found, record.test))
         for other in others
         for record in records
         if record.simulator == name
+        for found in [RowKey.of(record)._replace(simulator=other)]
     ]
     return tuple(before), tuple(record for record in records if record.simulator in others)
 
