@@ -80,4 +80,4 @@ def test_failures_of_10_percent_take_29_repetitions_and_the_docs_say_so() -> Non
     ]
     assert verdicts == [Verdict.INCONCLUSIVE, Verdict.INCONCLUSIVE, Verdict.SUPPORTED]
     page = " ".join((ROOT / "docs" / "gate.md").read_text("utf-8").split())
-    assert "no failure in 20 bounds the share at 13.9 % (0.05^(1/20)). 10 % takes 29" in page
+    assert "no crash in 20 bounds the share at 13.9 % (0.05^(1/20)). 10 % takes 29" in page
