@@ -265,6 +265,7 @@ class Repetition:
             metrics=outcome.metrics,
             details=outcome.details,
             notes=notes,
+            reasons=outcome.reasons,
             seconds=seconds,
             stepping=stepping,
             timeline={} if self._world is None else self._world.timeline,
@@ -287,7 +288,7 @@ class Repetition:
         if self.case.video not in ("on", "retain-on-failure"):
             return None
         name = file_stem(self.experiment, self.number)
-        return Camera(film=film.Film(self.case.folder / film.FOLDER / f"{name}.mp4"))
+        return Camera(film=film.Film(self.case.folder, f"{film.FOLDER}/{name}.mp4"))
 
     def _end_film(self, *, failed: bool) -> dict[str, Any]:
         """What the record tells of it: that there was one, and why it ended early."""
@@ -323,7 +324,7 @@ class Repetition:
         name = file_stem(self.experiment, self.number)
         try:
             trace = Trace.of(world.scene, Motion.joined(world.trace), world.phases)
-            trace.write(case.folder / FOLDER / f"{name}.npz")
+            trace.write(case.folder, f"{FOLDER}/{name}.npz")
         except (OSError, DescriptionError) as error:
             return f"the trace could not be written: {named(error)}"
         return ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from math import isfinite
+from typing import NoReturn
 
 from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval, proportion
 from pytest_simbench.measure.limits import CRASHED, check_threshold
@@ -46,11 +47,15 @@ class ResultSet:
         error: probability, at most, that a verdict on a claim is wrong.
         strict: whether a claim that is not decided fails (`--sim-strict`).
         claims_crashes: whether a claim about crashes was made, see `check_crashes`.
+        warns: whether a claim that is not decided is told by a warning: not where a run tells of
+            all claims together.
+        judged: the claims that were made, and what came of them.
     """
 
     error: float = ERROR
     strict: bool = False
     claims_crashes: bool = False
+    warns: bool = True
 
     def __init__(self, records: Iterable[Record], metrics: Iterable[Metric]) -> None:
         self.records: tuple[Record, ...] = tuple(records)
@@ -58,6 +63,7 @@ class ResultSet:
         self._costs = {metric.name: metric for metric in COSTS if metric.name not in self.metrics}
         self._intervals: dict[tuple[str, float], Interval] = {}
         self._ok: tuple[tuple[Record, ...], tuple[Record, ...]] = ((), ())
+        self.judged: list[tuple[Metric, Judgement]] = []
 
     def __len__(self) -> int:
         return len(self.records)
@@ -178,6 +184,8 @@ class ResultSet:
     def assert_between(self, name: str, low: float, high: float) -> None:
         """Fail when the true mean is outside `low`..`high`; shares are in 0..1."""
         __tracebackhide__ = True
+        for value in (low, high):
+            check_threshold(self.metric(name), value)
         if low > high:
             raise ValueError(f"{name} cannot lie between {low:g} and {high:g}: low is above high")
         self._assert(name, at_least(low), at_most(high))
@@ -188,7 +196,7 @@ class ResultSet:
         self.claims_crashes = True
         self._assert_recorded()
         if self.crashed:
-            raise AssertionError(self._crashes())
+            self._refute("")
 
     def assert_crashed_at_most(self, share: float) -> None:
         """Fail when more than `share` (0..1) of all repetitions ever made would crash."""
@@ -212,12 +220,19 @@ class ResultSet:
         if share >= 1 or not self.crashed:
             return
         if not self.ok:
-            raise AssertionError(f"{self._crashes()}. No repetition finished")
+            self._refute(". No repetition finished")
         if self.claims_crashes:
             return
         if not share:
-            raise AssertionError(f"{self._crashes()}. None may crash (--sim-crashes)")
+            self._refute(". None may crash (--sim-crashes)")
         self.assert_crashed_at_most(share)
+
+    def _refute(self, why: str) -> NoReturn:
+        """Fail for crashes of which there may be none: one is enough."""
+        __tracebackhide__ = True
+        found = Judgement(Verdict.REFUTED, at_most(0.0), self._judged(CRASHED))
+        self.judged.append((CRASHED, found))
+        raise AssertionError(f"{self._crashes()}{why}")
 
     def _assert(self, name: str, *claims: Claim) -> None:
         __tracebackhide__ = True
@@ -240,6 +255,7 @@ class ResultSet:
     ) -> None:
         """Fail, warn or say nothing."""
         __tracebackhide__ = True
+        self.judged += [(metric, judgement) for judgement in found]
         for judgement in found:
             if judgement.verdict is Verdict.REFUTED:
                 wrong = "below" if judgement.claim.relation == "at least" else "above"
@@ -251,7 +267,8 @@ class ResultSet:
                 text = f"{measured()}: {judgement.verdict} whether {claim}, {judgement.advice}"
                 if self.strict:
                     raise AssertionError(f"{text} (--sim-strict)")
-                warnings.warn(text, InconclusiveWarning, stacklevel=4)
+                if self.warns:
+                    warnings.warn(text, InconclusiveWarning, stacklevel=4)
 
     def _assert_recorded(self) -> None:
         __tracebackhide__ = True

@@ -90,8 +90,8 @@ PARTS: tuple[Part, ...] = (
     *(
         _part(name, "", "a result")
         for name in (
-            "status", "error", "metrics", "details", "notes", "seconds", "stepping", "timeline",
-            "resources",
+            "status", "error", "metrics", "details", "notes", "reasons", "seconds", "stepping",
+            "timeline", "resources",
         )
     ),
     _part("extra", "", "of a newer plugin: not known what it means"),

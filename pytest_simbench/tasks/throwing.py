@@ -199,6 +199,7 @@ class Throwing(Task):
         world.mark("start")
         metrics: dict[str, float | None] = {metric.name: None for metric in self.metrics}
         details: dict[str, object] = {}
+        reasons: list[str] = []
         thrown: Thrown | None = None
         try:
             with world.phase("pick"):
@@ -209,10 +210,13 @@ class Throwing(Task):
                 thrown = self._throw(manipulator)
             metrics |= thrown.metrics()
             details |= thrown.details()
+            reasons += [str(details[key]) for key in ("lost", "kept") if key in details]
         except LostCube as error:
             metrics["lost_in_transit"], details["lost"] = 1.0, str(error)
+            reasons.append(str(error))
         except PlanningError as error:
             details["failed_pick"] = str(error)
+            reasons.append(str(error))
         world.mark("end")
         with world.phase("settle"):
             settling = world.wait(self.settle, log_period=SETTLE_PERIOD)
@@ -227,7 +231,7 @@ class Throwing(Task):
         details["moved"] = moved
         details["moved_otherwise"] = [name for name in off if name not in hit]
         details["projectile_end"] = list(world.pose("projectile").position)
-        return Outcome(metrics, details)
+        return Outcome(metrics, details, reasons=tuple(reasons))
 
     def _throw(self, manipulator: Manipulator) -> Thrown:
         """Swing, let go, and look on."""

@@ -95,6 +95,8 @@ def test_more_crashes_than_may_fail_whatever_else_is_claimed(
         return made.check_crashes(may)
     with pytest.raises(AssertionError, match=said):
         made.check_crashes(may)
+    ((metric, judgement),) = made.judged  # the table of claims shows it
+    assert (metric.name, judgement.verdict) == ("crashed", "refuted")
 
 
 def test_what_a_test_claims_of_crashes_itself_counts_but_none_must_finish_one() -> None:
