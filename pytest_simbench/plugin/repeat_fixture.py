@@ -144,7 +144,7 @@ def claim_of(case: Case, result: ResultSet, metric: Metric, judgement: Judgement
         low=bounds.low,
         high=bounds.high,
         n=bounds.n,
-        crashed=len(result.failures),
+        crashed=len(result.crashed),
         advice=judgement.advice,
     )
 

@@ -44,7 +44,7 @@ FIRST = 500
     [
         (1, [], ["silent"], "*1 of 2 repetitions crashed: 1 x WorkerExited in *seed 500: *"),
         (1, ["--sim-crashes=0"], ["silent", "marked"], "*None may crash (--sim-crashes)"),
-        (1, ["--sim-crashes=0.5"], [], "*1 of 2 *crashed*not judged whether at most 50 %*"),
+        (1, ["--sim-crashes=0.5"], [], "test_silent: crashed <= 50 %*UNDECIDED 1 of 2*"),
         (2, [], ["silent", "marked", "claims"], "*2 of 2 repetitions crashed*No repetition fin*"),
     ],
 )
