@@ -6,9 +6,9 @@
     pytest suites/test_physics.py --sim=all --sim-sweep
 
 A law that a simulator breaks is a finding, with its size, and no failure: it is in the tables. A
-test fails when its repetition fails or its world diverges. `--sim-threshold ratio=1` makes each law
-that is broken fail, `ratio=10` each that is missed by ten tolerances. A law draws nothing, so one
-repetition is enough of a simulator that is deterministic.
+test fails when its repetition crashes: its world diverges, for instance. `--sim-threshold ratio=1`
+makes each law that is broken fail, `ratio=10` each that is missed by ten tolerances. A law draws
+nothing, so one repetition is enough of a simulator that is deterministic.
 
 `--sim-sweep` asks the same of other time steps: what a simulator cannot do there is a finding, too.
 """
@@ -30,11 +30,8 @@ def asked(law):
 
 @pytest.mark.repeats("law")
 @pytest.mark.parametrize("law", [asked(law) for law in LAWS])
-def test_law(repeat, threshold, sim_swept, law):
+def test_law(repeat, threshold, law):
     limit = threshold("ratio", ANY)
     result = repeat(law)
-
-    if not sim_swept:
-        result.assert_no_failures()
     worst = max(result.values("ratio"), default=0.0)
     assert worst <= limit, f"{result.label}: off by {worst:.3g} tolerances"

@@ -17,7 +17,7 @@ def test_pushing_curve(repeat, threshold):
 
 
 def check(result, threshold):
-    result.assert_failures_at_most(threshold("failures", 0.15))
+    result.assert_crashed_at_most(threshold("crashed", 0.15))
     result.assert_at_most("position_error", threshold("position_error", 0.01))
     result.assert_at_most("heading_error", threshold("heading_error", 5.0))
     result.assert_at_most("path_error", threshold("path_error", 0.01))

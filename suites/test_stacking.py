@@ -12,7 +12,7 @@ from pytest_simbench.tasks import Stacking
 def test_stacking(repeat, threshold):
     result = repeat(Stacking())
 
-    result.assert_failures_at_most(threshold("failures", 0.15))
+    result.assert_crashed_at_most(threshold("crashed", 0.15))
     result.assert_at_least("placed", threshold("placed", 0.8))
     result.assert_at_least("at_end", threshold("at_end", 0.8))
     result.assert_at_most("untouched_moved", threshold("untouched_moved", 1.0))

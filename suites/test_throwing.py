@@ -12,6 +12,6 @@ from pytest_simbench.tasks import Throwing
 def test_throwing(repeat, threshold):
     result = repeat(Throwing())
 
-    result.assert_failures_at_most(threshold("failures", 0.15))
+    result.assert_crashed_at_most(threshold("crashed", 0.15))
     result.assert_at_least("hit", threshold("hit", 0.8))
     result.assert_at_least("moved", threshold("moved", 0.2))

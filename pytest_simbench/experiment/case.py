@@ -13,6 +13,7 @@ from pytest_simbench.client.environments import Environment, interpreter
 from pytest_simbench.client.launch import Launch
 from pytest_simbench.experiment.protocol import PROTOCOLS, Protocol
 from pytest_simbench.ground.names import file_name
+from pytest_simbench.records.choices import FIRST_SEED
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.series import short
 from pytest_simbench.scene import Robot
@@ -71,7 +72,7 @@ class Case:
     timeout: float | None = None
     stall_timeout: float = 60.0
     memory_limit: float | None = None
-    seed: int = 2022
+    seed: int = FIRST_SEED
     jitter: float = 1.0
     trace: str = "off"
     video: str = "off"

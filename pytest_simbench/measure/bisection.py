@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from pytest_simbench.measure.comparison import MeanDifference, compare_by_seed
-from pytest_simbench.measure.limits import FAILURES
+from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.speed import without_speed
 from pytest_simbench.records.metrics import Metric
@@ -42,12 +42,13 @@ def difference(metric: Metric, before: ResultSet, after: ResultSet) -> MeanDiffe
 
 
 def like_the_bad_one(metric: Metric, good: ResultSet, bad: ResultSet, other: ResultSet) -> bool:
-    """Whether a release is nearer to the bad one than to the good one; so is one that fails always.
+    """Whether a release is nearer to the bad one than to the good one; so is one that
+    always crashes.
 
     A test against the good one alone would call every release good that few repetitions cannot
     tell from it.
     """
-    if not (other.ok or metric is FAILURES):
+    if not (other.ok or metric is CRASHED):
         return True
     here = difference(metric, good, other).difference
     there = difference(metric, good, bad).difference
@@ -57,8 +58,8 @@ def like_the_bad_one(metric: Metric, good: ResultSet, bad: ResultSet, other: Res
 def _values(
     metric: Metric, before: ResultSet, after: ResultSet
 ) -> tuple[Mapping[int, float], Mapping[int, float]]:
-    if metric is FAILURES:
-        return before.failed_by_seed(), after.failed_by_seed()
+    if metric is CRASHED:
+        return before.crashed_by_seed(), after.crashed_by_seed()
     evened = without_speed(metric.name, before, after)
     return evened or (before.by_seed(metric.name), after.by_seed(metric.name))
 

@@ -2,7 +2,9 @@
 
 A limit is exceeded when the change is both larger than it and significant: a one-sided permutation
 test of the means, paired by seed where the runs share their seeds, corrected (Holm) for all
-comparisons of the run, so that a run without a true change fails in at most one of twenty cases.
+comparisons of the run. The shares of crashed repetitions are always compared, by exact tests of
+their own (`crashes`). A run without a true change fails in at most one of twenty cases, crashes and
+limits together. A limit that compares nothing fails the run.
 
 What it needs: a change of d with a spread of s between repetitions is found in 4 of 5 cases by
 about 12 (s / d)^2 repetitions (`power.repetitions_to_detect`), if its limit is well below d. A loss
@@ -18,6 +20,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from pytest_simbench.measure import crashes
 from pytest_simbench.measure.comparison import (
     ALPHA,
     PERMUTATIONS,
@@ -26,13 +29,13 @@ from pytest_simbench.measure.comparison import (
     compare_by_seed,
     holm,
 )
-from pytest_simbench.measure.limits import FAILURES, Limit
+from pytest_simbench.measure.limits import CRASHED, Limit
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.speed import POWER, without_speed
 from pytest_simbench.records.configuration import differences
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import by_test
+from pytest_simbench.records.series import RowKey, by_test, grouped
 
 
 @dataclass(frozen=True)
@@ -93,10 +96,12 @@ class GateReport:
 
     Attributes:
         differences: settings, versions and machines that are not the same: read them first.
-        changes: every comparison made.
+        changes: every comparison that can fail the run: those of the limits, then of each test the
+            share of crashed repetitions.
         others: metrics without a limit, tested in both directions and corrected among
             themselves: nothing fails for them, and they take nothing from the limits' certainty.
-        broken: tests that gave no result any more, one sentence each.
+        broken: tests that gave no result any more and limits that cannot fail or compared nothing,
+            one sentence each.
         notes: what could not be compared, and why.
     """
 
@@ -111,12 +116,19 @@ class GateReport:
         """One sentence for each limit exceeded and each broken test; empty: the gate is passed."""
         return (*self.broken, *(c.sentence() for c in self.changes if c.exceeded))
 
+    @property
+    def compared(self) -> bool:
+        """Whether a limit on anything but crashes compared something."""
+        return any(change.metric != CRASHED for change in self.changes)
+
 
 def run_gate(
     baseline: Iterable[Record],
     current: Iterable[Record],
     limits: Sequence[Limit],
     metrics: Mapping[str, Sequence[Metric]],
+    *,
+    typed: bool = True,
 ) -> GateReport:
     """Compare two runs.
 
@@ -125,6 +137,8 @@ def run_gate(
         current: records of this run.
         limits: from `parse_limits`.
         metrics: the metrics of each task, by its name.
+        typed: whether the limits are for this very run, so that one that compares nothing fails it;
+            else it is a note.
     """
     baseline, current = list(baseline), list(current)
     before, after = (
@@ -147,28 +161,29 @@ def run_gate(
         for limit in limits
         if limit.metric in after[test].known
     )
-    changes = _corrected(
-        _change(test, before[test], after[test], limit) for test in common for limit in limits
-    )
+    crashed, left = _rises({test: (before[test], after[test]) for test in common}, limits)
+    limits = [limit for limit in limits if limit.metric != CRASHED.name]
+    found = {
+        limit: {test: _change(test, before[test], after[test], limit) for test in common}
+        for limit in limits
+    }
+    changes = _corrected((c for of_limit in found.values() for c in of_limit.values()), left)
     limited = {limit.metric for limit in limits}
     others = _corrected(
         _change(test, before[test], after[test], Limit(name, 0.0, True), both_ways=True)
         for test in common
-        for name in (FAILURES.name, *after[test].known)
+        for name in after[test].known
         if name not in limited
     )
-    notes += [
-        f"{limit.metric} was not measured in both runs, so its limit is not tested"
-        for limit in limits
-        if not any(change.limit == limit for change in changes)
-    ]
-    notes += [
-        f"{test}: {limit.metric} is not compared: it depends on the machine, which was another "
-        "one, and not every repetition has the control workload that takes the machine's speed out"
-        for test in common
-        for limit in limits
-        if _of_machines(before[test], after[test], limit.metric)
-    ]
+    if not common and (limits or typed):
+        broken.append(_nothing_in_common(before, after))
+    for limit, of_limit in found.items():
+        reasons = {test: why for test, why in of_limit.items() if isinstance(why, str)}
+        if common and len(reasons) == len(common):
+            (broken if typed else notes).append(f"{limit} compared nothing: {_told(reasons)}")
+        else:
+            apart = {test: why for test, why in reasons.items() if why != UNKNOWN}
+            notes += [f"{test}: {limit} is not tested: {why}" for test, why in apart.items()]
     notes += [
         f"{change.test}: {change.repetitions} are too few for a change of {change.metric.name} "
         f"to be significant among {len(changes)} comparisons"
@@ -177,7 +192,11 @@ def run_gate(
     ]
     named = differences({test: (before[test].records, after[test].records) for test in common})
     return GateReport(
-        tuple(named), changes, others, tuple(filter(None, broken)), tuple(sorted(notes))
+        tuple(named),
+        (*changes, *crashed),
+        others,
+        tuple(filter(None, broken)),
+        tuple(sorted(notes)),
     )
 
 
@@ -188,15 +207,19 @@ def side_by_side(
 
     Args:
         records: of the run.
-        name: of the simulator, whose records are given again under the name of each other one.
+        name: of the simulator, whose records are given again as those of each other one: with its
+            name, and the id of its test of the same function, variant, mode and profile. Where the
+            other has no such test they keep the id that they have.
         others: the names of these.
     """
     records, others = list(records), list(others)
+    tests = {RowKey.of(record): record.test for record in records}
     before = [
-        replace(record, simulator=other, test=record.test.replace(f"{name}-", f"{other}-", 1))
+        replace(record, simulator=other, test=tests.get(found, record.test))
         for other in others
         for record in records
         if record.simulator == name
+        for found in [RowKey.of(record)._replace(simulator=other)]
     ]
     return tuple(before), tuple(record for record in records if record.simulator in others)
 
@@ -206,48 +229,89 @@ def _robots(records: Sequence[Record]) -> list[str]:
     return sorted({record.robot.get("name", "the tasks' own robot") for record in records})
 
 
-def _corrected(found: Iterable[Change | None]) -> tuple[Change, ...]:
-    """The changes that could be tested, with their p values corrected for their number."""
-    changes = [change for change in found if change is not None]
-    corrected = holm([change.comparison.p_value for change in changes])
-    return tuple(replace(c, p_value=p) for c, p in zip(changes, corrected, strict=True))
+def _nothing_in_common(before: Iterable[str], after: Iterable[str]) -> str:
+    sides = (", ".join([*names][:3]) + ", ..." * (len([*names]) > 3) for names in (after, before))
+    here, there = (names or "no repetition" for names in sides)
+    return (
+        "nothing was compared: no test of this run is in the baseline (this run has "
+        f"{here}; the baseline {there})"
+    )
+
+
+def _told(reasons: Mapping[str, str]) -> str:
+    """Why tests were not compared, each reason once, with the tests."""
+    tests = grouped(reasons, lambda test: reasons[test])
+    return "; ".join(f"{why} ({', '.join(found)})" for why, found in tests.items())
+
+
+def _corrected(found: Iterable[Change | str], error: float = 1.0) -> tuple[Change, ...]:
+    """The changes that could be tested, with their p values corrected for their number, where they
+    have that share of the error."""
+    changes = [change for change in found if isinstance(change, Change)]
+    p_values = holm([change.comparison.p_value for change in changes])
+    return tuple(
+        replace(c, p_value=min(1.0, p / error)) for c, p in zip(changes, p_values, strict=True)
+    )
 
 
 def _broken(test: str, old: ResultSet, new: ResultSet) -> str:
-    """A sentence when nothing succeeds any more, so that there is no metric to compare."""
-    if not old.ok or new.ok or not new.failures:
+    """A sentence when nothing finishes any more, so that there is no metric to compare."""
+    if not old.ok or new.ok or not new.crashed:
         return ""
     return (
-        f"{test}: none of {len(new.failures)} repetitions succeeded (most often "
+        f"{test}: none of {len(new.crashed)} repetitions finished (most often "
         f"{next(iter(new.causes()))}); {len(old.ok)} of {len(old)} did in the baseline"
     )
 
 
+def _rises(
+    sides: Mapping[str, tuple[ResultSet, ResultSet]], limits: Iterable[Limit]
+) -> tuple[list[Change], float]:
+    """By test the change of the share of crashed repetitions, which without a limit of its own may
+    not rise; and the part of the error that is left for the limits."""
+    limit = next((limit for limit in limits if limit.metric == CRASHED.name), NO_MORE)
+    found, chances = [], []
+    for test, (old, new) in sides.items():
+        first, second = old.crashed_by_seed(), new.crashed_by_seed()
+        if first and second:
+            comparison = compare_by_seed(first, second, "greater")
+            chances.append(crashes.rise(first, second, comparison.paired))
+            loss = limit.loss(CRASHED, comparison.first, comparison.second)
+            found.append(Change(test, CRASHED, limit, comparison, 1.0, loss))
+    p_values, left = crashes.corrected(chances)
+    return [replace(c, p_value=p) for c, p in zip(found, p_values, strict=True)], left
+
+
+NO_MORE = Limit(CRASHED.name, 0.0, True)
+"""What holds of crashes when nobody says anything: their share may not rise."""
+
+UNKNOWN = "it is not measured there"
+
+
 def _change(
     test: str, old: ResultSet, new: ResultSet, limit: Limit, *, both_ways: bool = False
-) -> Change | None:
-    """The change of one metric, not yet corrected; None where a side does not have it, or where
-    neither direction is the worse one."""
-    normalised = False
-    if limit.metric == FAILURES.name:
-        metric, first, second = FAILURES, old.failed_by_seed(), new.failed_by_seed()
-    elif limit.metric in old.known and limit.metric in new.known:
-        metric = new.metric(limit.metric)
-        first, second = old.by_seed(metric.name), new.by_seed(metric.name)
-        evened = without_speed(metric.name, old, new)
-        if evened is not None:
-            normalised = True
-            first, second = evened
-        elif _of_machines(old, new, metric.name):
-            return None
-    else:
-        return None
-    if metric.better is None or not first or not second:
-        return None
+) -> Change | str:
+    """The change of one metric, not yet corrected; else why there is none."""
+    if not (limit.metric in old.known and limit.metric in new.known):
+        return UNKNOWN
+    metric = new.metric(limit.metric)
+    if metric.better is None:
+        return "neither direction of it is worse"
+    if _of_machines(old, new, metric.name):
+        return (
+            "it depends on the machine, which was another one, and not every repetition has the "
+            "control workload that takes the machine's speed out"
+        )
+    first, second = old.by_seed(metric.name), new.by_seed(metric.name)
+    evened = without_speed(metric.name, old, new)
+    first, second = evened or (first, second)
+    if not first or not second:
+        return f"no repetition of {'this run' if first else 'the baseline'} has a value"
     worse: Alternative = "less" if metric.better == "higher" else "greater"
     comparison = compare_by_seed(first, second, "two-sided" if both_ways else worse)
     loss = limit.loss(metric, comparison.first, comparison.second)
-    return Change(test, metric, limit, comparison, comparison.p_value, loss, normalised)
+    p_value = comparison.p_value
+    return Change(test, metric, limit, comparison, p_value, loss, evened is not None)
 
 
 def _of_machines(old: ResultSet, new: ResultSet, name: str) -> bool:

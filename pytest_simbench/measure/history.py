@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from pytest_simbench.ground.versions import RELEASE, VersionedName, release_numbers
 from pytest_simbench.measure.change_points import ChangePoint, change_points
-from pytest_simbench.measure.limits import FAILURES
+from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.speed import without_speed
 from pytest_simbench.records.metrics import Metric
@@ -73,7 +73,7 @@ class History:
         return f"{self.simulator}, {self.task} ({self.variant})"
 
     def sentences(self) -> list[str]:
-        """What changed with which release, how much, and how sure; and which releases failed."""
+        """What changed with which release, how much, and how sure; and which releases crashed."""
         found = []
         for course in self.courses:
             present = [v for v, values in zip(self.releases, course.values, strict=True) if values]
@@ -88,12 +88,12 @@ class History:
         if not found:
             found.append("no change is supported by these repetitions")
         for release, result in zip(self.releases, self.results, strict=True):
-            if result.failures:
+            if result.crashed:
                 cause, records = next(iter(result.causes().items()))
-                total = len(result.ok) + len(result.failures)
+                total = len(result.ok) + len(result.crashed)
                 message = records[0].error.message if records[0].error else ""
                 found.append(
-                    f"{release}: {len(result.failures)} of {total} repetitions failed, most often "
+                    f"{release}: {len(result.crashed)} of {total} repetitions crashed, most often "
                     f"{cause}: {message[:200]}"
                 )
         return found
@@ -126,13 +126,13 @@ def histories(records: Iterable[Record], metrics: Mapping[str, Sequence[Metric]]
 
 
 def _courses(history: History) -> list[Course]:
-    """Each metric, cost and the failures over the releases; without those that nobody has."""
+    """Each metric, cost and the crashes over the releases; without those that nobody has."""
     results = history.results
     metrics = list(results[-1].metrics.values())
     metrics += [results[-1].metric(name) for name in COSTS if name not in results[-1].metrics]
     courses = [Course(m, tuple(_values(m.name, results, k) for k in range(len(results))))
                for m in metrics]  # fmt: skip
-    courses.append(Course(FAILURES, tuple(result.failed_by_seed() for result in results)))
+    courses.append(Course(CRASHED, tuple(result.crashed_by_seed() for result in results)))
     return [course for course in courses if any(course.values)]
 
 

@@ -7,16 +7,25 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 from numbers import Real
 
 from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric, significant
 
-FAILURES = Metric(
-    "failures", "failed repetitions", better="lower", kind="yes_no", doc="1 for each that failed"
+CRASHED = Metric(
+    "crashed", "crashed repetitions", better="lower", kind="yes_no", doc="1 for each that crashed"
 )
-"""The share of failed repetitions, as a metric of every task."""
+"""The share of crashed repetitions, as a metric of every task."""
+
+FAILURES = CRASHED
+ALIASES = {"failures": CRASHED.name}
+"""Names of before, which users may still type."""
+
+
+def named(name: str, known: Container[str] = ()) -> str:
+    """The name of a metric that a user typed; one that is known by it is not renamed."""
+    return name if name in known else ALIASES.get(name, name)
 
 
 class LimitError(ValueError):
@@ -47,10 +56,14 @@ class Limit:
             return loss / abs(before)
         return math.copysign(math.inf, loss) if loss else 0.0
 
+    def __str__(self) -> str:
+        """As it is typed: `placed:5%`."""
+        amount = significant(self.amount * (100 if self.percent else 1))
+        return f"{self.metric}:{amount}{'%' if self.percent else ''}"
+
     def vain(self, metric: Metric) -> str:
         """Why no run could ever exceed it, in a sentence; empty when one could."""
-        text = f"{self.metric}:{significant(self.amount * (100 if self.percent else 1))}"
-        text += "%" if self.percent else ""
+        text = str(self)
         if metric.bounded and self.amount >= 1:
             hint = "" if self.percent else f"; did you mean {text}%?"
             return f"{text} can never be exceeded: {self.metric} lies between 0 and 100 %{hint}"
@@ -74,14 +87,14 @@ def parse_limits(text: str, metrics: Iterable[Metric]) -> tuple[Limit, ...]:
 
     Args:
         text: as the user gave it.
-        metrics: of all tasks; the costs and `failures` are known besides.
+        metrics: of all tasks; the costs and `crashed` are known besides.
 
     Raises:
         LimitError: an item that is not of that form, is there twice, names a metric of which
             neither direction is better, or a limit that no run could exceed.
         UnknownMetric: no such metric; the message lists the valid names.
     """
-    known = {metric.name: metric for metric in (*COSTS, FAILURES, *metrics)}
+    known = {metric.name: metric for metric in (*COSTS, CRASHED, *metrics)}
     usable = [name for name, metric in known.items() if metric.better]
     found: dict[str, Limit] = {}
     for item in (part.strip() for part in text.split(",")):
@@ -89,6 +102,7 @@ def parse_limits(text: str, metrics: Iterable[Metric]) -> tuple[Limit, ...]:
         if match is None:
             raise LimitError(f"{item!r} is not a limit like placed:5% or landing_error:0.01")
         name, number, percent = match.groups()
+        name = named(name, known)
         if name not in known:
             raise UnknownMetric(name, usable)
         if name not in usable:

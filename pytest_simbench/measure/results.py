@@ -5,9 +5,10 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from math import isfinite
+from typing import NoReturn
 
 from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval, proportion
-from pytest_simbench.measure.limits import FAILURES, check_threshold
+from pytest_simbench.measure.limits import CRASHED, check_threshold
 from pytest_simbench.measure.verdicts import (
     ERROR,
     Claim,
@@ -31,11 +32,12 @@ class InconclusiveWarning(UserWarning):
 class ResultSet:
     """Records with the metrics of their task.
 
-    A failed repetition is left out of every metric, as in the reference study, and counted by
-    itself. An assertion on a metric *fails* when the interval of its mean, each of whose ends is
-    right in at least 95 of 100 runs, lies wholly on the wrong side of the threshold, *passes* when
-    it lies wholly on the right side, and else (also with fewer than 5 repetitions) passes with an
-    `InconclusiveWarning`, or fails where `strict`.
+    A crashed repetition counts with the worst value of a share or yes-or-no metric that has a good
+    direction (`Record.value`); other metrics, and all of `--protocol paper`, are of the repetitions
+    that finished. An assertion on a metric *fails* when the interval of its mean, each of whose
+    ends is right in at least 95 of 100 runs, lies wholly on the wrong side of the threshold,
+    *passes* when it lies wholly on the right side, and else (also with fewer than 5 repetitions)
+    passes with an `InconclusiveWarning`, or fails where `strict`.
 
     Args:
         records: of one task, simulator, mode and profile.
@@ -44,6 +46,7 @@ class ResultSet:
     Attributes:
         error: probability, at most, that a verdict on a claim is wrong.
         strict: whether a claim that is not decided fails (`--sim-strict`).
+        claims_crashes: whether a claim about crashes was made, see `check_crashes`.
         warns: whether a claim that is not decided is told by a warning: not where a run tells of
             all claims together.
         judged: the claims that were made, and what came of them.
@@ -51,6 +54,7 @@ class ResultSet:
 
     error: float = ERROR
     strict: bool = False
+    claims_crashes: bool = False
     warns: bool = True
 
     def __init__(self, records: Iterable[Record], metrics: Iterable[Metric]) -> None:
@@ -65,7 +69,7 @@ class ResultSet:
         return len(self.records)
 
     def __repr__(self) -> str:
-        return f"<ResultSet {self.label}: {len(self.ok)} ok, {len(self.failures)} failed>"
+        return f"<ResultSet {self.label}: {len(self.ok)} ok, {len(self.crashed)} crashed>"
 
     @property
     def label(self) -> str:
@@ -77,24 +81,26 @@ class ResultSet:
 
     @property
     def ok(self) -> tuple[Record, ...]:
-        """The repetitions that ended as they should."""
+        """The repetitions that finished."""
         if self._ok[0] is not self.records:  # a sequence of looks sets longer and longer ones
             self._ok = self.records, tuple(record for record in self.records if record.ok)
         return self._ok[1]
 
     @property
-    def failures(self) -> tuple[Record, ...]:
-        """The repetitions that failed; each has its `error`."""
+    def crashed(self) -> tuple[Record, ...]:
+        """The repetitions that crashed; each has its `error`."""
         return tuple(record for record in self.records if record.status == "failed")
+
+    failures = crashed
 
     @property
     def interrupted(self) -> tuple[Record, ...]:
-        """The repetitions that the user ended; neither ok nor failed."""
+        """The repetitions that the user ended; they neither finished nor crashed."""
         return tuple(record for record in self.records if record.status == "interrupted")
 
     def causes(self) -> dict[str, list[Record]]:
-        """The failures by cause (`WorkerHung in settle`), the most frequent first."""
-        found = grouped(self.failures, lambda r: r.error.cause if r.error else "unknown cause")
+        """The crashes by cause (`WorkerHung in settle`), the most frequent first."""
+        found = grouped(self.crashed, lambda r: r.error.cause if r.error else "unknown cause")
         return dict(sorted(found.items(), key=lambda item: -len(item[1])))
 
     @property
@@ -115,29 +121,22 @@ class ResultSet:
         return found
 
     def value(self, record: Record, name: str) -> float | None:
-        """A metric's value in one record; None where it is not available."""
-        found = self._reader(name)(record)
+        """What a record counts with at a metric; None where it has no value."""
+        found = record.value(self.metric(name))
         return None if found is None else float(found)
 
     def values(self, name: str) -> list[float]:
-        """A metric's values, one for each ok repetition that has it, in their order."""
-        read = self._reader(name)
-        return [float(value) for record in self.ok if (value := read(record)) is not None]
+        """A metric's values, one for each repetition that has one, in their order."""
+        return [found for record in self.records if (found := self.value(record, name)) is not None]
 
     def by_seed(self, name: str) -> dict[int, float]:
-        """A metric's values by seed, for pairing with another set; ok repetitions only."""
-        read = self._reader(name)
-        return {r.seed: float(value) for r in self.ok if (value := read(r)) is not None}
+        """A metric's values by seed, for pairing with another set."""
+        found = ((record.seed, self.value(record, name)) for record in self.records)
+        return {seed: value for seed, value in found if value is not None}
 
-    def failed_by_seed(self) -> dict[int, float]:
-        """1 for each repetition that failed, 0 for each that did not, by seed."""
-        return {r.seed: float(not r.ok) for r in (*self.ok, *self.failures)}
-
-    def _reader(self, name: str) -> Callable[[Record], float | None]:
-        """What finds a metric's value in a record."""
-        if self.metric(name).name in self.metrics:
-            return lambda record: record.metrics.get(name)
-        return lambda record: record.cost(name)
+    def crashed_by_seed(self) -> dict[int, float]:
+        """1 for each repetition that crashed, 0 for each that finished, by seed."""
+        return {r.seed: float(not r.ok) for r in (*self.ok, *self.crashed)}
 
     def interval(self, name: str, confidence: float = CONFIDENCE) -> Interval:
         """The interval of a metric's mean; without values its mean is nan and n is 0."""
@@ -146,23 +145,23 @@ class ResultSet:
             self._intervals[key] = interval(self.values(name), self.metric(name), confidence)
         return self._intervals[key]
 
-    def failure_interval(self, confidence: float = CONFIDENCE) -> Interval:
-        """The interval of the share of repetitions that fail, interrupted ones left out.
+    def crash_interval(self, confidence: float = CONFIDENCE) -> Interval:
+        """The interval of the share of repetitions that crash, interrupted ones left out.
 
         Raises:
             ValueError: no repetition has ended.
         """
-        return proportion(len(self.failures), len(self.ok) + len(self.failures), confidence)
+        return proportion(len(self.crashed), len(self.ok) + len(self.crashed), confidence)
 
     def judge(self, name: str, claim: Claim) -> Judgement:
         """What the repetitions say of a claim about a metric's true mean."""
         return self._decide(claim, lambda: self._judged(self.metric(name)))
 
     def _judged(self, metric: Metric) -> Interval:
-        """The interval by which claims about a metric, or about failures, are judged."""
+        """The interval by which claims about a metric, or about crashes, are judged."""
         level = confidence(metric, self.error)
-        if metric is FAILURES:
-            return self.failure_interval(level)
+        if metric is CRASHED:
+            return self.crash_interval(level)
         return self.interval(metric.name, level)
 
     def _decide(self, claim: Claim, interval: Callable[[], Interval]) -> Judgement:
@@ -191,21 +190,49 @@ class ResultSet:
             raise ValueError(f"{name} cannot lie between {low:g} and {high:g}: low is above high")
         self._assert(name, at_least(low), at_most(high))
 
-    def assert_no_failures(self) -> None:
-        """Fail when a repetition failed, or when none was recorded."""
+    def assert_no_crashes(self) -> None:
+        """Fail when a repetition crashed, or when none was recorded."""
         __tracebackhide__ = True
+        self.claims_crashes = True
         self._assert_recorded()
-        if self.failures:
-            raise AssertionError(self._failed())
+        if self.crashed:
+            self._refute("")
 
-    def assert_failures_at_most(self, share: float) -> None:
-        """Fail when more than `share` (0..1) of all repetitions ever made would fail."""
+    def assert_crashed_at_most(self, share: float) -> None:
+        """Fail when more than `share` (0..1) of all repetitions ever made would crash."""
         __tracebackhide__ = True
-        check_threshold(FAILURES, share)
+        check_threshold(CRASHED, share)
+        self.claims_crashes = True
         self._assert_recorded()
-        found = self._decide(at_most(share), lambda: self._judged(FAILURES))
-        sentence = f"{self._failed()} ({self._bounds(FAILURES, found.interval)})"
-        self._tell([found], FAILURES, lambda: sentence)
+        found = self._decide(at_most(share), lambda: self._judged(CRASHED))
+        sentence = f"{self._crashes()} ({self._bounds(CRASHED, found.interval)})"
+        self._tell([found], CRASHED, lambda: sentence)
+
+    assert_no_failures, assert_failures_at_most = assert_no_crashes, assert_crashed_at_most
+
+    def check_crashes(self, share: float) -> None:
+        """Fail when no repetition finished, or as `assert_crashed_at_most` where some crashed.
+
+        Of a share of 0 one crash is enough, whatever the number of repetitions. What the test
+        itself claimed of crashes counts in place of `share`. A share of 1 allows everything.
+        """
+        __tracebackhide__ = True
+        if share >= 1 or not self.crashed:
+            return
+        if not self.ok:
+            self._refute(". No repetition finished")
+        if self.claims_crashes:
+            return
+        if not share:
+            self._refute(". None may crash (--sim-crashes)")
+        self.assert_crashed_at_most(share)
+
+    def _refute(self, why: str) -> NoReturn:
+        """Fail for crashes of which there may be none: one is enough."""
+        __tracebackhide__ = True
+        found = Judgement(Verdict.REFUTED, at_most(0.0), self._judged(CRASHED))
+        self.judged.append((CRASHED, found))
+        raise AssertionError(f"{self._crashes()}{why}")
 
     def _assert(self, name: str, *claims: Claim) -> None:
         __tracebackhide__ = True
@@ -214,10 +241,11 @@ class ResultSet:
             check_threshold(metric, claim.value)
         self._assert_recorded()
         if not self.ok:
-            raise AssertionError(f"{name} cannot be judged: {self._failed()}")
-        if not self.values(name):
+            raise AssertionError(f"{name} cannot be judged: {self._crashes()}")
+        if all(self.value(record, name) is None for record in self.ok):
             raise AssertionError(
-                f"{self.label}: {name} is not available in any of {len(self.ok)} repetitions"
+                f"{self.label}: {name} is not available in any of the {len(self.ok)} repetitions "
+                "that finished"
             )
         found = [self.judge(name, claim) for claim in claims]
         self._tell(found, metric, lambda: self._measured(metric))
@@ -258,18 +286,22 @@ class ResultSet:
 
     def _measured(self, metric: Metric) -> str:
         """What was measured, with simulator, mode, profile, bounds and number of repetitions."""
-        found = self._judged(metric)
-        failed = f", {len(self.failures)} failed" if self.failures else ""
+        found, crashed = self._judged(metric), len(self.crashed)
+        number = f"{found.n} repetition{'s' if found.n > 1 else ''}"
+        if crashed and self.value(self.crashed[0], metric.name) is not None:
+            number += f", {crashed} crashed and counted as {metric.format(metric.crashed or 0.0)}"
+        elif crashed:
+            number += f" that finished, {crashed} crashed"
+            number += ", not counted by --protocol paper" if metric.crashed is not None else ""
         return (
             f"{self.label}: {metric.name} is {metric.format(found.mean)} on average "
-            f"({self._bounds(metric, found)}, {found.n} repetition{'s' if found.n > 1 else ''}"
-            f"{failed})"
+            f"({self._bounds(metric, found)}, {number})"
         )
 
-    def _failed(self) -> str:
-        """How many failed and why, the most frequent cause first, with its first message."""
-        total = len(self.ok) + len(self.failures)
-        text = f"{self.label}: {len(self.failures)} of {total} repetitions failed"
+    def _crashes(self) -> str:
+        """How many crashed and why, the most frequent cause first, with its first message."""
+        total = len(self.ok) + len(self.crashed)
+        text = f"{self.label}: {len(self.crashed)} of {total} repetitions crashed"
         reasons = [
             f"{len(records)} x {cause}{_example(records)}"
             for cause, records in self.causes().items()

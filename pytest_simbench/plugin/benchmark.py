@@ -109,8 +109,8 @@ def give_rounds(
         {
             **{name: getattr(first, name) for name in SAVED},
             **{name: dict(getattr(first, name)) for name in ("settings", "versions", "host")},
-            "failures": len(result.failures),
-            "metrics": {name: result.values(name) for name in result.metrics},
+            "crashed": len(result.crashed),
+            "metrics": {name: [r.metrics.get(name) for r in result.ok] for name in result.metrics},
             "seeds": [record.seed for record in result.ok],
             "costs": {name: [record.cost(name) for record in result.ok] for name in SAVED_COSTS},
             baseline.KEY: baseline.to_extra_info(

@@ -22,7 +22,7 @@ from pytest_simbench.measure.bisection import (
     like_the_bad_one,
     steps,
 )
-from pytest_simbench.measure.limits import FAILURES
+from pytest_simbench.measure.limits import CRASHED, named
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.plugin import options
 from pytest_simbench.plugin.history import folder_of
@@ -142,8 +142,8 @@ class Search:
             pytest.UsageError: no test has it, or several have, or neither direction is worse.
         """
         name, result = self._wanted.metric, self.result(0)
-        if name == FAILURES.name:
-            return FAILURES
+        if named(name, result.known) == CRASHED.name:
+            return CRASHED
         with options.refusing(UnknownMetric, "--sim-bisect"):
             metric = result.metric(name)
         if metric.better is None:
@@ -178,11 +178,11 @@ class Search:
     def told(self, place: int) -> str:
         """What a release scored, in words."""
         name, result = self._wanted.metric, self.result(place)
-        failed = f", {len(result.failures)} failed" if result.failures else ""
+        crashed = f", {len(result.crashed)} crashed" if result.crashed else ""
         if name in result.known and result.values(name):
             mean = result.metric(name).format(result.interval(name).mean)
-            return f"{self._releases[place]} {name} {mean}{failed}"
-        return f"{self._releases[place]} {len(result.failures)} of {len(result)} failed"
+            return f"{self._releases[place]} {name} {mean}{crashed}"
+        return f"{self._releases[place]} {len(result.crashed)} of {len(result)} crashed"
 
     def _name(self, place: int) -> str:
         return f"{self._wanted.name}=={self._releases[place]}"

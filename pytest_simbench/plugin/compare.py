@@ -35,13 +35,15 @@ class Comparison:
 
     Attributes:
         baseline: the run to compare with.
-        limits: how much worse each metric may get; none: a table and no failures.
+        limits: how much worse each metric may get; without any, crashes alone can fail the run.
+        typed: whether the limits are for this very run: one that compares nothing fails it.
         beside: a simulator of this very run, and its other versions, that are compared with it.
     """
 
     baseline: Reading
     limits: Sequence[Limit] = ()
     beside: Beside | None = None
+    typed: bool = False
     _report: GateReport | None = field(default=None, init=False)
 
     def make(self, run: Reading) -> None:
@@ -50,14 +52,15 @@ class Comparison:
         if self.beside is not None:
             before, now = side_by_side(run.records, *self.beside)
         metrics = {**self.baseline.metrics, **run.metrics}
-        report = run_gate(before, now, self.limits, metrics)
+        report = run_gate(before, now, self.limits, metrics, typed=self.typed)
         other = other_meanings(self.baseline.tasks, run.tasks)
         self._report = replace(report, differences=(*other, *report.differences))
 
     @property
     def failed(self) -> bool:
-        """Whether limits were given and one was exceeded, or a test gives nothing any more."""
-        return bool(self.limits and self._report and self._report.failures)
+        """Whether a limit was exceeded or compared nothing, more repetitions crashed, or a test
+        gives nothing any more."""
+        return bool(self._report and self._report.failures)
 
     @property
     def found(self) -> tuple[str, GateReport] | None:
@@ -97,14 +100,15 @@ def prepare(
         pytest.UsageError: no baseline, a malformed one, a malformed limit, an unknown metric.
     """
     text = options.value(config, "sim_compare_fail")
+    typed = config.getoption("sim_compare_fail") is not None
     beside = _beside(config, simulators)
     if beside is not None:
         here = Reading(f"{beside[0]} in this run")
-        return Comparison(here, _limits(text, here, typed=False), beside)
-    typed = config.getoption("sim_compare_fail") is not None
+        return Comparison(here, _limits(text, here, typed=False), beside, typed)
     with options.refusing(BaselineError):
         baseline = _baseline(config, saved, needed=typed)
-    return Comparison(baseline, _limits(text, baseline, typed=typed)) if baseline else None
+    limits = _limits(text, baseline, typed=typed) if baseline else ()
+    return Comparison(baseline, limits, typed=typed) if baseline else None
 
 
 def _beside(config: pytest.Config, names: Sequence[str]) -> Beside | None:

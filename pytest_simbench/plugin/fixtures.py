@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from pytest_simbench.plugin import ahead, arguments, benchmark, cluster, data, options, recording
-from pytest_simbench.plugin.session import session_of
+from pytest_simbench.plugin.session import REPEATED, session_of
 from pytest_simbench.plugin.spellings import is_conftest
 
 if TYPE_CHECKING:
@@ -202,6 +202,7 @@ def repeat(
         arguments.once(arguments.checked_task(task, "repeat"), done)
         return repeat(task)
 
+    request.node.stash[REPEATED] = repeat.check_crashes
     yield perform
     repeat.finish(simbench_rounds)
 
@@ -251,11 +252,15 @@ def perturb(
 @pytest.fixture
 def threshold(request: pytest.FixtureRequest) -> Callable[[str, float], float]:
     """`threshold("placed", 0.9)`: the suite's value, unless `--sim-threshold` changes it."""
-    given = options.value(request.config, "sim_threshold")
+    from pytest_simbench.measure.limits import named
+    from pytest_simbench.plugin.thresholds import typed
+
+    given = typed(request.config)
     this = session_of(request.config).run
 
     def choose(metric: str, default: float) -> float:
-        value = float(given.get(metric, arguments.checked_threshold(metric, default)))
+        default = arguments.checked_threshold(metric, default)
+        value = given.get(metric := named(metric), default)
         this.ask(request.node.nodeid, metric, value)
         return value
 

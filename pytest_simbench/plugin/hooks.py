@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from pytest_simbench.plugin import harmless, options, spellings
-from pytest_simbench.plugin.session import fixtures_of, session_of
+from pytest_simbench.plugin.session import REPEATED, fixtures_of, session_of
 
 MARKS = (
     "only_sim(*names): run only on these simulators",
@@ -21,6 +21,7 @@ MARKS = (
     "may begin before the test does",
     "sim_conformance(kit): one test of each law of the conformance kit, see conformance_checks",
     "sim_timeout(seconds): time-out of a repetition, unless --sim-timeout is given",
+    "sim_crashes(share): share of repetitions that may crash, unless --sim-crashes is given",
 )
 
 
@@ -119,7 +120,12 @@ def pytest_runtest_setup() -> Generator[None, Any, Any]:
         raise
 
 
-pytest_runtest_call = pytest_runtest_setup
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
+    """So is one that asks for it later; one whose repetitions crashed fails."""
+    found = yield from pytest_runtest_setup()
+    item.stash.get(REPEATED, lambda: None)()
+    return found
 
 
 @pytest.hookimpl(hookwrapper=True)

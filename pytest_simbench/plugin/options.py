@@ -30,6 +30,7 @@ from pytest_simbench.plugin.values import (
     Words,
 )
 from pytest_simbench.plugin.values import Auto as Auto
+from pytest_simbench.records.choices import FIRST_SEED
 
 AUTO_LIMIT = 160
 """Repetitions at which `--reps auto` gives up: with the looks before it 10, 20, 40, 80 and 160."""
@@ -110,7 +111,7 @@ OPTIONS = (
     Option("--sim-jitter", Number(0, 1000), "scale of the start jitter, at most 1000; 1 is 1 mm "
            "and 1 degree, 0 is none", 1.0, "--jitter", "SCALE"),
     Option("--sim-seed", Number(0, LARGEST_SEED, whole=True), "seed of the first repetition; the "
-           "next ones follow", 2022, metavar="SEED"),
+           "next ones follow", FIRST_SEED, metavar="SEED"),
     Option("--sim-timeout", SECONDS, "time-out of a repetition in seconds (default: the study's)",
            metavar="SECONDS"),
     Option("--sim-stall-timeout", SECONDS, "longest silence of a worker in seconds", 60.0,
@@ -155,6 +156,8 @@ OPTIONS = (
            "the suites: placed=0.9", {}, metavar="METRIC=VALUE"),
     Option("--sim-data", File(), "folder of measured data sets (default: $SIMBENCH_DATA, else a "
            "cache of the user's)", metavar="DIR"),
+    Option("--sim-crashes", Number(0, 1), "share of a test's repetitions that may crash: 0.1 "
+           "(default: 0; a test fails when one crashed); 1 allows all", metavar="SHARE"),
     Option("--sim-strict", Flag(), "claims that the repetitions do not decide fail, also those "
            "that are not judged because there are too few", False),
     Option("--sim-baseline", File(), "run to compare with: a run folder, its records.jsonl, or a "

@@ -98,6 +98,19 @@ class RepeatFixture:
                 found |= {r.repetition: r for r in repeater.run(missing).records}
         return [found[k] for k in sorted(found)]
 
+    def check_crashes(self) -> None:
+        """Fail the test when more repetitions crashed than may: `--sim-crashes`, else the mark of
+        that name, else none; at the time steps of a sweep a crash is a finding, and all may."""
+        config, most = self.node.config, None
+        if not options.given(config, "sim_crashes"):
+            most = number_mark(self.node, "sim_crashes")
+        if most is None:
+            most = options.value(config, "sim_crashes")
+        if most is None:
+            most = 0.0 if self.case.own_timestep is None else 1.0
+        for result in self.results:
+            result.check_crashes(most)
+
     def finish(self, benchmark: Any) -> None:
         """Tell pytest-benchmark, where there is one, and JUnit; called when the test has ended."""
         for result in self.results:
@@ -131,7 +144,7 @@ def claim_of(case: Case, result: ResultSet, metric: Metric, judgement: Judgement
         low=bounds.low,
         high=bounds.high,
         n=bounds.n,
-        crashed=len(result.failures),
+        crashed=len(result.crashed),
         advice=judgement.advice,
     )
 
@@ -148,8 +161,8 @@ def _refusals_fail_the_test() -> Iterator[None]:
 
 def _properties(result: ResultSet) -> Iterator[tuple[str, float]]:
     """For JUnit: the mean of each metric and cost and the ends of its 95 % interval."""
-    yield "repetitions", len(result.ok) + len(result.failures)
-    yield "failures", len(result.failures)
+    yield "repetitions", len(result.ok) + len(result.crashed)
+    yield "crashed", len(result.crashed)
     for known in result.known:
         found = result.interval(known)
         name = in_one_line(known)

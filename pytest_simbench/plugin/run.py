@@ -230,7 +230,7 @@ class Run:
     def _thresholds(self) -> dict[str, float]:
         """Those on the command line: the ini file's hold for other tests too."""
         given = options.given(self.config, "sim_threshold")
-        return options.value(self.config, "sim_threshold") if given else {}
+        return thresholds.typed(self.config) if given else {}
 
     def check_thresholds(self, session: pytest.Session) -> None:
         """When all tests have ended: fail the run for a threshold of a metric that none has."""

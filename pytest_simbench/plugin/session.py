@@ -6,7 +6,7 @@ Imported at plugin load: standard library and pytest only; everything else is im
 from __future__ import annotations
 
 import shlex
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -94,9 +94,9 @@ class SimSession:
         config = self.config
         data.check(config)
         if options.given(config, "sim_threshold"):
-            from pytest_simbench.plugin.thresholds import bad_value
+            from pytest_simbench.plugin.thresholds import bad_value, typed
 
-            if wrong := bad_value(options.value(config, "sim_threshold")):
+            if wrong := bad_value(typed(config)):
                 raise pytest.UsageError(wrong)
         if not self.in_worker:
             recording.check(config)
@@ -116,7 +116,7 @@ class SimSession:
         from pytest_simbench.plugin.marks import NOTHING, number_mark, parameters
 
         try:
-            for name in ("reps", "sim_timeout"):
+            for name in ("reps", "sim_timeout", "sim_crashes"):
                 number_mark(metafunc.definition, name)
             chosen = parameters(metafunc, self.selection)
         except pytest.UsageError as error:
@@ -214,19 +214,25 @@ class SimSession:
             )
 
     def finish(self, session: pytest.Session) -> None:
-        """Compare with the baseline; a metric that is worse than allowed fails the run, and so does
-        a threshold of a metric that no test has."""
+        """Compare with the baseline; a metric that is worse than allowed fails the run, and so do
+        a limit that compared nothing and a threshold of a metric that no test has."""
         if self._received:
             self.run.receive(self._received)
-        if not self.begun or self.in_worker:
+        if self.in_worker:
             return
-        self.run.fail(self._failed)
-        self.run.complete()
-        if self.comparison is not None and self.run.reading.records:
-            self.comparison.make(self.run.reading)
+        if self.begun:
+            self.run.fail(self._failed)
+            self.run.complete()
+        if self.comparison is not None and self._alone:
+            from pytest_simbench.records.folder import Reading
+
+            reading = self.run.reading if self.begun else Reading()
+            if reading.records or self.comparison.typed:
+                self.comparison.make(reading)
             if self.comparison.failed and session.exitstatus == pytest.ExitCode.OK:
                 session.exitstatus = pytest.ExitCode.TESTS_FAILED
-        self.run.check_thresholds(session)
+        if self.begun:
+            self.run.check_thresholds(session)
 
     def summarise(self, reporter: pytest.TerminalReporter, exitstatus: int) -> None:
         """Print the result, write the report, and say last where it is."""
@@ -255,6 +261,9 @@ class SimSession:
         if self.begun:
             self.run.close()
 
+
+REPEATED: pytest.StashKey[Callable[[], None]] = pytest.StashKey()
+"""Of a test that repeats a task: fails it when more crashed than may; called when it has passed."""
 
 _SESSION = pytest.StashKey[SimSession]()
 

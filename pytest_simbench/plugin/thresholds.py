@@ -8,13 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from pytest_simbench.measure.limits import FAILURES, LimitError, check_gate
+import pytest
+
+from pytest_simbench.measure.limits import CRASHED, LimitError, check_gate, named
+from pytest_simbench.plugin import options
 from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric
 from pytest_simbench.repeatability.stability import KEPT
 
-OF_EVERY_TASK = (*COSTS, FAILURES, KEPT)
+OF_EVERY_TASK = (*COSTS, CRASHED, KEPT)
 """What thresholds may be of besides the metrics of tasks."""
+
+
+def typed(config: pytest.Config) -> dict[str, float]:
+    """The thresholds of `--sim-threshold`, by the names that metrics have now."""
+    given = options.value(config, "sim_threshold")
+    return {named(name): float(value) for name, value in given.items()}
 
 
 def bad_value(given: Mapping[str, float], metrics: Iterable[Metric] = OF_EVERY_TASK) -> str:
@@ -31,7 +40,7 @@ def bad_value(given: Mapping[str, float], metrics: Iterable[Metric] = OF_EVERY_T
 def problem(given: Mapping[str, float], run: Reading) -> str:
     """What is wrong with thresholds, once the tests have run; else nothing.
 
-    Valid are the metrics of the tasks that were performed, the costs, `failures`, and every name
+    Valid are the metrics of the tasks that were performed, the costs, `crashed`, and every name
     that a test asked a threshold of.
     """
     metrics = [*OF_EVERY_TASK, *(m for found in run.metrics.values() for m in found)]

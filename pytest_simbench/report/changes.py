@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from pytest_simbench.ground.text import for_markdown, for_terminal
 from pytest_simbench.measure.gate import Change, GateReport
+from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.records.series import short
 from pytest_simbench.report import markdown
 from pytest_simbench.report.grid import Column, fill, render
@@ -14,6 +15,7 @@ ALWAYS = ("rtf", "cpu_cost", "ram")
 """Costs that are shown although they may not have changed, as the study's metrics are."""
 
 PASSED = "no metric got worse beyond its limit"
+NO_LIMIT = "not significantly more repetitions crashed; no other limit was tested"
 
 
 def columns(report: GateReport) -> list[Column]:
@@ -34,7 +36,11 @@ def columns(report: GateReport) -> list[Column]:
 
 def _rows(report: GateReport) -> list[tuple[Change, str]]:
     """Changes with their verdicts: by test, those with a limit first."""
-    found = [(change, _limited(change)) for change in report.changes]
+    found = [
+        (change, _limited(change))
+        for change in report.changes
+        if change.metric != CRASHED or change.comparison.first or change.comparison.second
+    ]
     found += [
         (change, _free(change))
         for change in report.others
@@ -87,9 +93,16 @@ def render_terminal(report: GateReport, width: int, limited: bool) -> str:
         render(table, width) if table else "",
         _listed("not compared", report.notes, width),
         "\n".join(fill(f"FAILED {sentence}", width, "  ") for sentence in report.failures),
-        PASSED if limited and not report.failures else "",
+        _passed(report) if limited else "",
     ]
     return for_terminal("\n\n".join(part for part in parts if part))
+
+
+def _passed(report: GateReport) -> str:
+    """What is said when nothing fails."""
+    if report.failures:
+        return ""
+    return PASSED if report.compared else NO_LIMIT
 
 
 def _listed(title: str, items: Iterable[str], width: int) -> str:
@@ -104,7 +117,7 @@ def render_markdown(report: GateReport, baseline: str, limited: bool) -> str:
         f"## {for_markdown(f'Compared with {baseline}')}",
         _bullets(f"{DIFFERENT}: {sentence}" for sentence in report.differences),
         _bullets(f"FAILED {sentence}" for sentence in report.failures),
-        f"Passed: {PASSED}." if limited and not report.failures else "",
+        f"Passed: {passed}." if limited and (passed := _passed(report)) else "",
         markdown.table(table) if table else "",
         _bullets(f"not compared: {sentence}" for sentence in report.notes),
     ]

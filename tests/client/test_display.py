@@ -112,7 +112,7 @@ class Blinded(Falling):
     name: ClassVar[str] = "blinded"
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
-        if seed == 2022:
+        if seed == 10001:
             for server in servers():
                 server.kill()
         return super().perform(world, seed, count)

@@ -38,16 +38,16 @@ TEST = """
                 began = Path(trouble, f"{seed}-{os.getpid()}")
                 began.touch()
                 time.sleep(1.0)
-                if seed == 2024 and len(list(Path(trouble).glob("2024-*"))) == 1:
+                if seed == 10003 and len(list(Path(trouble).glob("10003-*"))) == 1:
                     os.kill(os.getpid(), signal.SIGKILL)  # as a simulator may
-                if seed == 2029:
+                if seed == 10008:
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))  # wherever it runs
             return outcome
 
     def test_one(repeat):
         repeat(Slow())
 """
-FULL = 2029
+FULL = 10008
 """The seed at which every node's disk is full."""
 
 
@@ -136,7 +136,7 @@ def test_a_process_killed_a_machine_cut_off_and_one_added(
     again = {
         seed: r["notes"]["lost_nodes"] for seed, r in found.items() if "lost_nodes" in r["notes"]
     }
-    assert "its process ended, or its network is gone" in again[2024][0]
+    assert "its process ended, or its network is gone" in again[10003][0]
     assert any("b: " in texts[0] for texts in again.values())
     assert "d" in {r["host"]["node"] for r in found.values()}
     assert all((spread / "out" / r["notes"]["log"]).is_file() for r in found.values())

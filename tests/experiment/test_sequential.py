@@ -75,8 +75,8 @@ def test_failures_are_a_claim_too() -> None:
         return [failed(k) if k % 2 else record(k) for k in range(number)]
 
     result = SequentialResultSet(more(10), METRICS, PLAN, more)
-    with pytest.raises(AssertionError, match=r"20 of 40 repetitions failed.*99 % bounds"):
-        result.assert_failures_at_most(0.3)
+    with pytest.raises(AssertionError, match=r"20 of 40 repetitions crashed.*99 % bounds"):
+        result.assert_crashed_at_most(0.3)
 
 
 def test_when_no_more_come_it_ends() -> None:

@@ -22,7 +22,7 @@ REAL = RunFolder.of(Path(__file__).with_name("stacking_records.jsonl")).read().r
 
 
 def run(baseline: Iterable[Record], current: Iterable[Record], text: str) -> GateReport:
-    limits = parse_limits(text, METRICS)
+    limits = parse_limits(text, METRICS) if text else ()
     return run_gate(baseline, current, limits, {"stacking": METRICS})
 
 
@@ -126,18 +126,75 @@ def test_more_memory_fails() -> None:
     assert "ram rose from 150 MB to 180 MB (worse by 20 %, limit 10 %" in report.failures[0]
 
 
-def test_more_failures_fail() -> None:
-    current = [*made([1.0] * 10), *(failed(k) for k in range(10, 20))]
-    report = run(made([1.0] * 20), current, "failures:10%")
-    assert "failures rose from 0 % to 50 % (worse by 50 points" in report.failures[0]
+def with_crashes(number: int, of: int = 20, **changes: Any) -> list[Record]:
+    """Perfect stackings of which the last ones crashed."""
+    crashed = [replace(failed(k), **changes) for k in range(of - number, of)]
+    return [*made([1.0] * (of - number), **changes), *crashed]
+
+
+@pytest.mark.parametrize("limits", ["", "rtf:20%", "placed:5%,ram:10%,rtf:20%"])
+@pytest.mark.parametrize("number", [0, 1, 4, 5, 11, 19, 20])
+def test_more_crashes_fail_whatever_the_limits(number: int, limits: str) -> None:
+    report = run(with_crashes(0), with_crashes(number), limits)
+    rose = f"crashed rose from 0 % to {5 * number} % (worse by {5 * number} points, limit 0 points"
+    assert any(rose in failure for failure in report.failures) == (number >= 5)
+    if number < 20:
+        assert run(with_crashes(number), with_crashes(number), limits).failures == ()
+        assert run(with_crashes(number), with_crashes(0), limits).failures == ()
+
+
+def test_other_seeds_and_many_tests_do_not_hide_crashes() -> None:
+    before = [replace(r, seed=r.seed + 500) for r in with_crashes(0)]
+    assert "crashed rose" in run(before, with_crashes(5), "placed:50%").failures[0]
+    assert run(before, with_crashes(4), "placed:50%").failures == ()
+    sides = [
+        [r for k in range(16) for r in with_crashes(more * (k < 2), test=f"test_{k}[engine]")]
+        for more in (0, 5)
+    ]
+    found = run(*sides, "placed:50%").failures
+    assert [sentence[:9] for sentence in found] == ["test_0[en", "test_1[en"]
+
+
+def test_a_limit_on_crashes_allows_as_many() -> None:
+    allowed = "crashed rose from 0 % to 50 % (worse by 50 points, limit 10 points"
+    assert allowed in run(with_crashes(0), with_crashes(10), "crashed:10%").failures[0]
+    assert run(with_crashes(0), with_crashes(10), "failures:50%").failures == ()
+
+
+def test_crashes_count_in_shares_and_cost_nothing_where_there_is_none() -> None:
+    report = run(with_crashes(0), with_crashes(6), "placed:5%")
+    assert report.changes[0].comparison.second == pytest.approx(0.7)
+    assert report.changes[0].p_value == pytest.approx(report.changes[0].comparison.p_value / 0.3)
+    paper = run(with_crashes(0), with_crashes(6, protocol="paper"), "placed:5%")
+    assert paper.changes[0].comparison.second == 1.0
+    assert "crashed rose" in paper.failures[0]
 
 
 def test_a_test_that_gives_nothing_any_more_fails_whatever_the_limits() -> None:
-    report = run(made([1.0] * 3), [failed(0), failed(1)], "ram:10%")
+    report = run(made([1.0] * 3), [failed(0), failed(1)], "placed:10%")
     assert report.failures == (
-        "test_stacking[engine-headless]: none of 2 repetitions succeeded (most often WorkerHung in "
+        "test_stacking[engine-headless]: none of 2 repetitions finished (most often WorkerHung in "
         "settle); 3 of 3 did in the baseline",
     )
+
+
+def test_a_limit_that_compares_nothing_fails_and_says_why() -> None:
+    here = made([1.0] * 6) + made([1.0] * 6, test="test_other[engine-headless]")
+    text = "placed:5%,landing_error:1,ram:10%"
+    report = run(here, here, text)
+    both = "(test_stacking[engine-headless], test_other[engine-headless])"
+    missing = f"landing_error:1 compared nothing: no repetition of the baseline has a value {both}"
+    assert report.failures == (missing,)
+    waiting = run_gate(here, here, parse_limits(text, METRICS), {"stacking": METRICS}, typed=False)
+    assert waiting.failures == ()
+    assert missing in waiting.notes
+    nothing = run(here, made([1.0] * 6, test="test_x[e]"), "placed:5%")
+    assert nothing.failures == (
+        "nothing was compared: no test of this run is in the baseline (this run has test_x[e]; "
+        "the baseline test_stacking[engine-headless], test_other[engine-headless])",
+    )
+    assert "this run has no repetition" in run(here, [], "placed:5%").failures[0]
+    assert run_gate(here, [], (), {}, typed=False).failures == ()
 
 
 def test_seeds_pair_where_they_can() -> None:
@@ -187,8 +244,8 @@ def test_another_machine_without_a_control_is_no_change_of_the_simulator() -> No
     elsewhere = [replace(record, host={"cpu": "another", "cores": 8}) for record in slow]
     assert len(run(before, slow, "rtf:20%").failures) == 1
     report = run(before, elsewhere, "rtf:20%")
-    assert not report.failures
-    assert any("rtf is not compared: it depends on the machine" in note for note in report.notes)
+    (failure,) = report.failures
+    assert failure.startswith("rtf:20% compared nothing: it depends on the machine, which was ano")
     with_control = [replace(r, host={"cpu": "another"}) for r in timed(16.0, 2e-4, rng)]
     assert len(run(timed(8.0, 2e-4, rng), with_control, "rtf:20%").failures) == 1
 
@@ -215,12 +272,12 @@ def test_two_tests_of_one_name_are_kept_apart_by_their_path() -> None:
 def test_what_cannot_be_compared_is_said() -> None:
     baseline = made([1.0] * 3, test="kept") + made([1.0] * 3, test="gone")
     current = made([1.0] * 3, test="kept") + made([1.0] * 3, test="new")
-    report = run(baseline, current, "placed:5%,landing_error:1")
+    current[0] = replace(current[0], metrics={"placed": 1.0, "landing_error": 1.0})
+    report = run(baseline, current, "placed:5%")
     assert report.failures == ()
     assert report.notes == (
         "gone is in the baseline but did not run",
         "kept: 3 pairs are too few for a change of placed to be significant among 1 comparisons",
-        "landing_error was not measured in both runs, so its limit is not tested",
         "new is not in the baseline and is not compared",
     )
 
@@ -237,13 +294,13 @@ def test_what_has_no_limit_is_tested_in_both_directions_and_fails_nothing() -> N
     ]
     report = run(baseline, current, "placed:5%")
     assert report.failures == ()
-    assert [change.metric.name for change in report.changes] == ["placed"]
+    assert [change.metric.name for change in report.changes] == ["placed", "crashed"]
     costs = ["rtf", "cpu", "ram", "ram_peak", "cpu_cost", "start", "end", "total"]
-    assert [change.metric.name for change in report.others] == ["failures", "hit", *costs]
+    assert [change.metric.name for change in report.others] == ["hit", *costs]
     others = {change.metric.name: change for change in report.others}
     assert others["hit"].significant
     assert others["hit"].loss == -1.0
-    assert others["hit"].p_value == pytest.approx(10 * others["hit"].comparison.p_value)
+    assert others["hit"].p_value == pytest.approx(9 * others["hit"].comparison.p_value)
     assert not others["ram"].significant
     assert others["hit"].limit == Limit("hit", 0.0, True)
     assert not any(change.normalised for change in report.others)
@@ -291,11 +348,11 @@ def test_the_sentence_of_a_metric_in_its_unit() -> None:
 
 def test_a_test_that_is_broken_is_told_beside_its_limits() -> None:
     """Only where the baseline had results, and the run has failures."""
-    assert run([failed(0)], [failed(0)], "placed:5%").broken == ()
+    assert run([failed(0)], [failed(0)], "placed:5%").failures == ()
     assert run(made([1.0]), made([1.0]), "placed:5%").broken == ()
     report = run(made([1.0] * 2), [failed(0), failed(1, "WorkerDied"), failed(2)], "placed:5%")
-    assert report.broken == report.failures
-    assert "none of 3 repetitions succeeded (most often WorkerHung in settle)" in report.broken[0]
+    assert report.broken == report.failures[:1]
+    assert "none of 3 repetitions finished (most often WorkerHung in settle)" in report.broken[0]
 
 
 def test_runs_of_different_robots_are_not_comparable() -> None:

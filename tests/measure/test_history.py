@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 
 from pytest_simbench.measure.bisection import between, first_worse, like_the_bad_one, steps
-from pytest_simbench.measure.gate import side_by_side
+from pytest_simbench.measure.gate import run_gate, side_by_side
 from pytest_simbench.measure.history import histories
+from pytest_simbench.measure.limits import parse_limits
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.record import Record
 from tests.records.build import METRICS, failed, record
@@ -69,7 +70,7 @@ def test_a_release_that_fails_is_named_with_its_message() -> None:
     found = [*release("1", 1.0), *release("2", 1.0), *broken]
     (history,) = histories(found, {"stacking": METRICS})
     assert history.sentences()[-1] == (
-        "3: 4 of 4 repetitions failed, most often WorkerHung in settle: no answer for 30 s"
+        "3: 4 of 4 repetitions crashed, most often WorkerHung in settle: no answer for 30 s"
     )
 
 
@@ -115,3 +116,29 @@ def test_a_run_as_baseline_and_current() -> None:
     assert {r.simulator for r in now} == {r.simulator for r in before} == {"engine==2"}
     assert {r.test for r in before} == {"test_stacking[engine==2-headless]"}
     assert {r.metrics["placed"] for r in before} == {r.metrics["placed"] for r in found[:8]}
+
+
+def test_a_simulators_name_in_a_folder_or_a_parameter_hides_no_comparison() -> None:
+    """`--sim-baseline=mujoco` in `mujoco-bench/` compared nothing, and passed."""
+    test = "mujoco-bench/test_it.py::test_stacking[mujoco-law-{}-headless]"
+    found = [
+        record(
+            k,
+            test=test.format(name),
+            function="mujoco-bench/test_it.py::test_stacking",
+            variant="mujoco-law",
+            simulator=name,
+            metrics={"placed": placed},
+        )
+        for name, placed in (("mujoco", 1.0), ("mujoco==3.3.7", 0.5))
+        for k in range(20)
+    ]
+    sides = side_by_side(found, "mujoco", ["mujoco==3.3.7"])
+    assert {r.test for r in sides[0]} == {r.test for r in sides[1]}
+    (failure,) = run_gate(
+        *sides, parse_limits("placed:5%", METRICS), {"stacking": METRICS}
+    ).failures
+    assert "placed fell from 100 % to 50 %" in failure
+    alone = [r for r in found if r.simulator == "mujoco"]
+    nothing = run_gate(*side_by_side(alone, "mujoco", ["mujoco==3.3.7"]), (), {})
+    assert "no test of this run is in the baseline" in nothing.failures[0]

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.measure.limits import (
-    FAILURES,
+    CRASHED,
     Limit,
     LimitError,
     check_gate,
@@ -35,8 +35,11 @@ def test_an_amount_without_percent_is_in_the_metrics_unit() -> None:
     assert parse_limits("landing_error:0.01", METRICS) == (Limit("landing_error", 0.01, False),)
 
 
-def test_failures_are_a_metric() -> None:
-    assert parse_limits("failures:10%", ()) == (Limit("failures", 0.1, True),)
+@pytest.mark.parametrize("name", ["crashed", "failures"])
+def test_crashes_are_a_metric_also_by_its_name_of_before(name: str) -> None:
+    assert parse_limits(f"{name}:10%", ()) == (Limit("crashed", 0.1, True),)
+    own = Metric("failures", "failures of the task", better="lower")
+    assert parse_limits("failures:10%,crashed:5%", (own,))[0] == Limit("failures", 0.1, True)
 
 
 @pytest.mark.parametrize(
@@ -51,7 +54,7 @@ def test_an_unknown_metric_lists_the_valid_names() -> None:
     with pytest.raises(UnknownMetric) as caught:
         parse_limits("plaecd:5%", METRICS)
     assert "did you mean 'placed'?" in str(caught.value)
-    assert "failures" in str(caught.value)
+    assert "crashed" in str(caught.value)
     assert "landing_x" not in str(caught.value)
 
 
@@ -69,7 +72,7 @@ def test_two_limits_of_one_metric_are_refused() -> None:
     ("limit", "metric", "before", "after", "loss", "text"),
     [
         (Limit("placed", 0.05, True), PLACED, 0.9, 0.8, 0.1, "10 points"),
-        (Limit("failures", 0.05, True), FAILURES, 0.1, 0.3, 0.2, "20 points"),
+        (Limit("crashed", 0.05, True), CRASHED, 0.1, 0.3, 0.2, "20 points"),
         (Limit("rtf", 0.2, True), RTF, 10, 7, 0.3, "30 %"),
         (Limit("rtf", 0.2, True), RTF, 10, 12, -0.2, "-20 %"),
         (Limit("landing_error", 0.01, False), ERROR, 0.01, 0.03, 0.02, "0.02 m"),
@@ -99,7 +102,7 @@ def test_worse_one_way_is_better_the_other(before: float, after: float, percent:
         ("placed:1", "placed lies between 0 and 100 %; did you mean placed:1%?"),
         ("hit:100%", "hit lies between 0 and 100 %"),
         ("placed:150%", "placed lies between 0 and 100 %"),
-        ("failures:2", "failures lies between 0 and 100 %; did you mean failures:2%?"),
+        ("crashed:2", "crashed lies between 0 and 100 %; did you mean crashed:2%?"),
         ("rtf:200%", "rtf cannot fall by more than 100 %"),
         ("rtf:100%", "rtf cannot fall by more than 100 %"),
     ],
@@ -143,7 +146,7 @@ def test_a_threshold_that_a_metric_cannot_reach_is_refused(
 
 
 def test_thresholds_at_the_ends_are_claims_but_no_gates() -> None:
-    for metric, value, always in ((PLACED, 0.0, "at least 0"), (FAILURES, 1.0, "at most 1")):
+    for metric, value, always in ((PLACED, 0.0, "at least 0"), (CRASHED, 1.0, "at most 1")):
         check_threshold(metric, value)
         with pytest.raises(LimitError) as caught:
             check_gate(metric, value)
@@ -161,7 +164,7 @@ def test_thresholds_at_the_ends_are_claims_but_no_gates() -> None:
 
 @pytest.mark.parametrize(
     ("metric", "value"),
-    [(PLACED, 0.01), (PLACED, 1.0), (FAILURES, 0.0), (FAILURES, 0.99), (RTF, 0.1), (ERROR, 0.0)],
+    [(PLACED, 0.01), (PLACED, 1.0), (CRASHED, 0.0), (CRASHED, 0.99), (RTF, 0.1), (ERROR, 0.0)],
 )
 def test_thresholds_that_can_fail_are_taken(metric: Metric, value: float) -> None:
     check_gate(metric, value)

@@ -159,7 +159,7 @@ def test_the_table_of_the_docs_is_what_is_printed(
 ) -> None:
     main()
     printed = capsys.readouterr().out
-    assert "| failures at most 15 % | 20 | 0 failures | 33 % | 51 % |  |" in printed
+    assert "| crashed at most 15 % | 20 | 0 crashed | 33 % | 51 % |  |" in printed
     assert printed in (pytestconfig.rootpath / "docs" / "gate.md").read_text()
 
 

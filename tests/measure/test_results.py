@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
 import pytest
 
 from pytest_simbench.measure.intervals import interval, proportion
 from pytest_simbench.measure.results import InconclusiveWarning, ResultSet
 from pytest_simbench.measure.verdicts import at_least
-from pytest_simbench.records.metrics import UnknownMetric
+from pytest_simbench.records.metrics import Metric, UnknownMetric
 from tests.records.build import METRICS, failed, record, records
 
 
@@ -24,11 +25,92 @@ GOOD = [14 / 15, 1.0] * 10
 MIXED = [0.8, 1.0] * 10
 
 
-def test_failed_repetitions_are_left_out_of_metrics_and_counted() -> None:
-    result = placed(0.5, 1.0, also=3)
-    assert result.values("placed") == [0.5, 1.0]
-    assert (len(result), len(result.ok), len(result.failures)) == (5, 2, 3)
-    assert result.by_seed("placed") == {1000: 0.5, 1001: 1.0}
+@pytest.mark.parametrize(
+    ("metric", "protocol", "values"),
+    [
+        ("placed", "fast", [0.5, 0.5, 0.0, 0.0]),
+        ("hit", "smoke", [0.5, 0.5, 0.0, 0.0]),
+        ("tipped", "fast", [0.5, 0.5, 1.0, 1.0]),  # the worst value there is
+        ("landing_error", "fast", [0.5, 0.5]),  # lengths and times have none
+        ("landing_x", "fast", [0.5, 0.5]),
+        ("sides", "fast", [0.5, 0.5]),  # a share of which neither direction is good
+        ("rtf", "fast", [17.5, 17.5]),
+        ("placed", "paper", [0.5, 0.5]),  # as the study counts
+    ],
+)
+def test_a_crashed_repetition_counts_with_the_worst_value_that_there_is(
+    metric: str, protocol: str, values: list[float]
+) -> None:
+    metrics = (
+        *METRICS,
+        Metric("tipped", "tipped", better="lower", kind="yes_no"),
+        Metric("sides", "sides", better=None, kind="share", of=2),
+    )
+    given: dict[str, float | None] = {m.name: 0.5 for m in metrics}
+    made = [record(k, metrics=given, protocol=protocol) for k in range(2)]
+    made += [replace(failed(k), protocol=protocol) for k in (2, 3)]
+    made.append(record(4, status="interrupted", metrics=given))
+    result = ResultSet(made, metrics)
+    assert result.values(metric) == values
+    assert result.by_seed(metric) == {1000 + k: value for k, value in enumerate(values)}
+    assert result.interval(metric).n == len(values)
+    assert (len(result), len(result.ok), len(result.crashed)) == (5, 2, 2)
+    assert result.failures == result.crashed
+    assert result.crashed_by_seed() == {1000: 0.0, 1001: 0.0, 1002: 1.0, 1003: 1.0}
+
+
+@pytest.mark.parametrize(
+    ("metric", "protocol", "said"),
+    [
+        ("placed", "fast", r"placed is 90 % .*, 20 repetitions, 2 crashed and counted as 0 %\)"),
+        ("landing_error", "fast", r"is 1 m .*, 18 repetitions that finished, 2 crashed\)"),
+        ("placed", "paper", r"placed is 100 % .*, 18 repetitions that finished, 2 crashed, not "
+                            r"counted by --protocol paper\)"),
+    ],
+)  # fmt: skip
+def test_a_message_says_what_became_of_the_crashed(metric: str, protocol: str, said: str) -> None:
+    made = [record(k, metrics={metric: 1.0}, protocol=protocol) for k in range(18)]
+    made += [replace(failed(k), protocol=protocol) for k in (18, 19)]
+    with pytest.raises(AssertionError, match=said):
+        ResultSet(made, METRICS).assert_at_most(metric, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("finished", "crashed", "may", "said"),
+    [
+        (1, 1, 0.0, "1 of 2 repetitions crashed: 1 x WorkerHung in settle .*None may crash"),
+        (19, 1, 0.0, "1 of 20 repetitions crashed"),
+        (20, 0, 0.0, ""),
+        (0, 2, 0.0, "2 of 2 repetitions crashed: 2 x WorkerHung.*No repetition finished"),
+        (0, 2, 0.99, "No repetition finished"),
+        (0, 2, 1.0, ""),
+        (16, 4, 0.05, "4 of 20 repetitions crashed.*95 % bounds 7.1.*above 5 %"),
+    ],
+)
+def test_more_crashes_than_may_fail_whatever_else_is_claimed(
+    finished: int, crashed: int, may: float, said: str
+) -> None:
+    made = placed(*[1.0] * finished, also=crashed)
+    if not said:
+        return made.check_crashes(may)
+    with pytest.raises(AssertionError, match=said):
+        made.check_crashes(may)
+    ((metric, judgement),) = made.judged  # the table of claims shows it
+    assert (metric.name, judgement.verdict) == ("crashed", "refuted")
+
+
+def test_what_a_test_claims_of_crashes_itself_counts_but_none_must_finish_one() -> None:
+    made = placed(*GOOD, also=1)
+    made.assert_crashed_at_most(0.5)
+    made.check_crashes(0.0)
+    undecided = placed(*GOOD, also=1)
+    undecided.strict = True
+    with pytest.raises(AssertionError, match="inconclusive whether at most 5 %.*--sim-strict"):
+        undecided.check_crashes(0.05)
+    nothing = placed(also=5)
+    nothing.assert_crashed_at_most(1.0)
+    with pytest.raises(AssertionError, match="No repetition finished"):
+        nothing.check_crashes(0.0)
 
 
 def test_a_metric_that_is_not_available_is_left_out() -> None:
@@ -62,9 +144,9 @@ def test_at_least_fails_with_one_sentence_that_says_all() -> None:
         placed(*MIXED, also=1).assert_at_least("placed", 0.97)
     message = str(caught.value)
     assert message.startswith(
-        "stacking on engine headless (tuned): placed is 90 % on average (95 % bounds 74.35 % and "
+        "stacking on engine headless (tuned): placed is 85.71 % on average (95 % bounds 62.9 % and "
     )
-    assert message.endswith("20 repetitions, 1 failed), which is below 97 %")
+    assert message.endswith("21 repetitions, 1 crashed and counted as 0 %), which is below 97 %")
 
 
 def test_at_most_fails_when_the_interval_is_above() -> None:
@@ -102,7 +184,7 @@ def test_fewer_than_five_repetitions_are_not_judged(n: int, value: float) -> Non
     for check in (
         lambda: result.assert_at_least("placed", 0.5),
         lambda: result.assert_at_most("placed", 0.5),
-        lambda: result.assert_failures_at_most(0.1),
+        lambda: result.assert_crashed_at_most(0.1),
         lambda: result.assert_at_least("rtf", 10),
         lambda: result.assert_at_least("rtf", 20),
     ):
@@ -129,17 +211,17 @@ def test_strict_fails_what_is_not_decided() -> None:
         with pytest.raises(AssertionError, match=rf"{reason} whether at least 90 %.*--sim-strict"):
             made.assert_at_least("placed", 0.9)
         with pytest.raises(AssertionError, match=rf"{reason} whether at most 10 %.*--sim-strict"):
-            made.assert_failures_at_most(0.1)
+            made.assert_crashed_at_most(0.1)
     decided = placed(*GOOD)
     decided.strict = True
     decided.assert_at_least("placed", 0.7)
-    decided.assert_failures_at_most(0.15)
+    decided.assert_crashed_at_most(0.15)
 
 
 def test_a_warning_points_at_the_line_of_the_test() -> None:
     for check in (
         lambda: placed(1.0).assert_at_least("placed", 0.9),
-        lambda: placed(1.0).assert_failures_at_most(0.1),
+        lambda: placed(1.0).assert_crashed_at_most(0.1),
         lambda: placed(1.0).assert_between("placed", 0.1, 0.2),
     ):
         with pytest.warns(InconclusiveWarning) as caught:
@@ -150,9 +232,9 @@ def test_a_warning_points_at_the_line_of_the_test() -> None:
 def test_no_failure_in_twenty_repetitions_supports_at_most_15_percent() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        placed(*GOOD).assert_failures_at_most(0.15)
+        placed(*GOOD).assert_crashed_at_most(0.15)
     with pytest.raises(AssertionError, match=r"95 % bounds 17\.73 % and .*above 15 %"):
-        placed(*GOOD[:13], also=7).assert_failures_at_most(0.15)
+        placed(*GOOD[:13], also=7).assert_crashed_at_most(0.15)
 
 
 def test_without_a_good_repetition_a_metric_fails_with_the_causes() -> None:
@@ -160,7 +242,7 @@ def test_without_a_good_repetition_a_metric_fails_with_the_causes() -> None:
     with pytest.raises(AssertionError) as caught:
         ResultSet(made, METRICS).assert_at_least("placed", 0.5)
     assert str(caught.value) == (
-        "placed cannot be judged: stacking on engine headless (tuned): 3 of 3 repetitions failed: "
+        "placed cannot be judged: stacking on engine headless (tuned): 3 of 3 repetitions crashed: "
         "2 x WorkerHung in settle (repetition 0, seed 1000: no answer for 30 s); "
         "1 x WorkerDied in step (repetition 2, seed 1002: no answer for 30 s)"
     )
@@ -171,55 +253,57 @@ def test_without_any_repetition_everything_fails() -> None:
         result = ResultSet(made, METRICS)
         for check in (
             lambda r=result: r.assert_at_least("placed", 0.5),
-            result.assert_no_failures,
-            lambda r=result: r.assert_failures_at_most(0.5),
+            result.assert_no_crashes,
+            lambda r=result: r.assert_crashed_at_most(0.5),
         ):
             with pytest.raises(AssertionError, match="no repetition has ended"):
                 check()
 
 
 def test_a_metric_that_no_repetition_has_fails() -> None:
-    with pytest.raises(AssertionError, match="landing_x is not available in any of 1 repetitions"):
+    with pytest.raises(
+        AssertionError, match="landing_x is not available in any of the 1 repetitions that finished"
+    ):
         placed(1.0).assert_at_least("landing_x", 1.0)
 
 
 def test_no_failures_is_strict() -> None:
-    placed(*GOOD).assert_no_failures()
+    placed(*GOOD).assert_no_crashes()
     with pytest.raises(
-        AssertionError, match=r"1 of 21 repetitions failed: 1 x WorkerHung in settle"
+        AssertionError, match=r"1 of 21 repetitions crashed: 1 x WorkerHung in settle"
     ):
-        placed(*GOOD, also=1).assert_no_failures()
+        placed(*GOOD, also=1).assert_no_crashes()
 
 
 def test_failures_at_most_is_judged_by_its_interval() -> None:
-    placed(*GOOD, also=1).assert_failures_at_most(0.3)
+    placed(*GOOD, also=1).assert_crashed_at_most(0.3)
     with pytest.raises(AssertionError, match="which is above 10 %"):
-        placed(*GOOD, also=20).assert_failures_at_most(0.1)
+        placed(*GOOD, also=20).assert_crashed_at_most(0.1)
     with pytest.warns(InconclusiveWarning, match="inconclusive whether at most 10 %"):
-        placed(*GOOD, also=1).assert_failures_at_most(0.1)
+        placed(*GOOD, also=1).assert_crashed_at_most(0.1)
     with pytest.raises(ValueError, match="between 0 and 1, not at 5; did you mean 0.05?"):
-        placed(*GOOD).assert_failures_at_most(5)
+        placed(*GOOD).assert_crashed_at_most(5)
 
 
 def test_interrupted_repetitions_count_as_neither() -> None:
     made = [*records("placed", GOOD), record(20, status="interrupted")]
     result = ResultSet(made, METRICS)
-    result.assert_no_failures()
-    assert result.failure_interval().n == 20
+    result.assert_no_crashes()
+    assert result.crash_interval().n == 20
     assert len(result.interrupted) == 1
 
 
 def test_the_summary_is_readable() -> None:
     assert repr(placed(1.0, also=2)) == (
-        "<ResultSet stacking on engine headless (tuned): 1 ok, 2 failed>"
+        "<ResultSet stacking on engine headless (tuned): 1 ok, 2 crashed>"
     )
 
 
 def test_an_interval_has_the_confidence_asked_for() -> None:
     result = placed(*GOOD, also=5)
     for level in (0.8, 0.95, 0.99):
-        assert result.interval("placed", level) == interval(GOOD, METRICS[0], level)
-        assert result.failure_interval(level) == proportion(5, 25, level)
+        assert result.interval("placed", level) == interval([*GOOD, *[0.0] * 5], METRICS[0], level)
+        assert result.crash_interval(level) == proportion(5, 25, level)
     assert result.interval("placed") == result.interval("placed", 0.95)
 
 
@@ -242,31 +326,31 @@ def test_a_failure_without_a_cause_is_counted_and_told() -> None:
     result = ResultSet([*records("placed", GOOD), record(20, status="failed")], METRICS)
     assert list(result.causes()) == ["unknown cause"]
     with pytest.raises(AssertionError) as caught:
-        result.assert_no_failures()
-    assert str(caught.value).endswith("failed: 1 x unknown cause (repetition 20, seed 1020)")
+        result.assert_no_crashes()
+    assert str(caught.value).endswith("crashed: 1 x unknown cause (repetition 20, seed 1020)")
 
 
 def test_no_failure_is_told_without_reasons() -> None:
     with pytest.warns(
-        InconclusiveWarning, match=r"0 of 20 repetitions failed \(95 % bounds 0 % and"
+        InconclusiveWarning, match=r"0 of 20 repetitions crashed \(95 % bounds 0 % and"
     ):
-        placed(*GOOD).assert_failures_at_most(0.1)
+        placed(*GOOD).assert_crashed_at_most(0.1)
 
 
 def test_a_range_may_be_a_point_and_failures_any_share() -> None:
     with pytest.raises(AssertionError, match="above 0 %"):
         placed(*GOOD).assert_between("placed", 0.0, 0.0)
-    placed(*GOOD).assert_failures_at_most(1.0)
+    placed(*GOOD).assert_crashed_at_most(1.0)
     with pytest.warns(InconclusiveWarning):
-        placed(*GOOD).assert_failures_at_most(0.0)
+        placed(*GOOD).assert_crashed_at_most(0.0)
     with pytest.raises(ValueError, match="not at 1.5"):
-        placed(*GOOD).assert_failures_at_most(1.5)
+        placed(*GOOD).assert_crashed_at_most(1.5)
 
 
 @pytest.mark.parametrize("cause", ["RepetitionTimeout", "WorkerHung", "Diverged"])
 def test_every_cause_is_a_failure(cause: str) -> None:
     result = ResultSet([*records("placed", [1.0] * 3), failed(3, cause)], METRICS)
-    assert [record.seed for record in result.failures] == [1003]
-    assert result.failure_interval().mean == 0.25
-    with pytest.raises(AssertionError, match=f"1 of 4 repetitions failed: 1 x {cause} in settle"):
-        result.assert_no_failures()
+    assert [record.seed for record in result.crashed] == [1003]
+    assert result.crash_interval().mean == 0.25
+    with pytest.raises(AssertionError, match=f"1 of 4 repetitions crashed: 1 x {cause} in settle"):
+        result.assert_no_crashes()

@@ -42,7 +42,7 @@ def test_less_is_better_for_costs_and_errors() -> None:
 def test_failures_are_compared_too() -> None:
     a = [record(k, metrics={"placed": 1.0}) for k in range(20)]
     b = [*a[:8], *(failed(k) for k in range(8, 20))]
-    assert ("a", "b", "failures") in names({"a": a, "b": b})
+    assert ("a", "b", "crashed") in names({"a": a, "b": b})
     ended = [replace(r, status="interrupted") for r in b[8:]]
     assert names({"a": a, "b": [*b[:8], *ended]}) == []
 

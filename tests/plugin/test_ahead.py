@@ -89,6 +89,6 @@ def test_ctrl_c_ends_both(
     pytester: pytest.Pytester, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The test's own is recorded as interrupted; what no test has come to, is not recorded."""
-    monkeypatch.setenv("STOP_AT", "2022")
+    monkeypatch.setenv("STOP_AT", "10001")
     assert run(pytester, "--sim-jobs=2").ret == pytest.ExitCode.INTERRUPTED
     assert [status for _, status in kept(folder)] == ["interrupted"]

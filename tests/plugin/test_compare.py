@@ -178,6 +178,34 @@ def test_a_limit_of_another_package_s_share_that_nothing_can_exceed_fails_the_ru
     result.stdout.fnmatch_lines(["FAILED landed:5 can never be exceeded: landed lies between 0*"])
 
 
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["other.py"], "*no test of this run is in the baseline (this run has test_other[[]*"),
+        (["plain.py"], "*this run has no repetition; the baseline test_falling[[]*"),
+    ],
+    ids=["another test", "no repetition"],
+)
+def test_a_limit_that_compares_nothing_fails_the_run_and_says_why(
+    pytester: pytest.Pytester,
+    baseline: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    told: str,
+) -> None:
+    monkeypatch.setenv("COLUMNS", "300")  # no sentence is folded
+    (baseline / "other.py").write_text(dedent(TEST).replace("test_falling", "test_other"))
+    (baseline / "plain.py").write_text("def test_nothing():\n    pass\n")
+    for more, code in (["--sim-compare-fail=landed:5%"], 1), ([], 0):
+        result = pytester.runpytest_subprocess(
+            "--sim=mujoco", "--reps=1", "--sim-baseline=base", *more, *arguments
+        )
+        assert result.ret == code
+        if code:
+            result.stdout.fnmatch_lines([told])
+            assert "no metric got worse" not in result.stdout.str()
+
+
 def test_limits_need_a_baseline(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(TEST)
     result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-compare-fail=landed:5%")
@@ -195,7 +223,7 @@ def test_junit_has_a_property_for_each_metric(
     tree = ElementTree.parse(pytester.path / "junit.xml")
     found = {item.get("name"): item.get("value") for item in tree.iter("property")}
     assert found["repetitions"] == "2"
-    assert found["failures"] == "0"
+    assert found["crashed"] == "0"
     assert found["landed"] == "1.0"
     assert 0.1 < float(found["landed.low"] or "nan") < 0.2  # 2 of 2 prove little
     assert {"rtf", "ram", "cpu", "start", "end"} <= found.keys()

@@ -118,7 +118,7 @@ def test_interrupted_and_resumed(
     monkeypatch: pytest.MonkeyPatch,
     arguments: list[str],
 ) -> None:
-    monkeypatch.setenv("STOP_AT", "2024")
+    monkeypatch.setenv("STOP_AT", "10003")
     stopped = run(pytester, "--reps=4", "--sim-output=out")
     assert stopped.ret == pytest.ExitCode.INTERRUPTED
     assert kept(folder / "out") == straight[:2]
@@ -136,7 +136,7 @@ def test_sharded_and_merged_then_judged_without_running(
     pytester: pytest.Pytester, folder: Path, straight: list[str]
 ) -> None:
     run(pytester, "--reps=3", "--sim-output=a").assert_outcomes(passed=2)
-    run(pytester, "--reps=1", "--sim-seed=2025", "--sim-output=b").assert_outcomes(passed=2)
+    run(pytester, "--reps=1", "--sim-seed=10004", "--sim-output=b").assert_outcomes(passed=2)
     merged = run(pytester, "--sim-merge", "b", "a", "--sim-output=whole")
     assert merged.ret == pytest.ExitCode.OK
     merged.stdout.fnmatch_lines(["falling: 4 repetitions*"])
@@ -154,7 +154,7 @@ def test_resuming_is_refused_with_the_difference(pytester: pytest.Pytester, fold
     for arguments, difference in (
         (["--sim-set=mujoco.timestep=0.002"], "settings.timestep was 0.001, is 0.002"),
         (["--jitter=0.5"], "jitter was 1.0, is 0.5"),
-        (["--sim-seed=3000"], "--sim-seed was 2022, is 3000"),
+        (["--sim-seed=3000"], "--sim-seed was 10001, is 3000"),
     ):
         result = run(pytester, "--reps=2", "--sim-resume=out", "-k", "one", *arguments)
         result.assert_outcomes(failed=1)
@@ -180,7 +180,7 @@ def test_resuming_is_refused_with_the_difference(pytester: pytest.Pytester, fold
         (["--sim-resume=bad"], "--sim-resume: *bad/records.jsonl:1: not JSON*"),
         (["--sim-merge", "none"], "--sim-merge none: cannot read records from *"),
         (["--sim-merge", "a", "a"], "--sim-merge a: the run is given twice"),
-        (["--sim-merge", "a", "b"], "--sim-merge: a and b overlap: both have seed 2022 of *"),
+        (["--sim-merge", "a", "b"], "--sim-merge: a and b overlap: both have seed 10001 of *"),
         (["--sim-merge", "a", "--sim-output=b"], "--sim-merge: *b already holds a run; *"),
         (["--sim-merge", "empty"], "--sim-merge: none of the runs holds a repetition that ended"),
         (
@@ -190,7 +190,7 @@ def test_resuming_is_refused_with_the_difference(pytester: pytest.Pytester, fold
         (["--sim-report", "empty"], "--sim-report empty: it holds no repetition"),
         (["--sim-report", "bad"], "--sim-report bad: *bad/records.jsonl:1: not JSON*"),
         (["--sim-report", "a", "./a"], "--sim-report ./a: the run is given twice"),
-        (["--sim-report", "a", "b"], "--sim-report: a and b overlap: both have seed 2022 of *"),
+        (["--sim-report", "a", "b"], "--sim-report: a and b overlap: both have seed 10001 of *"),
         (
             ["--sim-report", "a", "--sim-output=b"],
             "--sim-report: *b holds another run; *",

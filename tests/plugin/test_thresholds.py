@@ -44,7 +44,7 @@ def test_a_name_that_no_test_knows_is_told_at_the_end(
     result.stdout.fnmatch_lines(
         [
             "ERROR: --sim-threshold=landet=1: no metric is named 'landet'; did you mean 'landed'? "
-            "valid names: *failures, *landed, *own_metric*",
+            "valid names: *crashed, *landed, *own_metric*",
         ]
     )
     assert result.stdout.str().count("no metric is named") == 1

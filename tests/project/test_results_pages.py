@@ -12,6 +12,8 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.plugin.options import MOST_REPETITIONS
+from pytest_simbench.records.choices import FIRST_SEED
 from tests.records.build import record
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -88,6 +90,8 @@ def test_no_profile_was_chosen_on_a_published_seed() -> None:
     assert len(seen) >= len(make_results.SIMULATORS)
     assert seeds.keys() & {name for name, _ in seen}
     assert [found for found in seen if seeds[found[0]].intersection(found[1])] == []
+    default = range(FIRST_SEED, FIRST_SEED + MOST_REPETITIONS)
+    assert not set().union(*seeds.values()).intersection(default)
 
 
 @pytest.fixture

@@ -9,7 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.records.metrics import Metric
+from pytest_simbench.report import cells
 from pytest_simbench.report.cells import interval, metric_value, number
+from pytest_simbench.report.page import cells as page_cells
 from pytest_simbench.report.pooling import spread
 
 LATE = Metric("late", "late", unit="s")
@@ -48,6 +50,16 @@ def test_what_is_far_below_the_resolution_is_nothing(
     value: float, metric: Metric, shown: str
 ) -> None:
     assert metric_value(value, metric) == shown
+
+
+@pytest.mark.parametrize("yes", [0, 3, 20])
+def test_yes_or_no_is_told_by_how_many_said_yes(yes: int) -> None:
+    hit = Metric("hit", "hit", kind="yes_no")
+    found = spread([1.0] * yes + [0.0] * (20 - yes), hit)
+    assert found is not None
+    lines = [f"{yes} of 20", f"{5 * yes} {interval(found, hit)}"]
+    assert cells.spread(found, hit) == lines
+    assert page_cells._spread(found, hit) == page_cells.Cell(lines, yes / 20)
 
 
 def test_an_end_far_nearer_to_0_than_to_the_other_is_0() -> None:

@@ -9,7 +9,8 @@ import pytest
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
-from pytest_simbench.records.choices import Seen, published_again
+from pytest_simbench.plugin.options import MOST_REPETITIONS, option
+from pytest_simbench.records.choices import FIRST_SEED, Seen, published_again
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.markdown import render_task as written
@@ -118,6 +119,14 @@ def test_every_adapter_speaks_of_profiles_that_it_has(name: str) -> None:
     for seen in (seen for all_seen in cls.chosen_on.values() for seen in all_seen):
         assert seen.data or seen.task in TASKS
         assert 0 <= seen.first <= seen.last
+
+
+@pytest.mark.parametrize("name", registered())
+def test_no_profile_was_chosen_on_the_default_seeds(name: str) -> None:
+    default = range(FIRST_SEED, FIRST_SEED + MOST_REPETITIONS)
+    assert option("sim_seed").default == FIRST_SEED
+    for seen in (seen for all_seen in adapter(name).chosen_on.values() for seen in all_seen):
+        assert seen.data or seen.last < FIRST_SEED or default[-1] < seen.first, seen
 
 
 def test_pybullet_admits_the_seeds_of_its_throw() -> None:
