@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from dataclasses import fields
+from pathlib import Path
 
 import pytest
 
@@ -35,6 +37,23 @@ ELSEWHERE = {
 
 BY_NAME = {law.name: law for law in LAWS}
 
+TRUTH = Path(__file__).parents[2] / "docs" / "data" / "truth.csv"
+
+with TRUTH.open(encoding="utf-8") as file:
+    PUBLISHED = {
+        (row["law"], row["simulator"]): float(row["tolerance"])
+        for row in csv.DictReader(file)
+        if row["profile"] == "tuned" and row["tolerance"]
+    }
+"""What each law allows each engine at its time step, as docs/truth.md tells."""
+
+SHORT = {
+    "tumble_energy_drift": 0.2867,
+    "tumble_momentum_drift": 0.2864,
+    "pendulum_energy_drift": 0.00924,
+}
+"""The same of the short versions, at 1 ms."""
+
 
 def outcome(law: Law, scene: Scene) -> Outcome:
     engine = adapter(ELSEWHERE.get(law.name, "mujoco"))
@@ -52,6 +71,8 @@ def test_a_law_is_kept_and_a_planted_fault_breaks_it(name: str) -> None:
     broken = outcome(law, FAULTS[name](law.build()))
     assert kept.metrics["ratio"] <= KEPT, kept.details[LAW]
     assert broken.metrics["ratio"] > BROKEN, broken.details[LAW]
+    allowed = SHORT.get(name) or PUBLISHED[name, ELSEWHERE.get(name, "mujoco")]
+    assert kept.details[LAW]["tolerance"] == pytest.approx(allowed, rel=0.01)
 
 
 def test_there_are_enough_and_each_phenomenon_has_one() -> None:
