@@ -7,10 +7,12 @@ import re
 from dataclasses import fields
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pytest_simbench.client.environments import missing
 from pytest_simbench.laws import LAW, LAWS, Law, Reading
+from pytest_simbench.laws.base import Watched
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
 from pytest_simbench.records.phenomena import PHENOMENA, PHENOMENON
 from pytest_simbench.scene import Scene
@@ -88,6 +90,14 @@ def test_a_law_says_where_it_comes_from_and_what_it_allows(law: Law) -> None:
     assert law.scene(1, Jitter()) == law.scene(2, Jitter(0.0, 0.0))
     assert law.parameters()[PHENOMENON] == law.phenomenon
     assert {f"task.{item.name}" for item in fields(law)} < law.parameters().keys()  # type: ignore[arg-type]
+
+
+def test_columns_are_read_between_samples() -> None:
+    t, none = np.array([0.1, 0.2]), np.empty((2, 0))
+    seen = Watched(0.1, t, none, none)
+    values = np.array([[0.0, 10.0], [1.0, 30.0]])
+    assert seen.at(0.15, values) == pytest.approx([0.5, 20.0])
+    assert seen.at(0.15, values[:, 1]) == pytest.approx(20.0)
 
 
 def test_a_reading_is_an_error_and_its_ratio_to_the_tolerance() -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -189,6 +190,30 @@ def told_genesis(s: Any) -> Told:
         "box_box_detection": kinds.box_box_detection,
         "gjk": solver.collider._collider_static_config.ccd_algorithm.name != "MPR",
     }
+
+
+def told_gazebo(s: Any) -> Told:
+    """What the world's text says: Gazebo tells none of it. The gain is its drives'."""
+    from tempfile import TemporaryDirectory
+
+    from pytest_simbench.sims.gazebo.sdf import world_text
+
+    with TemporaryDirectory() as folder:
+        text = world_text(s.scene, s.prepared, s._physics, "told", Path(folder))
+
+    def said(pattern: str) -> Any:
+        return one(re.findall(pattern, text))
+
+    told = {
+        "timestep": float(said("<max_step_size>(.*?)<")),
+        "engine": said("gz-physics-(.*?)-plugin"),
+        "detector": said("<collision_detector>(.*?)<"),
+        "solver": said("<solver_type>(.*?)<"),
+        "position_gain": s._drives._gain * s.settings.timestep,
+    }
+    if "<torsional>" in text:
+        told["torsional_friction"] = float(said(r"<torsional>\s*<coefficient>(.*?)<"))
+    return told
 
 
 def read(token: str) -> Any:
