@@ -13,6 +13,7 @@ from pytest_simbench.client.environments import Environment, interpreter
 from pytest_simbench.client.launch import Launch
 from pytest_simbench.experiment.protocol import PROTOCOLS, Protocol
 from pytest_simbench.ground.names import file_name
+from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.series import short
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator.registry import adapter, address
@@ -23,7 +24,7 @@ class Case:
     """What a test's repetitions have in common.
 
     Attributes:
-        test: id of the test, for records.
+        test, function, variant: of the test, see `records.record`.
         simulator, mode, profile: which simulator, `headless` or `gui`, which settings profile.
         adapter: `module:Class` of the simulator's adapter.
         changes: single settings changed by the user, by name.
@@ -50,7 +51,7 @@ class Case:
         attempt: of the same repetitions in this process, see `records.record`.
         robot: that does the tasks; None for the tasks' own.
         own_timestep: of the profile [s], where `changes` has another one for a sweep over steps;
-            its records tell it (`details`), and so that they belong to a sweep.
+            its records tell it (`notes`), and so that they belong to a sweep.
     """
 
     test: str
@@ -59,6 +60,8 @@ class Case:
     profile: str
     adapter: str
     folder: Path
+    function: str = ""
+    variant: str = ""
     changes: Mapping[str, Any] = field(default_factory=dict)
     python: str | None = None
     spec: str | None = None
@@ -121,8 +124,7 @@ class Case:
         """
         log = self.folder / "logs" / f"{name}.log"
         try:
-            log.parent.mkdir(parents=True, exist_ok=True)
-            log.unlink(missing_ok=True)
+            write_whole(self.folder, f"logs/{name}.log", b"")  # a new one, no link: others append
         except OSError:  # a full disk must not stop the worker
             log = Path(os.devnull)
         return Launch(

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import platform
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 from pytest_simbench.client.errors import (
@@ -29,9 +25,11 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import file_stem, record_of, settings
 from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.workers import IdleWorkers
+from pytest_simbench.ground.host import host
 from pytest_simbench.recordings import film
 from pytest_simbench.recordings.trace import FOLDER, Trace
-from pytest_simbench.records.record import OWN_TIMESTEP, Failure, Record, Status
+from pytest_simbench.records.notes import Notes
+from pytest_simbench.records.record import Failure, Record, Status
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.registry import seeds_seen
 from pytest_simbench.tasks.base import Outcome
@@ -108,11 +106,11 @@ class Repetition:
         found, error = self._ended(self._perform)
         outcome = found if error is None else Outcome()
         resources = self._finish(error)
-        problem = self._write_trace(failed=error is not None)
-        if problem:
-            outcome.details["trace"] = problem
-        outcome.details.update(self._end_film(failed=error is not None))
-        return self._record(outcome, error, resources), error
+        noted = {
+            "trace": self._write_trace(failed=error is not None),
+            **self._end_film(failed=error is not None),
+        }
+        return self._record(outcome, error, resources).noting(**noted), error
 
     def probe(self) -> tuple[Record, BaseException | None]:
         """Start and end the simulator alone: the record's settings and versions are what counts."""
@@ -235,6 +233,7 @@ class Repetition:
         self, outcome: Outcome, error: BaseException | None, resources: dict[str, Any]
     ) -> Record:
         case, total = self.case, self.stopwatch.elapsed()
+        python = self._process.python_version if self._process else ""
         stepping = self._stats.get("stepping", {})
         seconds = {
             k: self.stopwatch.seconds.get(k, 0.0) for k in ("launch", "compile", "load", "plan")
@@ -242,29 +241,26 @@ class Repetition:
         seconds["step"] = stepping.get("wall", 0.0)
         seconds["other"] = max(0.0, total - sum(seconds.values()))
         seconds["total"] = total
-        details = {**outcome.details, "log": self._log_name()}
-        if case.own_timestep is not None:
-            details[OWN_TIMESTEP] = case.own_timestep
-        if sample := self.experiment.task.sample(self.seed):
-            details["data"] = list(sample)
-        if seen := seeds_seen(case.adapter, case.profile):
-            details["chosen_on"] = [what.to_wire() for what in seen]
-        if self._constructed.untested:
-            details["untested"] = self._constructed.untested
-        if self._closing:
-            details["closing"] = self._closing
+        notes = Notes(
+            log=self._log_name(),
+            closing=self._closing or "",
+            untested=self._constructed.untested or "",
+            own_timestep=case.own_timestep,
+            chosen_on=seeds_seen(case.adapter, case.profile),
+            sample=self.experiment.task.sample(self.seed),
+            reading=outcome.reading,
+        )
         return record_of(
             self.experiment,
             self.number,
             status=_status(error),
             settings=self._constructed.settings or settings(case),
-            versions={
-                **({"python": self._process.python_version} if self._process else {}),
-                **self._constructed.versions,
-            },
+            versions={**({"python": python} if python else {}), **self._constructed.versions},
             error=None if error is None else _failure(error, self.where),
             metrics=outcome.metrics,
-            details=details,
+            details=outcome.details,
+            notes=notes,
+            reasons=outcome.reasons,
             seconds=seconds,
             stepping=stepping,
             timeline={} if self._world is None else self._world.timeline,
@@ -287,7 +283,7 @@ class Repetition:
         if self.case.video not in ("on", "retain-on-failure"):
             return None
         name = file_stem(self.experiment, self.number)
-        return Camera(film=film.Film(self.case.folder / film.FOLDER / f"{name}.mp4"))
+        return Camera(film=film.Film(self.case.folder, f"{film.FOLDER}/{name}.mp4"))
 
     def _end_film(self, *, failed: bool) -> dict[str, Any]:
         """What the record tells of it: that there was one, and why it ended early."""
@@ -295,8 +291,8 @@ class Repetition:
         if camera is None:
             return {}
         camera.finish(self._world, keep=failed or self.case.video != "retain-on-failure")
-        filmed = {"filmed": True} if camera.film is not None and camera.film.frames else {}
-        return {**filmed, **({"video": camera.problem} if camera.problem else {})}
+        filmed = camera.film is not None and bool(camera.film.frames)
+        return {"filmed": filmed, "video": camera.problem or ""}
 
     def _trace_period(self) -> float | None:
         """Of samples of the motion [s]. Which repetition fails is known at its end: until then a
@@ -323,7 +319,7 @@ class Repetition:
         name = file_stem(self.experiment, self.number)
         try:
             trace = Trace.of(world.scene, Motion.joined(world.trace), world.phases)
-            trace.write(case.folder / FOLDER / f"{name}.npz")
+            trace.write(case.folder, f"{FOLDER}/{name}.npz")
         except (OSError, DescriptionError) as error:
             return f"the trace could not be written: {named(error)}"
         return ""
@@ -352,17 +348,3 @@ def _failure(error: BaseException, where: Where) -> Failure:
         message = readable(error.what, 2 * LONGEST)  # shortened where it arose
         return Failure(type(error).__name__, message, error.phase, error.log_tail)
     return Failure(readable(type(error).__name__), told(error), where.phase)
-
-
-@cache
-def host() -> dict[str, Any]:
-    """The machine, as far as it bears on times."""
-    model = platform.processor() or platform.machine()
-    try:
-        for line in Path("/proc/cpuinfo").read_text().splitlines():
-            if line.startswith("model name"):
-                model = line.partition(":")[2].strip()
-                break
-    except OSError:
-        pass
-    return {"system": platform.system(), "cpu": model, "cores": os.cpu_count() or 0}
