@@ -8,6 +8,7 @@ the world moves as it does when the engine's own function sets the value behind 
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, replace
@@ -231,7 +232,8 @@ def told(worlds: dict[str, Worlds], name: str, changes: Changes) -> dict[str, An
     if name in HERE:
         with here(name, changes) as simulator:
             return settings_told.tell(simulator)
-    found: dict[str, Any] = loaded(worlds, name, changes).process.request("read_back")
+    numbers = loaded(worlds, name, changes).process.request("read_back")["told"]
+    found: dict[str, Any] = json.loads(bytes(map(int, numbers)))
     return found
 
 
