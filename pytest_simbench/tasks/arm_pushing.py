@@ -161,27 +161,9 @@ class ArmPushing(Task):
         world.mark("end")
         assert motion is not None  # a log was asked for
         states = np.vstack([world_start(course.start), motion.bodies[:, 0, :7]])
-        n = min(len(states), len(course.real))
-        moved, real = states[:n], course.real[:n]
-        off = np.linalg.norm(moved[:, :2] - real[:, :2], axis=1)
-        turns = [_turn(way) for way in (moved, real)]
-        way = [float(rows[-1, 0] - rows[0, 0]) for rows in (moved, real)]
-        return Outcome(
-            {
-                "displacement": way[0],
-                "displacement_error": abs(way[0] - way[1]),
-                "turn_error": abs(turns[0] - turns[1]),
-                "way_error": float(off.mean()),
-            },
-            {
-                "run": self.run(seed).name,
-                "real_displacement": way[1],
-                "turn": turns[0],
-                "real_turn": turns[1],
-                "delay": _half_way(moved, way[1]) - _half_way(real, way[1]),
-                "hand_error": float(np.abs(motion.joints[-1, 0] - course.path[-1]).max()),
-            },
-        )
+        metrics, details = compared(states, course.real)
+        off = float(np.abs(motion.joints[-1, 0] - course.path[-1]).max())
+        return Outcome(metrics, {"run": self.run(seed).name, **details, "hand_error": off})
 
     def _arm(self, start: FloatArray) -> Robot:
         return arm(self.runs.urdf, self.finger_angle, tuple(map(float, start)))
@@ -199,6 +181,27 @@ class ArmPushing(Task):
         model = RobotModel(self._arm(path[0]))
         effort = model.inverse_dynamics(gravity, path, velocity, acceleration)
         return Trajectory(TICK, path, velocity, effort)
+
+
+def compared(moved: FloatArray, real: FloatArray) -> tuple[dict[str, float | None], dict[str, Any]]:
+    """Metrics and details of a cube's motion and the real one's, rows as of `world_start`, (n, 7);
+    the longer motion is cut."""
+    n = min(len(moved), len(real))
+    moved, real = moved[:n], real[:n]
+    off = np.linalg.norm(moved[:, :2] - real[:, :2], axis=1)
+    turns = [_turn(rows) for rows in (moved, real)]
+    way = [float(rows[-1, 0] - rows[0, 0]) for rows in (moved, real)]
+    return {
+        "displacement": way[0],
+        "displacement_error": abs(way[0] - way[1]),
+        "turn_error": abs(_within(turns[0] - turns[1])),
+        "way_error": float(off.mean()),
+    }, {
+        "real_displacement": way[1],
+        "turn": turns[0],
+        "real_turn": turns[1],
+        "delay": _half_way(moved, way[1]) - _half_way(real, way[1]),
+    }
 
 
 def world_start(pose: Pose) -> FloatArray:
@@ -291,7 +294,11 @@ def yaw(row: FloatArray) -> float:
 
 def _turn(rows: FloatArray) -> float:
     """From the first row to the last [deg]."""
-    turn = math.degrees(yaw(rows[-1]) - yaw(rows[0]))
+    return _within(math.degrees(yaw(rows[-1]) - yaw(rows[0])))
+
+
+def _within(turn: float) -> float:
+    """The same turn [deg] within half a turn."""
     return (turn + 180.0) % 360.0 - 180.0
 
 

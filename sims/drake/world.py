@@ -40,6 +40,9 @@ trees = lazy_import("pydrake.multibody.tree")
 GREY = (0.5, 0.5, 0.5, 1.0)
 LIGHT = (0.85, 0.85, 0.85, 1.0)
 
+LAYER = 0.05
+"""How deep the ground gives way where surfaces are compliant [m]; Drake has no default."""
+
 VERTEX_RADIUS = 1e-6
 """Of the spheres at the vertices of free meshes [m]: they stick out by no more than that."""
 
@@ -104,6 +107,7 @@ class World:
         s, config = self.settings, geometry.SceneGraphConfig()
         surface = config.default_proximity_properties
         surface.compliance_type = s.compliance
+        surface.slab_thickness = LAYER
         surface.hydroelastic_modulus = s.hydroelastic_modulus
         surface.point_stiffness = s.point_stiffness
         surface.hunt_crossley_dissipation = s.hunt_crossley_dissipation

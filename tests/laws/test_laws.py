@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from dataclasses import fields
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pytest_simbench.client.environments import missing
 from pytest_simbench.laws import LAWS, Law, Reading
+from pytest_simbench.laws.base import Watched
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
 from pytest_simbench.records.phenomena import PHENOMENA, PHENOMENON
 from pytest_simbench.scene import Scene
@@ -35,6 +39,23 @@ ELSEWHERE = {
 
 BY_NAME = {law.name: law for law in LAWS}
 
+TRUTH = Path(__file__).parents[2] / "docs" / "data" / "truth.csv"
+
+with TRUTH.open(encoding="utf-8") as file:
+    PUBLISHED = {
+        (row["law"], row["simulator"]): float(row["tolerance"])
+        for row in csv.DictReader(file)
+        if row["profile"] == "tuned" and row["tolerance"]
+    }
+"""What each law allows each engine at its time step, as docs/truth.md tells."""
+
+SHORT = {
+    "tumble_energy_drift": 0.2867,
+    "tumble_momentum_drift": 0.2864,
+    "pendulum_energy_drift": 0.00924,
+}
+"""The same of the short versions, at 1 ms."""
+
 
 def outcome(law: Law, scene: Scene) -> Outcome:
     engine = adapter(ELSEWHERE.get(law.name, "mujoco"))
@@ -50,8 +71,11 @@ def test_a_law_is_kept_and_a_planted_fault_breaks_it(name: str) -> None:
     law = BY_NAME[name]
     kept = outcome(law, law.build())
     broken = outcome(law, FAULTS[name](law.build()))
+    assert kept.reading is not None
     assert kept.metrics["ratio"] <= KEPT, kept.reading
     assert broken.metrics["ratio"] > BROKEN, broken.reading
+    allowed = SHORT.get(name) or PUBLISHED[name, ELSEWHERE.get(name, "mujoco")]
+    assert kept.reading.tolerance == pytest.approx(allowed, rel=0.01)
 
 
 def test_there_are_enough_and_each_phenomenon_has_one() -> None:
@@ -67,6 +91,14 @@ def test_a_law_says_where_it_comes_from_and_what_it_allows(law: Law) -> None:
     assert law.scene(1, Jitter()) == law.scene(2, Jitter(0.0, 0.0))
     assert law.parameters()[PHENOMENON] == law.phenomenon
     assert {f"task.{item.name}" for item in fields(law)} < law.parameters().keys()  # type: ignore[arg-type]
+
+
+def test_columns_are_read_between_samples() -> None:
+    t, none = np.array([0.1, 0.2]), np.empty((2, 0))
+    seen = Watched(0.1, t, none, none)
+    values = np.array([[0.0, 10.0], [1.0, 30.0]])
+    assert seen.at(0.15, values) == pytest.approx([0.5, 20.0])
+    assert seen.at(0.15, values[:, 1]) == pytest.approx(20.0)
 
 
 def test_a_reading_is_an_error_and_its_ratio_to_the_tolerance() -> None:

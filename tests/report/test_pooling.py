@@ -39,6 +39,15 @@ def test_each_repetition_counts_the_same_however_often_it_was_sampled() -> None:
     assert found["pick"][0].mean == 90.0
 
 
+def test_the_peak_of_several_is_the_largest() -> None:
+    uses = [use(50.0, 100.0, 3) for _ in range(3)]
+    for told, peak in zip(uses, (120.0, 180.0, 150.0), strict=True):
+        told["rss_mb"]["peak"] = peak
+    found = pooled(uses, "rss_mb")
+    assert found is not None
+    assert found.peak == 180.0
+
+
 @given(st.lists(st.tuples(st.floats(0, 400), st.integers(1, 5000)), min_size=5, max_size=20))
 def test_a_mean_stands_in_its_interval(uses: list[tuple[float, int]]) -> None:
     """Also where short repetitions are the busy ones: DART's CPU was 35 +- 27 [38, 59]."""

@@ -16,8 +16,9 @@ from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import panda
 from pytest_simbench.robot.tracking import track
+from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks import ArmPushing
-from pytest_simbench.tasks.arm_pushing import described
+from pytest_simbench.tasks.arm_pushing import compared, described, world_start
 
 URDF = """<robot name="arm">
   <joint name="m1n6s300_joint_1" type="continuous"><limit lower="-6" upper="6"/></joint>
@@ -73,3 +74,24 @@ def test_the_cube_goes_where_the_real_one_went(case: Case) -> None:
     assert record.settings["task.half"] == "held_out"
     assert record.settings["task.calibrated_on"] == "CubeExp 1, 5, 9, 13, 17, 33"
     assert task.references["displacement"] == pytest.approx(0.095, abs=0.003)
+
+
+def test_each_metric_is_of_its_axis_and_turns_are_within_half_a_turn() -> None:
+    """Along x by 100 mm and by 80 mm in half of the time, aside by 50 mm; from 170 degrees on
+    turned by 30, and by -10; then by 175 and by -175, which are 10 degrees apart."""
+
+    def way(x: float, y: float, turn: float, rows: int = 101) -> FloatArray:
+        shares = np.minimum(np.linspace(0.0, 100.0 / 101 * rows, rows) / 50.0, 1.0)
+        poses = (Pose.at(s * x, 0.2 + s * y, 0.02, yaw=np.radians(170 + s * turn)) for s in shares)
+        return np.array([world_start(pose) for pose in poses])
+
+    metrics, details = compared(way(0.08, 0.05, -10.0), way(0.1, 0.0, 30.0))
+    assert metrics["displacement"] == pytest.approx(0.08)
+    assert metrics["displacement_error"] == pytest.approx(0.02)
+    assert metrics["turn_error"] == pytest.approx(40.0)
+    assert (details["turn"], details["real_turn"]) == pytest.approx((-10.0, 30.0))
+    share = (50 / 2 + 51) / 101  # on the way, and at its end
+    assert metrics["way_error"] == pytest.approx(share * np.hypot(0.02, 0.05), rel=0.01)
+    assert details["delay"] > 0
+    turned = compared(way(0.1, 0.0, 175.0), way(0.1, 0.0, -175.0, rows=90))[0]
+    assert turned["turn_error"] == pytest.approx(10.0)

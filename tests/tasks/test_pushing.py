@@ -98,6 +98,14 @@ def turn(angle: float):  # type: ignore[no-untyped-def]
     return effect
 
 
+def test_a_heading_beyond_half_a_turn_is_off_by_what_is_left() -> None:
+    """Of a way that turns by 172 degrees: 17 further is -171."""
+    task = replace(CURVE, turn=3.0)
+    end = task.at(task.way) * Pose.at(0, 0, 0, yaw=0.3)
+    found = task._score(end, None, lambda done, total: None, {}).metrics["heading_error"]
+    assert found == pytest.approx(math.degrees(0.3))
+
+
 def test_a_block_that_stays_is_a_whole_way_off() -> None:
     stays = PushedProcess([Mishap("push", 0.0, out_of_the_way), Mishap("settle", 0.5, back)])
     outcome, _ = perform(LINE, jitter=EXACT, process=stays)

@@ -44,6 +44,7 @@ FAULTS: list[tuple[type[Simulator], str]] = [
     (wrong.FallingBelt, "moves_as_prescribed"),
     (wrong.StandingBelt, "belt_carries"),
     (wrong.WrongSign, "weight_is_told"),
+    (wrong.WrongTorque, "weight_is_told"),
     (wrong.NormalAlone, "friction_is_told"),
     (wrong.NoContacts, "contacts_counted"),
     (wrong_robots.OpenLoop, "loops_stay_closed"),

@@ -114,6 +114,16 @@ class WrongSign(MuJoCo):
         return ((first, second, -wrench) for first, second, wrench in super().contact_forces())
 
 
+class WrongTorque(MuJoCo):
+    """Tells the right forces, and torques of the wrong sign."""
+
+    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        signs = np.repeat([1.0, -1.0], 3)
+        return (
+            (first, second, signs * wrench) for first, second, wrench in super().contact_forces()
+        )
+
+
 class NormalAlone(MuJoCo):
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
         upright = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])

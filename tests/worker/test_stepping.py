@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 
@@ -118,6 +119,19 @@ def test_cpu_seconds_are_those_of_the_steps_and_not_the_control_s(
     assert runs["control_cpu"] == pytest.approx(0.02, rel=0.2)
     assert toy.burnt <= stepper.clocks.cpu <= toy.burnt + 0.015
     assert stepper.clocks.cpu <= spent - 0.9 * stepper.control.cpu
+
+
+def test_an_engine_s_other_threads_are_cpu_time() -> None:
+    class Threaded(Toy):
+        def step(self) -> None:
+            thread = threading.Thread(target=super().step)
+            thread.start()
+            thread.join()
+
+    toy = Threaded(burn=0.001)
+    stepper = stepping(toy)
+    stepper.wait(0.1, None)
+    assert stepper.clocks.cpu >= toy.burnt > 0.0
 
 
 def test_sleeping_is_no_cpu_time() -> None:
