@@ -21,7 +21,7 @@ from pytest_simbench.report import outcome as outcome_of
 from pytest_simbench.report.badge import badge
 from pytest_simbench.report.figures import FiguresUnavailable, write_figures
 from pytest_simbench.report.history import AnyHistory
-from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.matrix import with_differences
 from pytest_simbench.report.outcome import Outcome
 from pytest_simbench.report.page import PAGE_NAME, Compared
 from pytest_simbench.report.replay import REPLAY_NAME
@@ -86,7 +86,7 @@ def write_report(
 def summaries_of(reading: Reading) -> list[TaskSummary]:
     """What a run tells of each task."""
     records = at_own_steps(in_order(reading.records))
-    return with_wins(summarise(records, reading.metrics, reading.references), records)
+    return with_differences(summarise(records, reading.metrics, reading.references), records)
 
 
 def in_order(records: Sequence[Record]) -> list[Record]:
