@@ -27,8 +27,10 @@ def test_markdown_tables_hold_one_line_per_row() -> None:
     )
     lines = markdown.render_task(summary).splitlines()
     assert lines[0] == "## stacking: 20 repetitions each, protocol fast"
-    assert lines[2] == "- placed: mujoco 99 % [97, 100] is ahead of pybullet 65 % [52, 78], by 33.3 points "
-        "[16.7, 49.9]."
+    assert lines[2] == (
+        "- placed: mujoco 99 % [97, 100] is ahead of pybullet 65 % [52, 78], "
+        "by 33.3 points [16.7, 49.9]."
+    )
     assert lines[6:10] == [
         "| simulator | failed | placed % | at the end % | CPU % | RAM MB | x real time "
         "| CPU s/sim s | start s | end s |",
