@@ -56,9 +56,17 @@ class Run:
     lines: list[dict[str, str]]
 
     def values(self, name: str) -> dict[int, float]:
-        """By seed, of the repetitions that ended well and have the value."""
-        known = [line for line in self.lines if line["status"] == "ok" and line[name]]
-        return {int(line["seed"]): _exact(self.task, name, float(line[name])) for line in known}
+        """By seed, of the repetitions that have a value; a crashed one has the worst, where there is
+        one, but not by the study's rules."""
+        metric = METRICS[self.task].get(name)
+        found = {}
+        for line in self.lines:
+            if line["status"] == "ok" and line[name]:
+                found[int(line["seed"])] = _exact(self.task, name, float(line[name]))
+            elif line["status"] == "failed" and line["rules"] != "study" and metric:
+                if metric.crashed is not None:
+                    found[int(line["seed"])] = metric.crashed
+        return found
 
     def mean(self, name: str, scale: float = 1.0) -> float | None:
         found = self.values(name)
@@ -178,6 +186,7 @@ def _record(task: str, number: int, line: dict[str, str]) -> Record:
         simulator=line["simulator"],
         mode="headless",
         profile=line["profile"],
+        protocol="paper" if line["rules"] == "study" else "fast",
         repetition=number,
         seed=int(line["seed"]),
         status=line["status"],  # type: ignore[arg-type]
