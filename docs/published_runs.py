@@ -56,16 +56,15 @@ class Run:
     lines: list[dict[str, str]]
 
     def values(self, name: str) -> dict[int, float]:
-        """By seed, of the repetitions that have a value; a crashed one has the worst, where there is
-        one, but not by the study's rules."""
+        """By seed, of the repetitions that have a value; a crashed one has the worst, if there is
+        any, but not by the study's rules."""
         metric = METRICS[self.task].get(name)
-        found = {}
-        for line in self.lines:
-            if line["status"] == "ok" and line[name]:
-                found[int(line["seed"])] = _exact(self.task, name, float(line[name]))
-            elif line["status"] == "failed" and line["rules"] != "study" and metric:
-                if metric.crashed is not None:
-                    found[int(line["seed"])] = metric.crashed
+        known = [line for line in self.lines if line["status"] == "ok" and line[name]]
+        found = {int(line["seed"]): _exact(self.task, name, float(line[name])) for line in known}
+        if metric is not None and metric.crashed is not None:
+            crashed = [line for line in self.lines if line["status"] == "failed"]
+            counted = [line for line in crashed if line.get("rules") != "study"]
+            found |= {int(line["seed"]): metric.crashed for line in counted}
         return found
 
     def mean(self, name: str, scale: float = 1.0) -> float | None:

@@ -186,8 +186,17 @@ UNDESCRIBED = (
 
 def notes(summary: TaskSummary) -> list[str]:
     """What a reader must know of the metrics, and of single rows."""
-    found = [] if summary.described else [f"{summary.task}: {UNDESCRIBED}"]
+    found = [f"{summary.task}: {text}" for text in of_run(summary)]
     return found + [f"{row.label}: {text}" for row in summary.rows for text in row.notes]
+
+
+def of_run(summary: TaskSummary) -> list[str]:
+    """What a reader must know of the run that a task was part of."""
+    again = (
+        f"judged {summary.looks} times, since repetitions were added after a verdict; intervals and "
+        "verdicts are those of a single look, and err more often than they say"
+    )
+    return [UNDESCRIBED] * (not summary.described) + [again] * (summary.looks > 1)
 
 
 def deviations(summaries: Sequence[TaskSummary]) -> list[tuple[str, str]]:

@@ -61,7 +61,10 @@ class Written:
 
 
 def write_report(
-    folder: RunFolder, reading: Reading | None = None, comparison: Compared | None = None
+    folder: RunFolder,
+    reading: Reading | None = None,
+    comparison: Compared | None = None,
+    looks: int = 1,
 ) -> Written:
     """Write all files from what a run folder holds, into it.
 
@@ -69,13 +72,14 @@ def write_report(
         folder: of the run.
         reading: of it, where it has been read already.
         comparison: with a baseline, where there is one.
+        looks: how often the run was judged, see `outcome.Outcome`.
 
     Raises:
         RecordError: its records cannot be read.
     """
     reading = reading or folder.read()
     records = in_order(reading.records)
-    summaries = summaries_of(reading)
+    summaries = summaries_of(reading, looks)
     histories, sweeps = tuple(history.of_run(reading)), tuple(sweep.of_run(reading))
     written = write_files(
         folder.path, summaries, records, comparison=comparison, histories=histories, sweeps=sweeps
@@ -83,10 +87,11 @@ def write_report(
     return replace(written, summaries=tuple(summaries), histories=histories, sweeps=sweeps)
 
 
-def summaries_of(reading: Reading) -> list[TaskSummary]:
-    """What a run tells of each task."""
+def summaries_of(reading: Reading, looks: int = 1) -> list[TaskSummary]:
+    """What a run that was judged so often tells of each task."""
     records = at_own_steps(in_order(reading.records))
-    return with_differences(summarise(records, reading.metrics, reading.references), records)
+    found = summarise(records, reading.metrics, reading.references)
+    return with_differences([replace(summary, looks=looks) for summary in found], records)
 
 
 def in_order(records: Sequence[Record]) -> list[Record]:

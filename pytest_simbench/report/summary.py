@@ -114,6 +114,7 @@ class TaskSummary:
         modes: whether headless and GUI agree, in sentences; from there too.
         described: whether the run says what the metrics mean; else they are plain numbers.
         phenomenon: that the task is a law of; empty of one that is none.
+        looks: how often the run was judged, see `outcome.Outcome`.
     """
 
     task: str
@@ -125,6 +126,7 @@ class TaskSummary:
     modes: tuple[str, ...] = ()
     described: bool = True
     phenomenon: str = ""
+    looks: int = 1
 
     @property
     def study(self) -> tuple[Metric, ...]:
