@@ -193,8 +193,8 @@ def notes(summary: TaskSummary) -> list[str]:
 def of_run(summary: TaskSummary) -> list[str]:
     """What a reader must know of the run that a task was part of."""
     again = (
-        f"judged {summary.looks} times, since repetitions were added after a verdict; intervals and "
-        "verdicts are those of a single look, and err more often than they say"
+        f"judged {summary.looks} times, since repetitions were added after a verdict; intervals "
+        "and verdicts are those of a single look, and err more often than they say"
     )
     return [UNDESCRIBED] * (not summary.described) + [again] * (summary.looks > 1)
 
