@@ -1,6 +1,6 @@
 """False wins among equal simulators, and the power for a loss of 10 points, by simulation.
 
-    python benchmarks/false_wins.py [RUNS]
+    python benchmarks/false_wins.py [RUNS [SIMULATORS...]]
 
 Each run has n = 20 repetitions of 3, 8 or 10 simulators at three outcomes (share of 15 cubes
 placed, hits, an error of skewed size), and two costs that differ wildly. `equal`: all outcomes are
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import false_discovery_control
 
+from pytest_simbench.measure import differences
 from pytest_simbench.measure.differences import step_down
 
 Array = NDArray[np.float64]
@@ -55,10 +56,11 @@ def found(rng: np.random.Generator, sides: int, loss: float) -> dict[str, tuple[
     return {name: (yes[last], yes[~last]) for name, yes in apart.items()}
 
 
-def main(runs: int) -> None:
+def main(runs: int = 1000, *simulators: int) -> None:
+    differences.PERMUTATIONS = SIGNS
     print(f"{runs} runs each, n = {N}: now / before")
     print("| simulators | equal | one worse | power |\n| --: | --: | --: | --: |")
-    for sides in (3, 8, 10):
+    for sides in simulators or (3, 8, 10):
         rates: dict[str, list[float]] = {"now": [], "before": []}
         for loss in (0.0, 1.0, 0.1):
             rng = np.random.default_rng(1)
@@ -76,4 +78,4 @@ def main(runs: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 1000)
+    main(*map(int, sys.argv[1:]))

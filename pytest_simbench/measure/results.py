@@ -44,6 +44,7 @@ class ResultSet:
     Attributes:
         error: probability, at most, that a verdict on a claim is wrong.
         strict: whether a claim that is not decided fails (`--sim-strict`).
+        judged: the claims that were made, and what came of them.
     """
 
     error: float = ERROR
@@ -55,6 +56,7 @@ class ResultSet:
         self._costs = {metric.name: metric for metric in COSTS if metric.name not in self.metrics}
         self._intervals: dict[tuple[str, float], Interval] = {}
         self._ok: tuple[tuple[Record, ...], tuple[Record, ...]] = ((), ())
+        self.judged: list[tuple[Metric, Judgement]] = []
 
     def __len__(self) -> int:
         return len(self.records)
@@ -220,6 +222,7 @@ class ResultSet:
     ) -> None:
         """Fail, warn or say nothing."""
         __tracebackhide__ = True
+        self.judged += [(metric, judgement) for judgement in found]
         for judgement in found:
             if judgement.verdict is Verdict.REFUTED:
                 wrong = "below" if judgement.claim.relation == "at least" else "above"

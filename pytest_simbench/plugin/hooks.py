@@ -125,8 +125,7 @@ pytest_runtest_call = pytest_runtest_setup
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: Any) -> Any:
     outcome = yield
-    if call.when == "call":
-        session_of(item.config).attach(item.nodeid, outcome.get_result())
+    session_of(item.config).attach(item, outcome.get_result())
 
 
 @pytest.hookimpl(trylast=True)  # xdist has heard all its workers then

@@ -27,6 +27,8 @@ from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.report import history, repeatability, sweep
 from pytest_simbench.report.brief import render_brief
 from pytest_simbench.report.changes import render_terminal
+from pytest_simbench.report.claims import Claims, claims_of
+from pytest_simbench.report.claims import lines as lines_of
 from pytest_simbench.report.files import (
     Written,
     in_order,
@@ -140,7 +142,7 @@ def merge_runs(config: pytest.Config) -> int:
         passed = together([outcome.passed for outcome in outcomes])
         problems += [*wrong, write_outcome(folder.path, Outcome(passed, looks=looks))]
         problems.append(publish(config, kept, passed))
-        _print(config, written.summaries, written.sweeps, problems)
+        _print(config, written.summaries, written.sweeps, problems, written.claims)
         if written.complete and not unsaved:
             print(where(folder.path / PAGE_NAME, config.invocation_params.dir))
     finally:
@@ -168,18 +170,27 @@ def report_runs(config: pytest.Config) -> int:
     tables, problems = ([], []) if others else repeatability.write_tables(folder.path, target)
     if not (whole.records or tables or problems):
         raise pytest.UsageError(f"--sim-report {first}: it holds no repetition")
+    compared = None if others else outcomes[0].compared
+    claims = claims_of(whole, compared[1] if compared else None)
     if target is not None:
         run = None if others else folder.path
-        compared = None if others else outcomes[0].compared
         written = write_files(
-            target, summaries, in_order(whole.records), True, compared, run, histories, sweeps
+            target,
+            summaries,
+            in_order(whole.records),
+            True,
+            compared,
+            run,
+            histories,
+            sweeps,
+            claims,
         )
     recorded = [*wrong, publish(config, whole.records, together([o.passed for o in outcomes]))]
     if target is not None and not others:
         recorded += recording.record(config, folder.path, target, whole.records)
     elif options.value(config, recording.RECORD):
         recorded.append("no recordings: join the runs with --sim-merge first")
-    _print(config, summaries, sweeps, [*runs.problems, *written.problems, *recorded])
+    _print(config, summaries, sweeps, [*runs.problems, *written.problems, *recorded], claims)
     width = shutil.get_terminal_size().columns
     for line in history.lines(histories, width):
         print(for_terminal(line))
@@ -218,8 +229,11 @@ def _print(
     summaries: Sequence[TaskSummary],
     sweeps: Sequence[Swept],
     problems: list[str],
+    claims: Claims | None,
 ) -> None:
     verbose, width = config.get_verbosity() > 0, shutil.get_terminal_size().columns
+    if claims:
+        print(lines_of(claims, width) + "\n")
     print((render_run if verbose else render_brief)(summaries, width))
     if sweeps:
         told = (sweep.whole if verbose else sweep.brief)(sweeps, width)

@@ -4,6 +4,7 @@
     tasks.jsonl        what each task's metrics and references mean (`description`); of several
                        lines of one task the last one holds
     thresholds.jsonl   thresholds that tests asked for
+    claims.jsonl       what tests claimed, and what came of it (`claims`)
     repeatability.jsonl, logs, traces, report.md, ...
 
 Report, merge, resume, baseline and gate need the folder alone, never the code that made it.
@@ -21,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_simbench.records import lines
+from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import Describing, TaskDescription, Threshold
 from pytest_simbench.records.lines import DAMAGED, LARGEST_LINE, Found, LinesFile, UnreadableError
 from pytest_simbench.records.lock import FolderLock
@@ -32,11 +34,12 @@ from pytest_simbench.records.series import settled
 RECORDS = "records.jsonl"
 TASKS = "tasks.jsonl"
 THRESHOLDS = "thresholds.jsonl"
+CLAIMS = "claims.jsonl"
 
 HOLD_RESULTS = (RECORDS, "repeatability.jsonl")
 """Files that make a folder one that holds a run."""
 
-NOUNS = {RECORDS: "record", TASKS: "task description", THRESHOLDS: "threshold"}
+NOUNS = {RECORDS: "record", TASKS: "task description", THRESHOLDS: "threshold", CLAIMS: "claim"}
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,7 @@ class Reading:
         records: those that count, in their order, see `series.settled`.
         tasks: what the metrics mean, by the name of their task.
         thresholds: that tests asked for.
+        claims: of tests, in the order in which they were judged.
         problems: damaged lines and descriptions that cannot be used, one sentence each; they are
             left out.
         refused: whole lines that are no records of ours, one sentence each.
@@ -59,6 +63,7 @@ class Reading:
     records: tuple[Record, ...] = ()
     tasks: Mapping[str, TaskDescription] = field(default_factory=dict)
     thresholds: tuple[Threshold, ...] = ()
+    claims: tuple[Claim, ...] = ()
     problems: tuple[str, ...] = ()
     refused: tuple[str, ...] = ()
     every: tuple[Record, ...] = ()
@@ -98,6 +103,7 @@ class RunFolder:
         self._spare = lines.spare_folder()
         self._described: dict[str, TaskDescription] = {}
         self._asked: dict[Threshold, None] = {}
+        self._claims: list[Claim] = []
         self._written: set[str] = set()
         self._lock = threading.RLock()
 
@@ -199,6 +205,12 @@ class RunFolder:
                 self._written.add(line)
                 self._write(THRESHOLDS, line)
 
+    def claim(self, claim: Claim) -> None:
+        """Keep what came of a claim."""
+        with self._lock:
+            self._claims.append(claim)
+            self._write(CLAIMS, json.dumps(claim.to_dict()))
+
     def _write(self, name: str, line: str) -> None:
         if name not in self._files:
             noun = NOUNS.get(name, "record")
@@ -231,9 +243,16 @@ class RunFolder:
         records = settled([*found.items, *self.own])
         tasks = {**self._tasks(problems), **self._described}
         asked = dict.fromkeys([*self._parsed(THRESHOLDS, Threshold, problems), *self._asked])
-        name = str(self.path if self._records == RECORDS else path)
+        claims = (*self._parsed(CLAIMS, Claim, problems), *self._claims)
         return Reading(
-            name, tuple(records), tasks, tuple(asked), tuple(problems), found.refused, found.items
+            name=str(self.path if self._records == RECORDS else path),
+            records=tuple(records),
+            tasks=tasks,
+            thresholds=tuple(asked),
+            claims=claims,
+            problems=tuple(problems),
+            refused=found.refused,
+            every=found.items,
         )
 
     def _tasks(self, problems: list[str] | None = None) -> dict[str, TaskDescription]:
@@ -262,7 +281,7 @@ class RunFolder:
             OSError: the folder cannot be written to.
         """
         repaired = []
-        for name in (self._records, TASKS, THRESHOLDS, *HOLD_RESULTS[1:]):
+        for name in (self._records, TASKS, THRESHOLDS, CLAIMS, *HOLD_RESULTS[1:]):
             with suppress(FolderError, UnreadableError):  # there is none that is read
                 repaired.append(lines.repair(self.inside(name)))
         return tuple(kept for kept in repaired if kept is not None)

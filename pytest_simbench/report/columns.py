@@ -29,7 +29,7 @@ BY_PHASE = "CPU and RAM by phase: means over all samples taken in it"
 
 
 def study(summary: TaskSummary) -> list[Column]:
-    """The study's table: failures, its metrics, CPU, RAM, speed, start and end."""
+    """The first table: crashes, the task's own metrics, then costs."""
     rows = summary.rows
     return [
         labels(rows),
@@ -159,10 +159,10 @@ def _beaten(metrics: list[str], same: bool) -> list[str]:
 
 
 def details(summary: TaskSummary) -> list[tuple[str, list[Column]]]:
-    """The tables below the study's, each with its title; a table without columns is left out."""
+    """The tables below the first, each with its title; a table without columns is left out."""
     found = [
         ("failures", failures(summary)),
-        ("beyond the study: mean [95 % interval]", stricter(summary)),
+        ("further metrics: mean [95 % interval]", stricter(summary)),
         (MATRIX, matrix(summary)),
         ("where the time went: mean wall seconds and share", time_spent(summary)),
     ]

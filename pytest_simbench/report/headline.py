@@ -13,7 +13,8 @@ from pytest_simbench.report.pooling import Spread
 from pytest_simbench.report.summary import Row, TaskSummary
 
 OUTCOMES = 2
-"""Metrics of a task without metrics of the study that the second sentence names."""
+"""Metrics that the second sentence names of a task of which the study has none with a good
+direction."""
 
 TOLD_COSTS = ("cpu_cost", "ram")
 """Of the costs those that the third sentence names; they belong to the simulator alone."""
@@ -60,9 +61,8 @@ def _outcome(summaries: Sequence[TaskSummary]) -> str:
     for summary in summaries:
         found: dict[str, list[str]] = {}
         ranked = [m for m in summary.metrics if m.better]
-        # Of a task whose study metrics have no good direction, what has one comes first.
-        study = [m for m in ranked if m.study] or [*ranked[:OUTCOMES], *summary.study]
-        for metric in [*study, *(m for m in summary.study if m not in study)]:
+        shown = [m for m in ranked if m.study] or ranked[:OUTCOMES]
+        for metric in [*shown, *(m for m in summary.metrics if m.study and not m.better)]:
             values = [row.metrics.get(metric.name) for row in summary.rows]
             if text := _who(metric, values, summary):
                 found.setdefault(text, []).append(metric.title)

@@ -107,7 +107,7 @@ class TaskSummary:
     """All rows of one task.
 
     Attributes:
-        metrics: what the task declares; those with `study` make its first table.
+        metrics: what the task declares; those with `study` make its first table, else all.
         references: the value a perfect run would give, by metric name.
         protocol: the protocol of its records; several are joined by commas.
         differences: between rows, by their places; from `matrix.with_differences`.
@@ -130,13 +130,13 @@ class TaskSummary:
 
     @property
     def study(self) -> tuple[Metric, ...]:
-        """What the reference study reports too."""
-        return tuple(metric for metric in self.metrics if metric.study)
+        """Those of the first table: what the reference study reports too, else all."""
+        return tuple(metric for metric in self.metrics if metric.study) or self.metrics
 
     @property
     def stricter(self) -> tuple[Metric, ...]:
-        """What this project measures beside it."""
-        return tuple(metric for metric in self.metrics if not metric.study)
+        """The others."""
+        return tuple(metric for metric in self.metrics if metric not in self.study)
 
 
 def at_own_steps(records: Iterable[Record]) -> list[Record]:
