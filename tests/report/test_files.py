@@ -29,7 +29,7 @@ def test_markdown_tables_hold_one_line_per_row() -> None:
     assert lines[0] == "## stacking: 20 repetitions each, protocol fast"
     assert lines[2] == (
         "- placed: mujoco 99 % [97, 100] is ahead of pybullet 65 % [52, 78], "
-        "by 33.3 points [16.7, 49.9]."
+        "by 33.3 points [16.7, 50]."
     )
     assert lines[6:10] == [
         "| simulator | failed | placed % | at the end % | CPU % | RAM MB | x real time "

@@ -60,7 +60,7 @@ def test_study_table_and_what_explains_it_at_100_columns() -> None:
         pybullet headless tuned      1  WorkerDied  pick    3            the worker was killed by SIGSEGV;
                                                                          last line of its log: died
 
-        stacking, beyond the study: mean [95 % interval]
+        stacking, further metrics: mean [95 % interval]
                            placed  at the end               untouched
         simulator        strict %    strict %  towers %   moved cubes    failed picks
         -----------------------------------------------------------------------------
