@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import stat
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +23,7 @@ from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.plugin import options, recording
 from pytest_simbench.records.folder import RECORDS, TASKS, Reading, RunFolder
 from pytest_simbench.records.merging import Merged, MergeError, merge, merge_tasks
-from pytest_simbench.records.paths import FolderError, new_name
+from pytest_simbench.records.paths import FolderError, new_name, opened, whole
 from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.report import history, repeatability, sweep
 from pytest_simbench.report.brief import render_brief
@@ -284,7 +285,7 @@ def _copy(records: list[Merged], folders: dict[str, RunFolder], to: RunFolder) -
             *((name.format(was), name.format(stem)) for name in BESIDE),
         ):
             try:
-                if source and _copied(folder.inside(source), to, target) and source == log:
+                if source and _copied(folder, source, to, target) and source == log:
                     kept = target
             except FolderError as error:
                 refused.setdefault(f"not copied: {error}")
@@ -292,20 +293,19 @@ def _copy(records: list[Merged], folders: dict[str, RunFolder], to: RunFolder) -
     return list(refused)
 
 
-def _copied(source: Path, folder: RunFolder, target: str) -> bool:
+def _copied(folder: RunFolder, source: str, to: RunFolder, target: str) -> bool:
     """Copy an ordinary file; a log that is missing makes no result wrong.
 
     Raises:
-        FolderError: the target would lie outside of the folder.
+        FolderError: one of them would lie outside of its folder.
     """
-    path = folder.inside(target)
+    folder.inside(source), to.inside(target)
     try:
-        if not source.is_file():
-            return False
-        path.parent.mkdir(parents=True, exist_ok=True)
-        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
-        with source.open("rb") as old, open(os.open(path, flags, 0o666), "wb") as new:
-            shutil.copyfileobj(old, new)
+        with open(opened(folder.path, source), "rb") as old:
+            if not stat.S_ISREG(os.fstat(old.fileno()).st_mode):
+                return False
+            with whole(to.path, target) as new:
+                shutil.copyfileobj(old, new)
     except OSError:
         return False
     return True

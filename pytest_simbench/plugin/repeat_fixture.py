@@ -73,6 +73,7 @@ class RepeatFixture:
             result = ResultSet(up_to(int(number or self.case.protocol.repetitions)), metrics)
         recording.photograph(self.node.config, experiment, result.records, self.run.tell)
         result.strict = options.value(self.node.config, "sim_strict")
+        result.warns = False
         self.results.append(result)
         return result
 

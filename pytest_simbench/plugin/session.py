@@ -5,7 +5,9 @@ Imported at plugin load: standard library and pytest only; everything else is im
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+import shlex
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -195,6 +197,21 @@ class SimSession:
         failed = getattr(report, "simbench_failed", None)
         if failed and not self.in_worker:
             self._failed.append(failed)
+
+    @contextmanager
+    def sparing(self) -> Iterator[None]:
+        """While results are put together: Ctrl-C ends that with one sentence."""
+        try:
+            yield
+        except KeyboardInterrupt:
+            if not self.begun or self.in_worker:
+                raise
+            folder = self.run.folder.path
+            pytest.exit(
+                f"interrupted while the report was made; the records are kept in {folder}, and "
+                f"pytest --sim-report {shlex.quote(str(folder))} makes the report",
+                returncode=pytest.ExitCode.INTERRUPTED,
+            )
 
     def finish(self, session: pytest.Session) -> None:
         """Compare with the baseline; a metric that is worse than allowed fails the run, and so does

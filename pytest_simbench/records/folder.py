@@ -27,7 +27,7 @@ from pytest_simbench.records.description import Describing, TaskDescription, Thr
 from pytest_simbench.records.lines import DAMAGED, LARGEST_LINE, Found, LinesFile, UnreadableError
 from pytest_simbench.records.lock import FolderLock
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.records.paths import FolderError, inside
+from pytest_simbench.records.paths import inside
 from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.records.series import settled
 
@@ -110,7 +110,10 @@ class RunFolder:
     @classmethod
     def of(cls, path: Path) -> RunFolder:
         """The folder that a user means by its path, or by that of its record file."""
-        return cls(path.parent, path.name) if os.path.isfile(path) else cls(path)
+        if not os.path.isfile(path):
+            return cls(path)
+        file = path.resolve() if path.is_symlink() else path  # what a user names may be a link
+        return cls(file.parent, file.name)
 
     def inside(self, name: str) -> Path:
         """The path of a file of this folder.
@@ -214,7 +217,7 @@ class RunFolder:
     def _write(self, name: str, line: str) -> None:
         if name not in self._files:
             noun = NOUNS.get(name, "record")
-            self._files[name] = LinesFile(self.path / name, self._spare, noun)
+            self._files[name] = LinesFile(self.path, name, self._spare, noun)
         self._files[name].append(line)
 
     def read(self) -> Reading:
@@ -261,11 +264,11 @@ class RunFolder:
 
     def _parsed(self, name: str, kind: Any, problems: list[str]) -> tuple[Any, ...]:
         """The items of a file beside the records, which may be missing."""
-        if self._records != RECORDS or not os.path.exists(self.path / name):
+        if self._records != RECORDS or not os.path.lexists(self.path / name):
             return ()
         try:
-            found = lines.read(self.inside(name), kind.from_dict)
-        except (FolderError, UnreadableError) as error:
+            found = lines.read(self.path, name, kind.from_dict)
+        except UnreadableError as error:
             problems.append(str(error))
             return ()
         problems += [*found.problems, *found.refused]
@@ -282,8 +285,8 @@ class RunFolder:
         """
         repaired = []
         for name in (self._records, TASKS, THRESHOLDS, CLAIMS, *HOLD_RESULTS[1:]):
-            with suppress(FolderError, UnreadableError):  # there is none that is read
-                repaired.append(lines.repair(self.inside(name)))
+            with suppress(UnreadableError):  # there is none that is read
+                repaired.append(lines.repair(self.path, name))
         return tuple(kept for kept in repaired if kept is not None)
 
     def _found(self) -> Found[Record]:
@@ -294,13 +297,9 @@ class RunFolder:
         """
         path = self.path / self._records
         try:
-            # What a user names may be a link; what a folder holds leads nowhere else.
-            path = self.inside(RECORDS) if self._records == RECORDS else path
-            if self.holds_run and not os.path.exists(path):
+            if self.holds_run and not os.path.lexists(path):
                 return Found()  # of its kind a run without repetitions of tasks
-            return lines.read(path, Record.from_dict)
-        except FolderError as error:
-            raise RecordError(f"cannot read records: {error}") from None
+            return lines.read(self.path, self._records, Record.from_dict)
         except UnreadableError as error:
             raise RecordError(
                 f"cannot read records from {path} ({error.reason}); give a run folder or its "

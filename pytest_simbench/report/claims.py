@@ -73,11 +73,13 @@ def claims_of(reading: Reading, comparison: GateReport | None = None) -> Claims:
         (claim for claim in claims if claim.verdict != "PASS"), key=lambda c: ORDER.index(c.verdict)
     )
     of_test = grouped(reading.records, lambda r: r.test)
-    troubles += [
-        _trouble(claim, of_test.get(claim.test, []), reading.metrics)
-        for claim in bad[: MOST - len(troubles)]
-    ]
-    more = len(bad) + len(failures) - len(troubles)
+    fails = [claim for claim in bad if claim.verdict == "FAIL"]
+    open_ = grouped(
+        bad[len(fails) :], lambda c: (_subject(c, claims), _claimed(c, reading.metrics))
+    )
+    troubles += [_trouble(c, of_test.get(c.test, []), reading.metrics) for c in fails]
+    troubles += [_undecided(*of, group, reading.metrics) for of, group in open_.items()]
+    troubles, more = troubles[:MOST], len(troubles) - MOST
     told = _sentence(state, count, reading.records)
     return Claims(state, told, _table(claims, reading.metrics), troubles, max(0, more))
 
@@ -212,8 +214,6 @@ def _trouble(
     worst = _worst(claim, [r for r in records if r.task == claim.task], metrics)
     value = f"{_value(claim, metrics)} over {claim.n} repetitions{crashed}"
     what = f"{claim.verdict} {test}: {_claimed(claim, metrics)} is {value}"
-    if claim.verdict == "UNDECIDED":
-        return Trouble(f"{what}; {claim.advice}", "", "", None)
     if worst is None:
         return Trouble(what)
     error = worst.error
@@ -221,6 +221,14 @@ def _trouble(
     return Trouble(
         what, f"seed {worst.seed}, repetition {worst.repetition} {why}", _again(worst), worst
     )
+
+
+def _undecided(
+    subject: str, claimed: str, claims: Sequence[Claim], metrics: Mapping[str, Sequence[Metric]]
+) -> Trouble:
+    """One claim of several simulators that are not decided."""
+    found = [f"{claim.simulator} {_value(claim, metrics)} ({claim.advice})" for claim in claims]
+    return Trouble(f"UNDECIDED {subject}: {claimed}: {'; '.join(found)}")
 
 
 def _told(record: Record, metric: Metric | None) -> str:

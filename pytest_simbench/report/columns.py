@@ -132,6 +132,18 @@ def failures(summary: TaskSummary) -> list[Column]:
     ]
 
 
+def reasons(summary: TaskSummary) -> list[Column]:
+    """Why the task fell short, in its own words, and how often; numbers that vary are `#`."""
+    found = [(row, text, count) for row in summary.rows for text, count in row.reasons]
+    if not found:
+        return []
+    return [
+        Column("simulator", [[row.label] for row, *_ in found], left=True, wrap=True),
+        Column("count", [[str(count)] for *_, count in found]),
+        Column("reason", [[text] for _, text, _ in found], left=True, wrap=True),
+    ]
+
+
 def matrix(summary: TaskSummary) -> list[Column]:
     """Which row beats which column at what; without rows that differ from none."""
     found: dict[tuple[int, int], list[str]] = {}
@@ -162,6 +174,7 @@ def details(summary: TaskSummary) -> list[tuple[str, list[Column]]]:
     """The tables below the first, each with its title; a table without columns is left out."""
     found = [
         ("failures", failures(summary)),
+        ("why the task fell short", reasons(summary)),
         ("further metrics: mean [95 % interval]", stricter(summary)),
         (MATRIX, matrix(summary)),
         ("where the time went: mean wall seconds and share", time_spent(summary)),

@@ -176,7 +176,7 @@ def write_files(
     encoded |= {sheet_name(task): sheet for task, sheet in sheets.items()}
     for name, content in encoded.items():
         try:
-            write_whole(folder / name, content)
+            write_whole(folder, name, content)
         except OSError as error:
             failed.append(_unwritable(folder / name, error))
     return Written((*problems, *failed), not failed)
@@ -218,8 +218,7 @@ def write_outcome(folder: Path, outcome: Outcome) -> str:
 def write_badge(path: Path, records: Sequence[Record], passed: bool | None) -> str:
     """Write the badge of a run; a sentence when it could not be written."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, badge(records, passed).encode("ascii"))
+        write_whole(path.parent, path.name, badge(records, passed).encode("ascii"))
     except OSError as error:
         return f"no badge: {_unwritable(path, error)}"
     return ""

@@ -7,6 +7,7 @@ of everything else crashed and interrupted ones are left out.
 
 from __future__ import annotations
 
+import re
 import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -64,6 +65,8 @@ class Row:
         by_phase: CPU in % of a core and RAM in MB by the task's phase, in order.
         seconds: mean wall seconds by phase (`PHASES`, `total`).
         notes: what a reader must know of these numbers (parallel repetitions, reused worker).
+        reasons: why scores are no better, in the task's words, and how often; the most frequent
+            first. Those that differ in numbers alone are counted together.
     """
 
     task: str
@@ -86,6 +89,7 @@ class Row:
     causes: tuple[Cause, ...] = ()
     deviations: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    reasons: tuple[tuple[str, int], ...] = ()
 
     @property
     def attempts(self) -> int:
@@ -221,7 +225,20 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str, ends: 
         causes=_causes(records),
         deviations=tuple(dict.fromkeys(text for r in records for text in r.deviations)),
         notes=tuple(notes),
+        reasons=_reasons(done),
     )
+
+
+def _reasons(records: Sequence[Record]) -> tuple[tuple[str, int], ...]:
+    told = [text for record in records for text in record.reasons]
+    same = grouped(told, lambda text: _NUMBERS.sub("#", text))
+    counted = [
+        (texts[0] if len(set(texts)) == 1 else form, len(texts)) for form, texts in same.items()
+    ]
+    return tuple(sorted(counted, key=lambda item: -item[1]))
+
+
+_NUMBERS = re.compile(r"-?\d+(?:\.\d+)?")
 
 
 def _seconds(records: Sequence[Record]) -> dict[str, float]:

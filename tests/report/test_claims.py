@@ -131,3 +131,15 @@ def test_markdown_opens_with_the_same() -> None:
     )
     assert "| claim | mujoco | drake |" in text
     assert "again: `pytest 'suites/test_stacking.py::test_stacking[drake-headless]'" in text
+
+
+def test_a_claim_that_is_not_decided_on_several_simulators_is_told_once() -> None:
+    open_ = [
+        claim(name, "UNDECIDED", advice="about 9 more repetitions needed", mean=0.9, n=9)
+        for name in ("mujoco", "sapien")
+    ]
+    (trouble,) = claims_of(reading(*open_)).troubles
+    assert trouble.what == (
+        "UNDECIDED test_stacking: placed >= 90 %: mujoco 90 (about 9 more repetitions needed); "
+        "sapien 90 (about 9 more repetitions needed)"
+    )

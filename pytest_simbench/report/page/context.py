@@ -287,7 +287,7 @@ def _repetition(record: Record, replay: str, video: str) -> dict[str, Any]:
         "repetition": record.repetition,
         "seed": str(record.seed),  # JavaScript keeps 53 bits of a number
         "status": record.status,
-        "cause": f"{error.cause}: {error.message}" if error else "",
+        "cause": f"{error.cause}: {error.message}" if error else "; ".join(record.reasons),
         "log": record.notes.log,
         "command": command(record),
         "replay": replay,
