@@ -18,7 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.matrix import with_differences
 from pytest_simbench.report.page import PAGE_NAME, page_of
 from pytest_simbench.report.summary import summarise
 from pytest_simbench.tasks import Stacking, Throwing
@@ -82,7 +82,7 @@ def main() -> None:
     lines = [line for run in given.run for line in (run / "records.jsonl").open()]
     records = resampled([Record.from_json(line) for line in lines])
     tasks = (Stacking(), Throwing())
-    summaries = with_wins(
+    summaries = with_differences(
         summarise(
             records,
             {task.name: task.metrics for task in tasks},

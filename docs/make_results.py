@@ -40,7 +40,7 @@ from published_runs import (
 from pytest_simbench.measure.comparison import compare_by_seed, holm
 from pytest_simbench.report import cells, markdown
 from pytest_simbench.report.figures import write_figures
-from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.matrix import with_differences
 from pytest_simbench.report.summary import summarise
 from pytest_simbench.tasks import Throwing
 
@@ -328,7 +328,7 @@ def raw(runs: Runs) -> None:
                 continue
             records = [record for _, run in found for record in run.records()]
             whole = TASKS[task].study() if rules == "study" else TASKS[task]
-            summary = with_wins(
+            summary = with_differences(
                 summarise(records, {task: whole.metrics}, {task: whole.references}), records
             )
             name = f"{rules}_{profile}_{task}"

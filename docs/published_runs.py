@@ -56,9 +56,16 @@ class Run:
     lines: list[dict[str, str]]
 
     def values(self, name: str) -> dict[int, float]:
-        """By seed, of the repetitions that ended well and have the value."""
+        """By seed, of the repetitions that have a value; a crashed one has the worst, if there is
+        any, but not by the study's rules."""
+        metric = METRICS[self.task].get(name)
         known = [line for line in self.lines if line["status"] == "ok" and line[name]]
-        return {int(line["seed"]): _exact(self.task, name, float(line[name])) for line in known}
+        found = {int(line["seed"]): _exact(self.task, name, float(line[name])) for line in known}
+        if metric is not None and metric.crashed is not None:
+            crashed = [line for line in self.lines if line["status"] == "failed"]
+            counted = [line for line in crashed if line.get("rules") != "study"]
+            found |= {int(line["seed"]): metric.crashed for line in counted}
+        return found
 
     def mean(self, name: str, scale: float = 1.0) -> float | None:
         found = self.values(name)
@@ -178,6 +185,7 @@ def _record(task: str, number: int, line: dict[str, str]) -> Record:
         simulator=line["simulator"],
         mode="headless",
         profile=line["profile"],
+        protocol="paper" if line["rules"] == "study" else "fast",
         repetition=number,
         seed=int(line["seed"]),
         status=line["status"],  # type: ignore[arg-type]

@@ -31,6 +31,9 @@ EFFECTIVE = 500.0
 """So many values must carry a difference for its permutations to be normal; of rare failures only
 the failed ones do. A p value of 0.05 is then right to 0.003, also for counts."""
 
+MARGIN = 0.05
+"""Shares that differ by less than this count as the same: not a whole cube of 15."""
+
 COMMON_SEEDS = 0.9
 """Pair by seed when at least this share of the smaller side's seeds is on both sides."""
 
@@ -216,14 +219,21 @@ class Equivalence:
         return self.p_value <= alpha
 
 
-def equivalence(first: ArrayLike, second: ArrayLike, margin: float) -> Equivalence:
+def equivalence(
+    first: ArrayLike, second: ArrayLike, margin: float, span: float = 1.0
+) -> Equivalence:
     """Two one-sided paired t tests (TOST): "headless and GUI do not differ by more than `margin`".
 
-    Not significantly different is not the same as equivalent: few repetitions show neither.
+    Not significantly different is not the same as equivalent: few repetitions show neither. Values
+    that were alike so far say nothing of what is rare: a difference of the whole `span` in a share
+    margin / span of the pairs stays unseen in n of them with the probability (1 - margin / span)^n,
+    below which no p value lies. So pairs that are all equal show a margin of 5 points with 59 of
+    them, of 10 points with 29.
 
     Args:
         first, second: values of the same seeds, (n,) each, at least two.
         margin: above 0.
+        span: the largest difference that there can be; 1 of shares.
 
     Raises:
         ValueError: fewer than two values on a side, unequal pairs, or a margin that is not above 0.
@@ -237,10 +247,17 @@ def equivalence(first: ArrayLike, second: ArrayLike, margin: float) -> Equivalen
         raise ValueError(f"equivalence needs two or more pairs, not {a.size} and {b.size} values")
     difference = float(b.mean() - a.mean())
     if np.ptp(b - a) <= 1e-12 * max(1.0, float(np.abs(a).max())):
-        return Equivalence(difference, margin, 0.0 if abs(difference) < margin else 1.0)
+        room = max(0.0, margin - abs(difference))
+        return Equivalence(difference, margin, max(0.0, 1 - room / span) ** a.size)
+    unseen = max(0.0, 1 - margin / span) ** a.size
     sides: tuple[tuple[FloatArray, Alternative], ...] = (
         (b + margin, "greater"),
         (b - margin, "less"),
     )
     found = [stats.ttest_rel(side, a, alternative=way).pvalue for side, way in sides]
-    return Equivalence(difference, margin, float(max(found)))
+    return Equivalence(difference, margin, float(max(*found, unseen)))
+
+
+def pairs_for_equivalence(margin: float, alpha: float = ALPHA, span: float = 1.0) -> int:
+    """Fewest pairs, all of them equal, that show an equivalence: 59 for 5 points of a share."""
+    return max(2, math.ceil(math.log(alpha) / math.log1p(-min(margin / span, 1 - 1e-9))))

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from pytest_simbench.measure.comparison import ALPHA, Equivalence, equivalence
+from pytest_simbench.measure.comparison import (
+    ALPHA,
+    MARGIN,
+    Equivalence,
+    equivalence,
+    pairs_for_equivalence,
+)
 from pytest_simbench.records.configuration import text
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import RowKey, series, told
-
-MARGIN = 0.05
-"""Shares that differ by less than this count as the same: not a whole cube of 15."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +24,7 @@ class ModeComparison:
 
     Attributes:
         simulator, profile, test: what ran in both.
-        pairs: seeds that both modes finished.
+        pairs: seeds at which both modes have a value; a crashed one has the worst.
         result: of the tests; None for fewer than two pairs.
     """
 
@@ -42,6 +45,11 @@ class ModeComparison:
         found = f"gui {points:+.3g} points, {self.pairs} common seeds"
         if self.result.equivalent(ALPHA):
             return f"{name}: the same within {100 * MARGIN:g} points ({found})."
+        fewest = pairs_for_equivalence(MARGIN)
+        if self.pairs < fewest and abs(self.result.difference) < MARGIN:
+            return (
+                f"{name}: {found}; the same within {100 * MARGIN:g} points takes {fewest} or more."
+            )
         return (
             f"{name}: not shown to be the same within {100 * MARGIN:g} points ({found}, "
             f"p = {self.result.p_value:.2g})."
@@ -52,7 +60,7 @@ def compare_modes(records: Sequence[Record], metrics: Iterable[Metric]) -> list[
     """Every simulator that ran in both modes, at each of the study's shares, paired by seed."""
     shares = [metric for metric in metrics if metric.study and metric.bounded]
     sides: dict[tuple[RowKey, str], dict[str, dict[int, Record]]] = {}
-    for row in series(record for record in records if record.ok):
+    for row in series(record for record in records if record.status != "interrupted"):
         # The two modes of one test and configuration.
         key = (row.key._replace(mode=""), text(told(row.records)))
         sides.setdefault(key, {})[row.key.mode] = {record.seed: record for record in row.records}
@@ -62,16 +70,14 @@ def compare_modes(records: Sequence[Record], metrics: Iterable[Metric]) -> list[
             continue
         for metric in shares:
             pairs = [
-                (first.metrics[metric.name], second.metrics[metric.name])
+                (one, other)
                 for seed, first in sorted(modes["headless"].items())
                 if (second := modes["gui"].get(seed)) is not None
-                and first.metrics.get(metric.name) is not None
-                and second.metrics.get(metric.name) is not None
+                and (one := first.value(metric)) is not None
+                and (other := second.value(metric)) is not None
             ]
-            result = None
-            if len(pairs) >= 2:
-                headless, gui = zip(*pairs, strict=True)
-                result = equivalence(headless, gui, MARGIN)
+            headless, gui = [one for one, _ in pairs], [other for _, other in pairs]
+            result = equivalence(headless, gui, MARGIN) if len(pairs) >= 2 else None
             side = (of.simulator, of.profile, of.function)
             found.append(ModeComparison(*side, metric, len(pairs), result))
     return found

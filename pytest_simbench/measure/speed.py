@@ -8,6 +8,7 @@ one: a machine half as fast has half the real-time factor, and the control takes
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.record import Record
@@ -30,22 +31,24 @@ def without_speed(name: str, before: ResultSet, after: ResultSet) -> tuple[Value
     Returns:
         None where the cost does not depend on speed, or a repetition has no control.
     """
-    power = POWER.get(name)
-    if power is None or name in after.metrics:
+    if name not in POWER or name in after.metrics or not before.ok:
         return None
-    sides = [{r.seed: r for r in side.ok} for side in (before, after)]
-    speeds = [{seed: control(r, name) for seed, r in side.items()} for side in sides]
-    known = [{seed: s for seed, s in side.items() if s} for side in speeds]
-    if not all(speeds) or any(len(k) < len(s) for k, s in zip(known, speeds, strict=True)):
+    usual = math.fsum(control(r, name) for r in before.ok) / len(before.ok) or 1.0
+    first, second = (evened(side.ok, name, usual) for side in (before, after))
+    return None if first is None or second is None else (first, second)
+
+
+def evened(records: Sequence[Record], name: str, usual: float) -> Values | None:
+    """A cost's values on a machine whose control takes `usual` seconds; None where a repetition has
+    no control, or none is there."""
+    speeds = [control(record, name) for record in records]
+    if not speeds or not all(speeds):
         return None
-    usual = math.fsum(known[0].values()) / len(known[0])
-    found: list[Values] = []
-    for side, speed in zip(sides, known, strict=True):
-        values = {seed: _value(record, name) for seed, record in side.items()}
-        found.append(
-            {s: v * (speed[s] / usual) ** power for s, v in values.items() if v is not None}
-        )
-    return found[0], found[1]
+    return {
+        r.seed: value * (speed / usual) ** POWER[name]
+        for r, speed in zip(records, speeds, strict=True)
+        if (value := _value(r, name)) is not None
+    }
 
 
 def control(record: Record, name: str) -> float:

@@ -134,13 +134,14 @@ def merge_runs(config: pytest.Config) -> int:
             folder.describe(task)
         refused = _copy(records, runs.folders, folder)
         unsaved = folder.flush()
-        written = write_report(folder)
+        outcomes, wrong = runs.outcomes()
+        looks = max(outcome.looks for outcome in outcomes)
+        written = write_report(folder, looks=looks)
         problems = [*runs.problems, *refused, *unsaved, *written.problems]
         kept = [item.record for item in records]
         problems += recording.record(config, folder.path, folder.path, kept)
-        outcomes, wrong = runs.outcomes()
         passed = together([outcome.passed for outcome in outcomes])
-        problems += [*wrong, write_outcome(folder.path, Outcome(passed))]
+        problems += [*wrong, write_outcome(folder.path, Outcome(passed, looks=looks))]
         problems.append(publish(config, kept, passed))
         _print(config, written.summaries, written.sweeps, problems, written.claims)
         if written.complete and not unsaved:
@@ -163,9 +164,10 @@ def report_runs(config: pytest.Config) -> int:
     target = _target(config, list(runs.folders.values()))
     (first, folder), *others = runs.folders.items()
     whole = runs.merged("--sim-report")[1] if others else runs.readings[first]
-    summaries, written = summaries_of(whole), Written()
-    histories, sweeps = history.of_run(whole), sweep.of_run(whole)
     outcomes, wrong = runs.outcomes()
+    looks = max(outcome.looks for outcome in outcomes)
+    summaries, written = summaries_of(whole, looks), Written()
+    histories, sweeps = history.of_run(whole), sweep.of_run(whole)
     tables, problems = ([], []) if others else repeatability.write_tables(folder.path, target)
     if not (whole.records or tables or problems):
         raise pytest.UsageError(f"--sim-report {first}: it holds no repetition")

@@ -283,7 +283,8 @@ class Run:
             return
         path, records = self.folder.path, self.reading.records
         recorded = recording.record(self.config, path, path, records, self.progress)
-        written = write_report(self.folder, self.reading, comparison.found if comparison else None)
+        found, looks = comparison.found if comparison else None, self._looks()
+        written = write_report(self.folder, self.reading, found, looks)
         unsaved = self.folder.flush()
         problems = [*self._problems, *self.reading.problems, *self.reading.refused]
         problems += [*written.problems, cluster.lost(self.reading.records)]
@@ -308,7 +309,8 @@ class Run:
             reporter.write_sep("=", "history")
             for line in lines(written.histories, reporter._tw.fullwidth):
                 reporter.write_line(for_terminal(line))
-        outcome = Outcome(passed, *(comparison.found or () if comparison else ()))
+        baseline, report = found or ("", None)
+        outcome = Outcome(passed, baseline, report, looks)
         problems.append(write_outcome(self.folder.path, outcome))
         problems.append(publish(self.config, self.reading.records, passed))
         problems += recorded
@@ -318,6 +320,16 @@ class Run:
             problems.insert(0, f"\nwhat could be written is in {self.folder.path}")
         for line in [*map(for_terminal, filter(None, problems)), *unsaved]:
             reporter.write_line(line)
+
+    def _looks(self) -> int:
+        """How often this run has been judged, with this time: one to which repetitions were added
+        after a verdict was looked at again."""
+        if self.resumed is None:
+            return 1
+        before, _ = Outcome.read(self.folder.path)
+        ended = [r for r in self.resumed.records if r.status != "interrupted"]
+        added = len([r for r in self.reading.records if r.status != "interrupted"]) > len(ended)
+        return before.looks + (before.passed is not None and added)
 
     def close(self) -> None:
         """End what the run started."""

@@ -18,10 +18,13 @@ Kind = Literal["share", "yes_no", "value"]
 Word = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
 
 
-RESOLUTIONS = {"m": 1e-3, "m/s": 5e-3, "s": 1e-3}
+RESOLUTIONS = {
+    "m": 1e-3, "mm": 1.0, "m/s": 5e-3, "s": 1e-3, "rad": 1e-3, "deg": 0.1, "rad/s": 5e-3, "%": 0.1,
+}  # fmt: skip
 """Smallest differences that mean anything, by unit: a millimetre is what tables print and what the
-start is jittered by; the others are what it is at the release of a throw (2.75 m/s, steps of 1 ms).
-Less than that between repetitions is a deterministic engine's rounding, not a spread."""
+start is jittered by; speeds and times are what it is at the release of a throw (2.75 m/s, steps of
+1 ms), angles what it is at an arm's reach of 1 m; a tenth of a percent is what tables print. Less
+than that between repetitions is a deterministic engine's rounding, not a spread."""
 
 
 def significant(value: float, digits: int = 3, *, keep_zeros: bool = False) -> str:
@@ -54,7 +57,8 @@ class Metric:
         name: its key in a record, for instance `placed`.
         title: its heading in a table.
         unit: of the value, for instance `m`; empty where it has none.
-        better: which direction is good, or None where neither is.
+        better: which direction is good. None where neither is: then two values only differ, unless
+            the task gives the right one (its `references`), which makes the nearer one better.
         kind: `share`: the mean over `of` things, 0..1, shown in percent; `yes_no`: 0 or 1 for each
             repetition, its mean shown in percent; `value`: a number in `unit`.
         of: how many things a share is of (15 cubes), else None.

@@ -106,9 +106,7 @@ def warnings(summaries: Sequence[TaskSummary]) -> list[str]:
                 notes.setdefault(text, []).append(name)
     every = {name for summary in summaries for name in short_labels(summary.rows)}
     told = [
-        f"note: {summary.task}: {columns.UNDESCRIBED}"
-        for summary in summaries
-        if not summary.described
+        f"note: {summary.task}: {text}" for summary in summaries for text in columns.of_run(summary)
     ]
     for text, names in notes.items():
         of = dict.fromkeys(names)

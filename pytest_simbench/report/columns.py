@@ -15,12 +15,13 @@ LEGEND = (
     "than 5 values and for values that are all alike. CPU in % of one core and RAM in MB: mean +- "
     "deviation of worker and children, each repetition counting the same. x real time: "
     "simulated over wall seconds of stepping; at full speed, compare CPU s per simulated s. Start "
-    "and end of the task: seconds from launch."
+    "and end of the task: seconds from launch. Rows beat each other or differ where that is 95 % "
+    "certain of all outcomes together, or of all costs."
 )
 """How to read the tables, in one paragraph."""
 
 
-MATRIX = "the row beats the column at (permutation tests, corrected)"
+MATRIX = "the row beats the column at (in brackets: differs from it)"
 """Title of the matrix."""
 
 BY_PHASE = "CPU and RAM by phase: means over all samples taken in it"
@@ -144,14 +145,18 @@ def reasons(summary: TaskSummary) -> list[Column]:
 
 
 def matrix(summary: TaskSummary) -> list[Column]:
-    """Which row beats which column at what; without rows that never won nor lost."""
-    places = sorted({place for win in summary.wins for place in (win.winner, win.loser)})
+    """Which row beats which column at what; without rows that differ from none."""
+    found: dict[tuple[int, int], list[str]] = {}
+    for item in summary.differences:
+        if item.winner is not None:
+            found.setdefault((item.winner, item.loser), []).append(item.metric.name)
+        elif item.verdict == "different":
+            for pair in ((item.a, item.b), (item.b, item.a)):
+                found.setdefault(pair, []).append(f"({item.metric.name})")
+    places = sorted({place for pair in found for place in pair})
     if not places:
         return []
     names = short_labels(summary.rows)
-    found: dict[tuple[int, int], list[str]] = {}
-    for win in summary.wins:
-        found.setdefault((win.winner, win.loser), []).append(win.metric.name)
     columns = [Column("simulator", [[names[place]] for place in places], left=True)]
     for loser in places:
         cells_ = [_beaten(found.get((place, loser), []), place == loser) for place in places]
@@ -194,8 +199,17 @@ UNDESCRIBED = (
 
 def notes(summary: TaskSummary) -> list[str]:
     """What a reader must know of the metrics, and of single rows."""
-    found = [] if summary.described else [f"{summary.task}: {UNDESCRIBED}"]
+    found = [f"{summary.task}: {text}" for text in of_run(summary)]
     return found + [f"{row.label}: {text}" for row in summary.rows for text in row.notes]
+
+
+def of_run(summary: TaskSummary) -> list[str]:
+    """What a reader must know of the run that a task was part of."""
+    again = (
+        f"judged {summary.looks} times, since repetitions were added after a verdict; intervals "
+        "and verdicts are those of a single look, and err more often than they say"
+    )
+    return [UNDESCRIBED] * (not summary.described) + [again] * (summary.looks > 1)
 
 
 def deviations(summaries: Sequence[TaskSummary]) -> list[tuple[str, str]]:

@@ -22,7 +22,7 @@ from pytest_simbench.report.badge import badge
 from pytest_simbench.report.claims import Claims, claims_of
 from pytest_simbench.report.figures import FiguresUnavailable, write_figures
 from pytest_simbench.report.history import AnyHistory
-from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.matrix import with_differences
 from pytest_simbench.report.outcome import Outcome
 from pytest_simbench.report.page import PAGE_NAME, Compared
 from pytest_simbench.report.replay import REPLAY_NAME
@@ -64,7 +64,10 @@ class Written:
 
 
 def write_report(
-    folder: RunFolder, reading: Reading | None = None, comparison: Compared | None = None
+    folder: RunFolder,
+    reading: Reading | None = None,
+    comparison: Compared | None = None,
+    looks: int = 1,
 ) -> Written:
     """Write all files from what a run folder holds, into it.
 
@@ -72,13 +75,14 @@ def write_report(
         folder: of the run.
         reading: of it, where it has been read already.
         comparison: with a baseline, where there is one.
+        looks: how often the run was judged, see `outcome.Outcome`.
 
     Raises:
         RecordError: its records cannot be read.
     """
     reading = reading or folder.read()
     records = in_order(reading.records)
-    summaries = summaries_of(reading)
+    summaries = summaries_of(reading, looks)
     histories, sweeps = tuple(history.of_run(reading)), tuple(sweep.of_run(reading))
     claims = claims_of(reading, comparison[1] if comparison else None)
     written = write_files(
@@ -95,10 +99,11 @@ def write_report(
     )
 
 
-def summaries_of(reading: Reading) -> list[TaskSummary]:
-    """What a run tells of each task."""
+def summaries_of(reading: Reading, looks: int = 1) -> list[TaskSummary]:
+    """What a run that was judged so often tells of each task."""
     records = at_own_steps(in_order(reading.records))
-    return with_wins(summarise(records, reading.metrics, reading.references), records)
+    found = summarise(records, reading.metrics, reading.references)
+    return with_differences([replace(summary, looks=looks) for summary in found], records)
 
 
 def in_order(records: Sequence[Record]) -> list[Record]:

@@ -8,12 +8,13 @@ from collections.abc import Sequence
 from pytest_simbench.ground.text import LONGEST_LABEL, in_one_line
 from pytest_simbench.records.metrics import COSTS, Metric
 from pytest_simbench.report import cells
-from pytest_simbench.report.answer import NAMED, Standing, short_labels, standing
+from pytest_simbench.report.answer import NAMED, short_labels, standing
 from pytest_simbench.report.pooling import Spread
 from pytest_simbench.report.summary import Row, TaskSummary
 
 OUTCOMES = 2
-"""Metrics of a task without metrics of the study that the second sentence names."""
+"""Metrics that the second sentence names of a task of which the study has none with a good
+direction."""
 
 TOLD_COSTS = ("cpu_cost", "ram")
 """Of the costs those that the third sentence names; they belong to the simulator alone."""
@@ -59,8 +60,9 @@ def _outcome(summaries: Sequence[TaskSummary]) -> str:
     clauses = []
     for summary in summaries:
         found: dict[str, list[str]] = {}
-        known = [m for m in summary.study or summary.metrics if m.better]
-        for metric in known[: None if any(m.study for m in known) else OUTCOMES]:
+        ranked = [m for m in summary.metrics if m.better]
+        shown = [m for m in ranked if m.study] or ranked[:OUTCOMES]
+        for metric in [*shown, *(m for m in summary.metrics if m.study and not m.better)]:
             values = [row.metrics.get(metric.name) for row in summary.rows]
             if text := _who(metric, values, summary):
                 found.setdefault(text, []).append(metric.title)
@@ -88,16 +90,15 @@ def _who(metric: Metric, values: Sequence[Spread | None], summary: TaskSummary) 
     there = [value for value in values if value is not None]
     if len(there) < 2:
         return "".join(cells.mean_in_words(value, metric) for value in there)
-    found = standing(metric.name, [v.count if v else 0 for v in values], summary)
-    if found == Standing():
-        return "too few repetitions to compare"
-    if not (found.ahead or found.behind):
-        return "no difference is shown"
-    names = short_labels(summary.rows)
-    ahead, behind = (_some([names[k] for k in who]) for who in (found.ahead, found.behind))
-    if not ahead:
-        return f"behind: {behind}"
-    return f"{ahead} ahead (behind: {behind})"
+    found, names = standing(metric.name, summary), short_labels(summary.rows)
+    ahead, behind, apart = (
+        _some([names[k] for k in who]) for who in (found.ahead, found.behind, found.apart)
+    )
+    if found.untold:
+        return found.untold
+    if apart:
+        return f"{apart} differ, and no value is the right one"
+    return f"{ahead} ahead (behind: {behind})" if ahead else f"behind: {behind}"
 
 
 def _some(names: Sequence[str]) -> str:

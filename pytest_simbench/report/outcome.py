@@ -31,11 +31,13 @@ class Outcome:
         passed: whether the tests, and the limits against the baseline, passed; None: not known.
         baseline: name of what it was compared with.
         comparison: what differs from it; None when nothing was compared.
+        looks: how often the run was gone on with and judged again, with the first time.
     """
 
     passed: bool | None = None
     baseline: str = ""
     comparison: GateReport | None = None
+    looks: int = 1
 
     @property
     def compared(self) -> tuple[str, GateReport] | None:
@@ -48,7 +50,7 @@ class Outcome:
         Raises:
             OSError: it cannot be written.
         """
-        found: dict[str, Any] = {"schema": SCHEMA, "passed": self.passed}
+        found: dict[str, Any] = {"schema": SCHEMA, "passed": self.passed, "looks": self.looks}
         if self.comparison is not None:
             found["comparison"] = {"baseline": self.baseline, **asdict(self.comparison)}
             for change in _changes(found):
@@ -72,7 +74,8 @@ class Outcome:
                 change["loss"] = float(change["loss"])
             comparison = data.get("comparison") or {}
             whole = {"baseline": comparison.pop("baseline", ""), "comparison": comparison or None}
-            return checked.convert({"passed": data.get("passed"), **whole}, cls), ""
+            whole |= {"passed": data.get("passed"), "looks": data.get("looks", 1)}
+            return checked.convert(whole, cls), ""
         except (FolderError, FileError) as error:
             return cls(), str(error)
         except (ValueError, LookupError, TypeError, AttributeError) as error:

@@ -1,8 +1,8 @@
 """From records to the rows of a table: one row per test and configuration of a task.
 
 Every renderer (terminal, Markdown, pictures) reads these rows, so that all of them tell the same
-numbers. Failed and interrupted repetitions are counted and left out of everything else, as in the
-reference study.
+numbers. A crashed repetition counts with the worst value where a metric has one (`Record.value`);
+of everything else crashed and interrupted ones are left out.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from pytest_simbench.measure.wins import Win
+from pytest_simbench.measure.differences import Difference
 from pytest_simbench.records.choices import published_again
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.phenomena import PHENOMENON
@@ -114,10 +114,11 @@ class TaskSummary:
         metrics: what the task declares; those with `study` make its first table, else all.
         references: the value a perfect run would give, by metric name.
         protocol: the protocol of its records; several are joined by commas.
-        wins: which row beats which at what, by the rows' places; from `matrix.with_wins`.
+        differences: between rows, by their places; from `matrix.with_differences`.
         modes: whether headless and GUI agree, in sentences; from there too.
         described: whether the run says what the metrics mean; else they are plain numbers.
         phenomenon: that the task is a law of; empty of one that is none.
+        looks: how often the run was judged, see `outcome.Outcome`.
     """
 
     task: str
@@ -125,10 +126,11 @@ class TaskSummary:
     rows: tuple[Row, ...]
     references: Mapping[str, float] = field(default_factory=dict)
     protocol: str = ""
-    wins: tuple[Win, ...] = ()
+    differences: tuple[Difference, ...] = ()
     modes: tuple[str, ...] = ()
     described: bool = True
     phenomenon: str = ""
+    looks: int = 1
 
     @property
     def study(self) -> tuple[Metric, ...]:
@@ -209,7 +211,7 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str, ends: 
         failed=sum(record.status == "failed" for record in records),
         interrupted=sum(record.status == "interrupted" for record in records),
         metrics={
-            metric.name: spread([r.metrics.get(metric.name) for r in done], metric, ends)
+            metric.name: spread([r.value(metric) for r in records], metric, ends)
             for metric in metrics
         },
         cpu_percent=pooled([r.resources for r in done], "cpu_percent", ends),

@@ -131,7 +131,7 @@ class Throwing(Task):
         far = f"{100 * STUDY_TOLERANCE * self.scale:g} cm"
         height = f"z = {LANDING_HEIGHT * self.scale:g}"
         return (
-            Metric("moved", "moved", kind="share", of=len(PYRAMID), study=True,
+            Metric("moved", "moved", kind="share", of=len(PYRAMID), study=True, better=None,
                    doc=f"cubes of the pyramid off by more than {far}, {self.settle:g} s after"
                        f"{by_throw}"),
             Metric("hit", "hit", kind="yes_no", doc="at least one cube of the pyramid moved"),

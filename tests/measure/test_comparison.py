@@ -18,6 +18,7 @@ from pytest_simbench.measure.comparison import (
     equivalence,
     holm,
     pair,
+    pairs_for_equivalence,
 )
 
 EXPERIMENTS = 400
@@ -210,35 +211,47 @@ def test_equivalence_is_not_the_lack_of_a_difference() -> None:
     rng = np.random.default_rng(14)
     few, many = rng.normal(0, 1, (2, 5)), rng.normal(0, 1, (2, 200))
     assert not compare(*few).significant()
-    assert not equivalence(*few, 0.5).equivalent()
-    assert equivalence(*many, 0.5).equivalent()
+    assert not equivalence(*few, 0.5, span=6.0).equivalent()
+    assert equivalence(*many, 0.5, span=6.0).equivalent()
 
 
-def test_equivalence_of_sides_without_spread() -> None:
-    assert equivalence([0.9] * 3, [0.9] * 3, 0.01).equivalent()
-    assert not equivalence([0.9] * 3, [0.8] * 3, 0.05).equivalent()
-    shifted = equivalence([1.0, 2.0, 3.0], [1.25, 2.25, 3.25], 0.5)
-    assert shifted == Equivalence(0.25, 0.5, 0.0)
-    assert equivalence([1.0, 2.0], [1.5, 2.5], 0.5).p_value == 1.0  # not below it
-    assert equivalence([1.0, 2.0], [0.25, 1.25], 0.5).p_value == 1.0
+@pytest.mark.parametrize(
+    ("n", "margin", "shift", "equivalent"),
+    [
+        (2, 0.05, 0.0, False), (58, 0.05, 0.0, False), (59, 0.05, 0.0, True),
+        (28, 0.1, 0.0, False), (29, 0.1, 0.0, True),
+        (59, 0.1, 0.05, True), (59, 0.1, 0.06, False), (400, 0.1, 0.1, False),
+        (400, 0.1, -0.2, False),
+    ],
+)  # fmt: skip
+def test_alike_so_far_is_bounded_by_what_is_rare(
+    n: int, margin: float, shift: float, equivalent: bool
+) -> None:
+    """Without a loss in n, a loss of everything in so many is left: 0.05^(1/n)."""
+    first = np.linspace(0.4, 0.6, n)
+    found = equivalence(first, first + shift, margin)
+    assert found.equivalent() is equivalent
+    assert found.difference == pytest.approx(shift)
+    assert pairs_for_equivalence(0.05) == 59
+    assert pairs_for_equivalence(0.1) == 29
+    assert equivalence([1, 1], [1, 1], 0.05).p_value == pytest.approx(0.95**2)
+    assert equivalence([1, 1], [1, 1], 5.0, span=100.0).p_value == pytest.approx(0.95**2)
 
 
-def test_equivalence_is_two_paired_t_tests() -> None:
+def test_equivalence_is_two_paired_t_tests_of_enough_pairs() -> None:
     """The worse of both; also where each pair's sum is always the same."""
     from scipy.stats import ttest_rel
 
     first = np.array([0.1, 0.2, 0.3, 0.45])
     for second in (0.5 - first, first[::-1] + 0.02, np.full(4, 0.25)):
-        found = equivalence(first, second, 0.05)
-        ways = (0.05, "greater"), (-0.05, "less")
-        tests = [ttest_rel(second + side, first, alternative=way) for side, way in ways]
-        assert found.p_value == pytest.approx(max(test.pvalue for test in tests))
-        assert found.difference == pytest.approx(second.mean() - first.mean())
-        assert found.margin == 0.05
-
-
-def test_two_values_a_side_are_enough_for_equivalence() -> None:
-    assert 0 < equivalence([0.1, 0.2], [0.15, 0.2], 0.5).p_value < 0.05
+        for margin in (0.05, 0.3):
+            found = equivalence(first, second, margin)
+            ways = (margin, "greater"), (-margin, "less")
+            tests = [ttest_rel(second + side, first, alternative=way) for side, way in ways]
+            worse = max(test.pvalue for test in tests)
+            assert found.p_value == pytest.approx(max(worse, (1 - margin) ** 4))
+            assert found.difference == pytest.approx(second.mean() - first.mean())
+            assert found.margin == margin
 
 
 @pytest.mark.parametrize(

@@ -37,8 +37,9 @@ def compared(headless: list[float], gui: list[float]) -> ModeComparison:
 
 
 def test_bit_identical_modes_are_the_same() -> None:
-    found = compared([1.0, 0.8, 1.0], [1.0, 0.8, 1.0])
-    assert "the same within 5 points (gui +0 points, 3 common seeds)" in found.sentence
+    """As many as bound a loss that was never seen below the margin."""
+    found = compared([1.0, 0.8, 1.0] * 20, [1.0, 0.8, 1.0] * 20)
+    assert "the same within 5 points (gui +0 points, 60 common seeds)" in found.sentence
 
 
 def test_a_clear_difference_is_not_called_the_same() -> None:
@@ -60,8 +61,8 @@ def test_error_rates(true: float, low: float, high: float) -> None:
     rng = np.random.default_rng(7)
     claims = 0
     for _ in range(300):
-        headless = rng.normal(0.8, 0.05, 20)
-        result = compared(list(headless), list(headless - true + rng.normal(0, 0.05, 20))).result
+        headless = rng.normal(0.8, 0.05, 60)
+        result = compared(list(headless), list(headless - true + rng.normal(0, 0.05, 60))).result
         assert result is not None
         claims += result.equivalent()
     assert low <= claims / 300 <= high
@@ -72,7 +73,9 @@ def test_each_sentence_word_by_word() -> None:
     name = "mujoco, headless and gui, placed"
     assert (same.simulator, same.profile, same.pairs) == ("mujoco", "tuned", 3)
     assert same.test == "suites/test_stacking.py::test_stacking"
-    assert same.sentence == (f"{name}: the same within 5 points (gui +0 points, 3 common seeds).")
+    assert same.sentence == (
+        f"{name}: gui +0 points, 3 common seeds; the same within 5 points takes 59 or more."
+    )
     other = compared([1.0, 0.5, 0.75, 0.5], [0.75, 0.5, 0.5, 0.25])
     assert other.result is not None
     assert other.sentence == (
@@ -89,10 +92,10 @@ def test_two_common_seeds_are_paired_by_seed() -> None:
     (found,) = compare_modes(records, [PLACED])
     assert found.pairs == 2
     assert found.result is not None
-    assert (found.result.difference, found.result.p_value) == (0.0, 0.0)
+    assert found.result.difference == 0.0
 
 
-def test_only_the_studys_shares_of_good_repetitions_are_compared() -> None:
+def test_only_the_studys_shares_are_compared_and_a_crash_counts() -> None:
     metrics = [
         replace(PLACED, name="a", study=False),
         Metric("b", "b", study=True),
@@ -108,5 +111,5 @@ def test_only_the_studys_shares_of_good_repetitions_are_compared() -> None:
     found = compare_modes([*records, failed, record("headless", 5, 0.0)], [*metrics, PLACED])
     assert [(row.metric.name, row.pairs, row.result is None) for row in found] == [
         ("c", 0, True),
-        ("placed", 2, False),
+        ("placed", 3, False),
     ]

@@ -231,6 +231,9 @@ def test_on_the_command_line(pytester: pytest.Pytester) -> None:
     again = path.read_bytes().splitlines(keepends=True)
     assert [again[0], again[1]] == [lines[0], lines[2]]
     assert [json.loads(line)["repetition"] for line in again] == [1, 3, 2]
+    result = run("--reps=4", "--sim-resume=o")
+    result.stdout.fnmatch_lines(["note: falling: judged 3 times, since repetitions were added *"])
+    assert "judged 3 times" in (pytester.path / "o" / "report.md").read_text()
 
 
 def test_a_newer_schema_is_one_sentence(pytester: pytest.Pytester, case: Case, save: Save) -> None:

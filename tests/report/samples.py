@@ -38,7 +38,7 @@ REFERENCES = {"throwing": {"landing_x": 1.352, "release_speed": 2.753}}
 def two_errors(values: Sequence[float], metric: Metric) -> tuple[float, float]:
     """Mean -+ two standard errors: ends that tests of texts can rely on, whatever the method."""
     mean = statistics.fmean(values)
-    half = 2 * statistics.stdev(values) / math.sqrt(len(values))
+    half = 2 * statistics.pstdev(values) / math.sqrt(max(1, len(values) - 1))
     low, high = mean - half, mean + half
     return (max(0.0, low), min(1.0, high)) if metric.bounded else (low, high)
 

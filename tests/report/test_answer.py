@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import re
+from itertools import combinations
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.measure.comparison import MeanDifference
-from pytest_simbench.measure.wins import Win
+from pytest_simbench.measure.differences import Difference, Verdict
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.report.answer import sentences, short_labels
-from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.matrix import with_differences
 from pytest_simbench.report.pooling import Spread
 from pytest_simbench.report.summary import Row, TaskSummary, summarise
 
@@ -36,25 +36,48 @@ def task(
         )
         for name, mean in found.items()
     )  # fmt: skip
-    places = list(found)
-    comparison = MeanDifference(0.0, 1.0, 0.001, True, (count, count))
-    wins = tuple(
-        Win(*(places.index(name) for name in text.split(">")), metric, comparison, 0.001)
-        for text in beats
-    )
-    return TaskSummary("t", (metric,), rows, wins=wins)
+    return TaskSummary("t", (metric,), rows, differences=told(list(found), beats, metric, count))
+
+
+def told(
+    names: list[str], beats: tuple[str, ...], metric: Metric, count: int = 20, needs: int = 0
+) -> tuple[Difference, ...]:
+    """Of each pair of rows what `beats` says: `a>b`, `a~b` equivalent, `a!b` different."""
+    verdicts: dict[str, tuple[Verdict, Verdict]] = {
+        ">": ("better", "worse"), "~": ("equivalent",) * 2, "!": ("different",) * 2,
+    }  # fmt: skip
+    said = {frozenset((text[0], text[2])): text for text in beats}
+    found = []
+    for a, b in combinations(names, 2):
+        text = said.get(frozenset((a, b)))
+        verdict = verdicts[text[1]][a != text[0]] if text else "undecided"
+        places = names.index(a), names.index(b)
+        found.append(
+            Difference(
+                *places, metric, "outcome", verdict, 0.0, 0.5, 0.4, 0.6, 0.001, count, count,
+                count, needs,
+            )
+        )  # fmt: skip
+    return tuple(found)
 
 
 def test_sample_runs() -> None:
-    (stacking,) = with_wins(summarise(stacking_run(), METRICS, ends=two_errors), stacking_run())
+    (stacking,) = with_differences(
+        summarise(stacking_run(), METRICS, ends=two_errors), stacking_run()
+    )
     assert sentences(stacking) == [
-        "placed: mujoco 99 % [97, 100] is ahead of pybullet 77 % [73, 80].",
-        "at the end: mujoco 97 % [94, 99] is ahead of pybullet 90 % [87, 94].",
+        "placed: mujoco 99 % [97, 100] is ahead of pybullet 65 % [52, 78], by 33.3 points "
+        "[16.7, 50].",
+        "at the end: mujoco 97 % [94, 99] is ahead of pybullet 77 % [62, 92], by 20 points "
+        "[1.53, 38.5].",
         "failures: pybullet 3 of 20.",
     ]
-    (throwing,) = with_wins(summarise(throwing_run(), METRICS, ends=two_errors), throwing_run())
+    (throwing,) = with_differences(
+        summarise(throwing_run(), METRICS, ends=two_errors), throwing_run()
+    )
     assert sentences(throwing) == [
-        "moved: mujoco 42 % [38, 45] and pybullet 39 % [34, 45]; no difference is shown.",
+        "moved: mujoco 42 % [38, 45] and pybullet 39 % [34, 45]; a difference needs at least 6 "
+        "pairs that differ; so far 1.",
         "failures: none in 40 repetitions.",
     ]
 
@@ -62,11 +85,24 @@ def test_sample_runs() -> None:
 @pytest.mark.parametrize(
     ("beats", "sentence"),
     [
-        (("c>a",), "c 90 % [80, 100] is ahead of a 20 % [10, 30]; not told apart: b 80 % [70, 90]"),
+        (
+            ("c>a",),
+            "c 90 % [80, 100] is ahead of a 20 % [10, 30], by 50 points [40, 60]; "
+            "not told apart: b 80 % [70, 90]",
+        ),
         (("c>a", "b>a"), "c 90 % [80, 100] and b 80 % [70, 90] are ahead; behind: a 20 % [10, 30]"),
         (("c>a", "b>a", "c>b"), "c 90 % [80, 100] is ahead of b 80 % [70, 90] and a 20 % [10, 30]"),
         (("c>b", "b>a"), "c 90 % [80, 100] is ahead; behind: b 80 % [70, 90] and a 20 % [10, 30]"),
-        ((), "c 90 % [80, 100], b 80 % [70, 90] and a 20 % [10, 30]; no difference is shown"),
+        ((), "c 90 % [80, 100], b 80 % [70, 90] and a 20 % [10, 30]; not told apart"),
+        (
+            ("a~b", "a~c", "b~c"),
+            "c 90 % [80, 100], b 80 % [70, 90] and a 20 % [10, 30]; the same within 5 points",
+        ),
+        (
+            ("a~b", "a!c"),
+            "c 90 % [80, 100], b 80 % [70, 90] and a 20 % [10, 30]; "
+            "1 of 3 pairs differ, and no value is the right one",
+        ),
     ],
 )
 def test_only_what_a_test_supports_is_ranked(beats: tuple[str, ...], sentence: str) -> None:
@@ -76,8 +112,8 @@ def test_only_what_a_test_supports_is_ranked(beats: tuple[str, ...], sentence: s
 def test_wins_at_other_metrics_rank_nobody() -> None:
     other = Metric("other", "other", "m", "lower")
     found = task({"a": 0.2, "b": 0.8}, ("b>a",), other)
-    found = TaskSummary("t", (SCORE,), found.rows, wins=found.wins)
-    assert sentences(found)[0].endswith("; no difference is shown.")
+    found = TaskSummary("t", (SCORE,), found.rows, differences=found.differences)
+    assert sentences(found)[0].endswith("; not compared.")
 
 
 def test_nobody_leads_with_nothing() -> None:
@@ -87,11 +123,13 @@ def test_nobody_leads_with_nothing() -> None:
         for name, moved in (("genesis", 0.0), ("newton", 0.0), ("drake", 0.5), ("dart", 0.5))
         for k in range(20)
     ]
-    (found,) = with_wins(summarise(records, METRICS), records)
+    (found,) = with_differences(summarise(records, METRICS), records)
     assert sentences(found)[0].startswith("moved: dart 50 % [")
     assert "are ahead; behind: genesis 0 % [0, " in sentences(found)[0]
-    (nothing,) = with_wins(summarise(records[:40], METRICS), records[:40])
-    assert sentences(nothing)[0].endswith("; no difference is shown.")
+    (nothing,) = with_differences(summarise(records[:40], METRICS), records[:40])
+    assert sentences(nothing)[0].endswith(
+        "; a difference needs at least 6 pairs that differ; so far none."
+    )
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4])
@@ -101,16 +139,20 @@ def test_few_repetitions_are_not_compared(count: int) -> None:
         for name, placed in (("good", 1.0), ("poor", 0.0))
         for k in range(count)
     ]
-    (found,) = with_wins(summarise(records, METRICS), records)
-    assert found.wins == ()
-    assert sentences(found)[0].endswith("; too few repetitions to compare.")
-    assert sentences(task({"a": 0.2, "b": 0.8}, count=count))[0].endswith("to compare.")
+    (found,) = with_differences(summarise(records, METRICS), records)
+    assert {d.verdict for d in found.differences} == {"undecided"}
+    assert sentences(found)[0].endswith(
+        f"; a difference needs at least 6 pairs that differ; so far {count}."
+    )
 
 
 def test_lower_is_better_where_the_metric_says_so() -> None:
     metric = Metric("score", "error", "m", "lower", study=True)
     found = sentences(task({"a": 0.2, "b": 0.11}, ("b>a",), metric))
-    assert found[0] == "error: b 0.11 m [0.01, 0.21] is ahead of a 0.2 m [0.1, 0.3]."
+    assert (
+        found[0]
+        == "error: b 0.11 m [0.01, 0.21] is ahead of a 0.2 m [0.1, 0.3], by 0.5 m [0.4, 0.6]."
+    )
 
 
 def test_many_simulators_are_not_all_named() -> None:
@@ -122,7 +164,12 @@ def test_many_simulators_are_not_all_named() -> None:
 
 def test_a_metric_without_a_good_direction_is_not_ranked() -> None:
     metric = Metric("score", "landing", "m", None, study=True)
-    assert sentences(task({"a": 1.1}, (), metric, failed=1)) == ["failures: a 1 of 21."]
+    assert sentences(task({"a": 1.1}, (), metric, failed=1)) == [
+        "landing: a 1.1 m [1, 1.2] (of 20 that finished).",
+        "failures: a 1 of 21.",
+    ]
+    two = sentences(task({"a": 1.1, "b": 2.1}, ("a!b",), metric))[0]
+    assert two.endswith("; they differ, and no value is the right one.")
 
 
 def test_a_single_simulator_is_told_without_a_rank() -> None:

@@ -9,7 +9,7 @@ import pytest
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.brief import MOST_LINES, render_brief
-from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.matrix import with_differences
 from pytest_simbench.report.summary import TaskSummary, summarise
 
 from .samples import METRICS, failed, record, stacking_run, throwing_run
@@ -37,25 +37,26 @@ def summaries(records: list[Record]) -> list[TaskSummary]:
 
 @pytest.fixture(scope="module")
 def eight() -> list[TaskSummary]:
-    return with_wins(summaries(run_of_eight()), run_of_eight())
+    return with_differences(summaries(run_of_eight()), run_of_eight())
 
 
 def test_the_answer_comes_first_then_a_line_for_each_row() -> None:
     records = [*stacking_run(), *throwing_run()]
-    assert render_brief(with_wins(summaries(records), records), 80) == text(
+    assert render_brief(with_differences(summaries(records), records), 80) == text(
         """
         2 simulators did stacking and throwing: 80 repetitions, 3 failed (pybullet 3).
         Outcome: stacking, placed and at the end: mujoco ahead (behind: pybullet);
-          throwing, moved: no difference is shown.
-        Cost: CPU s per simulated s, stacking and throwing: no difference is shown;
-          RAM, stacking and throwing: no difference is shown.
+          throwing, moved: a difference needs at least 6 pairs that differ; so far 1.
+        Cost: CPU s per simulated s, stacking and throwing: not compared; RAM,
+          stacking and throwing: a difference needs at least 6 pairs that differ; so far
+          none.
 
         stacking: 20 repetitions each, protocol fast
                                            at the end      CPU  RAM  x real
         simulator   failed      placed %            %  s/sim s   MB    time
         -------------------------------------------------------------------
         mujoco     0 of 20  99 [79, 100]  97 [77, 99]    0.048  150      20
-        pybullet   3 of 20   77 [59, 83]  90 [69, 95]    0.048  150      20
+        pybullet   3 of 20   65 [40, 78]  77 [46, 91]    0.048  150      20
 
         throwing: 20 repetitions each, protocol fast
                                              CPU  RAM  x real

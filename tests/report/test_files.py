@@ -15,17 +15,22 @@ import pytest
 from pytest_simbench.report import files, markdown
 from pytest_simbench.report.figures import FiguresUnavailable, draw, drawing, write_figures
 from pytest_simbench.report.files import Written, csv_of, write_files
-from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.matrix import with_differences
 from pytest_simbench.report.summary import summarise
 
 from .samples import METRICS, REFERENCES, failed, record, stacking_run, throwing_run, two_errors
 
 
 def test_markdown_tables_hold_one_line_per_row() -> None:
-    (summary,) = with_wins(summarise(stacking_run(), METRICS, ends=two_errors), stacking_run())
+    (summary,) = with_differences(
+        summarise(stacking_run(), METRICS, ends=two_errors), stacking_run()
+    )
     lines = markdown.render_task(summary).splitlines()
     assert lines[0] == "## stacking: 20 repetitions each, protocol fast"
-    assert lines[2] == "- placed: mujoco 99 % [97, 100] is ahead of pybullet 77 % [73, 80]."
+    assert lines[2] == (
+        "- placed: mujoco 99 % [97, 100] is ahead of pybullet 65 % [52, 78], "
+        "by 33.3 points [16.7, 50]."
+    )
     assert lines[6:10] == [
         "| simulator | failed | placed % | at the end % | CPU % | RAM MB | x real time "
         "| CPU s/sim s | start s | end s |",
@@ -35,7 +40,7 @@ def test_markdown_tables_hold_one_line_per_row() -> None:
         "| 99 +- 3 [99, 99] | 150 +- 2 [150, 150] (peak 161) "
         "| 20 [20, 20] | 0.048 [0.048, 0.048] | 0.80 [0.80, 0.80] | 9.8 [9.8, 9.8] |",
         "| pybullet headless tuned | 3 of 20 [3, 38] % "
-        "| 67 / 77 / 87 [73, 80] | 80 / 90 / 100 [87, 94] "
+        "| 0 / 65 / 87 [52, 78] | 0 / 77 / 100 [62, 92] "
         "| 99 +- 3 [99, 99] | 150 +- 2 [150, 150] (peak 161) "
         "| 20 [20, 20] | 0.048 [0.048, 0.048] | 0.80 [0.80, 0.80] | 9.8 [9.8, 9.8] |",
     ]

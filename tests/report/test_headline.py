@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.report.headline import headline
-from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.matrix import with_differences
 from pytest_simbench.report.summary import TaskSummary, summarise
 
 from .samples import METRICS, record, stacking_run, throwing_run
@@ -15,18 +15,18 @@ from .test_answer import SCORE, task
 
 def test_sample_runs() -> None:
     records = [*stacking_run(), *throwing_run()]
-    assert headline(with_wins(summarise(records, METRICS), records)) == [
+    assert headline(with_differences(summarise(records, METRICS), records)) == [
         "2 simulators did stacking and throwing: 80 repetitions, 3 failed (pybullet 3).",
         "Outcome: stacking, placed and at the end: mujoco ahead (behind: pybullet); "
-        "throwing, moved: no difference is shown.",
-        "Cost: CPU s per simulated s, stacking and throwing: no difference is shown; "
-        "RAM, stacking and throwing: no difference is shown.",
+        "throwing, moved: a difference needs at least 6 pairs that differ; so far 1.",
+        "Cost: CPU s per simulated s, stacking and throwing: not compared; RAM, stacking and "
+        "throwing: a difference needs at least 6 pairs that differ; so far none.",
     ]
 
 
 def test_without_wins_nobody_is_ahead() -> None:
     found = headline([task({"a": 0.1, "b": 0.9})])
-    assert found[1] == "Outcome: t, score: no difference is shown."
+    assert found[1] == "Outcome: t, score: not told apart."
 
 
 def test_many_are_counted_not_named() -> None:
@@ -52,7 +52,7 @@ def test_few_repetitions_are_not_compared() -> None:
     (_, outcome, _) = headline(
         summarise([record(name, metrics={"placed": 1.0, "at_end": 1.0}) for name in "ab"], METRICS)
     )
-    assert outcome == "Outcome: stacking, placed and at the end: too few repetitions to compare."
+    assert outcome == "Outcome: stacking, placed and at the end: not compared."
 
 
 def test_interrupted_repetitions_are_told() -> None:
@@ -68,7 +68,7 @@ def test_a_task_without_metrics_of_the_study_names_its_first_two() -> None:
     spread = found.rows[0].metrics[SCORE.name]
     rows = tuple(replace(row, metrics=dict.fromkeys(("one", "two"), spread)) for row in found.rows)
     assert headline([TaskSummary("t", metrics, rows)])[1] == (
-        "Outcome: t, one and two: no difference is shown."
+        "Outcome: t, one and two: not compared."
     )
 
 

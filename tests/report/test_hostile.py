@@ -17,7 +17,7 @@ from pytest_simbench.report.brief import render_brief
 from pytest_simbench.report.capabilities import capability_markdown, capability_table
 from pytest_simbench.report.files import csv_of, write_files
 from pytest_simbench.report.github import VARIABLE, append_summary
-from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.matrix import with_differences
 from pytest_simbench.report.progress import Progress
 from pytest_simbench.report.repeatability import render_markdown, render_terminal
 from pytest_simbench.report.repeatability import tables as repeatability_tables
@@ -71,7 +71,9 @@ def declared(text: str) -> dict[str, list[Metric]]:
 
 @texts
 def test_the_terminal(text: str) -> None:
-    found = with_wins(summarise(records(text), declared(text), {text: {text: 0.5}}), records(text))
+    found = with_differences(
+        summarise(records(text), declared(text), {text: {text: 0.5}}), records(text)
+    )
     for width in (60, 200):
         for shown in (tables.render_run(found, width), render_brief(found, width)):
             assert_harmless_terminal(shown)
@@ -80,7 +82,7 @@ def test_the_terminal(text: str) -> None:
 
 @texts
 def test_the_report_in_markdown(text: str) -> None:
-    found = with_wins(summarise(records(text), declared(text)), records(text))
+    found = with_differences(summarise(records(text), declared(text)), records(text))
     assert_harmless_markdown(markdown.render_run(found))
     assert_harmless_terminal(markdown.render_run(found))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pytest_simbench.report import columns, markdown
-from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.matrix import with_differences
 from pytest_simbench.report.summary import TaskSummary, summarise
 from pytest_simbench.report.tables import render_run
 
@@ -11,7 +11,7 @@ from .samples import METRICS, record, stacking_run
 
 
 def summary(records: list) -> TaskSummary:  # type: ignore[type-arg]
-    (found,) = with_wins(summarise(records, METRICS), records)
+    (found,) = with_differences(summarise(records, METRICS), records)
     return found
 
 
@@ -25,7 +25,7 @@ def test_the_better_simulator_beats_the_other_and_not_itself() -> None:
 
 def test_it_is_in_the_terminal_and_in_the_report() -> None:
     records = stacking_run()
-    found = with_wins(summarise(records, METRICS), records)
+    found = with_differences(summarise(records, METRICS), records)
     assert columns.MATRIX in " ".join(render_run(found, 100).split())
     assert columns.MATRIX[1:] in markdown.render_run(found)
     assert max(map(len, render_run(found, 80).splitlines())) <= 80
@@ -34,7 +34,7 @@ def test_it_is_in_the_terminal_and_in_the_report() -> None:
 def test_modes_are_not_set_against_each_other() -> None:
     good = [record("mujoco", k, metrics={"placed": 1.0}) for k in range(20)]
     poor = [record("mujoco", k, mode="gui", metrics={"placed": 0.2}) for k in range(20)]
-    assert summary([*good, *poor]).wins == ()
+    assert summary([*good, *poor]).differences == ()
 
 
 def test_without_a_winner_there_is_no_matrix() -> None:

@@ -31,7 +31,7 @@ def test_it_is_read_back(passed: bool | None, tmp_path: Path) -> None:
     report = compared()
     assert report.failures
     assert report.differences
-    outcome = Outcome(passed, "runs/before", report)
+    outcome = Outcome(passed, "runs/before", report, looks=2)
     outcome.write(tmp_path)
     found, problem = Outcome.read(tmp_path)
     assert problem == ""

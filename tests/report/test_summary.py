@@ -37,7 +37,7 @@ def test_one_summary_per_task_and_one_row_per_simulator_and_mode() -> None:
     assert summaries[1].references == REFERENCES["throwing"]
 
 
-def test_failed_and_interrupted_repetitions_are_counted_and_left_out() -> None:
+def test_failed_repetitions_count_and_interrupted_ones_are_left_out() -> None:
     records = [
         record(repetition=1, metrics={"placed": 0.8}),
         record(repetition=2, metrics={"placed": 0.6}),
@@ -50,8 +50,8 @@ def test_failed_and_interrupted_repetitions_are_counted_and_left_out() -> None:
     assert (row.finished, row.failed, row.interrupted, row.attempts) == (2, 3, 1, 5)
     placed = row.metrics["placed"]
     assert placed is not None
-    assert (placed.count, placed.min, placed.max) == (2, 0.6, 0.8)
-    assert placed.mean == pytest.approx(0.7)
+    assert (placed.count, placed.min, placed.max) == (5, 0.0, 0.8)  # a crash is the worst
+    assert placed.mean == pytest.approx(1.4 / 5)
     hung, died = row.causes
     assert (hung.type, hung.phase, hung.message) == ("WorkerHung", "settle", "no answer")
     assert (hung.repetitions, hung.seeds, hung.last_line) == ((3, 5), (1003, 1005), "died")

@@ -113,7 +113,7 @@ def test_all_its_motions_are_feasible(seed: int) -> None:
 def test_what_the_metrics_say() -> None:
     """Name, unit, direction and kind are what records, tables and gates go by."""
     assert [(m.name, m.unit, m.better, m.kind, m.of, m.study) for m in TASK.metrics] == [
-        ("moved", "", "higher", "share", 6, True),
+        ("moved", "", None, "share", 6, True),
         ("hit", "", "higher", "yes_no", None, False),
         ("moved_otherwise", "cubes", "lower", "value", None, False),
         ("lost_in_transit", "", "lower", "yes_no", None, False),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from pytest_simbench.measure.limits import FAILURES
@@ -34,7 +34,8 @@ class Cell:
     Attributes:
         lines: the first stands out.
         sort: what the column is sorted by; None: by the text.
-        verdict: `ahead`, `behind`, `level`, or empty where nothing was compared.
+        verdict: `ahead`, `behind`, `apart`, `same`, `open` (see `answer.Standing`), or empty where
+            nothing was compared.
     """
 
     lines: Sequence[str]
@@ -81,22 +82,19 @@ def study(summary: TaskSummary) -> Table:
     columns: list[tuple[Heading, list[Cell]]] = [
         (Heading("simulator", left=True), [Cell([row.simulator, row.variant]) for row in rows]),
     ]
-    failed, attempts = [_failures(row) for row in rows], [row.attempts for row in rows]
-    judged = _judged(failed, FAILURES.name, attempts, summary)
-    columns.append((Heading("failed", FAILURES.doc), judged))
+    failed = _judged(map(_failures, rows), FAILURES.name, summary)
+    columns.append((Heading("failed", FAILURES.doc), failed))
     for metric in summary.study:
-        spreads = [row.metrics.get(metric.name) for row in rows]
-        found = [_spread(value, metric) for value in spreads]
-        if metric.better is not None:
-            found = _judged(found, metric.name, _counts(spreads), summary)
-        columns.append((Heading(cells.heading(metric), metric.doc), found))
+        values = (_spread(row.metrics.get(metric.name), metric) for row in rows)
+        judged = _judged(values, metric.name, summary)
+        columns.append((Heading(cells.heading(metric), metric.doc), judged))
     for heading, note, name in COST_COLUMNS:
         costs = [cost_of(row, name) for row in rows]
         texts = (
             [cells.sampled(row.rss_mb) for row in rows] if name == "ram" else map(cells.cost, costs)
         )
         found = [Cell(text, _mean(cost)) for text, cost in zip(texts, costs, strict=True)]
-        columns.append((Heading(heading, note), _judged(found, name, _counts(costs), summary)))
+        columns.append((Heading(heading, note), _judged(found, name, summary)))
     columns += [
         (Heading("CPU %", "of one core: mean and deviation of worker and children"),
          [Cell(cells.sampled(row.cpu_percent), _mean(row.cpu_percent)) for row in rows]),
@@ -117,7 +115,7 @@ COST_COLUMNS = (
     ("x real time", "simulated over wall seconds of stepping", "rtf"),
     ("RAM MB", "resident memory of worker and children: mean, deviation, peak", "ram"),
 )
-"""Costs that the tests between the rows compare."""
+"""Costs with a doc of their own."""
 
 
 def from_columns(
@@ -144,20 +142,10 @@ def labelled(summary: TaskSummary) -> dict[tuple[str, ...], Of]:
     return found
 
 
-def _judged(
-    found: Iterable[Cell], name: str, counts: Sequence[int], summary: TaskSummary
-) -> list[Cell]:
-    """The cells with who is ahead and who is behind."""
-    who = standing(name, counts, summary)
-    verdicts = dict.fromkeys(who.level, "level")
-    verdicts |= dict.fromkeys(who.ahead, "ahead") | dict.fromkeys(who.behind, "behind")
-    return [
-        Cell(cell.lines, cell.sort, verdicts.get(place, "")) for place, cell in enumerate(found)
-    ]
-
-
-def _counts(spreads: Iterable[Spread | None]) -> list[int]:
-    return [0 if spread is None else spread.count for spread in spreads]
+def _judged(found: Iterable[Cell], name: str, summary: TaskSummary) -> list[Cell]:
+    """The cells with what their rows are."""
+    who = standing(name, summary).by_place
+    return [replace(cell, verdict=who.get(place, "")) for place, cell in enumerate(found)]
 
 
 def _failures(row: Row) -> Cell:

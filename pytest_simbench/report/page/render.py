@@ -19,7 +19,9 @@ _LOG = re.compile(r"logs/[A-Za-z0-9_=-][A-Za-z0-9_.=-]*\.log")
 """A log in the run folder, as this package names them: it becomes a link, anything else a text."""
 
 SYMBOLS = {"ahead": ("\u25b2", "ahead"), "behind": ("\u25bc", "behind"),
-           "level": ("\u2248", "not told apart"), "": ("", "")}  # fmt: skip
+           "apart": ("\u2260", "differs, no direction is right"),
+           "same": ("\u2248", "the same within 5 points"),
+           "open": ("?", "not told apart, or not yet"), "": ("", "")}  # fmt: skip
 """Of the verdicts: what is seen without colours, and what is read aloud."""
 
 

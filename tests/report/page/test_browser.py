@@ -11,7 +11,7 @@ import pytest
 from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.matrix import with_differences
 from pytest_simbench.report.page import PAGE_NAME, context
 from pytest_simbench.report.page.render import render
 from pytest_simbench.report.summary import summarise
@@ -32,7 +32,7 @@ __all__ = ["browser", "opened"]  # fixtures
 
 def write(folder: Path, found: list[Record], baseline: list[Record] | None = None) -> Path:
     metrics = METRICS | declared(STRANGE)
-    summaries = with_wins(summarise(found, metrics, REFERENCES), found)
+    summaries = with_differences(summarise(found, metrics, REFERENCES), found)
     comparison = None
     if baseline:
         comparison = ("runs/before", run_gate(baseline, found, (), metrics))

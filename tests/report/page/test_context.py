@@ -9,7 +9,7 @@ import pytest
 
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.matrix import with_differences
 from pytest_simbench.report.page import context
 from pytest_simbench.report.page.cells import Table, study
 from pytest_simbench.report.page.context import Page, command, page
@@ -19,7 +19,7 @@ from tests.report.samples import METRICS, failed, record, stacking_run, throwing
 
 
 def made(records: list[Record], folder: Path) -> Page:
-    return page(folder, with_wins(summarise(records, METRICS), records), records)
+    return page(folder, with_differences(summarise(records, METRICS), records), records)
 
 
 @pytest.fixture(autouse=True)
@@ -37,17 +37,18 @@ def verdicts(table: Table) -> dict[str, list[str]]:
 
 
 def test_cells_are_coloured_by_the_corrected_tests() -> None:
-    (summary,) = with_wins(summarise(stacking_run(), METRICS), stacking_run())
+    (summary,) = with_differences(summarise(stacking_run(), METRICS), stacking_run())
     found = verdicts(study(summary))
     assert found["placed %"] == found["at the end %"] == ["ahead", "behind"]
-    assert found["failed"] == found["RAM MB"] == found["x real time"] == ["level", "level"]
+    assert found["failed"] == found["RAM MB"] == ["open", "open"]
+    assert found["x real time"] == found["CPU s/sim s"] == ["", ""]  # no control was recorded
     assert found["CPU %"] == found["start s"] == found["simulator"] == ["", ""]
 
 
 def test_without_tests_or_with_few_repetitions_nothing_is_coloured() -> None:
     few = [r for r in stacking_run() if r.repetition < 5]
-    (summary,) = with_wins(summarise(few, METRICS), few)
-    assert {v for column in verdicts(study(summary)).values() for v in column} == {""}
+    (summary,) = with_differences(summarise(few, METRICS), few)
+    assert {v for column in verdicts(study(summary)).values() for v in column} == {"", "open"}
 
 
 def test_cells_tell_mean_interval_and_ends_and_sort_by_the_mean() -> None:
@@ -55,9 +56,9 @@ def test_cells_tell_mean_interval_and_ends_and_sort_by_the_mean() -> None:
     table = study(summary)
     place = [heading.text for heading in table.headings].index("placed %")
     cell = table.lines[1].cells[place]
-    assert cell.lines[0] == "77"
+    assert cell.lines[0] == "65"
     assert cell.lines[1].startswith("[")
-    assert cell.lines[2] == "67 to 87"
+    assert cell.lines[2] == "0 to 87"  # three crashed
     spread = summary.rows[1].metrics["placed"]
     assert spread is not None
     assert cell.sort == spread.mean

@@ -13,7 +13,7 @@ from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import Line, append
-from pytest_simbench.report.matrix import with_wins
+from pytest_simbench.report.matrix import with_differences
 from pytest_simbench.report.page import context
 from pytest_simbench.report.page.render import render
 from pytest_simbench.report.summary import summarise
@@ -62,7 +62,7 @@ class Parsed(HTMLParser):
 
 
 def made(found: list[Record], folder: Path, metrics: object = METRICS) -> str:
-    summaries = with_wins(summarise(found, metrics), found)  # type: ignore[arg-type]
+    summaries = with_differences(summarise(found, metrics), found)  # type: ignore[arg-type]
     return render(context.page(folder, summaries, found))
 
 
