@@ -68,6 +68,9 @@ def _parser() -> argparse.ArgumentParser:
     head.add_argument(
         "--tls", action="store_true", help="encrypted, by the certificates of Dask's configuration"
     )
+    head.add_argument(
+        "--pages", action="store_true", help="serve Dask's pages, to whoever reaches this machine"
+    )
     head.set_defaults(run=_head)
     node = kinds.add_parser("node", help="a machine that carries repetitions out")
     node.add_argument("address", help="of the head: tcp://head:8786, or tls://head:8786")
@@ -95,6 +98,8 @@ async def _head(given: argparse.Namespace) -> int:
 
     if given.lost_after < 1.0:
         raise ValueError("--lost-after: give at least 1 second")
+    if not given.pages:
+        dask.config.set({"distributed.scheduler.http.routes": []})
     dask.config.set(
         {
             "distributed.scheduler.allowed-failures": 0,
@@ -106,19 +111,24 @@ async def _head(given: argparse.Namespace) -> int:
         host=given.host,
         port=given.port,
         protocol="tls" if given.tls else "tcp",
+        dashboard=given.pages,
         dashboard_address=f"{given.host}:0",
     ) as scheduler:
         scheduler.set_metadata(keys=[SETTINGS], value={"lost-after": given.lost_after})
         print(f"the head listens on {scheduler.address}", flush=True)
+        if given.pages:
+            print(f"Dask's pages: http://{given.host}:{scheduler.http_server.port}", flush=True)
         await _either(scheduler.finished, _told())
     return 0
 
 
 async def _node(given: argparse.Namespace) -> int:
+    import dask
     from distributed import Nanny
     from distributed.comm import get_address_host, resolve_address
     from distributed.utils import get_ip
 
+    dask.config.set({"distributed.worker.http.routes": []})  # its process inherits that
     names = [name.strip() for name in given.sim.split(",")] if given.sim else None
     if given.slots < 1:
         raise ValueError("--slots: give a whole number from 1")

@@ -59,9 +59,17 @@ class Machines:
         folder: for their logs.
         lost_after: silence after which a node counts as lost [s].
         networks: whether each has a network of its own.
+        head: more options of the head; with `--tls` nodes get an address of that kind.
     """
 
-    def __init__(self, folder: Path, lost_after: float = 5.0, *, networks: bool = False) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        lost_after: float = 5.0,
+        *,
+        networks: bool = False,
+        head: Sequence[str] = (),
+    ) -> None:
         self.folder = folder
         self.networks = networks
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
@@ -73,8 +81,8 @@ class Machines:
             _ip("link", "set", self._bridge, "up")
         port = free_port()
         host = self._network("head") if networks else "127.0.0.1"
-        self.address = f"tcp://{host}:{port}"
-        options = ["--host", host, "--port", str(port), "--lost-after", str(lost_after)]
+        self.address = f"{'tls' if '--tls' in head else 'tcp'}://{host}:{port}"
+        options = ["--host", host, "--port", str(port), "--lost-after", str(lost_after), *head]
         self._start("head", ["head", *options], "the head listens")
 
     @property

@@ -125,13 +125,12 @@ def report(run: Path) -> None:
     for text in (*reading.problems, *written.problems, *filter(None, [wrong]), *problems, *told):
         one_sentence(text)
     render_repeatability(tables, 100)
-    for width in (20, 100):
-        render_brief(summaries, width)
-        render_run(summaries, width)
-        history.lines(histories, width)
-        sweep.whole(sweeps, width)
-        if outcome.compared is not None:
-            render_terminal(outcome.compared[1], width, False)
+    render_brief(summaries, 40)
+    render_run(summaries, 100)
+    history.lines(histories, 40)
+    sweep.whole(sweeps, 40)
+    if outcome.compared is not None:
+        render_terminal(outcome.compared[1], 100, False)
     for path in (run, run / BENCHMARKS):
         try:
             before = read_baseline(path)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import re
 from base64 import b64encode
+from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from jinja2 import BaseLoader, Environment, StrictUndefined
+from jinja2 import BaseLoader, Environment, StrictUndefined, Template
 from markupsafe import Markup
 
 from pytest_simbench import __version__
@@ -27,16 +28,8 @@ SYMBOLS = {"ahead": ("\u25b2", "ahead"), "behind": ("\u25bc", "behind"),
 
 def render(page: Page) -> str:
     """The page as one HTML document, without a line that depends on when it was made."""
-    environment = Environment(
-        loader=_Parts(),
-        autoescape=True,
-        finalize=_text,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     style, script = _part("page.css"), _part("page.js")
-    return environment.get_template("page.html").render(
+    return _template().render(
         page=page,
         style=Markup(style),
         script=Markup(script),
@@ -48,6 +41,18 @@ def render(page: Page) -> str:
         log_link=lambda log: log if _LOG.fullmatch(log) else "",
         version=__version__,
     )
+
+
+@cache
+def _template() -> Template:
+    return Environment(
+        loader=_Parts(),
+        autoescape=True,
+        finalize=_text,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    ).get_template("page.html")
 
 
 class _Parts(BaseLoader):
