@@ -259,6 +259,21 @@ class World:
         """Offscreen pictures along the way, see `WorkerProcess.film`."""
         self.process.film(take, period, size)
 
+    def watch(self, seed: int) -> None:
+        """From now on, have the worker look whether the world stays as it was loaded.
+
+        What changes, jumps or falls as it must not ends the motion under way with
+        `WorldParityError`.
+
+        Args:
+            seed: draws the steps at which the engine is asked again what it holds.
+        """
+        self.process.request("watch", seed=seed)
+
+    def read_again(self) -> None:
+        """Ask the engine once more what it holds, if it is watched; errors as `watch`."""
+        self.process.request("read_again")
+
     def stats(self) -> dict[str, Any]:
         """The worker's clocks of stepping and its exact memory peak."""
         stats: dict[str, Any] = self.process.request("stats")

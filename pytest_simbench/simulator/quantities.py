@@ -53,7 +53,10 @@ from pytest_simbench.simulator.loops import reduced
 from pytest_simbench.simulator.self_collision import links_collide
 from pytest_simbench.simulator.settings import Settings
 from pytest_simbench.simulator.shapes import DIRECTIONS, outlines, reach, shape_points
-from pytest_simbench.simulator.urdf import PreparedRobot
+from pytest_simbench.simulator.urdf import ROOT, PreparedRobot
+
+MOVING = ("pose", "velocity", "initial_position")
+"""Kinds of quantities that change while a world is stepped."""
 
 
 def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
@@ -92,6 +95,15 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
         named = {name for name in quantities if fnmatchcase(name, pattern)}
         quantities |= dict.fromkeys(named - own, value)
     return quantities
+
+
+def constants(names: Iterable[str], scene: Scene) -> list[str]:
+    """Those of the quantities that stay as they are while the world is stepped.
+
+    Places and speeds change, but for the places of fixed bodies and of the robot's base.
+    """
+    still = {f"body/{body.name}/pose" for body in scene.fixed_bodies} | {f"link/{ROOT}/pose"}
+    return [n for n in names if n.rpartition("/")[2] not in MOVING or n in still]
 
 
 def _named(prefix: str, **values: Any) -> dict[str, Any]:

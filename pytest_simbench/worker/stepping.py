@@ -13,6 +13,7 @@ from pytest_simbench.scene import FloatArray, Trajectory
 from pytest_simbench.simulator import DivergedError, Simulator
 from pytest_simbench.worker.acting import Acting
 from pytest_simbench.worker.control import Clock, Control
+from pytest_simbench.worker.watching import Watch
 
 HEARTBEAT_PERIOD = 0.5
 """Wall time between two signs of life while stepping [s]."""
@@ -86,6 +87,7 @@ class Stepper:
         film: pictures along the way, outside of the measured stepping time; None: none.
         clocks: totals since loading.
         control: the workload that shows the machine's speed meanwhile.
+        watch: what looks whether the world stays as it was loaded; None: nothing.
         real_time: wait for the wall clock after each step, as the study's simulators did.
     """
 
@@ -103,6 +105,7 @@ class Stepper:
         self.control = Control(self._clock)
         self.real_time = False
         self.film: Film | None = None
+        self.watch: Watch | None = None
         self._next_picture = 0.0
 
     def follow(self, trajectory: Trajectory, log_period: float | None) -> dict[str, Any]:
@@ -129,6 +132,7 @@ class Stepper:
 
         Raises:
             DivergedError: joint or body state is not finite.
+            ParityError: the world is not what it was, see `Watch`.
         """
         simulator, timestep = self.simulator, self.simulator.settings.timestep
         log_every = 0 if log_period is None else max(1, round(log_period / timestep))
@@ -136,7 +140,9 @@ class Stepper:
         watched = simulator.gui or self.real_time
         look_every = max(1, round((LOOK_PERIOD if watched else CHECK_PERIOD) / timestep))
         film_every = self.film.every if self.film is not None else 0
-        log = Log()
+        log, watch = Log(), self.watch
+        from_start, time_began = self.clocks.steps, simulator.time
+        due = watch.due - from_start if watch is not None else 0
         step, command, clock = simulator.step, simulator.command, self._clock
         totals, keep_up = self.clocks, self.control.keep_up
         act = self.acting.steps() if self.acting is not None else None
@@ -151,7 +157,13 @@ class Stepper:
             step()
             logs = log_every and k % log_every == 0
             films = film_every and (totals.steps + k) % film_every == 0
-            if not (logs or films) and k % look_every and k % check_every and k < steps:
+            if (
+                not (logs or films)
+                and k % look_every
+                and k % check_every
+                and k < steps
+                and k != due
+            ):
                 continue
             stopped, waited_now = clock()
             totals.wall += stopped - resumed
@@ -159,8 +171,9 @@ class Stepper:
             totals.cpu += self._cpu() - cpu_began
             if logs:
                 log.sample(simulator)
-            if k % check_every == 0:
-                self._check_finite(log if logs else None)
+            if k % check_every == 0 or k == due:
+                self._check_state(from_start + k, log if logs else None)
+                due = watch.due - from_start if watch is not None else 0
             if stopped - beat > HEARTBEAT_PERIOD:
                 beat = stopped
                 self.heartbeat(simulator.time)
@@ -180,22 +193,26 @@ class Stepper:
             resumed, waited = clock()
         totals.steps += steps
         totals.simulated += steps * timestep
-        self._check_finite()
+        self._check_state(totals.steps)
+        if watch is not None:
+            watch.moved(time_began, steps)
         return log.arrays() if log.times else {}
 
     def _cpu(self) -> float:
         """CPU time so far of all that simulates [s]."""
         return time.process_time() + self.simulator.other_cpu()
 
-    def _check_finite(self, log: Log | None = None) -> None:
-        """Look at the present state, or at the log's last sample where that is it."""
+    def _check_state(self, number: int, log: Log | None = None) -> None:
+        """Look at the state after that step since loading, or at the log's last sample where that
+        is it."""
         simulator = self.simulator
-        for what, state in (
-            ("joints", log.joints[-1] if log else simulator.joint_state()),
-            ("bodies", log.bodies[-1] if log else simulator.body_state()),
-        ):
+        joints = log.joints[-1] if log else simulator.joint_state()
+        bodies = log.bodies[-1] if log else simulator.body_state()
+        for what, state in (("joints", joints), ("bodies", bodies)):
             if not np.isfinite(state).all():
                 raise DivergedError(
                     f"the state of the {what} is not finite at t = {simulator.time:.3f} s with "
                     f"{simulator.settings}; a smaller timestep may help"
                 )
+        if self.watch is not None:
+            self.watch.look(number, joints, bodies)
