@@ -140,20 +140,17 @@ class Lasting:
 
         Raises:
             ParityError: something that lasts is another one now; the message gives both values of
-                each (the first three).
+                the first such quantity, and names the others.
         """
         now = {name: reported[name] for name in constants(reported, self._scene)}
-        changed = [
-            f"{name}: {_told(self._first.get(name))} when it was loaded, {_told(now.get(name))} at "
-            f"t = {time:.3f} s" + _difference_text(self._first.get(name), now.get(name))
-            for name in {**self._first, **now}
-            if not self._same(name, now.get(name))
-        ]
-        if changed:
-            names = ", ".join(text.partition(":")[0] for text in changed[:3])
-            more = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
+        names = [n for n in {**self._first, **now} if not self._same(n, now.get(n))]
+        if names:
+            before, after = self._first.get(names[0]), now.get(names[0])
+            more = f"; and {', '.join(names[1:4])}" if names[1:] else ""
+            more += f" and {len(names) - 4} more" if len(names) > 4 else ""
             raise ParityError(
-                f"{self._simulator} changed {names}{more} while it ran: {'; '.join(changed[:3])}"
+                f"{self._simulator} changed {names[0]} while it ran: {_told(before)} when it was "
+                f"loaded, {_told(after)} at t = {time:.3f} s{_difference_text(before, after)}{more}"
             )
 
     def _same(self, name: str, value: Any) -> bool:

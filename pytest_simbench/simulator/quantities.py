@@ -156,7 +156,8 @@ def touches(
 
     Args:
         can_touch: whether two of "ground", `body/NAME` and `link/NAME` can collide, as the engine
-            (or, for what is expected, the scene) has it; only asked where one of them can move.
+            (or, for what is expected, the scene) has it; only asked where one of them can move, and
+            once of each pair.
     """
     links = _links(prepared)
     bodies = [f"body/{body.name}" for body in scene.bodies]
@@ -164,10 +165,17 @@ def touches(
     if prepared is not None:
         still.add(f"link/{prepared.root}")
 
+    answers: dict[frozenset[str], bool] = {}
+
+    def touch(a: str, b: str) -> bool:
+        pair = frozenset((a, b))
+        if pair not in answers:
+            answers[pair] = bool(can_touch(a, b))
+        return answers[pair]
+
     def share(name: str, others: Iterable[str]) -> float:
         asked = [o for o in others if o != name and not (o in still and name in still)]
-        answers = [bool(can_touch(name, other)) for other in asked]
-        return float(np.mean(answers)) if answers else 0.0
+        return sum(touch(name, other) for other in asked) / len(asked) if asked else 0.0
 
     groups = (["ground"], bodies, links)
     return {

@@ -201,6 +201,7 @@ class Server:
         watch = self._loaded().watch
         if watch is not None:
             watch.check_log(log)
+            return {"log": log, "aside": watch.spent(), **self.do_state()}
         return {"log": log, **self.do_state()}
 
     def do_save(self, name: str) -> None:

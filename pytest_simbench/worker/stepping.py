@@ -13,6 +13,7 @@ from pytest_simbench.scene import FloatArray, Trajectory
 from pytest_simbench.simulator import DivergedError, Simulator
 from pytest_simbench.worker.acting import Acting
 from pytest_simbench.worker.control import Clock, Control
+from pytest_simbench.worker.family import Family
 from pytest_simbench.worker.watching import Watch
 
 HEARTBEAT_PERIOD = 0.5
@@ -39,7 +40,7 @@ class Clocks:
         simulated: [s].
         wall: seconds in the stepping loop, without log, window, pacing and control [s].
         waited: how much of that the thread waited for a processor that others had [s].
-        cpu: CPU seconds in that time of this process, and of one that simulates for it [s].
+        cpu: CPU seconds in that time of this process and of all that it started [s].
     """
 
     steps: int = 0
@@ -101,7 +102,7 @@ class Stepper:
         self.heartbeat = heartbeat
         self.acting = acting
         self.clocks = Clocks()
-        self._clock = Clock()
+        self._clock, self._family = Clock(), Family()
         self.control = Control(self._clock)
         self.real_time = False
         self.film: Film | None = None
@@ -146,7 +147,9 @@ class Stepper:
         step, command, clock = simulator.step, simulator.command, self._clock
         totals, keep_up = self.clocks, self.control.keep_up
         act = self.acting.steps() if self.acting is not None else None
-        cpu_began = self._cpu()
+        family = self._family
+        family.meet()
+        cpu_began = family.cpu()
         began, waited = clock()
         beat = resumed = began
         for k in range(1, steps + 1):
@@ -168,7 +171,9 @@ class Stepper:
             stopped, waited_now = clock()
             totals.wall += stopped - resumed
             totals.waited += waited_now - waited
-            totals.cpu += self._cpu() - cpu_began
+            if k == steps:
+                family.meet()
+            totals.cpu += family.cpu() - cpu_began
             if logs:
                 log.sample(simulator)
             if k % check_every == 0 or k == due:
@@ -189,7 +194,7 @@ class Stepper:
                     time.sleep(ahead)
             # The CPU time of an engine with threads, the wall time of a busy machine: the less.
             keep_up(min(totals.wall, totals.cpu))
-            cpu_began = self._cpu()
+            cpu_began = family.cpu()
             resumed, waited = clock()
         totals.steps += steps
         totals.simulated += steps * timestep
@@ -197,10 +202,6 @@ class Stepper:
         if watch is not None:
             watch.moved(time_began, steps)
         return log.arrays() if log.times else {}
-
-    def _cpu(self) -> float:
-        """CPU time so far of all that simulates [s]."""
-        return time.process_time() + self.simulator.other_cpu()
 
     def _check_state(self, number: int, log: Log | None = None) -> None:
         """Look at the state after that step since loading, or at the log's last sample where that

@@ -45,7 +45,7 @@ CLEAR = 0.01
 GRAVITY_TOLERANCE = 0.05
 """Share of gravity by which the acceleration of what flies free may differ."""
 
-SURGE, JOINT_SURGE = 2.0, 10.0
+SURGE, JOINT_SURGE = 0.5, 5.0
 """Between two looks a body may be faster than anything at either by `SURGE` [m/s], a joint than at
 either by `JOINT_SURGE` [rad/s, m/s]: pushed and braked again, or moved out of another body."""
 
@@ -75,7 +75,7 @@ class Watch:
 
     Attributes:
         due: the step, counted since loading, after which it wants to look.
-        seconds: wall time of the readings so far [s].
+        seconds: wall time of the readings since `spent` was last asked [s].
     """
 
     def __init__(
@@ -155,6 +155,11 @@ class Watch:
         elif self._ends == NEVER and self._clear(now).any():
             self._start, self._ends = now, step + self._glimpse
 
+    def spent(self) -> float:
+        """Wall time of the readings since the last call [s]."""
+        seconds, self.seconds = self.seconds, 0.0
+        return seconds
+
     def check_log(self, log: Mapping[str, FloatArray]) -> None:
         """The samples of a motion, as `stepping.Log.arrays`: whether anything jumps.
 
@@ -219,7 +224,7 @@ class Watch:
         found = (velocity[1] - velocity[0]) / span
         speed = np.linalg.norm(velocity, axis=2).max(axis=0)
         allowed = GRAVITY_TOLERANCE * max(1.0, float(np.linalg.norm(self._gravity)))
-        allowed = allowed + 2 * self._damping * speed + 1e-6 * (1 + speed) / span
+        allowed = allowed + 2 * self._damping * speed * (1 + speed) + 1e-6 * (1 + speed) / span
         off = np.linalg.norm(found - self._gravity, axis=1)
         for row in np.flatnonzero(~(off <= allowed) & self._clear(start) & self._clear(now)):
             raise ParityError(
