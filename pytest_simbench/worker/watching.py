@@ -100,7 +100,8 @@ class Watch:
         self._names = [body.name for body in scene.free_bodies]
         self._joints = () if scene.robot is None else scene.robot.joint_names
         self._led = np.array([body.prescribed for body in scene.free_bodies], dtype=bool)
-        self._free = ~self._led & [not body.wrenches for body in scene.free_bodies]
+        pushed = np.array([bool(body.wrenches) for body in scene.free_bodies], dtype=bool)
+        self._free = ~self._led & ~pushed
         self._radius = np.array([np.linalg.norm(body.extents) / 2 for body in scene.free_bodies])
         self._damping = np.array(
             [expected.get(f"body/{name}/damping", np.zeros(2))[0] for name in self._names]
