@@ -61,7 +61,7 @@ def alike(record: dict[str, Any]) -> str:
     """What must be the same wherever it ran, as JSON."""
     kept = {key: value for key, value in record.items() if key not in TIMES}
     kept["host"] = {k: v for k, v in record["host"].items() if k != "node"}
-    kept["details"] = {k: v for k, v in record["details"].items() if k != "lost_nodes"}
+    kept["notes"] = {k: v for k, v in record["notes"].items() if k != "lost_nodes"}
     return json.dumps(kept)
 
 
@@ -128,8 +128,8 @@ def main() -> None:
     other = [key(r) for r in found if alike(r) != straight.get(key(r))]
     print("nodes:", dict(sorted(Counter(r["host"]["node"] for r in found).items())))
     for record in found:
-        if record["details"].get("lost_nodes"):
-            print("tried again:", *key(record), record["status"], record["details"]["lost_nodes"])
+        if record["notes"].get("lost_nodes"):
+            print("tried again:", *key(record), record["status"], record["notes"]["lost_nodes"])
     print(
         f"{len(found)} records, {len(expected)} alone; twice: {twice}; missing: {sorted(missing)}"
     )

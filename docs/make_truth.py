@@ -21,11 +21,13 @@ from pathlib import Path
 from tables import engine_version, filled
 
 from pytest_simbench.ground.text import for_markdown
-from pytest_simbench.laws import LAW, LAWS
+from pytest_simbench.laws import LAWS
 from pytest_simbench.measure.sweep import Swept, sweeps
 from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.phenomena import PHENOMENA, PHENOMENON
-from pytest_simbench.records.record import OWN_TIMESTEP, Failure, Record
+from pytest_simbench.records.readings import Reading
+from pytest_simbench.records.record import Failure, Record
 from pytest_simbench.report import markdown, sweep, truth
 from pytest_simbench.report.figures import drawing
 from pytest_simbench.report.summary import TaskSummary, summarise
@@ -62,8 +64,7 @@ def read(folders: list[str], swept: bool = False) -> None:
 
 
 def _line(record: Record) -> list[object]:
-    told = record.details.get(LAW, {})
-    numbers = [told.get(name) for name in READING]
+    numbers = [getattr(record.notes.reading, name, None) for name in READING]
     numbers += [record.metrics.get(name) for name in ("error", "ratio")]
     costs = [record.stepping.get(name) for name in ("cpu", "simulated")]
     return [
@@ -76,7 +77,7 @@ def _line(record: Record) -> list[object]:
 def _of_sweep(record: Record) -> list[object]:
     message = " ".join(record.error.message.split()) if record.error else ""
     return [
-        _text(record.details.get(OWN_TIMESTEP)), _text(record.stepping.get("steps")), message
+        _text(record.notes.own_timestep), _text(record.stepping.get("steps")), message
     ]  # fmt: skip
 
 
@@ -95,14 +96,16 @@ def found_sweeps() -> list[Swept]:
 
 
 def _record_of_sweep(line: dict[str, str]) -> Record:
-    told = {name: float(line[name]) for name in READING if line[name]}
-    own = {OWN_TIMESTEP: float(line["own"])} if line["own"] else {}
+    told = [float(line[name]) for name in READING if line[name]]
     plain = _record(line)
     return replace(
         plain,
         settings={**plain.settings, "timestep": float(line["timestep"])},
         stepping={**plain.stepping, **({"steps": float(line["steps"])} if line["steps"] else {})},
-        details={**({LAW: told} if told else {}), **own},
+        notes=Notes(
+            reading=Reading(*told) if len(told) == len(READING) else None,
+            own_timestep=float(line["own"]) if line["own"] else None,
+        ),
         error=None if plain.ok else Failure("", line["message"]),
     )
 
@@ -129,6 +132,8 @@ def summaries(profile: str) -> list[TaskSummary]:
 def _record(line: dict[str, str]) -> Record:
     return Record(
         test=f"test_law[{line['simulator']}-headless-{line['law']}]",
+        function="test_law",
+        variant=line["law"],
         task=line["law"],
         simulator=line["simulator"],
         mode="headless",

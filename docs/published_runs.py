@@ -173,6 +173,7 @@ def _record(task: str, number: int, line: dict[str, str]) -> Record:
     cause, _, phase = line["cause"].partition(" in ")
     return Record(
         test=task,
+        function=task,
         task=task,
         simulator=line["simulator"],
         mode="headless",

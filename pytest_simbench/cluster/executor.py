@@ -2,8 +2,8 @@
 
 It is lost when the node's process ended (the simulator may have killed it), when its network is
 gone, or when the node says that it cannot (a full disk). Then it goes once more to another node,
-and the record says so (`details.lost`); after a second loss the repetition has failed. What a node
-sends after it was given up is not looked at, so there is one record for each repetition.
+and the record says so (`notes.lost_nodes`); after a second loss the repetition has failed. What a
+node sends after it was given up is not looked at, so there is one record for each repetition.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from pytest_simbench.experiment.identity import (
 )
 from pytest_simbench.experiment.repetition import Hooks
 from pytest_simbench.recordings.trace import FOLDER as TRACES
+from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.records.record import Failure, Record, Status
 from pytest_simbench.worker.text import told
@@ -251,15 +252,14 @@ class RemoteRepetition:
         """The record that a node sent, with what only this side knows; its files are written."""
         assert self._node is not None
         record = Record.from_json(answer["record"], f"the answer of {self._node.name}")
-        details = {**record.details, **({"lost_nodes": self._lost} if self._lost else {})}
         of_robot = self._shared(self.experiment).of_robot
         stem = file_stem(self.experiment, self.number)
-        self._keep(str(details.get("log") or ""), "logs", answer["log"])
+        self._keep(record.notes.log, "logs", answer["log"])
         problem = self._keep(f"{TRACES}/{stem}.npz", TRACES, answer["trace"])
         if problem:
-            details["trace"] = f"the trace could not be written: {problem}"
+            record = record.noting(trace=f"the trace could not be written: {problem}")
         host = {**record.host, "node": self._node.name}
-        record = replace(record, details=details, host=host, **of_robot)
+        record = replace(record.noting(lost_nodes=tuple(self._lost)), host=host, **of_robot)
         return record, heard(answer["error"], self.where)
 
     def _keep(self, name: str, folder: str, data: bytes | None) -> str:
@@ -288,7 +288,7 @@ class RemoteRepetition:
             settings=found,
             versions={},
             error=Failure(type(error).__name__, what, self.where.phase),
-            details={"lost_nodes": self._lost} if self._lost else {},
+            notes=Notes(lost_nodes=tuple(self._lost)),
             seconds={"total": seconds},
             host={"node": self._node.name} if self._node else {},
         )

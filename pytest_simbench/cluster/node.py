@@ -172,7 +172,7 @@ def carry_out(
         if isinstance(error, OSError) and error.errno in OF_THE_MACHINE:
             raise error
         lines = "" if error is None else "".join(traceback.format_exception(error))
-        name = str(record.details.get("log") or "")
+        name = record.notes.log
         trace = bench.folder / TRACES / f"{file_stem(experiment, number)}.npz"
         return {
             "record": record.to_json(),

@@ -23,7 +23,7 @@ class Case:
     """What a test's repetitions have in common.
 
     Attributes:
-        test: id of the test, for records.
+        test, function, variant: of the test, see `records.record`.
         simulator, mode, profile: which simulator, `headless` or `gui`, which settings profile.
         adapter: `module:Class` of the simulator's adapter.
         changes: single settings changed by the user, by name.
@@ -50,7 +50,7 @@ class Case:
         attempt: of the same repetitions in this process, see `records.record`.
         robot: that does the tasks; None for the tasks' own.
         own_timestep: of the profile [s], where `changes` has another one for a sweep over steps;
-            its records tell it (`details`), and so that they belong to a sweep.
+            its records tell it (`notes`), and so that they belong to a sweep.
     """
 
     test: str
@@ -59,6 +59,8 @@ class Case:
     profile: str
     adapter: str
     folder: Path
+    function: str = ""
+    variant: str = ""
     changes: Mapping[str, Any] = field(default_factory=dict)
     python: str | None = None
     spec: str | None = None

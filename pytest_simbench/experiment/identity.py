@@ -18,6 +18,7 @@ from pytest_simbench.client.environments import outside
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.ground.names import file_name
+from pytest_simbench.ground.versions import VersionedName
 from pytest_simbench.records.record import Record, Status
 from pytest_simbench.records.series import short
 from pytest_simbench.scene import MotionLimits, Pose, Robot
@@ -48,6 +49,9 @@ def record_of(
     case = experiment.case
     return Record(
         test=case.test,
+        function=case.function or case.test,
+        variant=case.variant,
+        version=VersionedName.of(case.simulator).which,
         task=experiment.task.name,
         simulator=case.simulator,
         mode=case.mode,

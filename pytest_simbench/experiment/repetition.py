@@ -31,7 +31,8 @@ from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.workers import IdleWorkers
 from pytest_simbench.recordings import film
 from pytest_simbench.recordings.trace import FOLDER, Trace
-from pytest_simbench.records.record import OWN_TIMESTEP, Failure, Record, Status
+from pytest_simbench.records.notes import Notes
+from pytest_simbench.records.record import Failure, Record, Status
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.registry import seeds_seen
 from pytest_simbench.tasks.base import Outcome
@@ -108,11 +109,11 @@ class Repetition:
         found, error = self._ended(self._perform)
         outcome = found if error is None else Outcome()
         resources = self._finish(error)
-        problem = self._write_trace(failed=error is not None)
-        if problem:
-            outcome.details["trace"] = problem
-        outcome.details.update(self._end_film(failed=error is not None))
-        return self._record(outcome, error, resources), error
+        noted = {
+            "trace": self._write_trace(failed=error is not None),
+            **self._end_film(failed=error is not None),
+        }
+        return self._record(outcome, error, resources).noting(**noted), error
 
     def probe(self) -> tuple[Record, BaseException | None]:
         """Start and end the simulator alone: the record's settings and versions are what counts."""
@@ -244,17 +245,15 @@ class Repetition:
         seconds["step"] = stepping.get("wall", 0.0)
         seconds["other"] = max(0.0, total - sum(seconds.values()))
         seconds["total"] = total
-        details = {**outcome.details, "log": self._log_name()}
-        if case.own_timestep is not None:
-            details[OWN_TIMESTEP] = case.own_timestep
-        if sample := self.experiment.task.sample(self.seed):
-            details["data"] = list(sample)
-        if seen := seeds_seen(case.adapter, case.profile):
-            details["chosen_on"] = [what.to_wire() for what in seen]
-        if self._constructed.untested:
-            details["untested"] = self._constructed.untested
-        if self._closing:
-            details["closing"] = self._closing
+        notes = Notes(
+            log=self._log_name(),
+            closing=self._closing or "",
+            untested=self._constructed.untested or "",
+            own_timestep=case.own_timestep,
+            chosen_on=seeds_seen(case.adapter, case.profile),
+            sample=self.experiment.task.sample(self.seed),
+            reading=outcome.reading,
+        )
         return record_of(
             self.experiment,
             self.number,
@@ -266,7 +265,8 @@ class Repetition:
             },
             error=None if error is None else _failure(error, self.where),
             metrics=outcome.metrics,
-            details=details,
+            details=outcome.details,
+            notes=notes,
             seconds=seconds,
             stepping=stepping,
             timeline={} if self._world is None else self._world.timeline,
@@ -297,8 +297,8 @@ class Repetition:
         if camera is None:
             return {}
         camera.finish(self._world, keep=failed or self.case.video != "retain-on-failure")
-        filmed = {"filmed": True} if camera.film is not None and camera.film.frames else {}
-        return {**filmed, **({"video": camera.problem} if camera.problem else {})}
+        filmed = camera.film is not None and bool(camera.film.frames)
+        return {"filmed": filmed, "video": camera.problem or ""}
 
     def _trace_period(self) -> float | None:
         """Of samples of the motion [s]. Which repetition fails is known at its end: until then a

@@ -1,6 +1,6 @@
 """Laws: cases whose right answer is known, by which a simulator can be wrong all by itself."""
 
-from pytest_simbench.laws.base import LAW, Law, Reading
+from pytest_simbench.laws.base import Law, Reading
 from pytest_simbench.laws.bounce import (
     BounceHeight,
     BounceRatio,
@@ -113,4 +113,4 @@ LAWS: tuple[Law, ...] = (
 )  # fmt: skip
 """All of them, by phenomenon."""
 
-__all__ = ["LAW", "LAWS", "Law", "Reading"]
+__all__ = ["LAWS", "Law", "Reading"]

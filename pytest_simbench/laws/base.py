@@ -23,7 +23,6 @@ import numpy as np
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.phenomena import PHENOMENON
-from pytest_simbench.records.readings import LAW as LAW
 from pytest_simbench.records.readings import Reading as Reading
 from pytest_simbench.records.readings import rounding as rounding
 from pytest_simbench.scene import FloatArray, Scene
@@ -102,13 +101,7 @@ class Law(Task):
         with world.phase("measure"):
             found = self.measure(world)
         world.mark("end")
-        told: dict[str, Any] = {
-            "phenomenon": self.phenomenon,
-            "quantity": self.quantity,
-            "unit": self.unit,
-            **vars(found),
-        }
-        return Outcome({"error": found.error, "ratio": found.ratio}, {LAW: told})
+        return Outcome({"error": found.error, "ratio": found.ratio}, reading=found)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ import numpy as np
 from pytest_simbench.measure.convergence import Convergence, convergence
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.phenomena import PHENOMENON
-from pytest_simbench.records.readings import LAW, rounding
+from pytest_simbench.records.readings import rounding
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import RowKey, configurations, grouped
 
@@ -202,9 +202,9 @@ def _point(step: float, records: Sequence[Record], unit: str) -> Point:
         failure = next((record.error for record in records if record.error), None)
         message = " ".join(failure.message.split()) if failure else ""
         return Point(step, math.inf, None, cost, message=message or "no error was recorded")
-    told = [record.details.get(LAW) or {} for record in records]
-    tolerances = [t["tolerance"] for t in told if isinstance(t.get("tolerance"), int | float)]
-    scale = max([PERCENT if unit == "%" else 1.0, *(abs(t.get("exact") or 0.0) for t in told)])
+    told = [record.notes.reading for record in records if record.notes.reading]
+    tolerances = [reading.tolerance for reading in told]
+    scale = max([PERCENT if unit == "%" else 1.0, *(abs(reading.exact) for reading in told)])
     many = max(record.stepping.get("steps") or 1.0 for record in records)
     tolerance = max(tolerances, default=None)
     return Point(step, max(known), tolerance, cost, rounding(scale, int(many)))

@@ -69,13 +69,13 @@ def nodes(config: pytest.Config) -> tuple[Node, ...]:
 
 def lost(records: Iterable[Record]) -> str:
     """How many repetitions were tried again, as a sentence for the end of the run, or nothing."""
-    again = [record for record in records if record.details.get("lost_nodes")]
+    again = [record for record in records if record.notes.lost_nodes]
     if not again:
         return ""
     failed = sum(record.error is not None and record.error.type == "NodeLost" for record in again)
     return (
         f"nodes were lost: {len(again)} of the repetitions were tried again on another one, and "
-        f"{failed} of them failed for it; `lost_nodes` in the details of their records says more"
+        f"{failed} of them failed for it; `notes.lost_nodes` of their records says more"
     )
 
 

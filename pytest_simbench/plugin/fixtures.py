@@ -99,12 +99,12 @@ def output_path(request: pytest.FixtureRequest) -> Path:
     return session_of(request.config).run.use()
 
 
-def _case(config: pytest.Config, variant: Variant, test: str, **more: Any) -> Case:
+def _case(config: pytest.Config, made_for: Variant, test: str, **more: Any) -> Case:
     """What the options say of a simulator's repetitions."""
     from pytest_simbench.experiment.case import Case
     from pytest_simbench.experiment.protocol import PROTOCOLS
 
-    name, mode = variant.simulator, variant.mode
+    name, mode = made_for.simulator, made_for.mode
     session = session_of(config)
     chosen, this = session.selection, session.run
     elsewhere = cluster.asked(config)  # nodes find interpreters and displays themselves
@@ -114,12 +114,12 @@ def _case(config: pytest.Config, variant: Variant, test: str, **more: Any) -> Ca
         python=chosen.pythons.get(name),
         test=test,
         mode=mode,
-        profile=variant.profile,
-        own_timestep=variant.own_timestep,
+        profile=made_for.profile,
+        own_timestep=made_for.own_timestep,
         folder=this.use(),
-        changes={**settings, **chosen.changes_of(name), **variant.changes},
+        changes={**settings, **chosen.changes_of(name), **made_for.changes},
         spec=chosen.specs.get(name),
-        robot=chosen.robots[variant.robot],
+        robot=chosen.robots[made_for.robot],
         display=_display(this) if mode == "gui" and not elsewhere else None,
         protocol=PROTOCOLS[options.value(config, "sim_protocol")],
         trace=recording.trace_mode(config),
@@ -151,12 +151,17 @@ def simbench_case(
 def case_of(item: pytest.Item, variant: Variant, settings: dict[str, Any]) -> Case:
     """The case of a test, with the settings that it changes."""
     from pytest_simbench.plugin.marks import number_mark
+    from pytest_simbench.plugin.variants import named
 
     given = options.value(item.config, "sim_timeout")
+    own = variant.id_with(len(session_of(item.config).selection.profiles))
+    function, others = named(item, own)
     return _case(
         item.config,
         variant,
         item.nodeid,
+        function=function,
+        variant=others,
         settings=arguments.checked_settings(settings, variant.simulator, variant.profile),
         timeout=given if given is not None else number_mark(item, "sim_timeout"),
     )

@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -262,19 +262,17 @@ def _copy(records: list[Merged], folders: dict[str, RunFolder], to: RunFolder) -
     refused: dict[str, None] = {}
     for item in records:
         was, stem, folder = file_stem_of(item.was), file_stem_of(item.record), folders[item.run]
-        details = dict(item.record.details)
-        if log := item.was.details.get("log") or "":
-            details["log"] = ""
+        kept, log = "", item.was.notes.log
         for source, target in (
             (log, f"logs/{stem}.log"),
             *((name.format(was), name.format(stem)) for name in BESIDE),
         ):
             try:
                 if source and _copied(folder.inside(source), to, target) and source == log:
-                    details["log"] = target
+                    kept = target
             except FolderError as error:
                 refused.setdefault(f"not copied: {error}")
-        to.append(replace(item.record, details=details))
+        to.append(item.record.noting(log=kept))
     return list(refused)
 
 

@@ -62,7 +62,7 @@ def photograph(
     told = photographer.draws(experiment.case.simulator)
     if not told and (pictures or video == "first"):
         told = photographer.photograph(experiment, pictures=pictures, video=video == "first")
-    ended = next((r.details["video"] for r in records if "video" in r.details), None)
+    ended = next((r.notes.video for r in records if r.notes.video), None)
     for problem in (told, f"{experiment.case.simulator}: no video: {ended}" if ended else ""):
         if problem:
             tell(problem)

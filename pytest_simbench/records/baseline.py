@@ -145,6 +145,7 @@ def from_extra_info(data: Any, where: str) -> list[Record]:
 def _slim(record: Record) -> dict[str, Any]:
     data = record.to_dict()
     del data["schema"], data["details"]
+    data["notes"].pop("log", None)
     if data["error"]:
         data["error"] = {**data["error"], "log_tail": ""}
     return data

@@ -6,11 +6,12 @@ written to a file again. Errors name the place inside the data.
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Mapping
 from math import isfinite
-from typing import Any
+from typing import Annotated, Any, TypeVar
+
+import msgspec
 
 DEEPEST = 32
 """Levels of nesting; a record of ours has four."""
@@ -20,6 +21,14 @@ LARGEST_INTEGER = 10**300
 
 LONGEST_NAME = 2000
 """Characters of a name: a test's id with its parameters is rarely longer than 200."""
+
+
+Name = Annotated[str, msgspec.Meta(max_length=LONGEST_NAME)]
+Count = Annotated[int, msgspec.Meta(ge=0)]
+Positive = Annotated[int, msgspec.Meta(ge=1)]
+Size = Annotated[float, msgspec.Meta(ge=0)]
+
+T = TypeVar("T")
 
 
 class CheckError(ValueError):
@@ -76,86 +85,44 @@ def writable(text: str) -> str:
     return text if text.isascii() else text.encode("utf-8", "replace").decode("utf-8")
 
 
-def name(value: Any, where: str) -> str:
-    """A text of at most `LONGEST_NAME` characters.
+def convert(value: Any, kind: type[T], where: str = "") -> T:
+    """Plain data as the dataclass (or typed dict) that they are of; more keys count for nothing.
+
+    Args:
+        where: the place of the data, for messages.
 
     Raises:
-        CheckError: it is something else.
+        CheckError: a key is missing, or a value is of another type or outside its bounds.
     """
-    if not isinstance(value, str):
-        raise CheckError(f"{where!r} must be str, not {type(value).__name__}")
-    if len(value) > LONGEST_NAME:
-        raise CheckError(f"{where!r} has {len(value)} characters, at most {LONGEST_NAME} are read")
-    return value
+    try:
+        return msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        text, _, path = str(error).replace("`", "'").partition(" - at ")
+        path = ".".join(filter(None, [where, path.strip("'").removeprefix("$").lstrip(".")]))
+        text = text.replace("Object missing required field", "there is no")
+        text = text.replace("object", "dict").replace("array", "list").replace("null", "None")
+        raise CheckError(f"{path!r}: {_small(text)}" if path else _small(text)) from None
 
 
-def number(value: Any, where: str, least: float = -math.inf) -> None:
-    """A number or None, at least so large.
+def _small(text: str) -> str:
+    return text[:1].lower() + text[1:]
+
+
+def schema(data: Any, newest: int) -> int:
+    """The schema that data are of; 1 where they do not say.
 
     Raises:
-        CheckError: it is something else.
+        CheckError: a newer one than this plugin reads, or data that are no object.
     """
-    if value is not None and not isinstance(value, int | float):
-        raise CheckError(f"{where!r} must be a number, not {short(value)}")
-    if value is not None and value < least:
-        raise CheckError(f"{where!r} must be at least {least:g}, not {value:g}")
-
-
-def one_of(value: Any, where: str, valid: tuple[Any, ...]) -> None:
-    """One of a few values.
-
-    Raises:
-        CheckError: it is something else.
-    """
-    if value not in valid:
-        shown = ", ".join(map(str, valid))
-        raise CheckError(f"{where!r} is {short(value)}, none of {shown}")
-
-
-def numbers(value: Mapping[str, Any], where: str) -> None:
-    """Numbers by name.
-
-    Raises:
-        CheckError: one of them is something else.
-    """
-    for key, item in value.items():
-        number(item, f"{where}.{key}")
-
-
-def texts(value: Mapping[str, Any], where: str) -> None:
-    """Texts by name, of any length.
-
-    Raises:
-        CheckError: one of them is something else.
-    """
-    for key, item in value.items():
-        if not isinstance(item, str):
-            raise CheckError(f"'{where}.{key}' must be str, not {type(item).__name__}")
-
-
-def use_of_resources(value: Mapping[str, Any], where: str) -> None:
-    """What `client.resources` writes: `cpu_percent`, `rss_mb`, `samples`, and so on by phase.
-
-    Raises:
-        CheckError: a part of it is of another type.
-    """
-    for key, item in value.items():
-        place = f"{where}.{key}"
-        if key == "phases":
-            for phase, part in _mapping(item, place).items():
-                use_of_resources(_mapping(part, f"{place}.{phase}"), f"{place}.{phase}")
-        elif key in ("cpu_percent", "rss_mb"):
-            numbers(_mapping(item, place), place)
-        elif key == "samples":
-            number(item, place, least=0)
-
-
-def _mapping(value: Any, where: str) -> Mapping[str, Any]:
-    if value is None:
-        return {}
-    if not isinstance(value, dict):
-        raise CheckError(f"{where!r} must be dict, not {type(value).__name__}")
-    return value
+    if not isinstance(data, Mapping):
+        raise CheckError(f"a JSON object is wanted, not {type(data).__name__}")
+    found = data.get("schema", 1)
+    if not isinstance(found, int) or not 0 < found <= newest:
+        raise CheckError(
+            f"schema {short(found)} was written by a newer pytest-simbench (this one reads up to "
+            f"{newest}); update it"
+        )
+    return found
 
 
 def short(value: Any) -> str:

@@ -2,94 +2,74 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Iterable
+from dataclasses import dataclass
 
-DeclaredSample = tuple[str, int] | None
-"""Data set and number of the measured motion that a repetition was held against, if it was."""
-
-
-@dataclass(frozen=True)
-class SeedsSeen:
-    """Seeds of a task by whose results settings were chosen, or others rejected.
-
-    Attributes:
-        task: its name, as in records.
-        first, last: both included.
-    """
-
-    task: str
-    first: int
-    last: int
-
-    def holds(self, task: str, seed: int, sample: DeclaredSample = None) -> bool:
-        """Whether a repetition of that task and seed was seen."""
-        return task == self.task and self.first <= seed <= self.last
-
-    def __str__(self) -> str:
-        return str(self.first) if self.first == self.last else f"{self.first} to {self.last}"
-
-    def to_wire(self) -> dict[str, Any]:
-        return asdict(self)
+Sample = tuple[str, int]
+"""Data set and number in it of a measured motion that a repetition is held against."""
 
 
 @dataclass(frozen=True)
-class DataSeen:
-    """Measured motions by whose simulation settings were chosen, or others rejected.
+class Seen:
+    """Seeds of a task, or measured motions, by whose results settings were chosen, or others
+    rejected. Made by `seeds` or `motions`.
 
     Attributes:
-        data: name of the data set.
-        first, last: numbers in the set, both included.
+        first, last: seeds, or numbers in the data set; both included.
         step: from one number to the next.
+        task: whose seeds they are; empty for measured motions.
+        data: the data set; empty for seeds.
     """
 
-    data: str
     first: int
     last: int
     step: int = 1
+    task: str = ""
+    data: str = ""
 
-    def holds(self, task: str, seed: int, sample: DeclaredSample = None) -> bool:
-        """Whether a repetition that was held against that motion was seen."""
+    @classmethod
+    def seeds(cls, task: str, first: int, last: int) -> Seen:
+        """Seeds of a task, by its name in records."""
+        return cls(first, last, task=task)
+
+    @classmethod
+    def motions(cls, data: str, first: int, last: int, step: int = 1) -> Seen:
+        """Motions of a data set, by its name."""
+        return cls(first, last, step, data=data)
+
+    def holds(self, task: str, seed: int, sample: Sample | None = None) -> bool:
+        """Whether a repetition of that task and seed, held against that motion, was seen."""
+        if not self.data:
+            return task == self.task and self.first <= seed <= self.last
         if sample is None or sample[0] != self.data:
             return False
-        return sample[1] in range(self.first, self.last + 1, self.step)
+        return sample[1] in range(self.first, self.last + 1, max(1, self.step))
 
     def __str__(self) -> str:
-        every = "" if self.step == 1 else f" in steps of {self.step}"
-        return f"{self.first} to {self.last}{every}"
-
-    def to_wire(self) -> dict[str, Any]:
-        return asdict(self)
-
-
-Seen = SeedsSeen | DataSeen
-
-
-def _seen(data: Mapping[str, Any]) -> Seen:
-    return DataSeen(**data) if "data" in data else SeedsSeen(**data)
+        if self.data:
+            every = "" if self.step == 1 else f" in steps of {self.step}"
+            return f"{self.first} to {self.last}{every}"
+        return str(self.first) if self.first == self.last else f"{self.first} to {self.last}"
 
 
 def published_again(
-    repetitions: Iterable[tuple[str, int, DeclaredSample, Iterable[Mapping[str, Any]]]],
+    repetitions: Iterable[tuple[str, int, Sample | None, Iterable[Seen]]],
 ) -> str:
     """A sentence when repetitions are of what their settings were chosen on; else nothing.
 
     Args:
-        repetitions: task, seed, what it was held against, and what the record says of the profile
-            (`to_wire` of each).
+        repetitions: task, seed, what it was held against, and what the settings were chosen on.
     """
     seen: dict[Seen, None] = {}
     hit = total = 0
     for task, seed, sample, declared in repetitions:
-        holding = [s for s in map(_seen, declared) if s.holds(task, seed, sample)]
+        holding = [s for s in declared if s.holds(task, seed, sample)]
         seen |= dict.fromkeys(holding)
         hit += bool(holding)
         total += 1
     if not hit:
         return ""
-    data = [what for what in seen if isinstance(what, DataSeen)]
-    if data:
+    if data := [what for what in seen if what.data]:
         sets = " and ".join(f"{what} of {what.data}" for what in data)
         return (
             f"its settings were chosen on numbers {sets}, and {hit} of these {total} repetitions "

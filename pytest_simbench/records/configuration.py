@@ -47,7 +47,10 @@ EVERYWHERE = "pool resume merge compare"
 PARTS: tuple[Part, ...] = (
     # What is repeated: records are found by these, so they never differ within a group.
     _part("test", "twin", "tells groups apart; merged runs may have it under another path"),
+    _part("function", "", "follows from the test"),
+    _part("variant", "", "follows from the test"),
     _part("task", "twin", "tells groups apart"),
+    _part("version", "", "follows from the simulator's name"),
     _part("simulator", "twin", "tells groups apart; simulators are what is ranked"),
     _part("mode", "twin rank", "tells groups apart; modes are compared by a test of their own"),
     # The configuration.
@@ -87,7 +90,8 @@ PARTS: tuple[Part, ...] = (
     *(
         _part(name, "", "a result")
         for name in (
-            "status", "error", "metrics", "details", "seconds", "stepping", "timeline", "resources",
+            "status", "error", "metrics", "details", "notes", "seconds", "stepping", "timeline",
+            "resources",
         )
     ),
     _part("extra", "", "of a newer plugin: not known what it means"),

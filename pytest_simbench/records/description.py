@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from math import isfinite
-from typing import Any, Protocol, get_args
+from typing import Any, Protocol, TypeVar
 
 from pytest_simbench.records import checked
-from pytest_simbench.records.metrics import Better, Kind, Metric
+from pytest_simbench.records.checked import Name
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import plain
 
 SCHEMA = 1
+
+T = TypeVar("T")
 
 
 class TaskDescriptionError(ValueError):
@@ -39,11 +42,18 @@ class TaskDescription:
         task: its name.
         metrics: what it measures, in the order of its tables.
         references: the value of a perfect simulator, by metric.
+
+    Raises:
+        ValueError: two metrics of one name.
     """
 
-    task: str
-    metrics: tuple[Metric, ...] = ()
+    task: Name
+    metrics: tuple[Metric, ...]
     references: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if len({metric.name for metric in self.metrics}) < len(self.metrics):
+            raise ValueError("two of the metrics have one name")
 
     @classmethod
     def of(cls, task: Describing) -> TaskDescription:
@@ -53,9 +63,7 @@ class TaskDescription:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data."""
-        metrics = [metric.to_wire() for metric in self.metrics]
-        data = {"task": self.task, "metrics": metrics, "references": self.references}
-        found: dict[str, Any] = plain({"schema": SCHEMA, **data})
+        found: dict[str, Any] = plain({"schema": SCHEMA, **asdict(self)})
         return found
 
     @classmethod
@@ -66,21 +74,7 @@ class TaskDescription:
             TaskDescriptionError: a part of it is missing or of the wrong type, or the schema is a
                 newer one.
         """
-        try:
-            whole = _whole(data)
-            metrics = tuple(_metric(item, k) for k, item in enumerate(_list(whole, "metrics"), 1))
-            names = [metric.name for metric in metrics]
-            if len(set(names)) < len(names):
-                raise checked.CheckError("two of the metrics have one name")
-            references = whole.get("references") or {}
-            if not isinstance(references, dict) or None in references.values():
-                raise checked.CheckError("'references' must be numbers by name")
-            checked.numbers(references, "references")
-            return cls(checked.name(whole.get("task"), "task"), metrics, references)
-        except checked.CheckError as error:
-            raise TaskDescriptionError(f"{where}: {error}") from None
-        except RecursionError:
-            raise TaskDescriptionError(f"{where}: it is nested too deeply") from None
+        return _read(cls, data, where)
 
 
 @dataclass(frozen=True)
@@ -93,13 +87,13 @@ class Threshold:
         value: what it got: its own, or that of `--sim-threshold`.
     """
 
-    test: str
-    metric: str
+    test: Name
+    metric: Name
     value: float
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data."""
-        return {"schema": SCHEMA, **vars(self)}
+        return {"schema": SCHEMA, **asdict(self)}
 
     @classmethod
     def from_dict(cls, data: Any, where: str = "threshold") -> Threshold:
@@ -108,57 +102,15 @@ class Threshold:
         Raises:
             TaskDescriptionError: it is none.
         """
-        try:
-            whole = _whole(data)
-            test, metric = (checked.name(whole.get(key), key) for key in ("test", "metric"))
-            if whole.get("value") is None:
-                raise checked.CheckError("'value' must be a number")
-            checked.number(whole["value"], "value")
-        except checked.CheckError as error:
-            raise TaskDescriptionError(f"{where}: {error}") from None
-        return cls(test, metric, float(whole["value"]))
+        return _read(cls, data, where)
 
 
-def _whole(data: Any) -> dict[str, Any]:
-    if not isinstance(data, dict):
-        raise checked.CheckError(f"a JSON object is wanted, not {type(data).__name__}")
-    schema = data.get("schema", SCHEMA)
-    if not isinstance(schema, int) or not 0 < schema <= SCHEMA:
-        raise checked.CheckError(
-            f"schema {checked.short(schema)} was written by a newer pytest-simbench (this one "
-            f"reads up to {SCHEMA}); update it"
-        )
-    found: dict[str, Any] = checked.plain(data)
-    return found
-
-
-def _list(data: Mapping[str, Any], key: str) -> list[Any]:
-    found = data.get(key)
-    if not isinstance(found, list):
-        raise checked.CheckError(f"{key!r} must be list, not {type(found).__name__}")
-    return found
-
-
-def _metric(data: Any, number: int) -> Metric:
-    """A metric in a list; what a newer plugin says of it besides is not known here."""
-    where = f"metrics.{number}"
-    if not isinstance(data, dict):
-        raise checked.CheckError(f"{where!r} must be dict, not {type(data).__name__}")
-    known = {f.name: data[f.name] for f in fields(Metric) if f.name in data}
-    for key in ("name", "title"):
-        if not checked.name(known.get(key), f"{where}.{key}"):
-            raise checked.CheckError(f"'{where}.{key}' is empty")
-    for key in ("unit", "doc"):
-        checked.name(known.get(key, ""), f"{where}.{key}")
-    checked.one_of(known.get("better", "higher"), f"{where}.better", (*get_args(Better), None))
-    checked.one_of(known.get("kind", "value"), f"{where}.kind", get_args(Kind))
-    for key, types in (("study", bool), ("of", int | None)):
-        if not isinstance(known.get(key, False if key == "study" else None), types):
-            raise checked.CheckError(f"'{where}.{key}' is {checked.short(known[key])}")
-    checked.number(known.get("of"), f"{where}.of", least=1)
-    checked.number(known.get("resolution"), f"{where}.resolution", least=0)
-    checked.number(known.get("least"), f"{where}.least")
+def _read(kind: type[T], data: Any, where: str) -> T:
     try:
-        return Metric(**known)
-    except ValueError as error:
-        raise checked.CheckError(str(error)) from None
+        checked.schema(data, SCHEMA)
+        whole = checked.plain(data)
+        return checked.convert({k: v for k, v in whole.items() if v is not None}, kind)
+    except checked.CheckError as error:
+        raise TaskDescriptionError(f"{where}: {error}") from None
+    except RecursionError:
+        raise TaskDescriptionError(f"{where}: it is nested too deeply") from None

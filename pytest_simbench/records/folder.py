@@ -167,9 +167,8 @@ class RunFolder:
         """Keep a record, on the disk before this returns if that can be. Never raises OSError."""
         line = record.to_json()
         if len(line) >= LARGEST_LINE:  # no reader would take it
-            kept = {key: record.details[key] for key in ("log",) if key in record.details}
             note = f"{len(line)} bytes, more than a record may have"
-            line = replace(record, details={**kept, "left_out": note}).to_json()
+            line = replace(record.noting(left_out=note), details={}).to_json()
         with self._lock:
             self.own.append(record)
             self._write(self._records, line)

@@ -56,10 +56,12 @@ def merge(runs: Mapping[str, Sequence[Record]]) -> list[Merged]:
         _check(test, parts)
         every = [(record, name) for name, run in parts.items() for record in run]
         first = min(record.seed for record, _ in every)
-        id_ = every[0][0].test
+        named = every[0][0]
         for record, name in sorted(every, key=lambda item: item[0].seed):
             number = record.seed - first + 1
-            ours = replace(record, test=id_, repetition=number, attempt=1)
+            ours = replace(
+                record, test=named.test, function=named.function, repetition=number, attempt=1
+            )
             merged.append(Merged(ours, name, record))
     return merged
 

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import partial
-from typing import Any, Literal
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from pytest_simbench.records.checked import LONGEST_NAME, Name, Positive, Size
 
 Better = Literal["higher", "lower"]
 Kind = Literal["share", "yes_no", "value"]
+Word = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
 
 
 RESOLUTIONS = {"m": 1e-3, "m/s": 5e-3, "s": 1e-3}
@@ -64,15 +69,15 @@ class Metric:
         ValueError: a share without `of`.
     """
 
-    name: str
-    title: str
-    unit: str = ""
+    name: Word
+    title: Word
+    unit: Name = ""
     better: Better | None = "higher"
     kind: Kind = "value"
-    of: int | None = None
+    of: Positive | None = None
     study: bool = False
-    doc: str = ""
-    resolution: float | None = None
+    doc: Name = ""
+    resolution: Size | None = None
     least: float | None = None
 
     def __post_init__(self) -> None:
@@ -101,10 +106,6 @@ class Metric:
         if not self.bounded or self.better is None:
             return None
         return 0.0 if self.better == "higher" else 1.0
-
-    def to_wire(self) -> dict[str, Any]:
-        """Plain data: the arguments that make it again."""
-        return {item.name: getattr(self, item.name) for item in fields(self)}
 
     def format(self, value: float, digits: int = 3) -> str:
         """The value as a reader sees it: proportions in percent, others with their unit."""

@@ -5,9 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-LAW = "law"
-"""Key of a record's details that holds what was read, see `Law.perform`."""
-
 
 def rounding(scale: float, steps: int) -> float:
     """What single precision may add up to in so many steps on a number of that size: half of the

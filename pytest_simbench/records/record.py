@@ -5,19 +5,20 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, dataclass, field, fields
-from typing import Any, Literal, get_args
+from dataclasses import asdict, dataclass, field, fields, replace
+from typing import Any, Literal, TypedDict
 
 from pytest_simbench.records import checked
+from pytest_simbench.records.checked import Count, Name, Positive, Size
 from pytest_simbench.records.metrics import COSTS, Metric
+from pytest_simbench.records.notes import Notes
+from pytest_simbench.records.upgrade import upgraded
 
-SCHEMA = 1
-
-OWN_TIMESTEP = "own_timestep"
-"""Of the details of a record of a sweep: the time step that its profile has [s], where its own is
-another one."""
+SCHEMA = 2
+"""Of the lines that are written; lines of older ones are read too, see `upgrade`."""
 
 Status = Literal["ok", "failed", "interrupted"]
+"""How a repetition ended; one that failed is said to have crashed."""
 
 
 class RecordError(ValueError):
@@ -55,6 +56,14 @@ class Record:
     together stands in `records.configuration`.
 
     Attributes:
+        test: id of the test, as pytest has it; only shown and compared as a whole.
+        function: the test's id without its parameters.
+        simulator: as the user named it, with the version that was asked for: `name==3.3.7`.
+        version: the release or build that was asked for; empty: what is installed.
+        variant: the test's parameters besides simulator, mode, profile, robot and time step, as
+            the id has them.
+        details: what explains the score; the task's alone.
+        notes: what the tool notes.
         scene: digest of the task's scene for one seed and no jitter; empty where not known.
         robot: its `name` and the `digest` of its description; empty for the task's own robot.
         limits: `timeout`, `stall_timeout` [s] and `memory_limit` [MB]; empty where not known.
@@ -62,31 +71,35 @@ class Record:
             that reruns failed tests, or a test that repeats a task twice. The last one counts.
     """
 
-    test: str
-    task: str
-    simulator: str
-    mode: str
-    profile: str
-    repetition: int
-    seed: int
+    test: Name
+    function: Name
+    task: Name
+    simulator: Name
+    mode: Name
+    profile: Name
+    repetition: Count
+    seed: Count
     status: Status
-    protocol: str = "fast"
-    jitter: float = 0.0
+    version: Name = ""
+    variant: Name = ""
+    protocol: Name = "fast"
+    jitter: Size = 0.0
     error: Failure | None = None
-    metrics: Mapping[str, float | None] = field(default_factory=dict)
+    metrics: Mapping[str, float | bool | None] = field(default_factory=dict)
     details: Mapping[str, Any] = field(default_factory=dict)
+    notes: Notes = field(default_factory=Notes)
     seconds: Mapping[str, float] = field(default_factory=dict)
     stepping: Mapping[str, float] = field(default_factory=dict)
     timeline: Mapping[str, float] = field(default_factory=dict)
     resources: Mapping[str, Any] = field(default_factory=dict)
     settings: Mapping[str, Any] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
-    scene: str = ""
+    scene: Name = ""
     robot: Mapping[str, str] = field(default_factory=dict)
     limits: Mapping[str, float | None] = field(default_factory=dict)
-    attempt: int = 1
+    attempt: Positive = 1
     host: Mapping[str, Any] = field(default_factory=dict)
-    deviations: tuple[str, ...] = ()
+    deviations: tuple[Name, ...] = ()
     contended: bool = False
     reused_worker: bool = False
     extra: Mapping[str, Any] = field(default_factory=dict)
@@ -101,9 +114,18 @@ class Record:
         return f"{self.simulator} {self.mode} ({self.profile})"
 
     @property
+    def name(self) -> str:
+        """The test's id without file and class."""
+        return self.test[len(self.function) - len(self.function.rpartition("::")[2]) :]
+
+    @property
     def swept(self) -> bool:
         """Whether it was made at another time step than its profile's own."""
-        return OWN_TIMESTEP in self.details
+        return self.notes.own_timestep is not None
+
+    def noting(self, **notes: Any) -> Record:
+        """The same record with other notes."""
+        return replace(self, notes=replace(self.notes, **notes))
 
     def value(self, metric: Metric) -> float | None:
         """What it counts with at a metric of its task, or at a cost; None where it has no value.
@@ -128,8 +150,9 @@ class Record:
         for item in fields(self):
             if item.name != "extra" and not (item.name == "robot" and not self.robot):
                 data[item.name] = getattr(self, item.name)
-        if self.error is not None:
-            data["error"] = {f.name: getattr(self.error, f.name) for f in fields(self.error)}
+        data["error"] = None if self.error is None else asdict(self.error)
+        noted = asdict(self.notes)
+        data["notes"] = {f.name: noted[f.name] for f in fields(Notes) if noted[f.name] != f.default}
         found: dict[str, Any] = plain({**data, **self.extra})
         return found
 
@@ -144,21 +167,26 @@ class Record:
         Raises:
             RecordError: a key is missing or of the wrong type, or the schema is a newer one.
         """
-        schema = data.get("schema", SCHEMA)
-        if not isinstance(schema, int) or not 0 < schema <= SCHEMA:
-            raise RecordError(
-                f"{where}: schema {checked.short(schema)} was written by a newer pytest-simbench "
-                f"(this one reads up to {SCHEMA}); update it"
-            )
         try:
+            schema = checked.schema(data, SCHEMA)
             whole: dict[str, Any] = checked.plain(dict(data))
-            known = _known(whole)
+            if schema < 2:
+                whole = upgraded(whole)
+            extra = {k: whole.pop(k) for k in whole.keys() - _KEYS}
+            whole = {k: v for k, v in whole.items() if v is not None}
+            for name in _TIMES & whole.keys():
+                whole[name] = _known(whole[name])
+            found = checked.convert(whole, cls)
+            if "metrics" not in whole:
+                raise checked.CheckError("there is no 'metrics'")
+            checked.convert(found.resources, Use, "resources")
         except checked.CheckError as error:
             raise RecordError(f"{where}: {error}") from None
         except RecursionError:
             raise RecordError(f"{where}: the record is nested too deeply") from None
-        extra = {k: v for k, v in whole.items() if k not in known and k not in ("schema", "error")}
-        return cls(**known, extra=extra)
+        extra.pop("schema", None)
+        shared = {name: _shared(getattr(found, name)) for name in _SHARED}
+        return replace(found, extra=extra, **shared)
 
     @classmethod
     def from_json(cls, line: str | bytes, where: str = "record") -> Record:
@@ -176,49 +204,27 @@ class Record:
         return cls.from_dict(data, where)
 
 
-def _known(data: dict[str, Any]) -> dict[str, Any]:
-    """The arguments of a record, checked."""
-    known = {f.name: data[f.name] for f in fields(Record) if f.name in data and f.name != "extra"}
-    for name, types in _TYPES.items():
-        if name not in known:
-            if name in _REQUIRED:
-                raise checked.CheckError(f"the record has no {name!r}")
-        elif not isinstance(known[name], types) or (
-            isinstance(known[name], bool) and bool not in types
-        ):
-            wanted = " or ".join(kind.__name__ for kind in types)
-            raise checked.CheckError(f"{name!r} must be {wanted}, not {type(known[name]).__name__}")
-    if known["status"] not in get_args(Status):
-        valid = ", ".join(get_args(Status))
-        raise checked.CheckError(f"status {checked.short(known['status'])} is none of {valid}")
-    for name in _OBJECTS:
-        known[name] = known.get(name) or {}
-    for name in _NAMES:
-        checked.name(known.get(name, ""), name)
-    for name in ("repetition", "seed", "jitter"):
-        checked.number(known.get(name), name, least=0)
-    checked.number(known.get("attempt"), "attempt", least=1)
-    for name, value in known["metrics"].items():
-        if not isinstance(value, int | float | None):
-            raise checked.CheckError(
-                f"metric {name!r} must be a number, not {checked.short(value)}"
-            )
-    for name in ("seconds", "stepping", "timeline", "limits"):
-        checked.numbers(known[name], name)
-    for name in ("versions", "robot"):
-        checked.texts(known[name], name)
-    checked.texts({k: v for k, v in known["details"].items() if k in _TEXT_DETAILS}, "details")
-    checked.use_of_resources(known["resources"], "resources")
-    deviations = known.get("deviations") or ()
-    known["deviations"] = tuple(checked.name(text, "deviations") for text in deviations)
-    if known.get("error") is not None:
-        known["error"] = _failure(known["error"])
-    for name in _SHARED:
-        known[name] = _shared(known[name])
-    return known
+class Use(TypedDict, total=False):
+    """What `client.resources` writes, of the whole repetition and of its phases."""
+
+    cpu_percent: dict[str, float | None] | None
+    rss_mb: dict[str, float | None] | None
+    samples: Count | None
+    phases: dict[str, Use] | None
 
 
+_KEYS = frozenset(f.name for f in fields(Record)) - {"extra"}
+_TIMES = frozenset({"seconds", "stepping", "timeline"})
+_SHARED = ("settings", "versions", "robot", "limits", "host", "deviations")
+"""What records of a run have in common."""
+
+_MOST_SHARED = 1000
 _known_values: dict[str, Any] = {}
+
+
+def _known(times: Any) -> Any:
+    """Without those that are no number: such were NaN or infinite when they were written."""
+    return {k: v for k, v in times.items() if v is not None} if isinstance(times, dict) else times
 
 
 def _shared(value: Any) -> Any:
@@ -228,43 +234,6 @@ def _shared(value: Any) -> Any:
     if len(_known_values) >= _MOST_SHARED:
         _known_values.clear()
     return _known_values.setdefault(key, value)
-
-
-def _failure(error: Mapping[str, Any]) -> Failure:
-    if not isinstance(error.get("type"), str):
-        raise checked.CheckError("'error' has no 'type'")
-    found = {f.name: error[f.name] for f in fields(Failure) if f.name in error}
-    for name, value in found.items():
-        if not isinstance(value, str | None):
-            raise checked.CheckError(f"'error.{name}' must be str, not {type(value).__name__}")
-    return Failure(**{name: value or "" for name, value in found.items()})
-
-
-_REQUIRED = (
-    *(f.name for f in fields(Record) if f.default is MISSING and f.default_factory is MISSING),
-    "metrics",
-)
-_NAMES = ("test", "task", "simulator", "mode", "profile", "protocol", "scene")
-_TEXT_DETAILS = ("log", "untested", "closing")
-_OBJECTS = tuple(
-    f.name
-    for f in fields(Record)
-    if f.default_factory is dict and f.name not in ("metrics", "extra")
-)
-_SHARED = ("settings", "versions", "robot", "limits", "host", "deviations")
-"""What records of a run have in common."""
-
-_MOST_SHARED = 1000
-_TYPES: dict[str, tuple[type, ...]] = {
-    **dict.fromkeys((*_NAMES, "status"), (str,)),
-    **dict.fromkeys(("repetition", "seed", "attempt"), (int,)),
-    "jitter": (int, float),
-    "error": (dict, type(None)),
-    "metrics": (dict,),
-    **dict.fromkeys(_OBJECTS, (dict, type(None))),
-    "deviations": (list, type(None)),
-    **dict.fromkeys(("contended", "reused_worker"), (bool,)),
-}
 
 
 def _ratio(over: float | None, under: float | None) -> float | None:

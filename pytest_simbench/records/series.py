@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import lru_cache
 from typing import NamedTuple, TypeVar
 
 from pytest_simbench.ground.versions import VersionedName, release_numbers
@@ -84,7 +83,7 @@ class RowKey(NamedTuple):
 
     Attributes:
         function: id of the test without its parameters.
-        parameters: of the test, without simulator and mode.
+        parameters: robot, time step of a sweep, and the test's variant, as ids have them.
     """
 
     simulator: str
@@ -95,7 +94,14 @@ class RowKey(NamedTuple):
 
     @classmethod
     def of(cls, record: Record) -> RowKey:
-        return _row_key(record.simulator, record.mode, record.profile, record.test)
+        step = record.settings.get("timestep") if record.swept else None
+        parts = [
+            record.robot.get("name", ""),
+            f"dt={step_text(step)}" if isinstance(step, int | float) else "",
+            record.variant,
+        ]
+        parameters = "-".join(filter(None, parts))
+        return cls(record.simulator, record.mode, record.profile, record.function, parameters)
 
     @property
     def order(self) -> tuple[object, ...]:
@@ -103,14 +109,6 @@ class RowKey(NamedTuple):
         name = VersionedName.of(self.simulator)
         version = (name.base, name.kind, release_numbers(name.which), self.simulator)
         return (version, self.mode == "gui", *self[1:])
-
-
-@lru_cache(maxsize=1000)
-def _row_key(simulator: str, mode: str, profile: str, test: str) -> RowKey:
-    function, _, parameters = test.partition("[")
-    inside = "-" + parameters.removesuffix("]") + "-"
-    inside = inside.replace(f"-{simulator}-{mode}-", "-", 1).strip("-")
-    return RowKey(simulator, mode, profile, function, inside)
 
 
 class Series(NamedTuple):
@@ -216,10 +214,10 @@ def by_test(
         runs: records of each run, in the order in which they were made.
         apart: splits the records of one test and task.
     """
-    whole = any(len({r.test for r in run}) > len({short(r.test) for r in run}) for run in runs)
+    whole = any(len({r.test for r in run}) > len({r.name for r in run}) for run in runs)
     sides: list[dict[tuple[str, str, int], list[Record]]] = []
     for run in runs:
-        groups = grouped(run, lambda r: (r.test if whole else short(r.test), r.task))
+        groups = grouped(run, lambda r: (r.test if whole else r.name, r.task))
         sides.append(
             {
                 (*key, number): group

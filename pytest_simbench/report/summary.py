@@ -186,14 +186,12 @@ def _undeclared(records: Sequence[Record]) -> list[Metric]:
 def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str, ends: Ends) -> Row:
     first = records[0]
     done = [record for record in records if record.status == "ok"]
-    notes = list(dict.fromkeys(r.details["untested"] for r in records if "untested" in r.details))
-    again = published_again(
-        (r.task, r.seed, r.details.get("data"), r.details.get("chosen_on", ())) for r in done
-    )
+    notes = list(dict.fromkeys(r.notes.untested for r in records if r.notes.untested))
+    again = published_again((r.task, r.seed, r.notes.sample, r.notes.chosen_on) for r in done)
     notes += [again] * bool(again)
     if any(record.contended for record in done):
         notes.append("repetitions ran in parallel: its times and CPU are contended")
-    if any(record.details.get("filmed") for record in done):
+    if any(record.notes.filmed for record in done):
         notes.append("repetitions were filmed: CPU and RAM are those of simulator and renderer")
     if any(record.reused_worker for record in done):
         notes.append("one worker served several repetitions: launch and memory are not fresh")
@@ -250,7 +248,7 @@ def _causes(records: Sequence[Record]) -> tuple[Cause, ...]:
                 tail[-1].strip() if tail else "",
                 tuple(record.repetition for record in group),
                 tuple(record.seed for record in group),
-                str(group[0].details.get("log") or ""),
+                group[0].notes.log,
             )
         )
     return tuple(causes)

@@ -1,6 +1,6 @@
 """What an adapter implements, its settings, capabilities and report of the world it built."""
 
-from pytest_simbench.records.choices import DataSeen, SeedsSeen, Seen
+from pytest_simbench.records.choices import Seen
 from pytest_simbench.simulator.base import Simulator
 from pytest_simbench.simulator.errors import (
     DescriptionError,
@@ -23,7 +23,6 @@ from pytest_simbench.simulator.urdf import PreparedRobot
 __all__ = [
     "FOLLOWER",
     "Capability",
-    "DataSeen",
     "DescriptionError",
     "Deviation",
     "DivergedError",
@@ -31,7 +30,6 @@ __all__ = [
     "NotSupportedError",
     "ParityError",
     "PreparedRobot",
-    "SeedsSeen",
     "Seen",
     "Settings",
     "SettingsError",

@@ -11,6 +11,7 @@ import numpy as np
 
 from pytest_simbench.client.world import World
 from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.readings import Reading
 from pytest_simbench.robot.errors import RobotError
 from pytest_simbench.scene import Box, Pose, Robot, Scene, Vector3
 from pytest_simbench.tasks.moments import Moment
@@ -57,10 +58,12 @@ class Outcome:
     Attributes:
         metrics: value of each of the task's metrics; None where there is none.
         details: whatever explains the score, as plain data.
+        reading: of a law.
     """
 
     metrics: dict[str, float | None] = field(default_factory=dict)
     details: dict[str, Any] = field(default_factory=dict)
+    reading: Reading | None = None
 
 
 Count = Callable[[int, int], None]

@@ -21,7 +21,7 @@ from pytest_simbench.simulator import (
     Capability,
     Deviation,
     PreparedRobot,
-    SeedsSeen,
+    Seen,
     Settings,
     Simulator,
     SimulatorInfo,
@@ -119,7 +119,7 @@ class Gazebo(Simulator):
         install_size_mb=1500,
     )
     profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[SeedsSeen, ...]]] = CHOSEN_ON
+    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
     settings: GazeboSettings
     _window: Window | None = None
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from pytest_simbench.simulator import SeedsSeen, Settings
+from pytest_simbench.simulator import Seen, Settings
 
 
 @dataclass(frozen=True)
@@ -40,11 +40,11 @@ PROFILES: Mapping[str, Settings] = {
     ),
 }
 
-CHOSEN_ON: Mapping[str, tuple[SeedsSeen, ...]] = {
+CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
     "tuned": (
-        SeedsSeen("throwing", 2022, 2023),
-        SeedsSeen("stacking", 2022, 2022),
-        SeedsSeen("pushing", 920001, 920002),
-        SeedsSeen("pushing_curve", 920001, 920002),
+        Seen.seeds("throwing", 2022, 2023),
+        Seen.seeds("stacking", 2022, 2022),
+        Seen.seeds("pushing", 920001, 920002),
+        Seen.seeds("pushing_curve", 920001, 920002),
     ),
 }

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from pytest_simbench.simulator import DataSeen, SeedsSeen, Seen, Settings
+from pytest_simbench.simulator import Seen, Settings
 
 
 @dataclass(frozen=True)
@@ -62,12 +62,12 @@ PROFILES: Mapping[str, Settings] = {
 }
 
 SEEDS = (
-    SeedsSeen("throwing", 100, 101),
-    SeedsSeen("stacking", 100, 100),
-    SeedsSeen("pushing", 920008, 920008),
+    Seen.seeds("throwing", 100, 101),
+    Seen.seeds("stacking", 100, 100),
+    Seen.seeds("pushing", 920008, 920008),
 )
 
 CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
     "tuned": SEEDS,
-    "real": (*SEEDS, DataSeen("cube_tosses", 0, 564, 6)),
+    "real": (*SEEDS, Seen.motions("cube_tosses", 0, 564, 6)),
 }

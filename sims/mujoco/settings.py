@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from pytest_simbench.simulator import DataSeen, SeedsSeen, Seen, Settings
+from pytest_simbench.simulator import Seen, Settings
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,9 @@ PROFILES: Mapping[str, Settings] = {
     "real": replace(TUNED, solref=(0.004, 2.0)),
 }
 
-SEEDS = (SeedsSeen("throwing", 1, 1), SeedsSeen("stacking", 1, 1))
+SEEDS = (Seen.seeds("throwing", 1, 1), Seen.seeds("stacking", 1, 1))
 
 CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
     "tuned": SEEDS,
-    "real": (*SEEDS, DataSeen("cube_tosses", 0, 564, 6)),
+    "real": (*SEEDS, Seen.motions("cube_tosses", 0, 564, 6)),
 }

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from pytest_simbench.simulator import DataSeen, Seen, Settings
+from pytest_simbench.simulator import Seen, Settings
 
 
 @dataclass(frozen=True)
@@ -53,4 +53,4 @@ PROFILES: Mapping[str, Settings] = {
     "real": replace(TUNED, ke=62500.0),
 }
 
-CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {"real": (DataSeen("cube_tosses", 0, 564, 6),)}
+CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {"real": (Seen.motions("cube_tosses", 0, 564, 6),)}

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from pytest_simbench.simulator import DataSeen, SeedsSeen, Seen, Settings
+from pytest_simbench.simulator import Seen, Settings
 
 
 @dataclass(frozen=True)
@@ -72,9 +72,9 @@ PROFILES: Mapping[str, Settings] = {
 }
 
 # the candidate of 1 ms was dropped for its 15 of 20 on 2022 to 2041
-SEEDS = (SeedsSeen("throwing", 100, 149), SeedsSeen("throwing", 2022, 2041))
+SEEDS = (Seen.seeds("throwing", 100, 149), Seen.seeds("throwing", 2022, 2041))
 
 CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
     "tuned": SEEDS,
-    "real": (*SEEDS, DataSeen("cube_tosses", 0, 564, 6)),
+    "real": (*SEEDS, Seen.motions("cube_tosses", 0, 564, 6)),
 }

@@ -103,7 +103,7 @@ def test_garbage_on_stdout_harms_nothing(engine: Case) -> None:
 def test_crash_while_closing_does_not_fail_a_finished_repetition(engine: Case) -> None:
     record = run(engine, "CrashesClosing")
     assert record.status == "ok"
-    assert "SIGSEGV" in record.details["closing"]
+    assert "SIGSEGV" in record.notes.closing
 
 
 def test_exit_at_import(case: Case) -> None:

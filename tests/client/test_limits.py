@@ -113,7 +113,7 @@ def test_a_connection_that_is_none(case: Case, fault: str, kind: str) -> None:
 def test_a_worker_that_does_not_close(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     record, _ = Repetition(Experiment(unruly(case, "StopsClosing"), Falling()), 1).run()
     assert record.status == "ok"
-    assert record.details["closing"] == "the worker did not close within 10 s"
+    assert record.notes.closing == "the worker did not close within 10 s"
 
 
 def test_a_log_does_not_fill_the_disk(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:

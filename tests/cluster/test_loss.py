@@ -91,9 +91,9 @@ def records(folder: Path) -> dict[int, dict[str, Any]]:
 def alike(record: dict[str, Any]) -> dict[str, Any]:
     """What must be the same wherever it ran."""
     host = {k: v for k, v in record["host"].items() if k != "node"}
-    details = {k: v for k, v in record["details"].items() if k != "lost_nodes"}
+    notes = {k: v for k, v in record["notes"].items() if k != "lost_nodes"}
     kept = {k: v for k, v in record.items() if k not in TIMES}
-    return {**kept, "host": host, "details": details}
+    return {**kept, "host": host, "notes": notes}
 
 
 def until(condition: Any, seconds: float = 120.0) -> None:
@@ -130,18 +130,16 @@ def test_a_process_killed_a_machine_cut_off_and_one_added(
     assert found.keys() == expected.keys()
     lost = found.pop(FULL)
     assert (lost["status"], lost["error"]["type"]) == ("failed", "NodeLost")
-    assert len(lost["details"]["lost_nodes"]) == 2
+    assert len(lost["notes"]["lost_nodes"]) == 2
     assert "it cannot: No space left on device, then on" in lost["error"]["message"]
     assert {s: alike(r) for s, r in found.items()} == {s: alike(expected[s]) for s in found}
     again = {
-        seed: r["details"]["lost_nodes"]
-        for seed, r in found.items()
-        if "lost_nodes" in r["details"]
+        seed: r["notes"]["lost_nodes"] for seed, r in found.items() if "lost_nodes" in r["notes"]
     }
     assert "its process ended, or its network is gone" in again[2024][0]
     assert any("b: " in texts[0] for texts in again.values())
     assert "d" in {r["host"]["node"] for r in found.values()}
-    assert all((spread / "out" / r["details"]["log"]).is_file() for r in found.values())
+    assert all((spread / "out" / r["notes"]["log"]).is_file() for r in found.values())
     assert len(list((spread / "out" / "traces").iterdir())) == 1
 
 
@@ -159,8 +157,8 @@ def test_what_a_node_has_found_is_lost_with_it(machines: Machines, case: Case) -
     pool.close()
     assert isinstance(error, NodeLost), error
     assert record.status == "failed"
-    assert len(record.details["lost_nodes"]) == 2
-    assert all("its process ended" in told for told in record.details["lost_nodes"])
+    assert len(record.notes.lost_nodes) == 2
+    assert all("its process ended" in told for told in record.notes.lost_nodes)
 
 
 def test_several_tests_at_once_and_a_release_that_one_node_has(

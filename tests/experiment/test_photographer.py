@@ -92,21 +92,21 @@ def test_whose_film_is_kept(case: Case, mode: str, kept: list[str]) -> None:
     found = []
     for task in (Falling(), Unlucky()):
         record, _ = Repetition(Experiment(filmed, task), 1).run()
-        assert record.details["filmed"] is True
+        assert record.notes.filmed
         for path in (case.folder / "videos").glob("*"):
             path.unlink()
             found.append(f"{task.name} 1".removeprefix("falling "))
     assert found == kept
     plain, _ = Repetition(Experiment(case, Falling()), 1).run()
-    assert "filmed" not in plain.details
+    assert not plain.notes.filmed
 
 
 def test_a_film_that_cannot_be_drawn_fails_nothing(case: Case) -> None:
     blind = replace(case, video="on", adapter="tests.client.faulty:Blind")
     record, error = Repetition(Experiment(blind, Falling()), 1).run()
     assert error is None
-    assert record.details["video"] == "mujoco has no offscreen picture"
-    assert "filmed" not in record.details
+    assert record.notes.video == "mujoco has no offscreen picture"
+    assert not record.notes.filmed
     assert not (case.folder / "videos").exists()
 
 

@@ -79,7 +79,7 @@ def test_a_record_says_what_it_was(case: Case) -> None:
     assert record.stepping["simulated"] == pytest.approx(0.6)
     assert record.resources["rss_mb"]["peak"] > 20
     assert set(record.seconds) == {*("launch", "compile", "load", "plan", "step", "other", "total")}
-    assert record.details["log"].startswith("logs/")
+    assert record.notes.log.startswith("logs/")
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,8 @@ def asked(
     named = {
         "simulator": name,
         "test": f"test_law[{name}-headless-{law}]",
+        "function": "test_law",
+        "variant": law,
         "task": law,
         "settings": {PHENOMENON: phenomenon},
     }

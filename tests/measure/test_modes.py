@@ -17,6 +17,7 @@ PLACED = Metric("placed", "placed", kind="share", of=15, better="higher", study=
 def record(mode: str, seed: int, placed: float) -> Record:
     return Record(
         test=f"suites/test_stacking.py::test_stacking[mujoco-{mode}]",
+        function="suites/test_stacking.py::test_stacking",
         task="stacking",
         simulator="mujoco",
         mode=mode,

@@ -7,11 +7,13 @@ from typing import Any
 
 import pytest
 
-from pytest_simbench.laws import LAW
 from pytest_simbench.measure.sweep import Swept, choice, sweeps, tolerance_at
 from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.phenomena import PHENOMENON
-from pytest_simbench.records.record import OWN_TIMESTEP, Failure, Record
+from pytest_simbench.records.readings import Reading
+from pytest_simbench.records.record import Failure, Record
+from tests.records.build import made
 
 METRICS = {"fall": (Metric("error", "error", "m", "lower"),)}
 STEPS = (0.004, 0.002, 0.001, 0.0005)
@@ -23,7 +25,6 @@ def law(
 ) -> Record:
     """A law at a time step, which costs 1 s for 1000 steps; it failed where there is no error."""
     settings = {"timestep": step, PHENOMENON: "free motion", **given.pop("settings", {})}
-    told = {"value": 5.0, "exact": 4.9, "tolerance": 10 * step}
     found: dict[str, Any] = {
         "test": f"test_law[{simulator}-headless-dt={1e3 * step:g}ms-{name}]",
         "task": name,
@@ -34,7 +35,7 @@ def law(
         "seed": 1,
         "status": "ok",
         "metrics": {"error": error, "ratio": (error or 0.0) / (10 * step)},
-        "details": {LAW: told, OWN_TIMESTEP: 0.001},
+        "notes": Notes(reading=Reading(5.0, 4.9, 10 * step), own_timestep=0.001),
         "stepping": {"cpu": 1e-3 / step, "simulated": 1.0, "steps": 1 / step},
         "settings": settings,
         "versions": {"mujoco": "3"},
@@ -42,8 +43,8 @@ def law(
     if error is None:
         message = "the worker\nwas killed"
         found |= {"status": "failed", "metrics": {}, "error": Failure("WorkerDied", message)}
-        found |= {"details": {OWN_TIMESTEP: 0.001}, "versions": {}}
-    return Record(**{**found, **given})
+        found |= {"notes": Notes(own_timestep=0.001), "versions": {}}
+    return made({**found, **given})
 
 
 def one(records: list[Record]) -> Swept:

@@ -69,7 +69,7 @@ def hostile_run(folder: Path, records: Path) -> None:
                 continue
             record |= {"task": EVIL, "profile": EVIL, "deviations": [EVIL], "test": f"t::{EVIL}"}
             record["metrics"] = {EVIL: 0.5}
-            record["details"] = {"untested": EVIL}
+            record["notes"] = {"untested": EVIL}
             file.write(json.dumps(record) + "\n")
 
 

@@ -19,7 +19,7 @@ from tests.records.build import record
 
 def saved(folder: Path, seed: int, log: str, **changes: object) -> Record:
     """A run of one repetition."""
-    found = record(1, seed=seed, details={"log": log}, **changes)
+    found = record(1, seed=seed, **changes).noting(log=log)
     RunFolder(folder).append(found)
     return found
 
@@ -39,7 +39,7 @@ def test_logs_and_traces_are_copied_under_names_of_ours(pytester: pytest.Pyteste
             file.write_text(f"{path} of {name}")
     assert merge(pytester, "a", "b") == 0
     whole = pytester.path / "whole"
-    logs = [r.details["log"] for r in RunFolder(whole).read().records]
+    logs = [r.notes.log for r in RunFolder(whole).read().records]
     assert [(whole / log).read_text() for log in logs] == [
         "logs/x-1.log of a",
         "logs/x-1.log of b",
@@ -73,7 +73,7 @@ def test_a_record_leads_nowhere(
     assert {path.name for path in pytester.path.glob("[!.]*")} == {"a", "victim.log", "whole"}
     whole = pytester.path / "whole"
     (found,) = RunFolder(whole).read().records
-    assert found.details["log"] == ""
+    assert found.notes.log == ""
     kept = {path.name for path in whole.rglob("*") if path.suffix not in (".png", "")}
     assert kept == {"records.jsonl", "outcome.json", "report.html", "report.md", "report.csv"}
     if log not in ("logs", "logs/pipe.log"):
@@ -126,7 +126,7 @@ def test_the_same_run_by_another_name_is_given_twice(pytester: pytest.Pytester) 
 
 def test_foreign_records_of_wrong_types_are_one_sentence(pytester: pytest.Pytester) -> None:
     found = saved(pytester.path / "a", 1, "")
-    for change in ({"stepping": {"wall": "x"}}, {"details": {"log": 3}}, {"seed": "1"}):
+    for change in ({"stepping": {"wall": "x"}}, {"notes": {"log": 3}}, {"seed": "1"}):
         text = json.dumps({**found.to_dict(), **change})
         (pytester.path / "a/records.jsonl").write_text(text + "\n")
         with pytest.raises(pytest.UsageError, match=r"--sim-merge a: .*records.jsonl:1: '"):

@@ -123,7 +123,7 @@ def test_each_setting_class_and_task_is_a_row_with_files_of_its_own(
         names = [path.name for path in (pytester.path / "o" / folder).iterdir()]
         assert len(names) == 6
         assert all(name.endswith(f"-1.{ending}") for name in names)
-    assert len({r["details"]["log"] for r in found}) == 6
+    assert len({r["notes"]["log"] for r in found}) == 6
     table = (pytester.path / "o" / "report.md").read_text()
     for step in ("0.001", "0.004"):
         assert table.count(f"TestA::test\\_falling timestep={step} | 0 of 1") == 1

@@ -33,7 +33,7 @@ def test_a_broken_law_is_a_finding_and_no_failure_unless_asked_for(
         for law in ("free_fall", "sag")
     ]  # fmt: skip
     assert [r["reused_worker"] for r in records] == [False, True, False, True]
-    law = records[-1]["details"]["law"]
+    law = records[-1]["notes"]["reading"]
     assert law["exact"] == pytest.approx(0.1925, abs=1e-4)
     assert records[-1]["metrics"]["ratio"] == pytest.approx(law["exact"] / law["tolerance"], 0.01)
     again = pytester.runpytest_subprocess("--sim-report", "out")

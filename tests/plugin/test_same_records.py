@@ -141,7 +141,7 @@ def test_sharded_and_merged_then_judged_without_running(
     assert merged.ret == pytest.ExitCode.OK
     merged.stdout.fnmatch_lines(["falling: 4 repetitions*"])
     assert kept(folder / "whole") == straight
-    names = [json.loads(line)["details"]["log"] for line in straight]
+    names = [json.loads(line)["notes"]["log"] for line in straight]
     assert [name[:9] for name in names] == ["logs/test"] * 8
     assert {path.name for path in (folder / "whole/logs").iterdir()} == {n[5:] for n in names}
     run(pytester, "--reps=4", "--sim-resume=whole").assert_outcomes(passed=2)

@@ -82,7 +82,7 @@ def test_no_profile_was_chosen_on_a_published_seed() -> None:
         ((path.parent.name, task), range(int(first), int(last) + 1))
         for path in (ROOT / "sims").glob("*/settings.py")
         for task, first, last in re.findall(
-            r'SeedsSeen\("(\w+)", (\d+), (\d+)\)', path.read_text(encoding="utf-8")
+            r'Seen\.seeds\("(\w+)", (\d+), (\d+)\)', path.read_text(encoding="utf-8")
         )
     ]
     assert len(seen) >= len(make_results.SIMULATORS)

@@ -7,6 +7,7 @@ from typing import Any
 
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Failure, Record
+from pytest_simbench.records.upgrade import taken_apart
 
 METRICS = (
     Metric("placed", "placed", kind="share", of=15, study=True),
@@ -42,7 +43,15 @@ def record(
         "versions": {"engine": "1.0"},
         "host": {"cpu": "some", "cores": 2},
     }
-    return Record(**{**given, **changes})
+    return made({**given, **changes})
+
+
+def made(given: dict[str, Any]) -> Record:
+    """A record, with function and variant as its test's id has them."""
+    robot = given.get("robot", {}).get("name", "")
+    names = (given[key] for key in ("test", "simulator", "mode", "profile"))
+    function, variant = taken_apart(*names, robot)
+    return Record(**{"function": function, "variant": variant, **given})
 
 
 def records(name: str, values: Sequence[float], **changes: Any) -> list[Record]:

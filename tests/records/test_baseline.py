@@ -72,7 +72,7 @@ def test_every_form_gives_the_same_records(tmp_path: Path, form: str) -> None:
     [
         ("", "holds no repetition"),
         ("[1, 2]", "cannot be read: .*:1: a line is a JSON object, not list"),
-        ('{"test": "t"}', "cannot be read: .*:1: the record has no 'task'"),
+        ('{"test": "t"}', "cannot be read: .*:1: there is no 'task'"),
         ('{"benchmarks": {}}', "malformed: 'benchmarks' is not a list"),
         ('{"benchmarks": [3, {"extra_info": 4}]}', "holds no repetition of a simulator"),
         ('{"benchmarks": [{"extra_info": {"simbench": 1}}]}', "does not hold repetitions"),
@@ -83,7 +83,7 @@ def test_every_form_gives_the_same_records(tmp_path: Path, form: str) -> None:
         ),
         (
             '{"benchmarks": [{"extra_info": {"simbench": {"shared": {}, "repetitions": [{}]}}}]}',
-            "a benchmark without a name: repetition 1: the record has no 'test'",
+            "a benchmark without a name: repetition 1: there is no 'test'",
         ),
         (
             '{"benchmarks": [{"extra_info": '

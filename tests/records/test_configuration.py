@@ -99,7 +99,10 @@ def test_every_field_of_a_metric_has_its_line_and_reason() -> None:
 def test_other_meanings_are_named(change: dict[str, Any], named: str | None) -> None:
     metric = Metric("x", "x", "m")
     before = {"t": TaskDescription("t", (metric, Metric("gone", "gone")))}
-    now = {"t": TaskDescription("t", (replace(metric, **change),)), "new": TaskDescription("new")}
+    now = {
+        "t": TaskDescription("t", (replace(metric, **change),)),
+        "new": TaskDescription("new", ()),
+    }
     for use in ("resume", "merge", "compare"):
         assert other_meanings(before, now, use) == ([named] if named else [])  # type: ignore[arg-type]
 

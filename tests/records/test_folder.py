@@ -33,33 +33,39 @@ def test_what_holds_a_run(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"seed": "7"}, "'seed' must be int, not str"),
-        ({"repetition": True}, "'repetition' must be int, not bool"),
-        ({"metrics": None}, "'metrics' must be dict, not NoneType"),
-        ({"metrics": {"placed": "many"}}, "metric 'placed' must be a number, not 'many'"),
-        ({"status": "fine"}, "status 'fine' is none of ok, failed, interrupted"),
-        ({"error": {"message": "x"}}, "'error' has no 'type'"),
+        ({"seed": "7"}, "'seed': expected 'int', got 'str'"),
+        ({"repetition": True}, "'repetition': expected 'int', got 'bool'"),
+        ({"metrics": None}, "there is no 'metrics'"),
+        (
+            {"metrics": {"placed": "many"}},
+            "'metrics[...]': expected 'bool | float | None'",
+        ),
+        ({"status": "fine"}, "'status': invalid enum value 'fine'"),
+        ({"error": {"message": "x"}}, "'error': there is no 'type'"),
         ({"schema": 99}, "schema 99 was written by a newer pytest-simbench"),
-        ({"test": 3}, "'test' must be str, not int"),
-        ({"test": "x" * 5000}, "'test' has 5000 characters, at most 2000 are read"),
-        ({"jitter": -1}, "'jitter' must be at least 0"),
-        ({"attempt": 0}, "'attempt' must be at least 1"),
-        ({"repetition": -3}, "'repetition' must be at least 0"),
+        ({"test": 3}, "'test': expected 'str', got 'int'"),
+        ({"test": "x" * 5000}, "'test': expected 'str' of length <= 2000"),
+        ({"jitter": -1}, "'jitter': expected 'float' >= 0.0"),
+        ({"attempt": 0}, "'attempt': expected 'int' >= 1"),
+        ({"repetition": -3}, "'repetition': expected 'int' >= 0"),
         ({"seed": 10**400}, "'seed' is larger than any number of ours"),
         ({"metrics": {"placed": 10**400}}, "'metrics.placed' is larger than any number"),
-        ({"seconds": {"total": "long"}}, "'seconds.total' must be a number, not 'long'"),
-        ({"stepping": {"wall": [1]}}, "'stepping.wall' must be a number"),
-        ({"timeline": {"start": {}}}, "'timeline.start' must be a number"),
-        ({"limits": {"timeout": "x"}}, "'limits.timeout' must be a number"),
-        ({"resources": {"rss_mb": 3}}, "'resources.rss_mb' must be dict, not int"),
-        ({"resources": {"samples": "x"}}, "'resources.samples' must be a number"),
-        ({"resources": {"samples": -1}}, "'resources.samples' must be at least 0"),
-        ({"resources": {"phases": {"load": {"rss_mb": {"mean": "x"}}}}}, "'resources.phases.load."),
-        ({"versions": {"engine": 3}}, "'versions.engine' must be str, not int"),
-        ({"details": {"log": ["a"]}}, "'details.log' must be str, not list"),
-        ({"details": {"untested": {}}}, "'details.untested' must be str, not dict"),
-        ({"deviations": [3]}, "'deviations' must be str, not int"),
-        ({"error": {"type": "E", "message": 3}}, "'error.message' must be str, not int"),
+        ({"seconds": {"total": "long"}}, "'seconds[...]': expected 'float', got 'str'"),
+        ({"stepping": {"wall": [1]}}, "'stepping[...]': expected 'float', got 'list'"),
+        ({"timeline": {"start": {}}}, "'timeline[...]': expected 'float', got 'dict'"),
+        ({"limits": {"timeout": "x"}}, "'limits[...]': expected 'float | None', got 'str'"),
+        ({"resources": {"rss_mb": 3}}, "'resources.rss_mb': expected 'dict | None', got 'int'"),
+        ({"resources": {"samples": "x"}}, "'resources.samples': expected 'int | None', got 'str'"),
+        ({"resources": {"samples": -1}}, "'resources.samples': expected 'int' >= 0"),
+        (
+            {"resources": {"phases": {"load": {"rss_mb": {"mean": "x"}}}}},
+            "'resources.phases[...].rss_mb[...]': expected 'float | None', got 'str'",
+        ),
+        ({"versions": {"engine": 3}}, "'versions[...]': expected 'str', got 'int'"),
+        ({"notes": {"log": ["a"]}}, "'notes.log': expected 'str', got 'list'"),
+        ({"notes": {"untested": {}}}, "'notes.untested': expected 'str', got 'dict'"),
+        ({"deviations": [3]}, "'deviations[0]': expected 'str', got 'int'"),
+        ({"error": {"type": "E", "message": 3}}, "'error.message': expected 'str', got 'int'"),
         ({"schema": 0}, "schema 0 "),
         ({"schema": "x" * 999}, "schema 'xxxx"),
     ],
@@ -118,12 +124,13 @@ def test_a_line_written_twice_counts_once(tmp_path: Path) -> None:
 
 def test_a_record_too_long_to_be_read_keeps_all_but_its_details(tmp_path: Path) -> None:
     path = tmp_path / RECORDS
-    details = {"log": "logs/a.log", "poses": "x" * LARGEST_LINE}
-    RunFolder(path.parent).append(record(1, details=details, metrics={"placed": 0.5}))
+    details = {"poses": "x" * LARGEST_LINE}
+    noted = record(1, details=details, metrics={"placed": 0.5}).noting(log="logs/a.log")
+    RunFolder(path.parent).append(noted)
     (found,) = RunFolder.of(path).read().records
     assert found.metrics == {"placed": 0.5}
-    assert found.details["log"] == "logs/a.log"
-    assert "more than a record may have" in found.details["left_out"]
+    assert found.notes.log == "logs/a.log"
+    assert "more than a record may have" in found.notes.left_out
 
 
 @pytest.mark.parametrize("kind", ["fifo", "device", "link out"])
@@ -202,8 +209,8 @@ def test_thresholds_are_read_back_each_once(tmp_path: Path) -> None:
     [
         (b'{"schema": 1, "task": "po', "the line is damaged and left out: not JSON"),
         (b"\0\0\0", "the line is damaged and left out: it holds NUL bytes"),
-        (b'{"task": 3, "metrics": []}', "'task' must be str, not int"),
-        (b'{"task": "pouring", "metrics": 1}', "'metrics' must be list, not int"),
+        (b'{"task": 3, "metrics": []}', "'task': expected 'str', got 'int'"),
+        (b'{"task": "pouring", "metrics": 1}', "'metrics': expected 'list', got 'int'"),
         (b'{"schema": 9}', "schema 9 was written by a newer pytest-simbench"),
     ],
 )
@@ -213,7 +220,7 @@ def test_a_bad_description_is_told_and_takes_nothing_with_it(
     folder_with(tmp_path, POURING)
     with (tmp_path / TASKS).open("ab") as file:
         file.write(line)
-    other = TaskDescription("baking")
+    other = TaskDescription("baking", ())
     folder_with(tmp_path, other)
     found = RunFolder(tmp_path).read()
     assert found.tasks == {"pouring": POURING, "baking": other}

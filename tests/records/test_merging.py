@@ -77,11 +77,15 @@ def test_what_was_interrupted_is_left_out_and_may_be_in_the_other_part() -> None
     assert [i.record for i in merge({"a": cut, "b": shard(whole, 2, 4)})] == whole
 
 
+def elsewhere(found: Record, file: str) -> Record:
+    return replace(found, test=f"{file}::test_s[e]", function=f"{file}::test_s")
+
+
 def test_the_path_of_the_test_file_does_not_matter() -> None:
-    a = [replace(r, test="suites/test_s.py::test_s[e]") for r in straight(2)]
-    b = [replace(r, test="../x/test_s.py::test_s[e]") for r in straight(2, first=2024)]
+    a = [elsewhere(r, "suites/test_s.py") for r in straight(2)]
+    b = [elsewhere(r, "../x/test_s.py") for r in straight(2, first=2024)]
     assert {item.record.test for item in merge({"a": a, "b": b})} == {"suites/test_s.py::test_s[e]"}
-    both = [*a, *(replace(r, test="other.py::test_s[e]") for r in straight(2))]
+    both = [*a, *(elsewhere(r, "other.py") for r in straight(2))]
     assert len({item.record.test for item in merge({"a": both})}) == 2
 
 
@@ -135,7 +139,7 @@ def test_what_the_numbers_mean_is_merged_and_the_last_wording_holds() -> None:
     placed = Metric("placed", "placed", kind="share", of=15)
     first = {"stacking": TaskDescription("stacking", (placed,))}
     reworded = TaskDescription("stacking", (replace(placed, title="in place", of=6),))
-    second = {"stacking": reworded, "pouring": TaskDescription("pouring")}
+    second = {"stacking": reworded, "pouring": TaskDescription("pouring", ())}
     assert merge_tasks({"a": first, "b": second, "c": {}}) == second
     assert merge_tasks({"b": second, "a": first}) == {**second, **first}
 
@@ -167,6 +171,6 @@ def test_what_a_run_without_a_good_repetition_knows_counts() -> None:
 
 def test_the_whole_has_the_test_id_of_the_first_run() -> None:
     first, second = straight(1), [replace(r, seed=2023) for r in straight(1)]
-    here = [replace(r, test=f"a/t.py::{r.test}") for r in first]
+    here = [replace(r, test=f"a/t.py::{r.test}", function=f"a/t.py::{r.function}") for r in first]
     assert {item.record.test for item in merge({"a": here, "b": second})} == {here[0].test}
     assert {item.record.test for item in merge({"b": second, "a": here})} == {second[0].test}

@@ -80,7 +80,7 @@ def test_numpy_values_nan_and_infinity_become_json() -> None:
 def test_a_missing_key_is_named() -> None:
     data = record().to_dict()
     del data["simulator"]
-    with pytest.raises(RecordError, match="the record has no 'simulator'"):
+    with pytest.raises(RecordError, match="there is no 'simulator'"):
         Record.from_dict(data)
 
 
@@ -98,7 +98,7 @@ def test_what_is_no_record_is_told_word_by_word() -> None:
     for line, said in (
         ("[1]", "here: a record is a JSON object, not list"),
         ("{", "here: not JSON (Expecting property name enclosed in double quotes: "),
-        ("{}", "here: the record has no 'test'"),
+        ("{}", "here: there is no 'test'"),
     ):
         with pytest.raises(RecordError) as caught:
             Record.from_json(line, "here")

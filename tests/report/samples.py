@@ -9,6 +9,7 @@ from typing import Any
 
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Failure, Record
+from tests.records.build import made
 
 STACKING = (
     Metric("placed", "placed", "", "higher", "share", 15, study=True),
@@ -74,14 +75,16 @@ def record(
         "deviations": ("rolling friction is not modelled",) if simulator == "pybullet" else (),
     }
     given.update(changes)
-    return Record(
-        task=task,
-        simulator=simulator,
-        mode=mode,
-        profile=profile,
-        repetition=repetition,
-        metrics=metrics or {},
-        **given,
+    return made(
+        {
+            "task": task,
+            "simulator": simulator,
+            "mode": mode,
+            "profile": profile,
+            "repetition": repetition,
+            "metrics": metrics or {},
+            **given,
+        }
     )
 
 

@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.brief import MOST_LINES, render_brief
 from pytest_simbench.report.matrix import with_wins
@@ -87,7 +88,7 @@ def test_a_run_of_eight_is_a_screen(eight: list[TaskSummary], width: int) -> Non
 
 @pytest.mark.parametrize("width", [60, 80, 140])
 def test_warnings_take_what_is_left_and_say_how_many_more(width: int) -> None:
-    records = run_of_eight(contended=True, reused_worker=True, details={"untested": "an old one"})
+    records = run_of_eight(contended=True, reused_worker=True, notes=Notes(untested="an old one"))
     for n, name in enumerate(EIGHT):
         records += [
             failed(kind, "load", "gone " * 50, simulator=name, repetition=30 + 10 * n + k)

@@ -9,6 +9,7 @@ import pytest
 
 from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Failure, Record
 from pytest_simbench.records.repeatability import Line
 from pytest_simbench.report import changes, markdown, tables
@@ -51,7 +52,7 @@ def records(text: str) -> list[Record]:
                 protocol=text,
                 metrics={text: number / 10},
                 deviations=(text,),
-                details={"log": text, "untested": text},
+                notes=Notes(log=text, untested=text),
                 settings={text: text},
                 versions={text: f"{text}{number}"},
                 host={text: text},

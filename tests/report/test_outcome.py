@@ -71,14 +71,14 @@ def spoilt(**changes: Any) -> str:
     [
         ("", "does not say how the run ended"),
         ("[]", "does not say how the run ended"),
-        ('{"schema": 2}', "of a newer version"),
-        ('{"passed": "yes"}', "none of True, False, None"),
-        ('{"comparison": {}}', "it lacks 'differences'"),
+        ('{"schema": 2}', "written by a newer"),
+        ('{"passed": "yes"}', "'passed': expected 'bool"),
+        ('{"comparison": {}}', "it lacks 'changes'"),
         ('{"comparison": {"differences": [1], "broken": [], "notes": []}}', "does not say"),
         (spoilt(loss="x"), "does not say how the run ended"),
         (spoilt(metric={"name": "x", "title": "x", "kind": "odd"}), "does not say how"),
-        (spoilt(limit={}), "it lacks 'metric'"),
-        (spoilt(test=3), "'test' must be str"),
+        (spoilt(limit={}), "there is no 'metric'"),
+        (spoilt(test=3), "changes[0].test': expected 'str'"),
     ],
 )
 def test_what_is_none_is_told(text: str, told: str, tmp_path: Path) -> None:

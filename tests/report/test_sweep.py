@@ -6,11 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.laws import LAW
 from pytest_simbench.measure.sweep import Swept, sweeps
 from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.phenomena import PHENOMENON
-from pytest_simbench.records.record import OWN_TIMESTEP, Record
+from pytest_simbench.records.readings import Reading
+from pytest_simbench.records.record import Record
 from pytest_simbench.report import markdown, sweep
 from pytest_simbench.report.page.context import page
 from pytest_simbench.report.page.render import render
@@ -24,14 +25,15 @@ STEPS = (0.002, 0.001, 0.0005)
 
 def law(simulator: str, step: float, error: float | None, profile: str = "tuned") -> Record:
     settings = {"timestep": step, PHENOMENON: "free motion"}
-    swept = {} if step == 0.001 else {OWN_TIMESTEP: 0.001}
+    own = None if step == 0.001 else 0.001
     told = {"simulator": simulator, "task": "fall", "profile": profile, "settings": settings}
     if error is None:
-        return failed("Diverged", "measure", "it left the room", details=swept, **told)
-    details = {LAW: {"exact": 1.0, "tolerance": 10 * step}, **swept}
+        noted = Notes(own_timestep=own)
+        return failed("Diverged", "measure", "it left the room", notes=noted, **told)
+    notes = Notes(reading=Reading(1.0, 1.0, 10 * step), own_timestep=own)
     stepping = {"cpu": 1e-5 / step, "simulated": 1.0, "steps": 1 / step}
     metrics = {"error": error, "ratio": error / (10 * step)}
-    return record(metrics=metrics, details=details, stepping=stepping, **told)
+    return record(metrics=metrics, notes=notes, stepping=stepping, **told)
 
 
 RECORDS = [
@@ -88,7 +90,7 @@ def test_the_terminal_tells_the_table_and_what_failed() -> None:
 
 
 def test_laws_at_other_steps_are_in_no_other_table_and_other_tasks_are() -> None:
-    stacking = record(settings={"timestep": 0.5}, details={OWN_TIMESTEP: 0.001})
+    stacking = record(settings={"timestep": 0.5}, notes=Notes(own_timestep=0.001))
     kept = at_own_steps([*RECORDS, stacking])
     assert [(r.simulator, r.settings["timestep"]) for r in kept] == [
         ("mujoco", 0.001), ("ode", 0.001), ("mujoco", 0.5)

@@ -9,7 +9,8 @@ import pytest
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
-from pytest_simbench.records.choices import DataSeen, SeedsSeen, published_again
+from pytest_simbench.records.choices import Seen, published_again
+from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.markdown import render_task as written
 from pytest_simbench.report.summary import summarise
@@ -21,13 +22,12 @@ from tests.tiny import Falling
 TASKS = ("stacking", "throwing", "pushing", "pushing_curve")
 """On whose seeds settings were chosen."""
 
-SEEN = (SeedsSeen("throwing", 2022, 2041), SeedsSeen("stacking", 100, 100))
+SEEN = (Seen.seeds("throwing", 2022, 2041), Seen.seeds("stacking", 100, 100))
 
 
 def run(seeds: Sequence[int], task: str = "throwing", **changes: object) -> list[Record]:
-    declared = {"chosen_on": [seeds_.to_wire() for seeds_ in SEEN]}
     return [
-        record("pybullet", k, task, seed=seed, details=declared, **changes)  # type: ignore[arg-type]
+        record("pybullet", k, task, seed=seed, notes=Notes(chosen_on=SEEN), **changes)  # type: ignore[arg-type]
         for k, seed in enumerate(seeds, start=1)
     ]
 
@@ -70,9 +70,11 @@ def test_a_report_on_other_seeds_or_of_another_task_does_not(
     ],
 )
 def test_a_report_on_the_data_of_choosing_says_so(numbers: Sequence[int], sentence: str) -> None:
-    declared = {"chosen_on": [DataSeen("cube_tosses", 0, 564, 6).to_wire()]}
+    seen = (Seen.motions("cube_tosses", 0, 564, 6),)
     records = [
-        record("pybullet", k, "tossing", details={**declared, "data": ["cube_tosses", number]})
+        record(
+            "pybullet", k, "tossing", notes=Notes(chosen_on=seen, sample=("cube_tosses", number))
+        )
         for k, number in enumerate(numbers, start=1)
     ]
     (found,) = summarise(records, METRICS)
@@ -82,7 +84,7 @@ def test_a_report_on_the_data_of_choosing_says_so(numbers: Sequence[int], senten
 
 
 def test_other_data_of_the_same_numbers_were_not_seen() -> None:
-    seen = DataSeen("cube_tosses", 0, 564, 6)
+    seen = Seen.motions("cube_tosses", 0, 564, 6)
     assert seen.holds("tossing", 1, ("cube_tosses", 6))
     assert not seen.holds("tossing", 6, None)
     assert not seen.holds("tossing", 6, ("other", 6))
@@ -106,9 +108,7 @@ def test_a_record_says_on_what_its_profile_was_chosen(case: Case) -> None:
     made, _ = Repetition(Experiment(case, Falling()), 1).run()
     declared = seeds_seen(case.adapter, case.profile)
     assert declared
-    assert Record.from_json(made.to_json()).details["chosen_on"] == [
-        {"task": seen.task, "first": seen.first, "last": seen.last} for seen in declared
-    ]
+    assert Record.from_json(made.to_json()).notes.chosen_on == declared
 
 
 @pytest.mark.parametrize("name", registered())
@@ -116,9 +116,9 @@ def test_every_adapter_speaks_of_profiles_that_it_has(name: str) -> None:
     cls = adapter(name)
     assert cls.chosen_on.keys() <= cls.profiles.keys()
     for seen in (seen for all_seen in cls.chosen_on.values() for seen in all_seen):
-        assert isinstance(seen, DataSeen) or seen.task in TASKS
+        assert seen.data or seen.task in TASKS
         assert 0 <= seen.first <= seen.last
 
 
 def test_pybullet_admits_the_seeds_of_its_throw() -> None:
-    assert SeedsSeen("throwing", 2022, 2041) in adapter("pybullet").chosen_on["tuned"]
+    assert Seen.seeds("throwing", 2022, 2041) in adapter("pybullet").chosen_on["tuned"]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import series, step_text
+from pytest_simbench.records.series import series
 from pytest_simbench.report import columns, repeatability, sweep, truth
 from pytest_simbench.report.answer import sentences
 from pytest_simbench.report.changes import DIFFERENT
@@ -280,7 +280,7 @@ def _repetition(record: Record, replay: str, video: str) -> dict[str, Any]:
         "seed": str(record.seed),  # JavaScript keeps 53 bits of a number
         "status": record.status,
         "cause": f"{error.cause}: {error.message}" if error else "",
-        "log": str(record.details.get("log") or ""),
+        "log": record.notes.log,
         "command": command(record),
         "replay": replay,
         "video": video,
@@ -291,14 +291,14 @@ def _repetition(record: Record, replay: str, video: str) -> dict[str, Any]:
 def command(record: Record) -> str:
     """What runs the same seed of the same test again; empty where its id is no plain one.
 
-    Settings that `--sim-set` changed are not in it. A profile or a time step in the id is one of
-    several that the run had: a run of this one alone has none there.
+    Settings that `--sim-set` changed are not in it. A profile, a robot or a time step in the id is
+    one of several that the run had: a run of this one alone has none there.
     """
-    file, _, name = record.test.partition("::")
+    file, _, name = record.function.partition("::")
     step = record.settings.get("timestep")
-    test = record.test.replace(f"-{record.mode}-{record.profile}", f"-{record.mode}", 1)
-    if record.swept and isinstance(step, int | float):
-        test = test.replace(f"-dt={step_text(step)}", "", 1)
+    alone = f"{record.function}[{record.simulator}-{record.mode}"
+    ours_first = record.test.startswith(alone)
+    test = f"{'-'.join(filter(None, [alone, record.variant]))}]" if ours_first else record.test
     fine = name and record.test.isprintable() and not file.startswith(("-", "/", "."))
     if not fine or ".." in file or not file.endswith(".py"):
         return ""
@@ -309,6 +309,7 @@ def command(record: Record) -> str:
         f"--sim-profile={record.profile}",
         f"--sim-protocol={record.protocol}",
         f"--sim-jitter={record.jitter:g}",
+        *[f"--sim-robot={record.robot.get('name')}"] * bool(record.robot),
         *["--sim-gui"] * (record.mode == "gui"),
         *[f"--sim-set={record.simulator}.timestep={step!r}"] * record.swept,
     ]

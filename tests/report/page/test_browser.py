@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from pytest_simbench.measure.gate import run_gate
+from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.page import PAGE_NAME, context
@@ -44,8 +45,8 @@ def write(folder: Path, found: list[Record], baseline: list[Record] | None = Non
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of two simulators at two tasks, one of them in both modes, with a baseline."""
     found = [*stacking_run(), *stacking_run("gui"), *throwing_run()]
-    log = {"log": "logs/test_stacking-1.log"}
-    found += [record("drake", k, metrics={"placed": 0.5}, details=log) for k in range(1, 7)]
+    log = Notes(log="logs/test_stacking-1.log")
+    found += [record("drake", k, metrics={"placed": 0.5}, notes=log) for k in range(1, 7)]
     return write(tmp_path_factory.mktemp("run"), found, stacking_run())
 
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.records.record import OWN_TIMESTEP, Record
+from pytest_simbench.records.notes import Notes
+from pytest_simbench.records.record import Record
 from pytest_simbench.report.matrix import with_wins
 from pytest_simbench.report.page import context
 from pytest_simbench.report.page.cells import Table, study
@@ -131,8 +132,8 @@ def test_the_command_runs_the_same_seed_again() -> None:
 
 def test_the_command_runs_one_of_several_profiles_and_time_steps_alone() -> None:
     test = "suites/test_x.py::test_x[mujoco-headless-default-dt=0.5ms-fall]"
-    settings, details = {"timestep": 0.0005}, {OWN_TIMESTEP: 0.001}
-    given = record(test=test, profile="default", settings=settings, details=details)
+    settings, notes = {"timestep": 0.0005}, Notes(own_timestep=0.001)
+    given = record(test=test, profile="default", settings=settings, notes=notes)
     words = shlex.split(command(given))
     assert words[1] == "suites/test_x.py::test_x[mujoco-headless-fall]"
     assert {"--sim-profile=default", "--sim-set=mujoco.timestep=0.0005"} <= set(words)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.experiment.identity import file_stem_of
+from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import Line, append
 from pytest_simbench.report.matrix import with_wins
@@ -175,7 +176,7 @@ def test_results_on_repeatability_stay_texts(tmp_path: Path, plain: str) -> None
     ],
 )
 def test_only_a_log_of_the_run_is_a_link(log: str, linked: bool, tmp_path: Path) -> None:
-    page = made([failed("WorkerDied", "load", "gone", details={"log": log})], tmp_path)
+    page = made([failed("WorkerDied", "load", "gone", notes=Notes(log=log))], tmp_path)
     found = [address for address in addresses(page) if not address.startswith("#")]
     assert found == ([log] if linked else [])
 

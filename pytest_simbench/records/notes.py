@@ -1,0 +1,40 @@
+"""What the tool notes of a repetition; `details` are the task's alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pytest_simbench.records.choices import Sample, Seen
+from pytest_simbench.records.readings import Reading
+
+
+@dataclass(frozen=True)
+class Notes:
+    """What the tool notes of a repetition besides its numbers.
+
+    Attributes:
+        log: the worker's log, a path in the run folder.
+        closing: why the worker did not end well, after the task had.
+        untested: a sentence on a version of the engine that nobody has tested.
+        filmed: whether it was filmed.
+        video, trace: why the film ended early, why the motion was not written.
+        left_out: why its details are not there.
+        own_timestep: the time step that its profile has [s], where a sweep took another one.
+        chosen_on: by what its settings were chosen.
+        sample: the measured motion that it was held against.
+        reading: of a law: measured, right, and the tolerance.
+        lost_nodes: machines of a cluster that were lost with it before, and how.
+    """
+
+    log: str = ""
+    closing: str = ""
+    untested: str = ""
+    filmed: bool = False
+    video: str = ""
+    trace: str = ""
+    left_out: str = ""
+    own_timestep: float | None = None
+    chosen_on: tuple[Seen, ...] = ()
+    sample: Sample | None = None
+    reading: Reading | None = None
+    lost_nodes: tuple[str, ...] = ()
