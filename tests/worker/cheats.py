@@ -70,6 +70,8 @@ CHEATS: dict[str, dict[str, Cheat]] = {
         "lift": _lift,
         "time": lambda s: setattr(s.model.opt, "timestep", s.settings.timestep / 2),
         "snap": _snap,
+        "nudge": lambda s: s.data.qpos.__setitem__(s._body_q[0, 1], 0.005),
+        "clock": lambda s: setattr(s, "pace", 0.5),
     },
     "PyBullet": {
         "friction": _grip,
@@ -98,7 +100,7 @@ def cheating(name: str) -> type[Simulator]:
 
     class Cheating(base):  # type: ignore[misc, valid-type]
         steps = 0
-        planted = False
+        planted, pace = False, 1.0
 
         def load(self, scene: Scene) -> None:
             super().load(scene)
@@ -119,7 +121,7 @@ def cheating(name: str) -> type[Simulator]:
 
         @property
         def time(self) -> float:
-            return self.steps * self.settings.timestep
+            return self.pace * self.steps * self.settings.timestep
 
     return Cheating
 

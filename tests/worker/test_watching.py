@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from pytest_simbench.robot.panda import panda
-from pytest_simbench.scene import Scene
+from pytest_simbench.scene import Scene, Wrench
 from pytest_simbench.worker.server import Server
+from pytest_simbench.worker.watching import Watch
 from pytest_simbench.worker.wire import pack
 from tests.conftest import ADAPTERS
-from tests.worker.cheats import CHEATS, CUBE, LATER, UNTIL
+from tests.worker.cheats import CUBE, LATER, UNTIL
+from tests.worker.toys import Toy
+
+Operation = tuple[str, dict[str, Any]]
+"""A request to a worker, and its arguments."""
 
 SCENE = Scene("flight", (CUBE,), panda())
+
+PUSH = Wrench(force=(0.5, 0.0, 0.5), start=0.1, end=0.4)
 
 BUILT = r"\w+ built another world than the scene describes: "
 FALLS = r"accelerated 'cube' by \(.*, -4\.9\) m/s\^2 at t = {} s, where it flew free and gravity is"
@@ -44,19 +53,25 @@ TOLD = {
 """By cheat and time: the one sentence."""
 
 
-def told(adapter: str, *, seed: int = 1, log_period: float | None = None) -> str:
-    """What ends a repetition in which the cube flies for 0.5 s and lies for 0.7 s."""
+def wait(duration: float, log_period: float | None = None) -> Operation:
+    return "wait", {"duration": duration, "log_period": log_period}
+
+
+def told(
+    adapter: str, *operations: Operation, scene: Scene = SCENE, seed: int = 1, watched: bool = True
+) -> str:
+    """What ends a repetition; by default one in which the cube flies for 0.5 s, then lies."""
     answers: list[Any] = []
     server = Server(answers.append)
+    construct = {"profile": "tuned", "changes": {}, "gui": False, "real_time": False}
     try:
         for op, arguments in (
-            ("construct", {"adapter": adapter, "profile": "tuned", "changes": {}, "gui": False,
-                           "real_time": False}),
-            ("load", {"scene": SCENE.to_wire(), "parity": True}),
-            ("watch", {"seed": seed}),
-            ("wait", {"duration": 1.2, "log_period": log_period}),
+            ("construct", {"adapter": adapter, **construct}),
+            ("load", {"scene": scene.to_wire(), "parity": True}),
+            *([("watch", {"seed": seed})] if watched else []),
+            *(operations or [wait(1.2)]),
             ("read_again", {}),
-        ):  # fmt: skip
+        ):
             server.answer({"op": op, **pack(arguments)})
             if "error" in answers[-1]:
                 return str(answers[-1]["error"]["message"])
@@ -66,7 +81,7 @@ def told(adapter: str, *, seed: int = 1, log_period: float | None = None) -> str
 
 
 @pytest.mark.parametrize(("cheat", "when"), TOLD)
-@pytest.mark.parametrize("engine", CHEATS)
+@pytest.mark.parametrize("engine", ["MuJoCo", "PyBullet"])
 def test_a_cheat_is_told_in_one_sentence(engine: str, cheat: str, when: str) -> None:
     message = told(f"tests.worker.cheats:{engine}_{cheat}_{when}")
     assert re.search(TOLD[cheat, when], message), message
@@ -82,6 +97,57 @@ def test_what_is_undone_again_is_told_by_a_step_drawn_meanwhile(seed: int) -> No
 
 
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
-@pytest.mark.parametrize("log_period", [None, 0.0])
-def test_who_does_not_cheat_is_not_told(engine: str, log_period: float | None) -> None:
-    assert told(ADAPTERS[engine], log_period=log_period) == ""
+@pytest.mark.parametrize(
+    ("scene", "operations"),
+    [
+        (SCENE, [wait(1.2)]),
+        (SCENE, [wait(1.2, 0.0)]),
+        (SCENE, [wait(0.1), ("save", {"name": "a"}), wait(0.8), ("restore", {"name": "a"})]),
+        (Scene("nothing"), [wait(1.2)]),
+        (Scene("arm", robot=panda()), [wait(1.2)]),
+        (Scene("air", (replace(CUBE, linear_damping=2.0),)), [wait(0.4)]),
+        (Scene("wind", (replace(CUBE, wrenches=(PUSH,)),)), [wait(0.5)]),
+    ],
+    ids=["unlogged", "logged", "restored", "nothing", "arm", "air", "pushed"],
+)  # fmt: skip
+def test_who_does_not_cheat_is_not_told(
+    engine: str, scene: Scene, operations: list[Operation]
+) -> None:
+    assert told(ADAPTERS[engine], *operations, scene=scene) == ""
+
+
+def test_a_jump_is_told_by_each_step_of_a_log_and_a_small_one_by_no_less() -> None:
+    """5 mm sideways: in a log of every step, and not in 0.1 s."""
+    adapter = "tests.worker.cheats:MuJoCo_nudge_later"
+    pattern = r"let 'cube' jump: it moved by 0\.00\d+ m in the 0\.001 s before t = 0\.25"
+    assert re.search(pattern, told(adapter, wait(1.2, 0.0)))
+    assert told(adapter) == ""
+
+
+def test_a_clock_that_is_not_the_steps_is_told() -> None:
+    message = told("tests.worker.cheats:MuJoCo_clock_loaded", wait(0.05))
+    assert message == "MuJoCo says that 0.025 s passed in 50 steps of 0.001 s, which are 0.05 s"
+
+
+def test_only_who_is_watched_is_told() -> None:
+    """The kit plants faults of its own, and finds them by its laws."""
+    assert told("tests.worker.cheats:MuJoCo_lift_later", watched=False) == ""
+
+
+def test_steps_are_drawn_in_spans_that_grow() -> None:
+    """In the first second, then up to 4, 16 and 64 s; other ones with another seed."""
+    drawn = []
+    for seed in range(20):
+        toy = Toy()
+        toy.bodies = np.zeros((0, 13))
+        watch = Watch(toy, Scene("toy"), {}, {}, seed)
+        steps = []
+        while toy.steps < 64 / 0.002:
+            steps.append(watch.due)
+            toy.steps = watch.due
+            watch.look(watch.due, toy.joint_state(), toy.bodies)
+        drawn.append(steps)
+        spans = [(0, 500), (500, 2000), (2000, 8000), (8000, 32000)]
+        assert all(a < step <= b for step, (a, b) in zip(steps, spans, strict=False))
+        assert len(steps) >= 4
+    assert len({steps[0] for steps in drawn}) > 10
