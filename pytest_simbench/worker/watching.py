@@ -190,17 +190,17 @@ class Watch:
         fastest = speed.max(axis=1, keepdims=True, initial=0.0)  # it may have pushed the others
         moved = np.linalg.norm(np.diff(bodies[:, :, :3], axis=0), axis=2)
         moved[:, self._led] = 0.0
-        self._explained(moved, fastest, SURGE, spans, times, [(n, "m") for n in self._names])
+        self._explained(moved, fastest, SURGE, spans, times, "m")
         moved = np.abs(np.diff(joints[:, 0], axis=0))
-        names = [(name, "rad or m") for name in self._joints]
-        self._explained(moved, np.abs(joints[:, 1]), JOINT_SURGE, spans, times, names)
+        self._explained(moved, np.abs(joints[:, 1]), JOINT_SURGE, spans, times, "rad or m")
 
     def _explained(
-        self, moved: FloatArray, speed: FloatArray, surge: float, spans: Any, times: Any, names: Any
+        self, moved: FloatArray, speed: FloatArray, surge: float, spans: Any, times: Any, unit: str
     ) -> None:
         most = (np.maximum(speed[1:], speed[:-1]) + surge) * spans[:, None]
         for at, row in np.argwhere(~(moved <= most)):
-            (name, unit), limit = names[row], most[at, min(row, most.shape[1] - 1)]
+            name = (self._names if unit == "m" else self._joints)[row]
+            limit = most[at, min(row, most.shape[1] - 1)]
             raise ParityError(
                 f"{self._title} let {name!r} jump: it moved by {moved[at, row]:.3g} {unit} in the "
                 f"{spans[at]:.4g} s before t = {times[at]:.3f} s, where the speeds explain "

@@ -7,6 +7,7 @@ later, and at `UNTIL` it is undone (friction alone). What ends with a step is do
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import pybullet
@@ -99,6 +100,7 @@ def cheating(name: str) -> type[Simulator]:
     base, plant = ENGINES[engine], CHEATS[engine][cheat]
 
     class Cheating(base):  # type: ignore[misc, valid-type]
+        info = replace(base.info, name=name.lower())
         steps = 0
         planted, pace = False, 1.0
 
