@@ -106,6 +106,6 @@ def test_pytest_tells_who_cheats(pytester: pytest.Pytester) -> None:
         [
             "*MuJoCo changed gravity while it ran: *-9.80665] when it was loaded, *-4.903325] at*",
             "*PyBullet changed body/left/mass while it ran: 0.1* when it was loaded, 1.* at t = *",
-            "*_loaded built another world than the scene describes: timestep: scene 0.001, *0.0005*",
+            "*built another world than the scene describes: timestep: scene 0.001, * 0.0005*",
         ]
     )

@@ -23,7 +23,7 @@ LATER = 0.25
 UNTIL = 0.9
 """Simulated time at which what is planted a while ends [s]."""
 
-CUBE = Box("cube", (0.05,) * 3, Pose.at(1.2, 0.0, 1.0), mass=0.1, linear_velocity=(0.5, 0.0, 1.0))
+CUBE = Box("cube", (0.05,) * 3, Pose.at(1.2, 0.0, 1.0), mass=0.1, linear_velocity=(0.7, 0.0, 1.0))
 TARGET = (1.5, 0.0, 0.025)
 
 Cheat = Callable[[Any], None]
