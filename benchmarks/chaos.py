@@ -108,6 +108,13 @@ FAULTS = (
     Fault("surrogate message", cause=("EngineFailed", "\\ud800")),
     Fault("endless recursion", cause=("EngineFailed", "RecursionError")),
     Fault("state not a number", cause=("Diverged", "not finite")),
+    *(Fault(f"state {what}", cause=("BadState", "float64")) for what in ("of nothing", "a text")),
+    *(
+        Fault(f"time {what}", cause=("BadState", "the time must be"))
+        for what in ("not a number", "infinite", "stands still", "runs back", "jumps")
+    ),
+    Fault("versions of numbers", cause=("ProtocolError", "$.versions"), phase="launch"),
+    Fault("fork that answers", cause=("ProtocolError", "engine forks"), phase=None),
     Fault("wrong shape", cause=("BadState", "float64 (2, 13)"), phase="load"),
     Fault("wrong type of number", cause=("BadState", "float32"), phase="load"),
     Fault("bodies in another order", cause=("BadState", "order"), phase="load"),
@@ -115,6 +122,9 @@ FAULTS = (
     Fault("memory refused", cause=("OutOfMemory", "allocate")),
     Fault("slow", cause=("RepetitionTimeout", "--sim-timeout")),
     Fault("child left behind", "ok"),
+    Fault("child stopped, left behind", "ok"),
+    Fault("child stopped, waited for", cause=HUNG),
+    Fault("SIGSEGV of a child", cause=("EngineFailed", "SIGSEGV")),
     Fault("daemon left behind", "ok"),
     Fault("full disk for the log", "ok"),
     Fault("log deleted", "ok"),

@@ -116,6 +116,25 @@ def without_folder() -> None:
     os.rmdir(folder)
 
 
+def fork() -> None:
+    """The child answers, too, and first."""
+    if os.fork():
+        time.sleep(1.0)
+
+
+def child(number: int | None = None, wait: bool = False) -> Callable[[], None]:
+    """A child that gets a signal, and may be waited for, as by an engine with a server."""
+
+    def fault() -> None:
+        started = subprocess.Popen(SLEEPER)
+        if number is not None:
+            started.send_signal(number)
+        if wait and started.wait():
+            raise subprocess.CalledProcessError(started.returncode, "engine")
+
+    return fault
+
+
 def signalled(number: int) -> Callable[[], None]:
     return lambda: os.kill(os.getpid(), number)
 
@@ -142,7 +161,11 @@ STEPPING: dict[str, Callable[[], None]] = {
     "endless recursion": recurse,
     "memory up to the limit": eat,
     "memory refused": eat_at_once,
-    "child left behind": lambda: subprocess.Popen(SLEEPER) and None,
+    "child left behind": child(),
+    "child stopped, left behind": child(signal.SIGSTOP),
+    "child stopped, waited for": child(signal.SIGSTOP, wait=True),
+    "SIGSEGV of a child": child(signal.SIGSEGV, wait=True),
+    "fork that answers": fork,
     "daemon left behind": daemon,
     "full disk for the log": without_disk,
     "log deleted": lambda: os.unlink(os.readlink("/proc/self/fd/1")),
@@ -159,11 +182,27 @@ LATER: dict[str, Callable[[], None]] = {
 
 STATES: dict[str, Callable[[FloatArray], Any]] = {
     "state not a number": lambda b: b * np.nan,
+    "state of nothing": lambda b: None,
+    "state a text": str,
     "wrong shape": lambda b: b[:, :7],
     "wrong type of number": lambda b: b.astype(np.float32),
     "bodies in another order": lambda b: b[::-1].copy(),
 }
-"""What becomes of the bodies' state; the first one from the moment on."""
+"""What becomes of the bodies' state; the first of them from the moment on."""
+
+TIMES: dict[str, Callable[[float], Any]] = {
+    "time not a number": lambda t: np.nan,
+    "time infinite": lambda t: np.inf,
+    "time stands still": lambda t: Chaos.at,
+    "time runs back": lambda t: 2 * Chaos.at - t,
+    "time jumps": lambda t: t + 100.0,
+}
+"""What becomes of the time, from the moment on."""
+
+ANSWERS: dict[str, Callable[[dict[str, str]], Any]] = {
+    "versions of numbers": lambda found: {**found, "numpy": 2},
+}
+"""What becomes of the versions."""
 
 
 class Chaos(Simulator):
@@ -204,9 +243,18 @@ class Chaos(Simulator):
 
     def body_state(self) -> FloatArray:
         state = super().body_state()  # type: ignore[safe-super]
-        if self.fault == "state not a number" and self.time < self.at:
+        if self.fault in tuple(STATES)[:3] and super().time <= self.at:
             return state
         return STATES.get(self.fault, lambda b: b)(state)  # type: ignore[no-any-return]
+
+    @property
+    def time(self) -> float:
+        now: float = super().time  # type: ignore[safe-super]
+        change = TIMES.get(self.fault) if now > self.at else None
+        return change(now) if change else now
+
+    def versions(self) -> dict[str, str]:
+        return ANSWERS.get(self.fault, lambda found: found)(super().versions())  # type: ignore[no-any-return]
 
     def close(self) -> None:
         if self.fault == "exception while closing":

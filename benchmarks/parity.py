@@ -21,8 +21,9 @@ from pytest_simbench.simulator.parity import ParityResult
 from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.testing import CHECKS, Subject
 from pytest_simbench.testing.expected import read_expected_failures, reason_for
-from pytest_simbench.testing.faults import FAULTS, Fault, rounds
+from pytest_simbench.testing.faults import FAULTS, rounds
 from pytest_simbench.testing.parity import planted
+from pytest_simbench.testing.robot_faults import Fault
 
 PAGE = Path(__file__).parent.parent / "docs" / "parity.md"
 EXPECTED = read_expected_failures(PAGE.parents[1] / "tests" / "sims" / "expected_failures.txt")
@@ -58,6 +59,9 @@ IN_TIME: dict[str, tuple[str, Capability | None]] = {
     "links that are to collide do not": ("links_collide_when_asked", Capability.SELF_COLLIDE),
     "links that one joint joins collide": ("links_collide_when_asked", Capability.SELF_COLLIDE),
     "joint wrenches are in the link's axes": ("joint_loads_are_told", Capability.JOINT_WRENCHES),
+    "a cube is welded to the closed hand": ("pulled_grip_slips", None),
+    "what the hand let go falls with half its weight": ("thrown_cube_flies_free", None),
+    "a released cube snaps to its place": ("released_cube_is_let_be", None),
 }
 """The law that finds a fault of what happens in time, and the capability that it needs."""
 

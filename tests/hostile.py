@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 import unicodedata
 
 from markdown_it import MarkdownIt
@@ -18,6 +19,8 @@ HOSTILE = (
     "---", "- - -", "> quote", "```\ncode", "~~~", "&lt;b&gt;", "&amp;", "a\\", "\\[x](y)",
     "=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", ' "=1"', "a;=1", 'a; "=1"', "\uff1d1",
     "[red]x[/red]", "a\n\n# b", "x\x00y", "\u2028\u2029\x85", "A" * 5000, "\x1b" * 5000, "",
+    "a\n::error::owned", "::add-mask::x", "x " * 40 + "::stop-commands::x", "##[error]",
+    "##vso[x]y", "  ::warning file=a::b",
 )  # fmt: skip
 
 FORMULA = tuple("=+-@\t\r\uff1d\uff0b\uff0d\uff20")
@@ -45,8 +48,13 @@ PLAIN = {
 """What our own headings, lists, paragraphs and tables are made of."""
 
 
+COMMAND = re.compile(r"(?m)^\s*::[a-z-]+.*?::|##\[|##vso\[")
+"""What GitHub's and Azure's runners take for a command in a log."""
+
+
 def assert_harmless_terminal(text: str) -> None:
-    """Nothing but printable characters and line ends."""
+    """Nothing but printable characters and line ends; no command to a CI service."""
+    assert not COMMAND.search(text)
     for char in text.replace("\n", ""):
         assert unicodedata.category(char)[0] != "C", repr(char)
         assert char.isprintable(), repr(char)

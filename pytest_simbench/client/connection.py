@@ -33,6 +33,12 @@ OPENED = object()
 
 _END = object()
 
+BOOTSTRAP = "import sys;exec("
+"""How execnet's text for an interpreter begins, on this machine and through ssh."""
+
+SAFE = "import sys;sys.path[:1]=filter(None,sys.path[:1]);exec("
+"""The same without the folder where the interpreter stands, like the option -P."""
+
 MOST_WAITING = 16
 """Messages that may wait to be read. A worker answers one request at a time: more is a flood."""
 
@@ -79,7 +85,6 @@ class Connection:
         self._inbox: SimpleQueue[Any] = SimpleQueue()
         self._channel: Any = None
         self._cut = False
-        self._simulated: float | None = None
         self._spec = execnet.XSpec(spec or "popen//execmodel=main_thread_only")
         if not spec:  # not in the text, where a // in a path would end it
             self._spec.python = shlex.quote(python or sys.executable)
@@ -105,6 +110,9 @@ class Connection:
 
     def _start(self, command: list[str], **pipes: Any) -> subprocess.Popen[bytes]:
         """Called by execnet, in the thread of `open`."""
+        # What lies where pytest was started must not hide modules, nor can -P be said to a Python
+        # before 3.11: the text that it runs drops its path's first entry before it imports.
+        command = [part.replace(BOOTSTRAP, SAFE) for part in command]
         with contextlib.ExitStack() as stack:
             if self._log is not None:
                 with contextlib.suppress(OSError):  # a full disk must not stop the worker
@@ -120,8 +128,7 @@ class Connection:
     def _arrived(self, message: Any) -> None:
         """Called by execnet's thread with each message."""
         if isinstance(message, dict) and "alive" in message:
-            if message["alive"] != self._simulated:  # time that stands still is no sign of life
-                self._simulated, self.heard = message["alive"], time.monotonic()
+            self.heard = time.monotonic()
         elif self.on_frame is not None and isinstance(message, dict) and "frame" in message:
             self.on_frame(message["frame"])
             self.heard = time.monotonic()
@@ -191,6 +198,8 @@ class Connection:
         def work() -> None:
             with contextlib.suppress(Exception):
                 self._group.terminate(timeout=GOODBYE_TIMEOUT)
+            with contextlib.suppress(Exception):  # takes an error that execnet would print else
+                self._channel.waitclose(GOODBYE_TIMEOUT)
 
         self.status(GOODBYE_TIMEOUT)
         thread = threading.Thread(target=work, name="simbench-close", daemon=True)

@@ -12,7 +12,7 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import distributions
 from pathlib import Path
@@ -20,6 +20,7 @@ from pathlib import Path
 from pytest_simbench.client import installing, package_index
 from pytest_simbench.client.system import SystemPython
 from pytest_simbench.ground.versions import RELEASE, VersionedName
+from pytest_simbench.records.paths import write_whole
 from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.info import SimulatorInfo, alternatives, importable, no_module
 
@@ -94,6 +95,21 @@ class Environment:
         """Environment variables that keep compiled kernels between runs."""
         return cache_variables(self.info.caches, self.folder / "cache")
 
+    def check(self) -> None:
+        """Complain of what can be known before anything is made.
+
+        Raises:
+            SimulatorError: it needs none, something else is in its place, or there is no such
+                release.
+        """
+        if not self.info.requirements:
+            raise SimulatorError(
+                f"{self.info.name} needs no environment of its own: {self.info.install}"
+            )
+        if wrong := foreign(self.folder):
+            raise SimulatorError(wrong)
+        self._check_release()
+
     def create(self, tell: installing.Tell = lambda text: None) -> None:
         """Make it anew, unless another process has made it meanwhile.
 
@@ -101,26 +117,22 @@ class Environment:
             tell: shows progress: lines that end, and lines that the next one overwrites.
 
         Raises:
-            SimulatorError: there is no such release, or the packages do not install; what is
-                there stays half installed.
+            SimulatorError: see `check`; or the packages do not install, or the folder cannot be
+                written to; what is there stays half installed.
         """
-        if not self.info.requirements:
-            raise SimulatorError(
-                f"{self.info.name} needs no environment of its own: {self.info.install}"
-            )
-        self._check_release()
+        self.check()
         with installing.alone(self.folder, tell):
             if self.folder.exists() and self.problem is None:
                 return
             began = time.monotonic()
             try:
                 installing.install(self.folder, self.info.requirements, tell)
-            except SimulatorError as error:
+                marker = {"requirements": list(self.info.requirements)}
+                write_whole(self.folder, MARKER, f"{json.dumps(marker)}\n".encode())
+            except (SimulatorError, OSError) as error:
                 raise SimulatorError(
                     f"the environment of {self.info.name} is only half installed: {error}"
                 ) from None
-            marker = {"requirements": list(self.info.requirements)}
-            (self.folder / MARKER).write_text(json.dumps(marker) + "\n", "utf-8")
             tell(f"{installing.progress(self.folder, time.monotonic() - began)}\n")
 
     def _check_release(self) -> None:
@@ -137,12 +149,37 @@ class Environment:
             raise SimulatorError(f"{self.info.name}: {problem}")
 
 
+def create_all(environments: Sequence[Environment], tell: installing.Tell) -> None:
+    """Make those that are not ready, once nothing is wrong with any of them.
+
+    Raises:
+        SimulatorError: see `Environment.create`.
+    """
+    wanted = [environment for environment in environments if environment.problem]
+    for environment in wanted:
+        environment.check()
+    for environment in wanted:
+        environment.create(tell)
+
+
+def foreign(folder: Path) -> str:
+    """That something else is in an environment's place, as a sentence; empty if nothing is."""
+    if folder.is_symlink():
+        return f"{folder} is a link, which is left alone; remove it, then there is room for ours"
+    if os.path.lexists(folder) and not folder.is_dir():
+        return f"{folder} is no folder; move it away, then there is room for an environment"
+    return ""
+
+
 def remove(folder: Path) -> None:
     """Take an environment off the disk, with what it has compiled.
 
     Raises:
+        SimulatorError: a link is in its place.
         OSError: somebody else's files.
     """
+    if wrong := foreign(folder):
+        raise SimulatorError(wrong)
     with installing.alone(folder, lambda text: None):
         # Without its marker, what a break leaves is half installed.
         (folder / MARKER).unlink(missing_ok=True)

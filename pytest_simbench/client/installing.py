@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from pytest_simbench.client.package_index import pip_configuration
+from pytest_simbench.records.paths import opened
 from pytest_simbench.simulator.errors import SimulatorError
 
 LOOK_PERIOD = 0.5
@@ -44,9 +45,16 @@ def alone(folder: Path, tell: Tell) -> Iterator[None]:
     """Only one process makes an environment at a time; another one waits until that is done.
 
     The lock ends with its process, however that ends.
+
+    Raises:
+        SimulatorError: their folder cannot be written to.
     """
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    lock = os.open(folder.with_name(f".{folder.name}.lock"), os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        lock = opened(folder.parent, f".{folder.name}.lock", os.O_RDWR | os.O_CREAT)
+    except OSError as error:
+        raise SimulatorError(
+            f"environments cannot be made in {folder.parent} ({error.strerror})"
+        ) from None
     try:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -81,8 +89,8 @@ def install(folder: Path, requirements: Sequence[str], tell: Tell) -> None:
         ]  # fmt: skip
     else:
         variables = {}
-        pip = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-        commands = [[sys.executable, "-m", "venv", str(folder)], [*pip, *requirements]]
+        pip = [python, "-P", "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+        commands = [[sys.executable, "-P", "-m", "venv", str(folder)], [*pip, *requirements]]
     began = time.monotonic()
     for command in commands:
         _run(command, variables, lambda: tell(progress(folder, time.monotonic() - began)))

@@ -154,7 +154,7 @@ def pip_configuration() -> dict[str, str]:
 
     Environment variables win over the user's file, and that over the machine's, as in pip.
     """
-    command = [sys.executable, "-m", "pip", "config", "list", "--disable-pip-version-check"]
+    command = [sys.executable, "-P", "-m", "pip", "config", "list", "--disable-pip-version-check"]
     answer = subprocess.run(command, capture_output=True, text=True, check=False).stdout
     found: dict[str, str] = {}
     for line in answer.splitlines():

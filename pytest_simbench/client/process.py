@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import importlib.util
+import shutil
 import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import psutil
 from packaging.utils import canonicalize_version
 
 from pytest_simbench import __version__
 from pytest_simbench.client import bootstrap, reaper
+from pytest_simbench.client.answers import checked
 from pytest_simbench.client.connection import Connection, RemoteError
 from pytest_simbench.client.crowding import crowding
 from pytest_simbench.client.errors import (
@@ -77,9 +80,11 @@ class WorkerProcess:
         self.where = where
         self.deadline = deadline
         self.busy = False
+        self._asked = 0
         self.pid: int | None = None
         self.python_version = ""
         self._mark = reaper.new_mark()
+        self._temporary = reaper.folder_of(self._mark)
         self._family: set[psutil.Process] = set()
         self._reason: tuple[type[WorkerError], str] | None = None
         self._ended = False
@@ -87,7 +92,11 @@ class WorkerProcess:
         self._connection = Connection(
             launch.spec,
             launch.python,
-            {**launch.environment, reaper.VARIABLE: self._mark},
+            {
+                **({"TMPDIR": str(self._temporary)} if self._temporary else {}),
+                **launch.environment,
+                reaper.VARIABLE: self._mark,
+            },
             launch.log,
         )
         made(self)
@@ -146,17 +155,27 @@ class WorkerProcess:
         if self._connection.unread and not self._ended:
             self._unread()
         self.busy = True
-        self._connection.send({"op": operation, **pack(arguments)})
+        self._asked += 1
+        self._connection.send({"op": operation, "number": self._asked, **pack(arguments)})
         answer = self._next(timeout, self._hung)
         self.busy = False
         try:
-            if "error" in answer:
+            if answer["number"] != self._asked:
+                problem = (
+                    f"request {self._asked} ({operation}) got the answer to request "
+                    f"{answer['number']:d}; this happens where an engine forks and its child "
+                    "answers, too"
+                )
+            elif "error" in answer:
                 error = self._remote_error(answer["error"])
+                problem = ""
             else:
-                return unpack(answer["ok"])
+                return checked(operation, unpack(answer["ok"]))
+        except msgspec.ValidationError as wrong:
+            problem = f"the answer to {operation!r} has a wrong type: {wrong}; mend the adapter"
         except Exception:
-            raise self._ended_by(ProtocolError, f"unreadable answer {answer!r:.80}") from None
-        raise error
+            problem = f"unreadable answer {answer!r:.80}"
+        raise self._ended_by(ProtocolError, problem) if problem else error
 
     def construct(
         self,
@@ -182,7 +201,7 @@ class WorkerProcess:
             WorkerError: as `request`; its engine is of another version than the simulator's name
                 says.
         """
-        answer = self.request(
+        constructed: Constructed = self.request(
             "construct",
             timeout=timeout,
             adapter=adapter or self.launch.adapter,
@@ -191,7 +210,6 @@ class WorkerProcess:
             gui=gui,
             real_time=real_time,
         )
-        constructed = Constructed(**answer)
         if problem := _another_release(self.where.simulator, constructed.versions):
             raise self._ended_by(WorkerStartError, problem)
         return constructed
@@ -235,6 +253,7 @@ class WorkerProcess:
         began = time.monotonic()
         limit = self.launch.stall_timeout if timeout is None else timeout
         while True:
+            shorten_log(self.launch.log)
             # Signs of life put the end off, unless the request as a whole is limited.
             since = max(began, self._connection.heard) if timeout is None else began
             now, until, error = time.monotonic(), since + limit, late
@@ -245,7 +264,7 @@ class WorkerProcess:
             try:
                 return self._connection.receive(min(until - now, LOOK_PERIOD))
             except TimeoutError:
-                shorten_log(self.launch.log)
+                continue
             except EOFError:
                 raise self._exited() from None
             except Exception as problem:  # of starting, of sending, or out of the bootstrap there
@@ -368,6 +387,9 @@ class WorkerProcess:
                 process.kill()
         self._connection.cut()
         self._connection.close()
+        shorten_log(self.launch.log)
+        if self._temporary is not None:
+            shutil.rmtree(self._temporary, ignore_errors=True)
         self._ended = True
 
     def _know_family(self) -> None:

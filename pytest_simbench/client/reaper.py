@@ -12,14 +12,17 @@ import atexit
 import contextlib
 import os
 import select
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import uuid
 from collections.abc import Iterable
 from itertools import count
+from pathlib import Path
 
 import psutil
 
@@ -29,6 +32,9 @@ VARIABLE = "PYTEST_SIMBENCH_WORKER"
 REAP_TIMEOUT = 5.0
 """Wall time in which the marked must be gone [s]: the kernel ends them within milliseconds, unless
 they hang in a driver, and then nobody can end them."""
+
+FOLDERS = "simbench-"
+"""Before the mark, in the name of a process's temporary folder."""
 
 PARENT_PERIOD = 1.0
 """Wall time between two looks whether the parent still lives [s]; usually its pipe tells first."""
@@ -55,14 +61,20 @@ class _Run:
                 stderr=subprocess.DEVNULL,
                 start_new_session=True,
             )
+        self._script.send_signal(signal.SIGCONT)  # somebody may have stopped it
 
     def _dismiss(self) -> None:
-        if self._script is None or self.pid != os.getpid():
+        script = self._script
+        if script is None or self.pid != os.getpid():
             return
-        assert self._script.stdin is not None
-        with contextlib.suppress(OSError, subprocess.TimeoutExpired):
-            self._script.stdin.close()
-            self._script.wait(2 * REAP_TIMEOUT)
+        assert script.stdin is not None
+        with contextlib.suppress(OSError):
+            script.stdin.close()
+        script.send_signal(signal.SIGCONT)
+        try:
+            script.wait(2 * REAP_TIMEOUT)
+        except subprocess.TimeoutExpired:
+            script.kill()
 
 
 _run: _Run | None = None
@@ -77,6 +89,18 @@ def new_mark() -> str:
             _run = _Run()
         _run.watch()
         return f"{_run.mark}.{next(_run.numbers)}"
+
+
+def folder_of(mark: str) -> Path | None:
+    """A new folder for the temporary files of what carries the mark; None where none can be made.
+
+    Whoever ends the process removes it. The script removes those of a run that was killed.
+    """
+    with contextlib.suppress(OSError):
+        folder = Path(tempfile.gettempdir(), f"{FOLDERS}{mark}")
+        folder.mkdir(0o700)
+        return folder
+    return None
 
 
 def marked(mark: str) -> list[psutil.Process]:
@@ -139,6 +163,9 @@ def main(mark: str) -> None:
         if readable and not os.read(0, 1):
             break
     reap(mark)
+    with contextlib.suppress(OSError):
+        for folder in Path(tempfile.gettempdir()).glob(f"{FOLDERS}{mark}.*"):
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 if __name__ == "__main__":

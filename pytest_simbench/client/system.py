@@ -23,8 +23,9 @@ TIMEOUT = 30.0
 """For an interpreter to look round, on a busy machine [s]."""
 
 PROBE = """
-import importlib.metadata, importlib.util, json, sys
+import sys
 sys.path[:] = [entry for entry in sys.path if entry]  # nor does a worker look where it stands
+import importlib.metadata, importlib.util, json
 distribution, *modules = sys.argv[1:]
 try:
     version = importlib.metadata.version(distribution)

@@ -16,6 +16,7 @@ from pytest_simbench.client.frame import Frame
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.stopwatch import Stopwatch
 from pytest_simbench.scene import FloatArray, Pose, Scene, Trajectory
+from pytest_simbench.scene.checks import check_number
 from pytest_simbench.scene.plausibility import implausible
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.files import FileError
@@ -27,6 +28,10 @@ TRACE_PERIOD = 0.02
 PART = 2.0
 """A sampled wait is asked for in parts of this simulated time [s]: the worker holds the samples of
 one. Those of a minute took 27 MB there, which looked like the simulator's memory."""
+
+
+LONGEST = 1e9
+"""A wait [s]."""
 
 
 @dataclass(frozen=True)
@@ -173,13 +178,23 @@ class World:
     def follow(self, trajectory: Trajectory, *, log_period: float | None = None) -> Motion | None:
         """Have the robot follow a trajectory; the motion sampled every `log_period` [s] (0: each
         step, None: no samples)."""
+        __tracebackhide__ = True
         return self._move("follow", log_period, **vars(trajectory))
 
     def wait(self, duration: float, *, log_period: float | None = None) -> Motion | None:
-        """Let `duration` [s] of simulated time pass under the last command."""
+        """Let `duration` [s] of simulated time pass under the last command.
+
+        Raises:
+            SceneError: the duration is no number, not finite, or negative.
+        """
+        __tracebackhide__ = True
+        check_number(duration, "the duration [s] of a wait", 0.0, LONGEST)
         return self._move("wait", log_period, duration=float(duration))
 
     def _move(self, operation: str, log_period: float | None, **arguments: Any) -> Motion | None:
+        __tracebackhide__ = True
+        if log_period is not None:
+            check_number(log_period, "the log_period [s] of a motion", 0.0)
         period = log_period if log_period is not None else self._trace_period
         requests = [arguments]
         if operation == "wait" and period is not None:

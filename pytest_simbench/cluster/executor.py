@@ -33,7 +33,7 @@ from pytest_simbench.experiment.identity import (
 from pytest_simbench.experiment.repetition import Hooks
 from pytest_simbench.recordings.trace import FOLDER as TRACES
 from pytest_simbench.records.notes import Notes
-from pytest_simbench.records.paths import FolderError, inside
+from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Failure, Record, Status
 from pytest_simbench.worker.text import told
 
@@ -267,10 +267,8 @@ class RemoteRepetition:
         if data is None or Path(name).parent != Path(folder):
             return ""
         try:
-            path = inside(self.case.folder, name)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(data)
-        except (OSError, FolderError) as error:
+            write_whole(self.case.folder, name, data)
+        except OSError as error:
             return told(error)
         return ""
 

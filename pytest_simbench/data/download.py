@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import tarfile
 import urllib.error
 import urllib.request
+import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import IO
@@ -17,7 +19,7 @@ TIMEOUT = 60.0
 """Longest silence of the server [s]."""
 
 LARGEST = 2**30
-"""Of all files of a set together [bytes]."""
+"""Of an archive, packed or not, with what is not wanted of it [bytes]."""
 
 
 def digest(files: Mapping[str, bytes]) -> str:
@@ -42,7 +44,7 @@ def download(wanted: DataSet, folder: Path, tell: Callable[[str], None] = print)
     try:
         with urllib.request.urlopen(wanted.url, timeout=TIMEOUT) as answer:
             files = _wanted(answer, wanted.files)
-    except (OSError, EOFError, tarfile.TarError) as error:
+    except (OSError, EOFError, zlib.error, tarfile.TarError) as error:
         reason = getattr(error, "reason", None) or str(error) or type(error).__name__
         raise DataError(f"{wanted.name} cannot be downloaded from {wanted.url}: {reason}") from None
     found = digest(files)
@@ -59,18 +61,36 @@ def download(wanted: DataSet, folder: Path, tell: Callable[[str], None] = print)
     tell(f"{wanted.name}: {len(files)} files, {sum(map(len, files.values())) / 1e6:.0f} MB, kept")
 
 
+class Limited:
+    """What a server sends, until it is more than `LARGEST`: names and headers count too, and what
+    nobody wants."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+        self._taken = 0
+
+    def read(self, size: int = -1) -> bytes:
+        """The next bytes.
+
+        Raises:
+            DataError: these are too many.
+        """
+        data = self._file.read(size)
+        self._taken += len(data)
+        if self._taken > LARGEST:
+            raise DataError("the archive is larger than any data set")
+        return data
+
+
 def _wanted(archive: IO[bytes], beginnings: tuple[str, ...]) -> dict[str, bytes]:
     """The regular files of an archive whose paths begin so, without the archive's own folder."""
     files: dict[str, bytes] = {}
-    size = 0
-    with tarfile.open(fileobj=archive, mode="r|gz") as packed:
+    plain = Limited(gzip.GzipFile(fileobj=Limited(archive)))  # type: ignore[call-overload]
+    with tarfile.open(fileobj=plain, mode="r|") as packed:  # type: ignore[call-overload]
         for member in packed:
             path = member.name.partition("/")[2]
             content = packed.extractfile(member) if path.startswith(beginnings) else None
             if content is None or not member.isreg():
                 continue
-            size += member.size
-            if size > LARGEST:
-                raise DataError("the archive is larger than any data set")
             files[path] = content.read()
     return files

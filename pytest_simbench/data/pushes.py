@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from pytest_simbench.data.errors import DataError
 from pytest_simbench.data.tosses import Half
+from pytest_simbench.records.paths import whole, write_whole
 from pytest_simbench.scene import FloatArray
 from pytest_simbench.simulator.files import FileError, read_arrays
 
@@ -190,7 +191,6 @@ def convert(files: Mapping[str, bytes], folder: Path) -> None:
         OSError: the folder cannot be written to.
     """
     there = folder / FOLDER
-    (there / "meshes").mkdir(parents=True, exist_ok=True)
     arrays: dict[str, np.ndarray] = {}
     names = []
     for path, content in sorted(files.items()):
@@ -201,11 +201,10 @@ def convert(files: Mapping[str, bytes], folder: Path) -> None:
             arrays |= {f"{names[-1]}/time": time, f"{names[-1]}/hand": hand}
             arrays[f"{names[-1]}/cube"] = cube
         else:
-            (there / ("meshes" if file.suffix == ".STL" else "") / file.name).write_bytes(content)
-    partial = there / "runs.partial"
-    with partial.open("wb") as packed:
+            place = "meshes" if file.suffix == ".STL" else "."
+            write_whole(there, f"{place}/{file.name}", content)
+    with whole(there, FILES[0]) as packed:
         np.savez_compressed(packed, runs=np.array(names), **arrays)  # type: ignore[arg-type]
-    partial.replace(there / FILES[0])
 
 
 def _table(content: bytes, path: str) -> tuple[FloatArray, FloatArray, FloatArray]:

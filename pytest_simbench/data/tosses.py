@@ -13,6 +13,7 @@ import numpy as np
 
 from pytest_simbench.data.errors import DataError
 from pytest_simbench.data.torch_file import read_tensor
+from pytest_simbench.records.paths import whole
 from pytest_simbench.scene import FloatArray, Pose, Vector3
 from pytest_simbench.simulator.files import FileError, read_arrays
 
@@ -187,15 +188,13 @@ def convert(files: Mapping[str, bytes], folder: Path) -> None:
 
 def write(path: Path, indices: Sequence[int], states: Sequence[FloatArray]) -> None:
     """Write tosses, whole or not at all."""
-    partial = path.with_suffix(".partial")
-    with partial.open("wb") as file:
+    with whole(path.parent, path.name) as file:
         np.savez_compressed(
             file,
             toss_index=np.array(indices, np.int64),
             length=np.array([len(state) for state in states], np.int64),
             state=np.concatenate(states),
         )
-    partial.replace(path)
 
 
 def _state(tensor: FloatArray, number: int) -> FloatArray:

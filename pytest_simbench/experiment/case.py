@@ -13,6 +13,7 @@ from pytest_simbench.client.environments import Environment, interpreter
 from pytest_simbench.client.launch import Launch
 from pytest_simbench.experiment.protocol import PROTOCOLS, Protocol
 from pytest_simbench.ground.names import file_name
+from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.series import short
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator.registry import adapter, address
@@ -123,8 +124,7 @@ class Case:
         """
         log = self.folder / "logs" / f"{name}.log"
         try:
-            log.parent.mkdir(parents=True, exist_ok=True)
-            log.unlink(missing_ok=True)
+            write_whole(self.folder, f"logs/{name}.log", b"")  # a new one, no link: others append
         except OSError:  # a full disk must not stop the worker
             log = Path(os.devnull)
         return Launch(

@@ -22,6 +22,7 @@ from pytest_simbench.client.tape import ARRAYS, Operation
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.text import in_one_line
+from pytest_simbench.records.paths import write_whole
 from pytest_simbench.robot.registry import BUILT_IN as ROBOTS
 from pytest_simbench.scene import Scene
 from pytest_simbench.simulator.errors import SimulatorError
@@ -84,7 +85,7 @@ def write_example(
         OSError: the folder cannot be written to.
     """
     test = os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" ")[0]
-    path = case.folder / FOLDER / f"{file_name(name, test, case.test)}.json"
+    file = f"{FOLDER}/{file_name(name, test, case.test)}.json"
     world = scene.to_wire()
     if scene.robot is not None and scene.robot.name in ROBOTS:
         world["robot"] = {k: v for k, v in world["robot"].items() if k not in ROBOT_FILES}
@@ -95,9 +96,8 @@ def write_example(
         "scene": world,
         "tape": [operation.to_wire() for operation in tape],
     }
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(example) + "\n", encoding="utf-8")
-    return path
+    write_whole(case.folder, file, f"{json.dumps(example)}\n".encode())
+    return case.folder / file
 
 
 def read_example(

@@ -3,11 +3,15 @@ stays without them, and goes the same way where the engine is deterministic."""
 
 from __future__ import annotations
 
+import os
+
+from pytest_simbench.client.errors import WorkerError
 from pytest_simbench.experiment.camera import Camera
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import file_stem
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.recordings import album, film
+from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.worker.text import named
@@ -36,9 +40,13 @@ def photograph(experiment: Experiment, *, pictures: bool = True, video: bool = F
     if told := draws(case.simulator):
         return told
     stem = file_stem(experiment, 1)
-    paths = case.folder / album.FOLDER / f"{stem}.npz", case.folder / film.FOLDER / f"{stem}.mp4"
-    taken = album.Album() if pictures and not paths[0].exists() else None
-    filmed = film.Film(paths[1]) if video and not paths[1].exists() else None
+    names = f"{album.FOLDER}/{stem}.npz", f"{film.FOLDER}/{stem}.mp4"
+    try:
+        there = [os.path.lexists(inside(case.folder, name)) for name in names]
+    except FolderError as wrong:
+        return f"{case.simulator}: no pictures and no videos: {wrong}"
+    taken = album.Album() if pictures and not there[0] else None
+    filmed = film.Film(case.folder, names[1]) if video and not there[1] else None
     if taken is None and filmed is None:
         return ""
     camera = Camera(taken, filmed, experiment.task.pictured)
@@ -48,8 +56,11 @@ def photograph(experiment: Experiment, *, pictures: bool = True, video: bool = F
         raise error
     if taken is not None and taken.pictures:
         try:
-            taken.write(paths[0])
+            taken.write(case.folder, names[0])
         except OSError as wrong:
             error = error or wrong
-    problem = camera.problem if error is None else named(error)
+    problem = camera.problem
+    if error is not None:  # without the log's last lines, and their traceback
+        what = error.what if isinstance(error, WorkerError) else ""
+        problem = f"{type(error).__name__}: {what}" if what else named(error)
     return f"{case.simulator}: pictures end early: {problem}" if problem else ""

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import platform
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 from pytest_simbench.client.errors import (
@@ -29,6 +25,7 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import file_stem, record_of, settings
 from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.workers import IdleWorkers
+from pytest_simbench.ground.host import host
 from pytest_simbench.recordings import film
 from pytest_simbench.recordings.trace import FOLDER, Trace
 from pytest_simbench.records.notes import Notes
@@ -238,6 +235,7 @@ class Repetition:
         self, outcome: Outcome, error: BaseException | None, resources: dict[str, Any]
     ) -> Record:
         case, total = self.case, self.stopwatch.elapsed()
+        python = self._process.python_version if self._process else ""
         stepping = self._stats.get("stepping", {})
         seconds = {
             k: self.stopwatch.seconds.get(k, 0.0) for k in ("launch", "compile", "load", "plan")
@@ -259,14 +257,12 @@ class Repetition:
             self.number,
             status=_status(error),
             settings=self._constructed.settings or settings(case),
-            versions={
-                **({"python": self._process.python_version} if self._process else {}),
-                **self._constructed.versions,
-            },
+            versions={**({"python": python} if python else {}), **self._constructed.versions},
             error=None if error is None else _failure(error, self.where),
             metrics=outcome.metrics,
             details=outcome.details,
             notes=notes,
+            reasons=outcome.reasons,
             seconds=seconds,
             stepping=stepping,
             timeline={} if self._world is None else self._world.timeline,
@@ -289,7 +285,7 @@ class Repetition:
         if self.case.video not in ("on", "retain-on-failure"):
             return None
         name = file_stem(self.experiment, self.number)
-        return Camera(film=film.Film(self.case.folder / film.FOLDER / f"{name}.mp4"))
+        return Camera(film=film.Film(self.case.folder, f"{film.FOLDER}/{name}.mp4"))
 
     def _end_film(self, *, failed: bool) -> dict[str, Any]:
         """What the record tells of it: that there was one, and why it ended early."""
@@ -325,7 +321,7 @@ class Repetition:
         name = file_stem(self.experiment, self.number)
         try:
             trace = Trace.of(world.scene, Motion.joined(world.trace), world.phases)
-            trace.write(case.folder / FOLDER / f"{name}.npz")
+            trace.write(case.folder, f"{FOLDER}/{name}.npz")
         except (OSError, DescriptionError) as error:
             return f"the trace could not be written: {named(error)}"
         return ""
@@ -354,17 +350,3 @@ def _failure(error: BaseException, where: Where) -> Failure:
         message = readable(error.what, 2 * LONGEST)  # shortened where it arose
         return Failure(type(error).__name__, message, error.phase, error.log_tail)
     return Failure(readable(type(error).__name__), told(error), where.phase)
-
-
-@cache
-def host() -> dict[str, Any]:
-    """The machine, as far as it bears on times."""
-    model = platform.processor() or platform.machine()
-    try:
-        for line in Path("/proc/cpuinfo").read_text().splitlines():
-            if line.startswith("model name"):
-                model = line.partition(":")[2].strip()
-                break
-    except OSError:
-        pass
-    return {"system": platform.system(), "cpu": model, "cores": os.cpu_count() or 0}

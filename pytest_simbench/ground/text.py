@@ -26,7 +26,8 @@ def for_terminal(text: str, longest: int = LONGEST_LINE) -> str:
 
     Escape sequences and other control characters, marks that reverse the direction of reading and
     lone surrogates are written as Python writes them (`\x1b`), any white space as a blank. A line
-    of more than `longest` characters is cut and says so.
+    of more than `longest` characters is cut and says so. No line is a command to a CI service that
+    reads the log (GitHub, Azure).
     """
     return "\n".join(_line(line, longest) for line in text.replace("\r\n", "\n").split("\n"))
 
@@ -76,11 +77,18 @@ _LINKED = re.compile(r":(?=//)|@(?=\S)|\\#(?=\d)|\bGH-(?=\d)|www(?=\.)", re.IGNO
 _BLOCK = re.compile(r"^(?:\d{1,9}(?=[.)](?:\s|$))|(?=[-+=](?:[-+=\s]|$)))")
 """Where a backslash keeps a line from being a list or a rule."""
 
+_COMMAND = re.compile(
+    r":(?=:(?:add-[a-z]+|debug|echo|endgroup|error|group|notice|remove-matcher|save-state|set-[a-z]+"
+    r"|stop-commands|warning)\b)|#(?=#(?:\[|vso\[))"
+)
+"""How a command begins, wherever wrapping may put it (GitHub: workflow commands, `##[` in older
+runners; Azure: logging commands)."""
+
 _FORMULA = re.compile(r"(?:^|;)(?=[\"\s]*[=+\-@\uff1d\uff0b\uff0d\uff20])")
 
 
 def _line(text: str, longest: int) -> str:
-    shown = text[:longest]
+    shown = _COMMAND.sub(lambda found: f"\\x{ord(found[0]):02x}", text[:longest])
     if not shown.isprintable():
         shown = "".join(
             char if char.isprintable() else " " if char.isspace() else ascii(char)[1:-1]

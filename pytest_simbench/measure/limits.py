@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from numbers import Real
 
 from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric, significant
 
@@ -110,8 +111,8 @@ def check_threshold(metric: Metric, value: float) -> None:
     Raises:
         LimitError: it is no finite number, or lies outside what the metric can be.
     """
-    if not math.isfinite(value):
-        raise LimitError(f"a threshold of {metric.name} is a finite number, not {value:g}")
+    if not isinstance(value, Real) or not math.isfinite(value):
+        raise LimitError(f"a threshold of {metric.name} is a finite number, not {value!r:.80}")
     if metric.bounded and not 0 <= value <= 1:
         hint = f"; did you mean {significant(value / 100)}?" if 1 < value <= 100 else ""
         raise LimitError(

@@ -44,10 +44,14 @@ class ResultSet:
     Attributes:
         error: probability, at most, that a verdict on a claim is wrong.
         strict: whether a claim that is not decided fails (`--sim-strict`).
+        warns: whether a claim that is not decided is told by a warning: not where a run tells of
+            all claims together.
+        judged: the claims that were made, and what came of them.
     """
 
     error: float = ERROR
     strict: bool = False
+    warns: bool = True
 
     def __init__(self, records: Iterable[Record], metrics: Iterable[Metric]) -> None:
         self.records: tuple[Record, ...] = tuple(records)
@@ -55,6 +59,7 @@ class ResultSet:
         self._costs = {metric.name: metric for metric in COSTS if metric.name not in self.metrics}
         self._intervals: dict[tuple[str, float], Interval] = {}
         self._ok: tuple[tuple[Record, ...], tuple[Record, ...]] = ((), ())
+        self.judged: list[tuple[Metric, Judgement]] = []
 
     def __len__(self) -> int:
         return len(self.records)
@@ -180,6 +185,8 @@ class ResultSet:
     def assert_between(self, name: str, low: float, high: float) -> None:
         """Fail when the true mean is outside `low`..`high`; shares are in 0..1."""
         __tracebackhide__ = True
+        for value in (low, high):
+            check_threshold(self.metric(name), value)
         if low > high:
             raise ValueError(f"{name} cannot lie between {low:g} and {high:g}: low is above high")
         self._assert(name, at_least(low), at_most(high))
@@ -220,6 +227,7 @@ class ResultSet:
     ) -> None:
         """Fail, warn or say nothing."""
         __tracebackhide__ = True
+        self.judged += [(metric, judgement) for judgement in found]
         for judgement in found:
             if judgement.verdict is Verdict.REFUTED:
                 wrong = "below" if judgement.claim.relation == "at least" else "above"
@@ -231,7 +239,8 @@ class ResultSet:
                 text = f"{measured()}: {judgement.verdict} whether {claim}, {judgement.advice}"
                 if self.strict:
                     raise AssertionError(f"{text} (--sim-strict)")
-                warnings.warn(text, InconclusiveWarning, stacklevel=4)
+                if self.warns:
+                    warnings.warn(text, InconclusiveWarning, stacklevel=4)
 
     def _assert_recorded(self) -> None:
         __tracebackhide__ = True

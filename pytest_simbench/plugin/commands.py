@@ -35,7 +35,12 @@ def run_command(config: pytest.Config) -> int:
         _robots,
     )  # fmt: skip
     commands = dict(zip(options.COMMANDS, actions, strict=True))
-    return next(do(config) for name, do in commands.items() if options.given(config, name))
+    name = next(name for name in commands if options.given(config, name))
+    try:
+        return commands[name](config)
+    except KeyboardInterrupt:
+        print(f"\n{options.option(name).flag}: interrupted; nothing that it read was changed")
+        return int(pytest.ExitCode.INTERRUPTED)
 
 
 def _list(config: pytest.Config) -> int:
@@ -92,8 +97,9 @@ def _here(selection: Selection, name: str) -> str:
     except Exception:  # not there, or metadata that nobody can read
         found = None
     place = other.place if other else "installed"
-    untested = "" if info.tested(found or "") else ", UNTESTED"
-    return f"version {found or 'unknown'}{untested}, {place}"
+    if not found:  # no Python package tells it: the engine does, when it runs
+        return f"version not known before it runs, {place}"
+    return f"version {found}{'' if info.tested(found) else ', UNTESTED'}, {place}"
 
 
 def _size(info: SimulatorInfo) -> str:

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from pytest_simbench.client.environments import Environment, default_folder, existing, remove
+from pytest_simbench.client.environments import (
+    Environment,
+    create_all,
+    default_folder,
+    existing,
+    remove,
+)
 from pytest_simbench.client.installing import size_mb
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.plugin import options
@@ -16,11 +22,11 @@ from pytest_simbench.simulator.registry import adapter
 def install(config: pytest.Config) -> int:
     """`--sim-install`: make the environments of simulators, also of releases of them."""
     with options.refusing(SimulatorError):
-        for name in options.value(config, "sim_install"):
-            environment = Environment.of(adapter(name).info)
-            if environment.problem:
-                environment.create(progress())
-            print(f"{name}: {environment.info.title} {environment.version()} is ready")
+        names = options.value(config, "sim_install")
+        found = {name: Environment.of(adapter(name).info) for name in names}
+        create_all(list(found.values()), progress())
+    for name, environment in found.items():
+        print(f"{name}: {environment.info.title} {environment.version()} is ready")
     return 0
 
 
@@ -37,7 +43,8 @@ def uninstall(config: pytest.Config) -> int:
     for name in dict.fromkeys(names):
         size = size_mb(there[name])
         try:
-            remove(there[name])
+            with options.refusing(SimulatorError, "--sim-uninstall"):
+                remove(there[name])
         except OSError as error:
             raise pytest.UsageError(f"{there[name]} cannot be removed: {error.strerror}") from None
         print(f"{name}: removed, {size:.0f} MB")

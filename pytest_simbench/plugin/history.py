@@ -10,7 +10,7 @@ import pytest
 
 from pytest_simbench import __version__
 from pytest_simbench.client.package_index import newest_of_minors, releases
-from pytest_simbench.experiment.repetition import host
+from pytest_simbench.ground.host import host
 from pytest_simbench.ground.names import digest
 from pytest_simbench.plugin import options
 from pytest_simbench.plugin.values import Releases

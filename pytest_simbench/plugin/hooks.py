@@ -125,13 +125,14 @@ pytest_runtest_call = pytest_runtest_setup
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: Any) -> Any:
     outcome = yield
-    if call.when == "call":
-        session_of(item.config).attach(item.nodeid, outcome.get_result())
+    session_of(item.config).attach(item, outcome.get_result())
 
 
 @pytest.hookimpl(trylast=True)  # xdist has heard all its workers then
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    session_of(session.config).finish(session)
+    ours = session_of(session.config)
+    with ours.sparing():
+        ours.finish(session)
 
 
 @pytest.hookimpl(optionalhook=True, wrapper=True)
@@ -143,7 +144,9 @@ def pytest_benchmark_group_stats(config: pytest.Config) -> Generator[None, Any, 
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, exitstatus: int) -> None:
-    session_of(terminalreporter.config).summarise(terminalreporter, exitstatus)
+    ours = session_of(terminalreporter.config)
+    with ours.sparing():
+        ours.summarise(terminalreporter, exitstatus)
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:

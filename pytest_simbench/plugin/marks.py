@@ -7,11 +7,12 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.ground.text import in_one_line
 from pytest_simbench.ground.versions import covers
 from pytest_simbench.plugin import options
 from pytest_simbench.plugin.selection import Selection
 from pytest_simbench.plugin.values import BadValue, shown
-from pytest_simbench.plugin.variants import Variant
+from pytest_simbench.plugin.variants import Variant, named
 from pytest_simbench.simulator import registry
 from pytest_simbench.simulator.info import Capability
 
@@ -109,6 +110,24 @@ def _names(mark: pytest.Mark, node: Any) -> list[str]:
     with options.refusing(registry.UnknownSimulatorError, f"{node.nodeid}: {mark.name}"):
         registry.check_names(map(str, mark.args))
     return list(mark.args)
+
+
+def told(item: pytest.Item, report: pytest.TestReport, profiles: int) -> dict[str, Any]:
+    """Plain data of a claim: that a test of a simulator failed as a whole, and why."""
+    variant = item.callspec.params["sim_case"]  # type: ignore[attr-defined]
+    function, others = named(item, variant.id_with(profiles))
+    crash = getattr(report.longrepr, "reprcrash", None)
+    message = crash.message if crash else str(report.longrepr)
+    return {
+        "test": item.nodeid,
+        "function": function,
+        "variant": others,
+        "simulator": variant.simulator,
+        "mode": variant.mode,
+        "profile": variant.profile,
+        "verdict": "FAIL",
+        "advice": in_one_line(message.split("\n")[0]),
+    }
 
 
 KEYWORDS = {"skip_sim": ("reason",), "xfail_sim": ("reason",)}

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import stat
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,11 +23,13 @@ from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.plugin import options, recording
 from pytest_simbench.records.folder import RECORDS, TASKS, Reading, RunFolder
 from pytest_simbench.records.merging import Merged, MergeError, merge, merge_tasks
-from pytest_simbench.records.paths import FolderError, new_name
+from pytest_simbench.records.paths import FolderError, new_name, opened, whole
 from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.report import history, repeatability, sweep
 from pytest_simbench.report.brief import render_brief
 from pytest_simbench.report.changes import render_terminal
+from pytest_simbench.report.claims import Claims, claims_of
+from pytest_simbench.report.claims import lines as lines_of
 from pytest_simbench.report.files import (
     Written,
     in_order,
@@ -139,7 +142,7 @@ def merge_runs(config: pytest.Config) -> int:
         passed = together([outcome.passed for outcome in outcomes])
         problems += [*wrong, write_outcome(folder.path, Outcome(passed))]
         problems.append(publish(config, kept, passed))
-        _print(config, written.summaries, written.sweeps, problems)
+        _print(config, written.summaries, written.sweeps, problems, written.claims)
         if written.complete and not unsaved:
             print(where(folder.path / PAGE_NAME, config.invocation_params.dir))
     finally:
@@ -166,18 +169,27 @@ def report_runs(config: pytest.Config) -> int:
     tables, problems = ([], []) if others else repeatability.write_tables(folder.path, target)
     if not (whole.records or tables or problems):
         raise pytest.UsageError(f"--sim-report {first}: it holds no repetition")
+    compared = None if others else outcomes[0].compared
+    claims = claims_of(whole, compared[1] if compared else None)
     if target is not None:
         run = None if others else folder.path
-        compared = None if others else outcomes[0].compared
         written = write_files(
-            target, summaries, in_order(whole.records), True, compared, run, histories, sweeps
+            target,
+            summaries,
+            in_order(whole.records),
+            True,
+            compared,
+            run,
+            histories,
+            sweeps,
+            claims,
         )
     recorded = [*wrong, publish(config, whole.records, together([o.passed for o in outcomes]))]
     if target is not None and not others:
         recorded += recording.record(config, folder.path, target, whole.records)
     elif options.value(config, recording.RECORD):
         recorded.append("no recordings: join the runs with --sim-merge first")
-    _print(config, summaries, sweeps, [*runs.problems, *written.problems, *recorded])
+    _print(config, summaries, sweeps, [*runs.problems, *written.problems, *recorded], claims)
     width = shutil.get_terminal_size().columns
     for line in history.lines(histories, width):
         print(for_terminal(line))
@@ -216,8 +228,11 @@ def _print(
     summaries: Sequence[TaskSummary],
     sweeps: Sequence[Swept],
     problems: list[str],
+    claims: Claims | None,
 ) -> None:
     verbose, width = config.get_verbosity() > 0, shutil.get_terminal_size().columns
+    if claims:
+        print(lines_of(claims, width) + "\n")
     print((render_run if verbose else render_brief)(summaries, width))
     if sweeps:
         told = (sweep.whole if verbose else sweep.brief)(sweeps, width)
@@ -268,7 +283,7 @@ def _copy(records: list[Merged], folders: dict[str, RunFolder], to: RunFolder) -
             *((name.format(was), name.format(stem)) for name in BESIDE),
         ):
             try:
-                if source and _copied(folder.inside(source), to, target) and source == log:
+                if source and _copied(folder, source, to, target) and source == log:
                     kept = target
             except FolderError as error:
                 refused.setdefault(f"not copied: {error}")
@@ -276,20 +291,19 @@ def _copy(records: list[Merged], folders: dict[str, RunFolder], to: RunFolder) -
     return list(refused)
 
 
-def _copied(source: Path, folder: RunFolder, target: str) -> bool:
+def _copied(folder: RunFolder, source: str, to: RunFolder, target: str) -> bool:
     """Copy an ordinary file; a log that is missing makes no result wrong.
 
     Raises:
-        FolderError: the target would lie outside of the folder.
+        FolderError: one of them would lie outside of its folder.
     """
-    path = folder.inside(target)
+    folder.inside(source), to.inside(target)
     try:
-        if not source.is_file():
-            return False
-        path.parent.mkdir(parents=True, exist_ok=True)
-        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
-        with source.open("rb") as old, open(os.open(path, flags, 0o666), "wb") as new:
-            shutil.copyfileobj(old, new)
+        with open(opened(folder.path, source), "rb") as old:
+            if not stat.S_ISREG(os.fstat(old.fileno()).st_mode):
+                return False
+            with whole(to.path, target) as new:
+                shutil.copyfileobj(old, new)
     except OSError:
         return False
     return True

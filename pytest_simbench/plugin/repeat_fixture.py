@@ -16,6 +16,8 @@ from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.sequential import Plan, SequentialResultSet
 from pytest_simbench.ground.text import in_one_line
 from pytest_simbench.measure.results import ResultSet
+from pytest_simbench.measure.verdicts import Judgement
+from pytest_simbench.measure.verdicts import Verdict as DataVerdict
 from pytest_simbench.plugin import options, recording
 from pytest_simbench.plugin.arguments import can_do
 from pytest_simbench.plugin.benchmark import give_rounds
@@ -23,7 +25,9 @@ from pytest_simbench.plugin.marks import number_mark
 from pytest_simbench.plugin.resume import NotResumed
 from pytest_simbench.plugin.run import Run
 from pytest_simbench.plugin.session import session_of
+from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import TaskDescription
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.tasks.base import Task
 
@@ -69,6 +73,7 @@ class RepeatFixture:
             result = ResultSet(up_to(int(number or self.case.protocol.repetitions)), metrics)
         recording.photograph(self.node.config, experiment, result.records, self.run.tell)
         result.strict = options.value(self.node.config, "sim_strict")
+        result.warns = False
         self.results.append(result)
         return result
 
@@ -97,8 +102,38 @@ class RepeatFixture:
         """Tell pytest-benchmark, where there is one, and JUnit; called when the test has ended."""
         for result in self.results:
             self.node.user_properties.extend(_properties(result))
+            for metric, judgement in result.judged:
+                claim = claim_of(self.case, result, metric, judgement)
+                self.run.folder.claim(claim)
+                title = in_one_line(f"claim {metric.name} {judgement.claim}")
+                self.node.user_properties.append((title, claim.verdict))
         if self.results and benchmark is not None:
             give_rounds(benchmark, self.results, self.described.values())
+
+
+def claim_of(case: Case, result: ResultSet, metric: Metric, judgement: Judgement) -> Claim:
+    """What the run folder keeps of a claim."""
+    verdict = {DataVerdict.SUPPORTED: "PASS", DataVerdict.REFUTED: "FAIL"}
+    bounds = judgement.interval
+    return Claim(
+        test=case.test,
+        function=case.function,
+        variant=case.variant,
+        simulator=case.simulator,
+        mode=case.mode,
+        profile=case.profile,
+        task=result.records[0].task,
+        metric=metric.name,
+        relation=judgement.claim.relation,
+        threshold=judgement.claim.value,
+        verdict=verdict.get(judgement.verdict, "UNDECIDED"),  # type: ignore[arg-type]
+        mean=bounds.mean,
+        low=bounds.low,
+        high=bounds.high,
+        n=bounds.n,
+        crashed=len(result.failures),
+        advice=judgement.advice,
+    )
 
 
 @contextmanager

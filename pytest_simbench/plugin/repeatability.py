@@ -70,7 +70,7 @@ class ReplayFixture:
         with suppress(OSError):
             label = f"{case.simulator} {case.mode} {case.profile}"
             sample = Sample.of(result.first, label, episodes.task.name, case.seed)
-            sample.save(case.folder / FOLDER / f"{case.short_name}.npz")
+            sample.save(case.folder, f"{FOLDER}/{case.short_name}.npz")
         _keep("replay", episodes, result.to_wire())
         return result
 

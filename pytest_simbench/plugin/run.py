@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from functools import cached_property
 from pathlib import Path
@@ -26,6 +26,7 @@ from pytest_simbench.plugin.compare import Comparison
 from pytest_simbench.plugin.history import elsewhere, folder_of
 from pytest_simbench.plugin.merge import publish
 from pytest_simbench.plugin.resume import Resumed, folder_to_resume
+from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import Threshold
 from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import FolderError, new_name
@@ -33,6 +34,7 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import NAME
 from pytest_simbench.report import markdown, sweep
 from pytest_simbench.report.brief import render_brief
+from pytest_simbench.report.claims import lines as lines_of
 from pytest_simbench.report.files import write_outcome, write_report
 from pytest_simbench.report.github import append_summary
 from pytest_simbench.report.history import lines
@@ -253,6 +255,12 @@ class Run:
         """Take over records that came with a report, from an xdist worker for instance."""
         self.folder.take_over(Record.from_json(line) for line in lines)
 
+    def fail(self, tests: Iterable[Mapping[str, Any]]) -> None:
+        """Keep that tests failed as a whole."""
+        if self.folder.locked:
+            for test in tests:
+                self.folder.claim(Claim.from_dict(test))
+
     def complete(self) -> None:
         """Read what all processes wrote; called when all tests have ended."""
         shared = self.config.pluginmanager.has_plugin("dsession")
@@ -281,9 +289,13 @@ class Run:
         problems += [*written.problems, cluster.lost(self.reading.records)]
         if written.summaries or written.sweeps:
             changes = comparison.markdown() if comparison else ""
-            page = markdown.render_run(written.summaries, sweeps=written.sweeps)
+            page = markdown.render_run(
+                written.summaries, sweeps=written.sweeps, claims=written.claims
+            )
             problems.append(append_summary("\n".join([changes, page])))
             reporter.write_sep("=", "simulator comparison")
+            if written.claims:
+                reporter.write_line(lines_of(written.claims, reporter._tw.fullwidth) + "\n")
             verbose = self.config.get_verbosity() > 0
             show = render_run if verbose else render_brief
             reporter.write_line(show(written.summaries, reporter._tw.fullwidth))

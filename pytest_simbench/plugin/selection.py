@@ -94,6 +94,12 @@ class Selection:
             return None
         return environments.missing(registry.adapter(name).info)
 
+    def unusable(self, name: str) -> str | None:
+        """Why a simulator cannot run in any of the profiles. Tests in those that one lacks are
+        skipped, with the reason."""
+        reasons = [self.missing(name, (profile,)) for profile in self.profiles]
+        return reasons[0] if all(reasons) else None
+
     def _settings(self, name: str, profile: str) -> Settings:
         """Of a simulator, in a profile, as the user changed them.
 
@@ -173,17 +179,12 @@ def _select(config: pytest.Config) -> Selection:
         if refused := selection._settings_problem(name):
             raise pytest.UsageError(refused)
     for name in names:
-        reason = selection.missing(name)
-        if reason:
+        if reason := selection.unusable(name):
             raise pytest.UsageError(reason)
     if asked or names:
         return selection
-    here = [
-        name
-        for name in selection.simulators
-        if not all(selection.missing(name, (profile,)) for profile in selection.profiles)
-    ]
-    return replace(selection, simulators=tuple(here))
+    here = tuple(name for name in selection.simulators if not selection.unusable(name))
+    return replace(selection, simulators=here)
 
 
 def _installs(config: pytest.Config) -> bool:

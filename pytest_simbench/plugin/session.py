@@ -5,7 +5,9 @@ Imported at plugin load: standard library and pytest only; everything else is im
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+import shlex
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +49,7 @@ class SimSession:
         self.problems: list[str] = []
         self.comparison: Comparison | None = None
         self._received: list[str] = []
+        self._failed: list[dict[str, Any]] = []
 
     @cached_property
     def selection(self) -> Selection:
@@ -176,14 +179,39 @@ class SimSession:
         node.workerinput["simbench_folder"] = str(run.folder.path.absolute())
         node.workerinput["simbench_problem"] = run.problem
 
-    def attach(self, test: str, report: Any) -> None:
-        """Have a test's records travel with its report, to an xdist controller for instance."""
-        if self.begun and (lines := self.run.of_test(test)):
+    def attach(self, item: pytest.Item, report: Any) -> None:
+        """Have a test's records travel with its report, to an xdist controller for instance; and of
+        one that failed what it was of."""
+        if not self.begun:
+            return
+        if report.when == "call" and (lines := self.run.of_test(item.nodeid)):
             report.simbench = lines
+        if report.failed and "sim_case" in fixtures_of(item):
+            from pytest_simbench.plugin.marks import told
+
+            report.simbench_failed = told(item, report, len(self.selection.profiles))
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Keep the records that came with a report until all tests have ended."""
+        """Keep what came with a report until all tests have ended."""
         self._received += getattr(report, "simbench", ())
+        failed = getattr(report, "simbench_failed", None)
+        if failed and not self.in_worker:
+            self._failed.append(failed)
+
+    @contextmanager
+    def sparing(self) -> Iterator[None]:
+        """While results are put together: Ctrl-C ends that with one sentence."""
+        try:
+            yield
+        except KeyboardInterrupt:
+            if not self.begun or self.in_worker:
+                raise
+            folder = self.run.folder.path
+            pytest.exit(
+                f"interrupted while the report was made; the records are kept in {folder}, and "
+                f"pytest --sim-report {shlex.quote(str(folder))} makes the report",
+                returncode=pytest.ExitCode.INTERRUPTED,
+            )
 
     def finish(self, session: pytest.Session) -> None:
         """Compare with the baseline; a metric that is worse than allowed fails the run, and so does
@@ -192,6 +220,7 @@ class SimSession:
             self.run.receive(self._received)
         if not self.begun or self.in_worker:
             return
+        self.run.fail(self._failed)
         self.run.complete()
         if self.comparison is not None and self.run.reading.records:
             self.comparison.make(self.run.reading)

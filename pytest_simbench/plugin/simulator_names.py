@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 import pytest
 
-from pytest_simbench.client.environments import Environment, outside
+from pytest_simbench.client.environments import Environment, create_all, outside
 from pytest_simbench.client.system import OLDEST, look_into
 from pytest_simbench.ground.versions import BUILD, RELEASE, VersionedName, base_name
 from pytest_simbench.plugin.interpreters import interpreter_path
@@ -105,10 +105,8 @@ def install_missing(names: Iterable[str], tell: Callable[[str], None]) -> None:
     Raises:
         SimulatorError: one cannot be made.
     """
-    for name in names:
-        environment = outside(adapter(name).info)
-        if isinstance(environment, Environment) and environment.problem:
-            environment.create(tell)
+    found = [outside(adapter(name).info) for name in names]
+    create_all([place for place in found if isinstance(place, Environment)], tell)
 
 
 def progress() -> Callable[[str], None]:

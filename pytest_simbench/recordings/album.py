@@ -70,8 +70,8 @@ class Album:
         order = sorted(self.pictures, key=self.times.__getitem__)
         self.pictures = {name: self.pictures[name] for name in order}
 
-    def write(self, path: Path) -> None:
-        """Write the file, whole or not at all.
+    def write(self, folder: Path, name: str) -> None:
+        """Write a file of a run folder, whole or not at all.
 
         Raises:
             OSError: it cannot be written.
@@ -81,8 +81,7 @@ class Album:
         taken = {f"picture_{k}": picture for k, picture in enumerate(self.pictures.values())}
         times = np.array([self.times[name] for name in self.pictures], dtype=float)
         np.savez_compressed(file, phases=names, times=times, **taken)  # type: ignore[arg-type]
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, file.getvalue())
+        write_whole(folder, name, file.getvalue())
 
     @classmethod
     def read(cls, path: Path) -> Album:

@@ -15,6 +15,7 @@ paths to mesh files would not travel.
 from __future__ import annotations
 
 import shutil
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -60,7 +61,7 @@ def write_bag(trace: Trace, folder: Path, told: dict[str, str] | None = None) ->
 
     Args:
         trace: of a repetition.
-        folder: of the bag.
+        folder: of the bag; the one above it is there, and no link.
         told: texts for the bag's metadata (`custom_data`), by name.
 
     Raises:
@@ -71,8 +72,7 @@ def write_bag(trace: Trace, folder: Path, told: dict[str, str] | None = None) ->
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
 
-    part = folder.with_name(f".{folder.name}.part")
-    shutil.rmtree(part, ignore_errors=True)
+    part = Path(tempfile.mkdtemp(".part", ".", folder.parent))
     inner = part / folder.name  # rosbags names the file like its folder
     try:
         writer = Writer(inner, version=9, storage_plugin=StoragePlugin.MCAP)

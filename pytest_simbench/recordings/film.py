@@ -5,8 +5,8 @@ A second of the film is a second of simulated time.
 
 from __future__ import annotations
 
+import io
 import threading
-from contextlib import suppress
 from fractions import Fraction
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from pytest_simbench.records.paths import write_whole
 
 INSTALL = "videos need PyAV: pip install 'pytest-simbench[video]'"
 
@@ -46,21 +48,23 @@ def check_available() -> None:
 
 
 class Film:
-    """One film, written picture by picture.
+    """One film, picture by picture; a minute takes some megabytes of memory.
 
     Args:
-        path: of the file; it is there when the film is whole.
+        folder: of the run.
+        name: of the file in it; it is there when the film is whole.
 
     Attributes:
         frames: pictures so far.
         problem: why there are no more, as a sentence.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, folder: Path, name: str) -> None:
+        self.path = folder / name
+        self._place = folder, name
         self.frames = 0
         self.problem = ""
-        self._part = path.with_name(f".{path.name}.part")
+        self._content = io.BytesIO()
         self._lock = threading.Lock()  # pictures come in a thread of the worker's connection
         self._over = False
         self._file: Any = None
@@ -88,12 +92,11 @@ class Film:
                         self._file.mux(self._stream.encode(None))
                     self._file.close()
                     if keep and not self.problem:
-                        self._part.replace(self.path)
+                        write_whole(*self._place, self._content.getvalue())
             except (OSError, ValueError) as error:
                 self._failed(error)
             self._file = None
-            with suppress(OSError):
-                self._part.unlink()
+            self._content.close()
 
     def _failed(self, error: Exception) -> None:
         self.problem = f"{self.path} could not be written ({error})"
@@ -102,10 +105,7 @@ class Film:
         import av
 
         if self._file is None:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = av.open(
-                str(self._part), "w", format="mp4", options={"movflags": "faststart"}
-            )
+            self._file = av.open(self._content, "w", format="mp4")
             self._stream = stream = self._file.add_stream(CODEC, round(1 / PERIOD), options=LOOK)
             stream.height, stream.width = (edge - edge % 2 for edge in picture.shape[:2])
             stream.pix_fmt = "yuv420p"

@@ -104,8 +104,8 @@ class Trace:
             return np.zeros((len(self.time), 0, 7))
         return self.figure.poses(self.joint_names, self.joints[:, 0])
 
-    def write(self, path: Path) -> None:
-        """Write the file, whole or not at all.
+    def write(self, folder: Path, name: str) -> None:
+        """Write a file of a run folder, whole or not at all.
 
         Raises:
             OSError: it cannot be written.
@@ -129,8 +129,7 @@ class Trace:
             about=np.frombuffer(json.dumps(about).encode(), dtype=np.uint8),
             **meshes,
         )
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, file.getvalue())
+        write_whole(folder, name, file.getvalue())
 
     @classmethod
     def read(cls, path: Path) -> Trace:

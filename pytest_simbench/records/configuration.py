@@ -90,8 +90,8 @@ PARTS: tuple[Part, ...] = (
     *(
         _part(name, "", "a result")
         for name in (
-            "status", "error", "metrics", "details", "notes", "seconds", "stepping", "timeline",
-            "resources",
+            "status", "error", "metrics", "details", "notes", "reasons", "seconds", "stepping",
+            "timeline", "resources",
         )
     ),
     _part("extra", "", "of a newer plugin: not known what it means"),
@@ -178,7 +178,7 @@ def _values(record: Record, use: Use) -> dict[str, Any]:
         key: value
         for name in equal_to(use)
         for key, value in _flat(name, getattr(record, name))
-        if not (name in NEW and value == "")
+        if not (name in NEW | LATE and value == "")
         and not (use == "rank" and name == "settings" and not key.startswith(f"settings.{TASK}"))
     }
 

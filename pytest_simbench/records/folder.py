@@ -4,6 +4,7 @@
     tasks.jsonl        what each task's metrics and references mean (`description`); of several
                        lines of one task the last one holds
     thresholds.jsonl   thresholds that tests asked for
+    claims.jsonl       what tests claimed, and what came of it (`claims`)
     repeatability.jsonl, logs, traces, report.md, ...
 
 Report, merge, resume, baseline and gate need the folder alone, never the code that made it.
@@ -21,22 +22,24 @@ from pathlib import Path
 from typing import Any
 
 from pytest_simbench.records import lines
+from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import Describing, TaskDescription, Threshold
 from pytest_simbench.records.lines import DAMAGED, LARGEST_LINE, Found, LinesFile, UnreadableError
 from pytest_simbench.records.lock import FolderLock
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.records.paths import FolderError, inside
+from pytest_simbench.records.paths import inside
 from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.records.series import settled
 
 RECORDS = "records.jsonl"
 TASKS = "tasks.jsonl"
 THRESHOLDS = "thresholds.jsonl"
+CLAIMS = "claims.jsonl"
 
 HOLD_RESULTS = (RECORDS, "repeatability.jsonl")
 """Files that make a folder one that holds a run."""
 
-NOUNS = {RECORDS: "record", TASKS: "task description", THRESHOLDS: "threshold"}
+NOUNS = {RECORDS: "record", TASKS: "task description", THRESHOLDS: "threshold", CLAIMS: "claim"}
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,7 @@ class Reading:
         records: those that count, in their order, see `series.settled`.
         tasks: what the metrics mean, by the name of their task.
         thresholds: that tests asked for.
+        claims: of tests, in the order in which they were judged.
         problems: damaged lines and descriptions that cannot be used, one sentence each; they are
             left out.
         refused: whole lines that are no records of ours, one sentence each.
@@ -59,6 +63,7 @@ class Reading:
     records: tuple[Record, ...] = ()
     tasks: Mapping[str, TaskDescription] = field(default_factory=dict)
     thresholds: tuple[Threshold, ...] = ()
+    claims: tuple[Claim, ...] = ()
     problems: tuple[str, ...] = ()
     refused: tuple[str, ...] = ()
     every: tuple[Record, ...] = ()
@@ -98,13 +103,17 @@ class RunFolder:
         self._spare = lines.spare_folder()
         self._described: dict[str, TaskDescription] = {}
         self._asked: dict[Threshold, None] = {}
+        self._claims: list[Claim] = []
         self._written: set[str] = set()
         self._lock = threading.RLock()
 
     @classmethod
     def of(cls, path: Path) -> RunFolder:
         """The folder that a user means by its path, or by that of its record file."""
-        return cls(path.parent, path.name) if os.path.isfile(path) else cls(path)
+        if not os.path.isfile(path):
+            return cls(path)
+        file = path.resolve() if path.is_symlink() else path  # what a user names may be a link
+        return cls(file.parent, file.name)
 
     def inside(self, name: str) -> Path:
         """The path of a file of this folder.
@@ -199,10 +208,16 @@ class RunFolder:
                 self._written.add(line)
                 self._write(THRESHOLDS, line)
 
+    def claim(self, claim: Claim) -> None:
+        """Keep what came of a claim."""
+        with self._lock:
+            self._claims.append(claim)
+            self._write(CLAIMS, json.dumps(claim.to_dict()))
+
     def _write(self, name: str, line: str) -> None:
         if name not in self._files:
             noun = NOUNS.get(name, "record")
-            self._files[name] = LinesFile(self.path / name, self._spare, noun)
+            self._files[name] = LinesFile(self.path, name, self._spare, noun)
         self._files[name].append(line)
 
     def read(self) -> Reading:
@@ -231,9 +246,16 @@ class RunFolder:
         records = settled([*found.items, *self.own])
         tasks = {**self._tasks(problems), **self._described}
         asked = dict.fromkeys([*self._parsed(THRESHOLDS, Threshold, problems), *self._asked])
-        name = str(self.path if self._records == RECORDS else path)
+        claims = (*self._parsed(CLAIMS, Claim, problems), *self._claims)
         return Reading(
-            name, tuple(records), tasks, tuple(asked), tuple(problems), found.refused, found.items
+            name=str(self.path if self._records == RECORDS else path),
+            records=tuple(records),
+            tasks=tasks,
+            thresholds=tuple(asked),
+            claims=claims,
+            problems=tuple(problems),
+            refused=found.refused,
+            every=found.items,
         )
 
     def _tasks(self, problems: list[str] | None = None) -> dict[str, TaskDescription]:
@@ -242,11 +264,11 @@ class RunFolder:
 
     def _parsed(self, name: str, kind: Any, problems: list[str]) -> tuple[Any, ...]:
         """The items of a file beside the records, which may be missing."""
-        if self._records != RECORDS or not os.path.exists(self.path / name):
+        if self._records != RECORDS or not os.path.lexists(self.path / name):
             return ()
         try:
-            found = lines.read(self.inside(name), kind.from_dict)
-        except (FolderError, UnreadableError) as error:
+            found = lines.read(self.path, name, kind.from_dict)
+        except UnreadableError as error:
             problems.append(str(error))
             return ()
         problems += [*found.problems, *found.refused]
@@ -262,9 +284,9 @@ class RunFolder:
             OSError: the folder cannot be written to.
         """
         repaired = []
-        for name in (self._records, TASKS, THRESHOLDS, *HOLD_RESULTS[1:]):
-            with suppress(FolderError, UnreadableError):  # there is none that is read
-                repaired.append(lines.repair(self.inside(name)))
+        for name in (self._records, TASKS, THRESHOLDS, CLAIMS, *HOLD_RESULTS[1:]):
+            with suppress(UnreadableError):  # there is none that is read
+                repaired.append(lines.repair(self.path, name))
         return tuple(kept for kept in repaired if kept is not None)
 
     def _found(self) -> Found[Record]:
@@ -275,13 +297,9 @@ class RunFolder:
         """
         path = self.path / self._records
         try:
-            # What a user names may be a link; what a folder holds leads nowhere else.
-            path = self.inside(RECORDS) if self._records == RECORDS else path
-            if self.holds_run and not os.path.exists(path):
+            if self.holds_run and not os.path.lexists(path):
                 return Found()  # of its kind a run without repetitions of tasks
-            return lines.read(path, Record.from_dict)
-        except FolderError as error:
-            raise RecordError(f"cannot read records: {error}") from None
+            return lines.read(self.path, self._records, Record.from_dict)
         except UnreadableError as error:
             raise RecordError(
                 f"cannot read records from {path} ({error.reason}); give a run folder or its "

@@ -10,13 +10,16 @@ import errno
 import gc
 import json
 import os
+import shutil
 import stat
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, BinaryIO, Generic, TypeVar
+
+from pytest_simbench.records.paths import opened, whole
 
 T = TypeVar("T")
 
@@ -74,13 +77,17 @@ class LinesFile:
     handed back.
 
     Args:
-        path: the file; its folder is made when the first line comes.
-        fallback: folder for what `path` cannot take; default: `spare_folder()`.
+        folder: of the file; it is made when the first line comes.
+        name: of the file.
+        fallback: folder for what `folder` cannot take; default: `spare_folder()`.
         noun: what a line is, for messages.
     """
 
-    def __init__(self, path: Path | str, fallback: Path | None = None, noun: str = "line") -> None:
-        self.path = Path(path)
+    def __init__(
+        self, folder: Path, name: str, fallback: Path | None = None, noun: str = "line"
+    ) -> None:
+        self.path = folder / name
+        self._name = name
         self._fallback = fallback
         self._noun = noun
         self._pending: list[str] = []
@@ -94,17 +101,17 @@ class LinesFile:
     def append(self, line: str) -> bool:
         """Write a line of ASCII; False when it has to wait in memory. Never raises OSError."""
         self._pending.append(line)
-        return self._flush(self.path)
+        return self._flush(self.path.parent)
 
     def close(self) -> Unwritten:
         """Try once more to write what waits, then elsewhere; may be called again."""
-        if not self._pending or self._flush(self.path):
+        if not self._pending or self._flush(self.path.parent):
             return Unwritten()
         count = f"{len(self._pending)} {self._noun}{'s' if len(self._pending) > 1 else ''}"
         lost = f"{count} could not be written to {self.path} ({self._why()})"
         folder = self._fallback or spare_folder()
-        fallback = folder / self.path.name
-        if self._flush(fallback):
+        fallback = folder / self._name
+        if self._flush(folder):
             return Unwritten((f"{lost}; they are in {fallback}",), fallback)
         unsaved, self._pending = tuple(self._pending), []
         problem = f"{lost} nor to {folder} ({self._why()}); they follow, one a line: save them"
@@ -113,14 +120,13 @@ class LinesFile:
     def _why(self) -> str:
         return str((self._reason and self._reason.strerror) or self._reason)
 
-    def _flush(self, path: Path) -> bool:
-        """Write what waits to `path`; a line leaves the memory once it is on the disk."""
+    def _flush(self, folder: Path) -> bool:
+        """Write what waits into a folder; a line leaves the memory once it is on the disk."""
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            is_new = not path.exists()
-            descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o666)
+            is_new = not os.path.exists(folder / self._name)
+            descriptor = opened(folder, self._name, os.O_RDWR | os.O_APPEND | os.O_CREAT)
             if is_new:
-                _sync_folder(path.parent)
+                _sync_folder(folder)
             try:
                 while self._pending:
                     _append_line(descriptor, self._pending[0])
@@ -173,11 +179,12 @@ class Found(Generic[T]):
     refused: tuple[str, ...] = ()
 
 
-def read(path: Path, make: Callable[[dict[str, Any], str], T]) -> Found[T]:
+def read(folder: Path, name: str, make: Callable[[dict[str, Any], str], T]) -> Found[T]:
     """The lines of a file.
 
     Args:
-        path: of an ordinary file.
+        folder: of an ordinary file.
+        name: of that file.
         make: turns an object and its place, for messages, into an item, or raises ValueError.
 
     Raises:
@@ -186,8 +193,8 @@ def read(path: Path, make: Callable[[dict[str, Any], str], T]) -> Found[T]:
     items: list[T] = []
     problems: list[str] = []
     refused: list[str] = []
-    with _kept_for_good(path):
-        for line in _lines(path):
+    with _kept_for_good(folder / name):
+        for line in _lines(folder, name):
             if line.problem:
                 problems.append(f"{line.where}: {DAMAGED}{line.problem}")
             for data in line.found:
@@ -222,7 +229,7 @@ def _kept_for_good(path: Path) -> Iterator[None]:
         gc.enable()
 
 
-def repair(path: Path) -> Path | None:
+def repair(folder: Path, name: str) -> Path | None:
     """Write a file anew without its damaged lines; the old one stays beside it.
 
     Returns:
@@ -232,23 +239,27 @@ def repair(path: Path) -> Path | None:
         UnreadableError: there is no such file.
         OSError: the folder cannot be written to.
     """
-    lines = list(_lines(path))
+    lines = list(_lines(folder, name))
     if not any(line.problem for line in lines):
         return None
     number = 1
-    while (kept := path.with_name(f"{path.name}.damaged-{number}")).exists():
+    while os.path.lexists(folder / (kept := f"{name}.damaged-{number}")):
         number += 1
-    os.link(path, kept)
-    fresh = path.with_name(f"{path.name}.{os.getpid()}.part")
-    with fresh.open("wb") as file:
+    with whole(folder, kept) as copy, open(opened(folder, name), "rb") as damaged:
+        shutil.copyfileobj(damaged, copy)
+        _sync(copy)
+    with whole(folder, name) as file:
         for line in lines:
             for data in line.found:
                 file.write(json.dumps(data).encode("ascii") + b"\n")
-        file.flush()
-        os.fsync(file.fileno())
-    fresh.replace(path)
-    _sync_folder(path.parent)
-    return kept
+        _sync(file)
+    _sync_folder(folder)
+    return folder / kept
+
+
+def _sync(file: BinaryIO) -> None:
+    file.flush()
+    os.fsync(file.fileno())
 
 
 @dataclass(frozen=True)
@@ -260,12 +271,13 @@ class _Line:
     problem: str = ""
 
 
-def _lines(path: Path) -> Iterator[_Line]:
+def _lines(folder: Path, name: str) -> Iterator[_Line]:
     """The lines that are not empty."""
+    path = folder / name
     try:
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise UnreadableError(path, "it is no ordinary file")
-        with path.open("rb") as file:
+        with open(opened(folder, name), "rb") as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise UnreadableError(path, "it is no ordinary file")
             number = 0
             while content := file.readline(LARGEST_LINE):
                 number += 1

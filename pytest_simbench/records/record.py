@@ -64,6 +64,7 @@ class Record:
             the id has them.
         details: what explains the score; the task's alone.
         notes: what the tool notes.
+        reasons: why the score is no better, in the task's words.
         scene: digest of the task's scene for one seed and no jitter; empty where not known.
         robot: its `name` and the `digest` of its description; empty for the task's own robot.
         limits: `timeout`, `stall_timeout` [s] and `memory_limit` [MB]; empty where not known.
@@ -88,6 +89,7 @@ class Record:
     metrics: Mapping[str, float | bool | None] = field(default_factory=dict)
     details: Mapping[str, Any] = field(default_factory=dict)
     notes: Notes = field(default_factory=Notes)
+    reasons: tuple[str, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
     stepping: Mapping[str, float] = field(default_factory=dict)
     timeline: Mapping[str, float] = field(default_factory=dict)

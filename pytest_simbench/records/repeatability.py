@@ -11,7 +11,6 @@ from typing import Any
 
 from pytest_simbench.records import checked, lines
 from pytest_simbench.records.lines import Found, LinesFile, Unwritten
-from pytest_simbench.records.paths import inside
 
 NAME = "repeatability.jsonl"
 SCHEMA = 1
@@ -50,7 +49,7 @@ class Line:
 def append(folder: Path, line: Line) -> Unwritten:
     """Write one line to the run folder, else elsewhere; what it returns says where. Never raises
     OSError."""
-    file = LinesFile(folder / NAME, noun="repeatability result")
+    file = LinesFile(folder, NAME, noun="repeatability result")
     file.append(json.dumps({"schema": SCHEMA, **vars(line)}))
     return file.close()
 
@@ -61,10 +60,9 @@ def read(folder: Path) -> Found[Line]:
     Raises:
         UnreadableError: there is one, and it cannot be read.
     """
-    path = folder / NAME
-    if not os.path.exists(path):
+    if not os.path.lexists(folder / NAME):
         return Found()
-    found = lines.read(inside(folder, NAME), _line)
+    found = lines.read(folder, NAME, _line)
     items = sorted(found.items, key=lambda line: (line.kind, line.task, line.test))
     return replace(found, items=tuple(items))
 

@@ -8,6 +8,7 @@ from which the set points differ is told as well.
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ import numpy as np
 
 from pytest_simbench.client.tape import Operation
 from pytest_simbench.client.world import Motion
+from pytest_simbench.records.paths import inside, write_whole
 from pytest_simbench.repeatability.episode import Episode
 from pytest_simbench.repeatability.motions import gaps
 from pytest_simbench.scene import FloatArray
@@ -67,8 +69,8 @@ class Sample:
         bodies, motions, counts = list(episode.bodies), episode.motions, episode.counts
         return cls(label, task, seed, bodies, motions, commands, durations, counts)
 
-    def save(self, path: Path) -> None:
-        """Write it as .npz.
+    def save(self, folder: Path, name: str) -> None:
+        """Write it as .npz into a run folder.
 
         Raises:
             OSError: the folder cannot be written to.
@@ -83,9 +85,9 @@ class Sample:
             "bodies": list(self.bodies),
             "counts": dict(self.counts),
         }
-        path.parent.mkdir(parents=True, exist_ok=True)
+        file = io.BytesIO()
         np.savez_compressed(
-            path,
+            file,
             facts=np.array(json.dumps(facts)),
             time=joined.time,
             joints=joined.joints,
@@ -94,6 +96,7 @@ class Sample:
             commands=np.array(commands).reshape(len(commands), width),
             durations=np.array(self.durations),
         )
+        write_whole(folder, name, file.getvalue())
 
     @classmethod
     def load(cls, path: Path) -> Sample:
@@ -240,7 +243,8 @@ def _commands_part(first: Sample, second: Sample) -> float | None:
 
 def agreements(folder: Path) -> list[Agreement]:
     """All pairs of what a run left in its folder, task by task and seed by seed."""
-    samples = [Sample.load(path) for path in sorted((folder / FOLDER).glob("*.npz"))]
+    names = sorted(path.name for path in inside(folder, FOLDER).glob("*.npz"))
+    samples = [Sample.load(inside(folder, f"{FOLDER}/{name}")) for name in names]
     return [
         agreement(a, b)
         for a, b in combinations(samples, 2)

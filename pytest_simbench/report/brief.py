@@ -11,7 +11,7 @@ from pytest_simbench.ground.text import for_terminal, in_one_line
 from pytest_simbench.report import cells, columns, truth
 from pytest_simbench.report.answer import short_labels
 from pytest_simbench.report.grid import GAP, Column, fill, render
-from pytest_simbench.report.headline import OUTCOMES, cost_of, headline
+from pytest_simbench.report.headline import cost_of, headline
 from pytest_simbench.report.summary import TaskSummary
 from pytest_simbench.report.tables import NARROWEST
 
@@ -68,7 +68,7 @@ def _short(text: str, width: int) -> list[str]:
 def table(summary: TaskSummary, width: int) -> list[Column]:
     """One line for each row; the last columns are left out where they do not fit."""
     rows = summary.rows
-    metrics = summary.study or summary.metrics[:OUTCOMES]
+    metrics = summary.study
     found = [
         Column("simulator", [[name] for name in short_labels(rows)], left=True),
         Column("failed", [[f"{row.failed} of {row.attempts}"] for row in rows]),

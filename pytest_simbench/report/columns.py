@@ -28,7 +28,7 @@ BY_PHASE = "CPU and RAM by phase: means over all samples taken in it"
 
 
 def study(summary: TaskSummary) -> list[Column]:
-    """The study's table: failures, its metrics, CPU, RAM, speed, start and end."""
+    """The first table: crashes, the task's own metrics, then costs."""
     rows = summary.rows
     return [
         labels(rows),
@@ -131,6 +131,18 @@ def failures(summary: TaskSummary) -> list[Column]:
     ]
 
 
+def reasons(summary: TaskSummary) -> list[Column]:
+    """Why the task fell short, in its own words, and how often; numbers that vary are `#`."""
+    found = [(row, text, count) for row in summary.rows for text, count in row.reasons]
+    if not found:
+        return []
+    return [
+        Column("simulator", [[row.label] for row, *_ in found], left=True, wrap=True),
+        Column("count", [[str(count)] for *_, count in found]),
+        Column("reason", [[text] for _, text, _ in found], left=True, wrap=True),
+    ]
+
+
 def matrix(summary: TaskSummary) -> list[Column]:
     """Which row beats which column at what; without rows that never won nor lost."""
     places = sorted({place for win in summary.wins for place in (win.winner, win.loser)})
@@ -154,10 +166,11 @@ def _beaten(metrics: list[str], same: bool) -> list[str]:
 
 
 def details(summary: TaskSummary) -> list[tuple[str, list[Column]]]:
-    """The tables below the study's, each with its title; a table without columns is left out."""
+    """The tables below the first, each with its title; a table without columns is left out."""
     found = [
         ("failures", failures(summary)),
-        ("beyond the study: mean [95 % interval]", stricter(summary)),
+        ("why the task fell short", reasons(summary)),
+        ("further metrics: mean [95 % interval]", stricter(summary)),
         (MATRIX, matrix(summary)),
         ("where the time went: mean wall seconds and share", time_spent(summary)),
     ]

@@ -64,10 +64,10 @@ def save(figure: Any, folder: Path, name: str) -> Path:
     Raises:
         OSError: the folder cannot be written to.
     """
-    path, picture = folder / f"{name}.png", io.BytesIO()
+    picture = io.BytesIO()
     figure.savefig(picture, format="png", dpi=DPI)
-    write_whole(path, picture.getvalue())
-    return path
+    write_whole(folder, f"{name}.png", picture.getvalue())
+    return folder / f"{name}.png"
 
 
 @contextmanager

@@ -19,6 +19,7 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.report import history, markdown, sweep
 from pytest_simbench.report import outcome as outcome_of
 from pytest_simbench.report.badge import badge
+from pytest_simbench.report.claims import Claims, claims_of
 from pytest_simbench.report.figures import FiguresUnavailable, write_figures
 from pytest_simbench.report.history import AnyHistory
 from pytest_simbench.report.matrix import with_wins
@@ -51,6 +52,7 @@ class Written:
         summaries: what the report tells of each task.
         histories: of simulators of which there are several releases.
         sweeps: laws over time steps.
+        claims: what the tests claimed, and what came of it.
     """
 
     problems: tuple[str, ...] = ()
@@ -58,6 +60,7 @@ class Written:
     summaries: tuple[TaskSummary, ...] = ()
     histories: tuple[AnyHistory, ...] = ()
     sweeps: tuple[Swept, ...] = ()
+    claims: Claims | None = None
 
 
 def write_report(
@@ -77,10 +80,19 @@ def write_report(
     records = in_order(reading.records)
     summaries = summaries_of(reading)
     histories, sweeps = tuple(history.of_run(reading)), tuple(sweep.of_run(reading))
+    claims = claims_of(reading, comparison[1] if comparison else None)
     written = write_files(
-        folder.path, summaries, records, comparison=comparison, histories=histories, sweeps=sweeps
+        folder.path,
+        summaries,
+        records,
+        comparison=comparison,
+        histories=histories,
+        sweeps=sweeps,
+        claims=claims,
     )
-    return replace(written, summaries=tuple(summaries), histories=histories, sweeps=sweeps)
+    return replace(
+        written, summaries=tuple(summaries), histories=histories, sweeps=sweeps, claims=claims
+    )
 
 
 def summaries_of(reading: Reading) -> list[TaskSummary]:
@@ -103,6 +115,7 @@ def write_files(
     run: Path | None = None,
     histories: Sequence[AnyHistory] = (),
     sweeps: Sequence[Swept] = (),
+    claims: Claims | None = None,
 ) -> Written:
     """Write all files; what cannot be written is told, and the rest is written all the same.
 
@@ -115,6 +128,7 @@ def write_files(
         run: the run folder, where it is another: its results on repeatability are on the page.
         histories: of simulators, drawn too.
         sweeps: laws over time steps, drawn too.
+        claims: what the tests claimed, which comes first.
     """
     from pytest_simbench.report.page.context import page
     from pytest_simbench.report.page.render import render  # Jinja2
@@ -144,10 +158,10 @@ def write_files(
             failed.append(f"the pictures could not be drawn: {named(error)}")
     told_of = {found.title: found.sentences() for found in histories}
     names = [picture.name for picture in pictures]
-    text = markdown.render_run(summaries, names, told_of, sweeps)
+    text = markdown.render_run(summaries, names, told_of, sweeps, claims)
     shown, replay, told = _replay(run or folder, records)
     problems += told
-    told_page = page(run or folder, summaries, records, comparison, shown, sheets, sweeps)
+    told_page = page(run or folder, summaries, records, comparison, shown, sheets, sweeps, claims)
     contents = {PAGE_NAME: render(told_page)}
     if replay:
         contents[REPLAY_NAME] = replay
@@ -157,7 +171,7 @@ def write_files(
     encoded |= {sheet_name(task): sheet for task, sheet in sheets.items()}
     for name, content in encoded.items():
         try:
-            write_whole(folder / name, content)
+            write_whole(folder, name, content)
         except OSError as error:
             failed.append(_unwritable(folder / name, error))
     return Written((*problems, *failed), not failed)
@@ -199,8 +213,7 @@ def write_outcome(folder: Path, outcome: Outcome) -> str:
 def write_badge(path: Path, records: Sequence[Record], passed: bool | None) -> str:
     """Write the badge of a run; a sentence when it could not be written."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, badge(records, passed).encode("ascii"))
+        write_whole(path.parent, path.name, badge(records, passed).encode("ascii"))
     except OSError as error:
         return f"no badge: {_unwritable(path, error)}"
     return ""

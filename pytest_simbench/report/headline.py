@@ -60,7 +60,7 @@ def _outcome(summaries: Sequence[TaskSummary]) -> str:
     for summary in summaries:
         found: dict[str, list[str]] = {}
         known = [m for m in summary.study or summary.metrics if m.better]
-        for metric in known[: None if summary.study else OUTCOMES]:
+        for metric in known[: None if any(m.study for m in known) else OUTCOMES]:
             values = [row.metrics.get(metric.name) for row in summary.rows]
             if text := _who(metric, values, summary):
                 found.setdefault(text, []).append(metric.title)

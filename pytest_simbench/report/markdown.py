@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from pytest_simbench.ground.text import for_markdown
+from pytest_simbench.ground.text import for_markdown, in_one_line
 from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.report import columns, sweep, truth
 from pytest_simbench.report.answer import sentences
+from pytest_simbench.report.claims import Claims
 from pytest_simbench.report.grid import Column, capital
 from pytest_simbench.report.summary import TaskSummary
 
@@ -17,6 +18,7 @@ def render_run(
     pictures: Sequence[str] = (),
     histories: Mapping[str, Sequence[str]] | None = None,
     sweeps: Sequence[Swept] = (),
+    claims: Claims | None = None,
 ) -> str:
     """The whole report; ends with a newline.
 
@@ -25,10 +27,12 @@ def render_run(
         pictures: addresses of pictures to show at the end, relative to the report.
         histories: what changed over a simulator's releases, in sentences, by title.
         sweeps: laws over time steps.
+        claims: what the tests claimed, which comes first.
     """
     if not (summaries or sweeps):
         return "No repetition was recorded.\n"
-    parts = [_truth(summaries)] if truth.laws(summaries) else []
+    parts = [render_claims(claims)] if claims else []
+    parts += [_truth(summaries)] if truth.laws(summaries) else []
     parts += [_sweep(sweeps)] if sweeps else []
     parts += [render_task(summary) for summary in truth.others(summaries)]
     for title, found in (histories or {}).items():
@@ -42,6 +46,20 @@ def render_run(
     if pictures:
         parts.append("\n".join(["## Pictures", "", *(f"![{name}]({name})" for name in pictures)]))
     return "\n\n".join(parts) + "\n"
+
+
+def render_claims(found: Claims) -> str:
+    """Pass or fail, and why."""
+    parts = [f"**{for_markdown(found.sentence)}**", table(found.table) if found.table else ""]
+    for trouble in found.troubles:
+        told = [f"- {for_markdown(trouble.what)}"]
+        told += [f"  worst: {for_markdown(trouble.worst)}"] if trouble.worst else []
+        if trouble.again and "`" not in trouble.again:
+            told.append(f"  again: `{in_one_line(trouble.again)}`")
+        parts.append("<br>\n".join(told))
+    if found.more:
+        parts.append(f"{found.more} more of them are in the run folder.")
+    return "\n\n".join(filter(None, parts))
 
 
 def _truth(summaries: Sequence[TaskSummary]) -> str:

@@ -54,7 +54,7 @@ class Outcome:
             for change in _changes(found):
                 # In the limit's terms it may be without bounds: of a baseline of 0.
                 change["loss"] = str(change["loss"])
-        write_whole(folder / NAME, json.dumps(found).encode())
+        write_whole(folder, NAME, json.dumps(found).encode())
 
     @classmethod
     def read(cls, folder: Path) -> tuple[Outcome, str]:

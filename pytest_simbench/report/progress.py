@@ -16,6 +16,9 @@ from pytest_simbench.ground.text import in_one_line
 REDRAW_SECONDS = 0.1
 """A terminal line is redrawn at most this often: faster than the eye follows costs only CPU."""
 
+LOG_SECONDS = 10.0
+"""A log gets a line of a repetition that ended at most this often, and one of a test's last."""
+
 HEARTBEAT_SECONDS = 30.0
 """A log gets a line at least this often while something reports; CI systems stop silent jobs."""
 
@@ -82,8 +85,9 @@ class Progress:
     """The live line of the running test.
 
     On a terminal the line is rewritten in place, cut to the width; call `clear` before anything
-    else is printed. In a log (`is_tty` false) there is one line for each finished repetition, and
-    one every `HEARTBEAT_SECONDS` while a longer one reports.
+    else is printed. In a log (`is_tty` false) there is a line of a finished repetition every
+    `LOG_SECONDS` at most and of the test's last one, and one every `HEARTBEAT_SECONDS` while a
+    longer one reports.
 
     Args:
         write: prints text as it is, without a line end of its own, and flushes. The caller sees to
@@ -156,9 +160,10 @@ class Progress:
             test.active = {key: item for key, item in test.active.items() if item is not current}
             test.seconds.append(seconds)
             test.failed += status != "ok"
+            last = len(test.seconds) == test.repetitions
             if self._is_tty:
-                self._update(force=len(test.seconds) == test.repetitions)
-            else:
+                self._update(force=last)
+            elif last or self._clock() - self._last >= LOG_SECONDS:
                 self._log(test, current, f"{in_one_line(status)} after {seconds:.1f} s")
 
     def end_test(self) -> None:
@@ -211,7 +216,8 @@ class Progress:
     def _log(self, test: _Test, ended: _Repetition, outcome: str) -> None:
         """One plain line for a repetition that ended."""
         where = f"repetition {ended.number} of {test.last}"
-        parts = [test.id, where, ended.place, outcome, ended.counted, self._left(test)]
+        failed = f"{test.failed} failed" if test.failed and test.repetitions > 1 else ""
+        parts = [test.id, where, ended.place, outcome, ended.counted, failed, self._left(test)]
         self._write("  ".join(part for part in parts if part) + "\n")
         self._last = self._clock()
 

@@ -55,7 +55,7 @@ def write_tables(folder: Path, to: Path | None = None) -> tuple[list[Table], lis
     if shown and to is not None:
         path = to / MARKDOWN_NAME
         try:
-            write_whole(path, render_markdown(shown).encode("utf-8", "replace"))
+            write_whole(to, MARKDOWN_NAME, render_markdown(shown).encode("utf-8", "replace"))
         except OSError as error:
             problems.append(f"{path} could not be written ({error.strerror or error})")
     return shown, problems

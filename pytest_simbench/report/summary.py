@@ -7,6 +7,7 @@ reference study.
 
 from __future__ import annotations
 
+import re
 import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -64,6 +65,8 @@ class Row:
         by_phase: CPU in % of a core and RAM in MB by the task's phase, in order.
         seconds: mean wall seconds by phase (`PHASES`, `total`).
         notes: what a reader must know of these numbers (parallel repetitions, reused worker).
+        reasons: why scores are no better, in the task's words, and how often; the most frequent
+            first. Those that differ in numbers alone are counted together.
     """
 
     task: str
@@ -86,6 +89,7 @@ class Row:
     causes: tuple[Cause, ...] = ()
     deviations: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    reasons: tuple[tuple[str, int], ...] = ()
 
     @property
     def attempts(self) -> int:
@@ -107,7 +111,7 @@ class TaskSummary:
     """All rows of one task.
 
     Attributes:
-        metrics: what the task declares; those with `study` make its first table.
+        metrics: what the task declares; those with `study` make its first table, else all.
         references: the value a perfect run would give, by metric name.
         protocol: the protocol of its records; several are joined by commas.
         wins: which row beats which at what, by the rows' places; from `matrix.with_wins`.
@@ -128,13 +132,13 @@ class TaskSummary:
 
     @property
     def study(self) -> tuple[Metric, ...]:
-        """What the reference study reports too."""
-        return tuple(metric for metric in self.metrics if metric.study)
+        """Those of the first table: what the reference study reports too, else all."""
+        return tuple(metric for metric in self.metrics if metric.study) or self.metrics
 
     @property
     def stricter(self) -> tuple[Metric, ...]:
-        """What this project measures beside it."""
-        return tuple(metric for metric in self.metrics if not metric.study)
+        """The others."""
+        return tuple(metric for metric in self.metrics if metric not in self.study)
 
 
 def at_own_steps(records: Iterable[Record]) -> list[Record]:
@@ -219,7 +223,20 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str, ends: 
         causes=_causes(records),
         deviations=tuple(dict.fromkeys(text for r in records for text in r.deviations)),
         notes=tuple(notes),
+        reasons=_reasons(done),
     )
+
+
+def _reasons(records: Sequence[Record]) -> tuple[tuple[str, int], ...]:
+    told = [text for record in records for text in record.reasons]
+    same = grouped(told, lambda text: _NUMBERS.sub("#", text))
+    counted = [
+        (texts[0] if len(set(texts)) == 1 else form, len(texts)) for form, texts in same.items()
+    ]
+    return tuple(sorted(counted, key=lambda item: -item[1]))
+
+
+_NUMBERS = re.compile(r"-?\d+(?:\.\d+)?")
 
 
 def _seconds(records: Sequence[Record]) -> dict[str, float]:

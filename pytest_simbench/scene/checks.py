@@ -49,6 +49,7 @@ def check_number(
     value: Any, what: str, least: float = -LARGEST, most: float = LARGEST, *, above: bool = False
 ) -> None:
     """A finite number from `least` (`above`: more than it) to `most`."""
+    __tracebackhide__ = True
     number: Any = value if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     if not ((least < number if above else least <= number) and number <= most):
         bound = "a number above" if above else "a number from"

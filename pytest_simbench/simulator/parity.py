@@ -26,7 +26,7 @@ LENGTH_TOLERANCE = 1e-5
 
 MEASURED_TOLERANCE = 1e-3
 """Between two readings of a shape in one run [m]: an engine that tells no corners is measured from
-another side each time, in single precision (PhysX: 0.14 mm)."""
+another side each time, in single precision (by up to 0.14 mm)."""
 
 
 @dataclass(frozen=True)

@@ -1,27 +1,42 @@
-"""The tasks: scene, procedure and score, the same for every simulator."""
+"""The tasks: scene, procedure and score, the same for every simulator.
 
-from pytest_simbench.tasks.arm_following import ArmFollowing, CorrectedArmFollowing
-from pytest_simbench.tasks.arm_pushing import ArmPushing
-from pytest_simbench.tasks.base import Jitter, Outcome, Task
-from pytest_simbench.tasks.moments import Moment
-from pytest_simbench.tasks.pushing import CurvePushing, Pushing
-from pytest_simbench.tasks.stacking import Stacking
-from pytest_simbench.tasks.throwing import Throwing
-from pytest_simbench.tasks.tossing import Tossing
-from pytest_simbench.tasks.towers import LeaningTowers
+Each is imported when it is asked for: planners are large, and who reads records needs none.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pytest_simbench.tasks.arm_following import ArmFollowing, CorrectedArmFollowing
+    from pytest_simbench.tasks.arm_pushing import ArmPushing
+    from pytest_simbench.tasks.base import Jitter, Outcome, Task
+    from pytest_simbench.tasks.moments import Moment
+    from pytest_simbench.tasks.pushing import CurvePushing, Pushing
+    from pytest_simbench.tasks.stacking import Stacking
+    from pytest_simbench.tasks.throwing import Throwing
+    from pytest_simbench.tasks.tossing import Tossing
+    from pytest_simbench.tasks.towers import LeaningTowers
 
 __all__ = [
-    "ArmFollowing",
-    "ArmPushing",
-    "CorrectedArmFollowing",
-    "CurvePushing",
-    "Jitter",
-    "LeaningTowers",
-    "Moment",
-    "Outcome",
-    "Pushing",
-    "Stacking",
-    "Task",
-    "Throwing",
-    "Tossing",
-]
+    "ArmFollowing", "ArmPushing", "CorrectedArmFollowing", "CurvePushing", "Jitter",
+    "LeaningTowers", "Moment", "Outcome", "Pushing", "Stacking", "Task", "Throwing", "Tossing",
+]  # fmt: skip
+
+_MODULES = {
+    "arm_following": ("ArmFollowing", "CorrectedArmFollowing"),
+    "arm_pushing": ("ArmPushing",),
+    "base": ("Jitter", "Outcome", "Task"),
+    "moments": ("Moment",),
+    "pushing": ("CurvePushing", "Pushing"),
+    "stacking": ("Stacking",),
+    "throwing": ("Throwing",),
+    "tossing": ("Tossing",),
+    "towers": ("LeaningTowers",),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _MODULES.items():
+        if name in names:
+            return getattr(import_module(f"{__name__}.{module}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -59,11 +59,14 @@ class Outcome:
         metrics: value of each of the task's metrics; None where there is none.
         details: whatever explains the score, as plain data.
         reading: of a law.
+        reasons: why the score is no better, one short text for each thing that went wrong; reports
+            count them.
     """
 
     metrics: dict[str, float | None] = field(default_factory=dict)
     details: dict[str, Any] = field(default_factory=dict)
     reading: Reading | None = None
+    reasons: tuple[str, ...] = ()
 
 
 Count = Callable[[int, int], None]

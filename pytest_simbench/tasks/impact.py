@@ -11,9 +11,13 @@ from dataclasses import dataclass
 
 import coal
 import numpy as np
+from numpy.typing import NDArray
 
 from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.tasks.base import CUBE_SIZE
+
+BoolArray = NDArray[np.bool_]
 
 WINDOW = 0.05
 """Motion is judged over this time, and causes are sought within it [s]."""
@@ -76,6 +80,27 @@ def impact(
     return Impact(tuple(caused), chain.calm_after(began))
 
 
+def may_touch(poses: FloatArray, cube: int, edge: float) -> BoolArray:
+    """At which samples one of the cubes may touch another one or the ground before the next, (n,).
+
+    Args:
+        poses: of all cubes, (n, m, 7).
+        cube: which one it is about.
+        edge: of every cube [m].
+    """
+    touch, box = TOUCH * edge / CUBE_SIZE, coal.Box(edge, edge, edge)
+    centres = poses[:, :, :3]
+    strides = np.linalg.norm(np.diff(centres, axis=0, prepend=centres[:1]), axis=2)
+    between = np.linalg.norm(centres - centres[:, [cube]], axis=2) - np.sqrt(3) * edge
+    reach = edge / 2 * np.abs(rotations(poses[:, cube, 3:7])[:, 2]).sum(axis=1)
+    found = centres[:, cube, 2] - reach <= touch + strides[:, cube]
+    for row, other in np.argwhere(between <= touch + strides + strides[:, [cube]]):
+        if other != cube and not found[row]:
+            apart = _distance(box, poses[row, cube], poses[row, other])
+            found[row] = apart <= touch + strides[row, cube] + strides[row, other]
+    return np.asarray(found)
+
+
 class _Chain:
     """Motion and contact of the bodies of a log, body 0 the thrown cube."""
 
@@ -100,10 +125,7 @@ class _Chain:
 
     def _distance(self, row: int, a: int, b: int) -> float:
         """Between their surfaces [m], negative where they overlap."""
-        places = [_placed(self.poses[row, body]) for body in (a, b)]
-        result = coal.DistanceResult()
-        coal.distance(self._box, places[0], self._box, places[1], coal.DistanceRequest(), result)
-        return float(result.min_distance)
+        return _distance(self._box, self.poses[row, a], self.poses[row, b])
 
     def calm_after(self, began: int) -> int:
         """The first sample after `began` that ends `CALM` without motion, or the last."""
@@ -114,6 +136,13 @@ class _Chain:
             elif self.time[k] - still_since >= CALM:
                 return k
         return len(self.time) - 1
+
+
+def _distance(box: coal.Box, a: FloatArray, b: FloatArray) -> float:
+    """Between the surfaces of two boxes at poses, (7,) each [m]."""
+    result = coal.DistanceResult()
+    coal.distance(box, _placed(a), box, _placed(b), coal.DistanceRequest(), result)
+    return float(result.min_distance)
 
 
 def _placed(row: FloatArray) -> coal.Transform3s:

@@ -310,6 +310,7 @@ class Stacking(Task):
                 "untouched_moved": moved,
                 "notes": picks.notes,
             },
+            reasons=tuple(pick["reason"] for pick in picks.failed),
         )
 
 

@@ -12,20 +12,18 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pytest_simbench.client.world import Motion
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.strain import strain
 from pytest_simbench.robot.throw import Throw, landing_x
-from pytest_simbench.scene import Body, FloatArray
-
-BoolArray = NDArray[np.bool_]
+from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.tasks.impact import BoolArray, may_touch
 
 FREE_FALL_TOLERANCE = 2.0
 """A released cube whose acceleration is within this of gravity flies freely [m/s^2]; engines' air
-damping makes 0.1 m/s^2. The swing itself accelerates the hand by chance almost as gravity
-does, so this alone does not tell a held cube from a flying one."""
+damping makes 0.1 m/s^2. It tells to the step when the hand or a body touches the cube. It never
+says that a flight is over: a flight whose acceleration is wrong would look short, and right."""
 
 OUT_OF_HAND = 0.06
 """Farther than this from the tool centre point, a cube of the study's size is certainly not held
@@ -41,10 +39,12 @@ class Flight:
 
     Attributes:
         first: index of the first sample in free flight: the release.
+        clear: index of the sample from which the hand touches it no more.
         last: index of the last one: before the first contact.
     """
 
     first: int
+    clear: int
     last: int
 
 
@@ -63,28 +63,45 @@ def free_flight(
     time: FloatArray,
     velocity: FloatArray,
     gone: BoolArray,
+    apart: BoolArray,
+    near: BoolArray,
     gravity: FloatArray,
 ) -> Flight | None:
     """The cube's first free flight after the hand let it go or lost it, or None.
+
+    It begins when the acceleration is gravity's, or, where it never is, when the cube is far from
+    the hand. It ends where something is near enough to touch, whatever the acceleration was.
 
     Args:
         time: of each sample [s], (n,), evenly spaced.
         velocity: of the cube [m/s], (n, 3).
         gone: whether it is out of the hand, (n,).
+        apart: whether it is so far from the hand that nothing of that touches it, (n,).
+        near: whether it may touch a body or the ground before the next sample, (n,).
         gravity: [m/s^2], (3,).
     """
     if len(time) < 3:
         return None
     acceleration = np.diff(velocity, axis=0) / np.diff(time)[:, None]
-    flying = np.linalg.norm(acceleration - gravity, axis=1) < FREE_FALL_TOLERANCE
-    starts = np.flatnonzero(flying & gone[:-1])
-    if not len(starts):
-        return None
-    first = last = int(starts[0])
-    while last + 1 < len(flying) and flying[last + 1]:
-        last += 1
     # flying[k] speaks of the time from sample k to k + 1
-    return Flight(first, last + 1)
+    flying = np.linalg.norm(acceleration - gravity, axis=1) < FREE_FALL_TOLERANCE
+    first, away = _first(flying & gone[:-1], 0), _first(apart, 0)
+    if away < _first(near, away) < first or first == len(flying):
+        first = away
+    if first >= len(flying):
+        return None
+    away, last = max(first, _first(apart, first)), _first(near[:-1], first)
+    pushed = np.flatnonzero(~flying[first:away])
+    clear = min(first + int(pushed[-1]) + 1, last) if len(pushed) else first
+    while last < len(flying) and flying[last]:
+        last += 1
+    return Flight(first, clear, last)
+
+
+def _first(holds: BoolArray, since: int) -> int:
+    """The first index from `since` on at which it holds, or the length."""
+    found = np.flatnonzero(holds[since:])
+    return since + int(found[0]) if len(found) else len(holds)
 
 
 class Thrown:
@@ -93,11 +110,10 @@ class Thrown:
     Args:
         model: of the robot.
         motion: samples of the swing and after it, at every step.
-        cube: which of the bodies is thrown,
-        held: and what it is.
+        scene: with cubes alone.
+        cube: name of the one that is thrown.
         started: simulated time at which the swing began [s].
         perfect: swing and release of a perfect follower.
-        gravity: [m/s^2], (3,).
         scale: of the scene over the study's.
 
     Attributes:
@@ -113,17 +129,18 @@ class Thrown:
         self,
         model: RobotModel,
         motion: Motion,
-        cube: int,
-        held: Body,
+        scene: Scene,
+        cube: str,
         started: float,
         perfect: Throw,
-        gravity: FloatArray,
         scale: float = 1.0,
     ) -> None:
         self.motion = motion
-        self._perfect, self._gravity = perfect, gravity
+        self._perfect, self._gravity = perfect, np.asarray(scene.gravity)
         self._time = motion.time - started
-        states = motion.bodies[:, cube]
+        held = scene.body(cube)
+        number = scene.free_bodies.index(held)
+        states = motion.bodies[:, number]
         self._position, self._velocity = states[:, :3], states[:, 7:10]
         joints = motion.joints[:, 0]
         tool = np.array([model.tool_pose(row).position for row in joints])
@@ -134,13 +151,14 @@ class Thrown:
         self.lost: str | None = None
         self.free = int(np.argmax(gone)) if gone.any() else len(motion)
         self.flight: Flight | None = None
-        self.strain = strain(model, gravity, motion.time, motion.joints, held, self.free)
+        self.strain = strain(model, self._gravity, motion.time, motion.joints, held, self.free)
         if apart[0]:
             self.lost, self.free = "was not in the hand when the swing began", len(motion)
             return
         if early.any():
             self.lost = f"left the hand {self._time[np.argmax(early)]:.3f} s into the throw"
-        self.flight = free_flight(self._time, self._velocity, gone, gravity)
+        near = may_touch(motion.bodies[:, :, :7], number, held.extents[0])
+        self.flight = free_flight(self._time, self._velocity, gone, apart, near, self._gravity)
 
     def metrics(self) -> dict[str, float | None]:
         """How the cube left the hand, where that sent it, and what the flight made of it."""
@@ -152,11 +170,12 @@ class Thrown:
         first, last, perfect = self.flight.first, self.flight.last, self._perfect
         position, velocity = self._position[first], self._velocity[first]
         landing = self._landing(position, velocity)
-        flown = self._landing(self._position[last], self._velocity[last])
+        clear = self.flight.clear
+        begun, flown = (self._landing(self._position[k], self._velocity[k]) for k in (clear, last))
         return found | {
             "landing_x": landing,
             "landing_error": _apart(landing, perfect.landing(self._gravity)),
-            "flight_error": _apart(flown, landing),
+            "flight_error": _apart(flown, begun),
             "release_speed": float(np.linalg.norm(velocity)),
             "release_velocity_error": float(np.linalg.norm(velocity - perfect.velocity)),
             "release_position_error": float(np.linalg.norm(position - perfect.position)),

@@ -144,7 +144,8 @@ class Throwing(Task):
             Metric("landing_error", "landing error", unit="m", better="lower", least=0,
                    doc="distance of that from a perfect follower's"),
             Metric("flight_error", "flight error", unit="m", better="lower", least=0,
-                   doc=f"distance from that to where the simulated flight crosses {height}"),
+                   doc="distance from that to where the simulated flight, up to its first contact, "
+                       f"crosses {height}"),
             Metric("release_speed", "release speed", unit="m/s", better=None,
                    doc="of the cube as its free flight begins"),
             Metric("release_velocity_error", "release velocity error", unit="m/s", better="lower",
@@ -199,6 +200,7 @@ class Throwing(Task):
         world.mark("start")
         metrics: dict[str, float | None] = {metric.name: None for metric in self.metrics}
         details: dict[str, object] = {}
+        reasons: list[str] = []
         thrown: Thrown | None = None
         try:
             with world.phase("pick"):
@@ -209,10 +211,13 @@ class Throwing(Task):
                 thrown = self._throw(manipulator)
             metrics |= thrown.metrics()
             details |= thrown.details()
+            reasons += [str(details[key]) for key in ("lost", "kept") if key in details]
         except LostCube as error:
             metrics["lost_in_transit"], details["lost"] = 1.0, str(error)
+            reasons.append(str(error))
         except PlanningError as error:
             details["failed_pick"] = str(error)
+            reasons.append(str(error))
         world.mark("end")
         with world.phase("settle"):
             settling = world.wait(self.settle, log_period=SETTLE_PERIOD)
@@ -227,7 +232,7 @@ class Throwing(Task):
         details["moved"] = moved
         details["moved_otherwise"] = [name for name in off if name not in hit]
         details["projectile_end"] = list(world.pose("projectile").position)
-        return Outcome(metrics, details)
+        return Outcome(metrics, details, reasons=tuple(reasons))
 
     def _throw(self, manipulator: Manipulator) -> Thrown:
         """Swing, let go, and look on."""
@@ -238,11 +243,8 @@ class Throwing(Task):
         )
         parts = (swing, world.wait(AFTER_THROW, log_period=0.0))
         motion = Motion.joined([part for part in parts if part is not None])
-        held = world.scene.body("projectile")
-        gravity = np.asarray(world.scene.gravity)
-        cube = world.scene.free_bodies.index(held)
         thrown = Thrown(
-            manipulator.model, motion, cube, held, started, perfect, gravity, self.scale
+            manipulator.model, motion, world.scene, "projectile", started, perfect, self.scale
         )
         if thrown.flight is not None:
             world.note("release", float(motion.time[thrown.flight.first]))

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
+from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,6 @@ from pytest_simbench.scene import (
     ConvexMesh,
     Cylinder,
     Pose,
-    Robot,
     Scene,
     Sphere,
 )
@@ -28,27 +27,15 @@ from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.mesh_check import TRIANGLE
 from pytest_simbench.simulator.shapes import mesh_points
 from pytest_simbench.testing import scenes
-
-Plant = Callable[[Scene, Path], Scene]
-Edit = Callable[[ET.Element, Robot, Path], None]
-
-
-@dataclass(frozen=True)
-class Fault:
-    """One way in which a world may be built wrong.
-
-    Attributes:
-        what: in plain words.
-        quantity: that must be found to differ.
-        plant: makes the faulty scene of the true one; files go into the folder.
-        needs: the capability without which an engine cannot be wrong in this way.
-    """
-
-    what: str
-    quantity: str
-    plant: Plant
-    needs: Capability | None = None
-
+from pytest_simbench.testing.robot_faults import (
+    Edit,
+    Fault,
+    Plant,
+    edited,
+    faults_about,
+    of_robot,
+    shift,
+)
 
 TURNED, SPIN = Pose.at(0.5, 0.1, 0.315, yaw=0.4), (0.7, -0.5, 0.4)
 """Of the true scene's brick: where it is, and its angular velocity [rad/s]."""
@@ -119,57 +106,13 @@ def of_body(name: str, **values: Any) -> Plant:
     return lambda scene, _: scene.with_body(replace(scene.body(name), **values))
 
 
-def of_robot(**values: Any) -> Plant:
-    return lambda scene, _: replace(scene, robot=replace(_robot(scene), **values))
-
-
-def of_joint(name: str, **factors: float) -> Plant:
-    """Values of one joint's drive, multiplied."""
-
-    def plant(scene: Scene, _: Path) -> Scene:
-        robot = _robot(scene)
-        joint = next(joint for joint in robot.joints if joint.name == name)
-        values = {key: factor * getattr(joint, key) for key, factor in factors.items()}
-        return replace(scene, robot=scenes.with_joint(robot, name, **values))
-
-    return plant
-
-
-def of_description(path: str, edit: Edit) -> Plant:
-    """An element of the URDF, edited."""
-
-    def plant(scene: Scene, folder: Path) -> Scene:
-        robot = _robot(scene)
-        tree = ET.parse(robot.urdf)
-        element = tree.getroot().find(path)
-        if element is None:
-            raise LookupError(f"{robot.urdf} has no {path}")
-        edit(element, robot, folder)
-        tree.write(folder / "faulty.urdf")
-        return replace(scene, robot=replace(robot, urdf=str(folder / "faulty.urdf")))
-
-    return plant
-
-
-def _robot(scene: Scene) -> Robot:
-    if scene.robot is None:
-        raise LookupError(f"scene {scene.name} has no robot")
-    return scene.robot
-
-
 def _set(**values: str) -> Edit:
-    return lambda element, robot, folder: element.attrib.update(values)
+    return lambda element, _: element.attrib.update(values)
 
 
-def _without_shapes(link: ET.Element, robot: Robot, folder: Path) -> None:
-    for shape in link.findall("collision"):
-        link.remove(shape)
-
-
-def _scaled(mesh: ET.Element, robot: Robot, folder: Path) -> None:
+def _scaled(mesh: ET.Element, folder: Path) -> None:
     """A mesh 1.3 times as large, as an STL file of its own beside the description."""
-    package, _, rest = mesh.attrib["filename"].removeprefix("package://").partition("/")
-    points = 1.3 * mesh_points(str(Path(robot.packages[package]) / rest))
+    points = 1.3 * mesh_points(str(folder / mesh.attrib["filename"]))
     corners = np.resize(points, (3 * math.ceil(len(points) / 3), 3)).reshape(-1, 3, 3)
     record = np.zeros(len(corners), TRIANGLE)
     record["corners"] = corners
@@ -178,17 +121,7 @@ def _scaled(mesh: ET.Element, robot: Robot, folder: Path) -> None:
     mesh.attrib["filename"] = path.name
 
 
-def _moved(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Edit:
-    """An <origin> moved."""
-
-    def edit(origin: ET.Element, robot: Robot, folder: Path) -> None:
-        at = np.array([float(part) for part in origin.attrib.get("xyz", "0 0 0").split()])
-        origin.attrib["xyz"] = " ".join(map(str, at + np.array([x, y, z])))
-
-    return edit
-
-
-def _turned_inertia(inertia: ET.Element, robot: Robot, folder: Path) -> None:
+def _turned_inertia(inertia: ET.Element, _: Path) -> None:
     """Turned by 90 degrees about z: x becomes y, y becomes minus x."""
     old = dict(inertia.attrib)
     negative = str(-float(old["ixy"]))
@@ -196,22 +129,13 @@ def _turned_inertia(inertia: ET.Element, robot: Robot, folder: Path) -> None:
     inertia.attrib.update(ixx=old["iyy"], iyy=old["ixx"], ixy=negative, ixz=turned, iyz=old["ixz"])
 
 
-_JOINT4, _LINK4 = "joint[@name='panda_joint4']", "link[@name='panda_link4']"
-_TIP = "link[@name='panda_leftfinger']/collision[4]"
-_TILTED = f"{math.sin(math.radians(5))} 0 {math.cos(math.radians(5))}"
+_LINK4, _TIP = "link[@name='panda_link4']", "link[@name='panda_leftfinger']/collision[4]"
 _THINNER = (0.1, 0.058, 0.03)
 
 
 def _described(what: str, quantity: str, path: str, edit: Edit) -> Fault:
     """An element of the URDF, edited."""
-    return Fault(what, quantity, of_description(path, edit))
-
-
-def _driven(what: str, **factor: float) -> Fault:
-    """One value of joint 4's drive, multiplied."""
-    return Fault(
-        what, f"joint/panda_joint4/{next(iter(factor))}", of_joint("panda_joint4", **factor)
-    )
+    return Fault(what, quantity, edited(path, edit))
 
 
 def _built(what: str, quantity: str, **values: Any) -> Fault:
@@ -220,6 +144,12 @@ def _built(what: str, quantity: str, **values: Any) -> Fault:
 
 
 FAULTS: dict[str, Fault] = {
+    **faults_about(
+        "panda_link1",
+        "panda_joint4",
+        "panda_link4",
+        ("panda_finger_joint1", "panda_finger_joint2"),
+    ),
     "finger_shape": _described(
         "the rubber tip of a finger is 3 mm thinner",
         "link/panda_leftfinger/boxes",
@@ -229,8 +159,8 @@ FAULTS: dict[str, Fault] = {
     "finger_pad": _described(
         "the rubber tip of a finger is 2 mm nearer to the hand",
         "link/panda_leftfinger/boxes",
-        f"{_TIP}/origin",
-        _moved(z=-0.002),
+        _TIP,
+        shift(z=-0.002),
     ),
     "mesh_scale": _described(
         "the mesh of link 4 is 1.3 times as large",
@@ -238,69 +168,18 @@ FAULTS: dict[str, Fault] = {
         f"{_LINK4}/collision/geometry/mesh",
         _scaled,
     ),
-    "no_shape": _described(
-        "link 4 has no collision shape", "link/panda_link4/meshes", _LINK4, _without_shapes
-    ),
-    "joint_origin": _described(
-        "joint 4 is 10 mm aside", "link/panda_link4/pose", f"{_JOINT4}/origin", _moved(y=0.01)
-    ),
-    "joint_axis": _described(
-        "the axis of joint 1 is turned by 5 degrees",
-        "joint/panda_joint1/axis",
-        "joint[@name='panda_joint1']/axis",
-        _set(xyz=_TILTED),
-    ),
-    "joint_limits": _described(
-        "joint 4 stops 0.1 rad earlier",
-        "joint/panda_joint4/limits",
-        f"{_JOINT4}/limit",
-        _set(lower="-2.9718"),
-    ),
-    "link_mass": _described(
-        "link 4 weighs 5 kg", "link/panda_link4/mass", f"{_LINK4}/inertial/mass", _set(value="5.0")
-    ),
-    "centre_of_mass": _described(
-        "the centre of mass of link 4 is 100 mm off",
-        "link/panda_link4/com",
-        f"{_LINK4}/inertial/origin",
-        _moved(y=-0.1),
-    ),
     "inertia_turned": _described(
         "the inertia of link 4 is turned by 90 degrees",
         "link/panda_link4/inertia",
         f"{_LINK4}/inertial/inertia",
         _turned_inertia,
     ),
-    "inertia_scaled": _described(
-        "the inertia of link 4 is 20 % larger about x",
-        "link/panda_link4/inertia",
-        f"{_LINK4}/inertial/inertia",
-        _set(ixx="0.031"),
-    ),
-    "base": Fault(
-        "the base is 10 mm aside", "link/panda_link1/pose", of_robot(base=Pose.at(0.0, 0.01, 0.0))
-    ),
-    "finger_friction": Fault(
-        "the robot's friction is 4", "link/panda_leftfinger/friction", of_robot(friction=4.0)
-    ),
-    "stiffness": _driven("the drive of joint 4 is 10 % stiffer", stiffness=1.1),
-    "drive_damping": _driven("the drive of joint 4 damps 10 % more", damping=1.1),
-    "effort_limit": _driven("joint 4 has twice its effort limit", effort_limit=2.0),
     "self_collide": Fault(
         "the robot's links collide with each other",
         "link/panda_link4/touches",
-        of_robot(self_collide=True),
+        of_robot(lambda robot: replace(robot, self_collide=True)),
         Capability.SELF_COLLIDE,
     ),
-    "squeeze": Fault(
-        "the fingers squeeze twice as strongly",
-        "joint/panda_finger_joint1/effort_limit",
-        lambda scene, folder: of_joint("panda_finger_joint1", effort_limit=2.0)(
-            of_joint("panda_finger_joint2", effort_limit=2.0)(scene, folder), folder
-        ),
-    ),
-    "armature": _driven("joint 4 has half its rotor inertia", armature=0.5),
-    "initial_position": _driven("joint 4 starts 1 % nearer to zero", initial_position=0.99),
     "body_mass": _built("the brick weighs 1 kg", "brick/mass", mass=1.0),
     "body_size": _built("the brick is 2 mm thinner", "brick/boxes", size=_THINNER),
     "ball_size": _built("the ball is 1 mm smaller", "ball/rounds", radius=0.0295),

@@ -15,8 +15,8 @@ from pytest_simbench.simulator.parity import ParityResult, compare
 from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
-from pytest_simbench.testing.faults import Fault, rounds, true_scene
-from pytest_simbench.testing.robot_faults import robot_faults
+from pytest_simbench.testing.faults import rounds, true_scene
+from pytest_simbench.testing.robot_faults import Fault, robot_faults
 from pytest_simbench.testing.robots import any_robot
 from pytest_simbench.testing.state import require_same, swung
 from pytest_simbench.testing.subject import Subject, require

@@ -33,3 +33,10 @@ def grasping(robot: Robot) -> str | None:
     if opened < needed:
         return f"{robot.name} opens its fingers to {opened:g} m; the law takes {needed:g} m"
     return None
+
+
+def throwing(robot: Robot) -> str | None:
+    """It must grasp, and know how to swing its arm for a throw."""
+    return grasping(robot) or (
+        None if robot.swing else f"robot {robot.name!r} has no swing for the throw"
+    )

@@ -58,15 +58,6 @@ def thrown() -> Scene:
     return Scene("thrown", (body,))
 
 
-def bowling() -> Scene:
-    """A ball and a lying can that start along x on the plane at 1 m/s without turning."""
-    lying = Pose((0.0, 0.5, RADIUS), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0))
-    start: dict[str, Any] = {"mass": MASS, "friction": 0.5, "linear_velocity": (1.0, 0.0, 0.0)}
-    ball = Sphere("ball", RADIUS, Pose.at(0.0, 0.0, RADIUS), **start)
-    can = Cylinder("can", RADIUS, 2 * RADIUS, lying, **start)
-    return Scene("bowling", (ball, can), ground_friction=0.5)
-
-
 def bouncing() -> Scene:
     """A ball that falls on the plane at 3 m/s, and leaves with 0.6 of it."""
     ball = Sphere(
@@ -182,13 +173,12 @@ def tower() -> Scene:
     )
 
 
-def incline(slope: float, mu: float, direction: float = 0.0) -> Scene:
-    """A slab on the plane, gravity tilted by atan(slope) towards `direction` [rad]."""
+def incline(slope: float, mu: float) -> Scene:
+    """A slab on the plane, gravity tilted by atan(slope) along x."""
     angle = math.atan(slope)
-    pull = GRAVITY * math.sin(angle)
-    gravity = (pull * math.cos(direction), pull * math.sin(direction), -GRAVITY * math.cos(angle))
+    gravity = (GRAVITY * math.sin(angle), 0.0, -GRAVITY * math.cos(angle))
     slab = Box("slab", (0.1, 0.1, 0.02), Pose.at(0, 0, 0.01), MASS, mu)
-    return Scene(f"incline {slope} {mu} {direction}", (slab,), gravity=gravity, ground_friction=mu)
+    return Scene(f"incline {slope} {mu}", (slab,), gravity=gravity, ground_friction=mu)
 
 
 def tumbling(size: Vector3) -> Scene:

@@ -18,6 +18,7 @@ from pytest_simbench.client.errors import BadState, Diverged, Where, WorkerError
 from pytest_simbench.client.launch import Constructed, Launch
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import Motion, World
+from pytest_simbench.laws import Law
 from pytest_simbench.robot.panda import panda
 from pytest_simbench.scene import Robot, Scene
 from pytest_simbench.simulator import Capability, Settings, Simulator
@@ -172,6 +173,20 @@ class Subject:
             with self.world(scene) as world:
                 self.motions[key] = logged(world.wait(seconds, log_period=log_period))
         return self.motions[key]
+
+
+def asked(subject: Subject, *laws: Law, within: float | None = None) -> None:
+    """Ask laws of `pytest_simbench.laws`, each in a world of its own; `within` their own
+    tolerances, or a bound [in the law's unit].
+
+    Raises:
+        ConformanceFailure: the reading of one is farther off.
+    """
+    for law in laws:
+        with subject.world(law.build()) as world:
+            found = law.measure(world)
+        limit = found.tolerance if within is None else within
+        require_close(f"{law.name}: {law.quantity}", found.value, found.exact, limit, law.unit)
 
 
 def logged(motion: Motion | None) -> Motion:

@@ -2,7 +2,8 @@
 
 Imports nothing but the rooms `scene` and `simulator`, numpy and the standard library, so that it
 runs in an interpreter that holds nothing but the engine. Each request is a dict
-`{"op": name, ...}`; the answer is `{"ok": result}` or `{"error": {type, message}}`. In between may
+`{"op": name, "number": n, ...}`; the answer has the same number, and is `{"ok": result}` or
+`{"error": {type, message}}`. In between may
 come any number of times `{"alive": simulated time}`, and `{"frame": {time, seconds, picture or
 problem}}` while a film is taken.
 """
@@ -34,7 +35,12 @@ from pytest_simbench.simulator.robot_files import received
 from pytest_simbench.simulator.self_collision import check_self_collision
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.worker.acting import Acting
-from pytest_simbench.worker.state import check_following, check_log, check_start, checked_state
+from pytest_simbench.worker.state import (
+    check_following,
+    check_start,
+    checked_quantities,
+    checked_state,
+)
 from pytest_simbench.worker.stepping import Film, Stepper
 from pytest_simbench.worker.text import LONGEST_LOGGED, named, readable, told
 from pytest_simbench.worker.watching import Watch
@@ -73,12 +79,14 @@ class Server:
         self.scene = Scene("empty")
         self.compared: tuple[dict[str, Any], dict[str, Any]] | None = None
         self.saved: dict[str, Any] = {}
+        self.number = 0
 
     def answer(self, request: dict[str, Any]) -> None:
         """Carry out one request and send its answer, whatever happens."""
+        self.number = request.pop("number")
         try:
             operation = getattr(self, f"do_{request.pop('op')}")
-            self.send({"ok": pack(operation(**unpack(request)))})
+            self.send({"number": self.number, "ok": pack(operation(**unpack(request)))})
         except SimulatorError as error:
             self._send_error(error, _typed(error), told(error))
         except MemoryError as error:
@@ -92,7 +100,7 @@ class Server:
         with suppress(Exception):  # a full disk, an exception that cannot be printed
             trace = "".join(traceback.format_exception(error))
             print(readable(trace, LONGEST_LOGGED), file=sys.stderr, flush=True)
-        self.send({"error": {"type": name, "message": message}})
+        self.send({"number": self.number, "error": {"type": name, "message": message}})
 
     def do_hello(self) -> dict[str, Any]:
         return {
@@ -140,7 +148,7 @@ class Server:
         simulator.load(world)
         self.scene = world
         acting = Acting.of(simulator, world)
-        self.stepper = Stepper(simulator, lambda at: self.send({"alive": float(at)}), acting)
+        self.stepper = Stepper(simulator, world, lambda at: self.send({"alive": at}), acting)
         self.stepper.real_time = self.real_time
         check_start(simulator, world)
         excused: list[str] = []
@@ -148,7 +156,7 @@ class Server:
         if parity:
             expected, reported = (
                 expected_quantities(world, simulator.settings),
-                simulator.read_back(),
+                checked_quantities(simulator),
             )
             info = simulator.info
             counting = (deviation for deviation in info.deviations if deviation.concerns(world))
@@ -178,9 +186,9 @@ class Server:
         """What the engine says; the adapter made to remember another scene meanwhile, if given."""
         simulator = self._constructed()
         if remember is None:
-            return simulator.read_back()
+            return checked_quantities(simulator)
         with remembering(simulator, Scene.from_wire(remember)):
-            return simulator.read_back()
+            return checked_quantities(simulator)
 
     def do_state(self) -> dict[str, Any]:
         return checked_state(self._constructed(), self.scene)
@@ -197,7 +205,6 @@ class Server:
         return self._moved(self._loaded().wait(duration, log_period))
 
     def _moved(self, log: dict[str, Any]) -> dict[str, Any]:
-        check_log(self._constructed(), self.scene, log)
         watch = self._loaded().watch
         if watch is not None:
             watch.check_log(log)

@@ -1,19 +1,22 @@
 """Is what an adapter returns the state of this scene: right shapes, numbers, units, order?
 
-Looked at when a world is loaded, where everything is where the scene puts it, and after each
-motion; never in the stepping loop. Whatever is wrong is an error of the adapter and ends the
-repetition: what was expected, and what came.
+Looked at when a world is loaded, where everything is where the scene puts it, at each look while
+stepping, and after each motion; never in the time that stepping takes. Whatever is wrong is an
+error of the adapter and ends the repetition: what was expected, and what came.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import ParityError, Simulator, StateError
+from pytest_simbench.worker.text import shown
 
 POSITION_TOLERANCE = 1e-3
 """Between scene and engine at the start [m], [rad]: single precision at 10 m is 1e-6."""
@@ -30,11 +33,74 @@ REST_TOLERANCE = 1e-6
 SPEED_TOLERANCE = 1e-4
 """Share by which the speed of a body at the start may differ from the scene's: as in parity."""
 
+CLOCK_TOLERANCE = 1e-3
+"""Share by which a clock may drift, beside half a step: one of single precision does."""
+
 EXCHANGED = 0.1
 """A joint this far from its set point [rad] may have been taken for another one."""
 
 ALIKE = 0.02
 """Joints that changed places stand this near to each other's set points [rad]."""
+
+
+@dataclass(frozen=True)
+class States:
+    """Reads a simulator's clock and states, and lets nothing pass that is none.
+
+    Attributes:
+        simulator: a loaded one.
+        scene: what it loaded.
+    """
+
+    simulator: Simulator
+    scene: Scene
+
+    def time(self) -> float:
+        """Simulated [s].
+
+        Raises:
+            StateError: no number, or not a finite one.
+        """
+        time = self.simulator.time
+        if isinstance(time, bool) or not isinstance(time, int | float | np.floating):
+            raise StateError(f"{self._name}: the time must be a float, not {shown(time)}")
+        if not math.isfinite(time):
+            raise StateError(f"{self._name}: the time must be finite, not {time}")
+        return float(time)
+
+    def time_after(self, steps: int, begin: float) -> float:
+        """Simulated time after so many steps from `begin` [s].
+
+        Raises:
+            StateError: as `time`; or it stood still, ran backwards, or went on by another time
+                than that of the steps.
+        """
+        time, timestep = self.time(), self.simulator.settings.timestep
+        passed = steps * timestep
+        if abs(time - begin - passed) > timestep / 2 + CLOCK_TOLERANCE * passed:
+            raise StateError(
+                f"{self._name}: the time must be {begin + passed:.6g} s after {steps} steps of "
+                f"{timestep:g} s from {begin:.6g} s on, not {time:.6g} s"
+            )
+        return time
+
+    def joints(self) -> FloatArray:
+        """Positions and velocities, (2, n_joints); errors as `bodies`."""
+        count = len(self.scene.robot.joints) if self.scene.robot is not None else 0
+        return _checked(f"{self._name}: joint_state()", self.simulator.joint_state(), (2, count))
+
+    def bodies(self) -> FloatArray:
+        """Rows as `Simulator.body_state`, (n_free, 13).
+
+        Raises:
+            StateError: a wrong type, shape or kind of number.
+        """
+        shape = (len(self.scene.free_bodies), 13)
+        return _checked(f"{self._name}: body_state()", self.simulator.body_state(), shape)
+
+    @property
+    def _name(self) -> str:
+        return self.simulator.info.name
 
 
 def checked_state(simulator: Simulator, scene: Scene) -> dict[str, Any]:
@@ -43,20 +109,33 @@ def checked_state(simulator: Simulator, scene: Scene) -> dict[str, Any]:
     Raises:
         StateError: a wrong type, shape or kind of number, or a quaternion that is no rotation.
     """
-    name, time = simulator.info.name, simulator.time
-    if isinstance(time, bool) or not isinstance(time, int | float | np.floating):
-        raise StateError(f"{name}: the time must be a float, not {time!r:.80}")
-    shapes = _shapes(scene)
-    joints = _checked(f"{name}: joint_state()", simulator.joint_state(), shapes["joints"])
-    bodies = _checked(f"{name}: body_state()", simulator.body_state(), shapes["bodies"])
+    states = States(simulator, scene)
+    time, joints, bodies = states.time(), states.joints(), states.bodies()
     norms = np.linalg.norm(bodies[:, 3:7], axis=1)
     for body, row, norm in zip(scene.free_bodies, bodies, norms, strict=True):
         if not abs(norm - 1.0) <= NORM_TOLERANCE:
             raise StateError(
-                f"{name}: the quaternion of {body.name!r} must have length 1, but "
+                f"{simulator.info.name}: the quaternion of {body.name!r} must have length 1, but "
                 f"{_text(row[3:7])} has {norm:.4g}"
             )
-    return {"time": float(time), "joints": joints, "bodies": bodies}
+    return {"time": time, "joints": joints, "bodies": bodies}
+
+
+def checked_quantities(simulator: Simulator) -> dict[str, Any]:
+    """What the engine says that it built.
+
+    Raises:
+        StateError: no dict of numbers by name.
+    """
+    title, found = f"{simulator.info.name}: read_back()", simulator.read_back()
+    if not isinstance(found, dict):
+        raise StateError(f"{title} must be a dict of numbers by name, not {shown(found)}")
+    for name, value in found.items():
+        try:
+            np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            raise StateError(f"{title}[{name!r}] must be numbers, not {shown(value)}") from None
+    return found
 
 
 def check_start(simulator: Simulator, scene: Scene) -> None:
@@ -124,25 +203,6 @@ def check_following(simulator: Simulator, scene: Scene, joints: FloatArray, goal
         f"{_text(reached[away])} where {_text(asked[away])} was commanded: their order is not that "
         "of scene.robot.joints"
     )
-
-
-def check_log(simulator: Simulator, scene: Scene, log: dict[str, Any]) -> None:
-    """The samples of a motion, stacked.
-
-    Raises:
-        StateError: a wrong type, shape or kind of number.
-    """
-    if log:
-        shapes = _shapes(scene)
-        samples = len(log["time"])
-        for what in ("joints", "bodies"):
-            title = f"{simulator.info.name}: the logged {what}"
-            _checked(title, log[what], (samples, *shapes[what]))
-
-
-def _shapes(scene: Scene) -> dict[str, tuple[int, ...]]:
-    count = len(scene.robot.joints) if scene.robot is not None else 0
-    return {"joints": (2, count), "bodies": (len(scene.free_bodies), 13)}
 
 
 def _checked(title: str, values: Any, shape: tuple[int, ...]) -> FloatArray:

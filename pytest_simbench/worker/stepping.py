@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Trajectory
+from pytest_simbench.scene import FloatArray, Scene, Trajectory
 from pytest_simbench.simulator import DivergedError, Simulator
 from pytest_simbench.worker.acting import Acting
 from pytest_simbench.worker.control import Clock, Control
 from pytest_simbench.worker.family import Family
+from pytest_simbench.worker.state import States
 from pytest_simbench.worker.watching import Watch
 
 HEARTBEAT_PERIOD = 0.5
@@ -58,10 +59,10 @@ class Log:
     joints: list[FloatArray] = field(default_factory=list)
     bodies: list[FloatArray] = field(default_factory=list)
 
-    def sample(self, simulator: Simulator) -> None:
-        self.times.append(simulator.time)
-        self.joints.append(simulator.joint_state())
-        self.bodies.append(simulator.body_state())
+    def sample(self, time: float, joints: FloatArray, bodies: FloatArray) -> None:
+        self.times.append(time)
+        self.joints.append(joints)
+        self.bodies.append(bodies)
 
     def arrays(self) -> dict[str, FloatArray]:
         """time (n,), joints (n, 2, n_joints), bodies (n, n_free, 13)."""
@@ -84,6 +85,7 @@ class Stepper:
     """Steps one simulator through trajectories and waits, and keeps its clocks.
 
     Attributes:
+        states: reads the simulator's clock and states.
         acting: what moves bodies from outside; None: nothing.
         film: pictures along the way, outside of the measured stepping time; None: none.
         clocks: totals since loading.
@@ -95,10 +97,12 @@ class Stepper:
     def __init__(
         self,
         simulator: Simulator,
+        scene: Scene,
         heartbeat: Callable[[float], None],
         acting: Acting | None = None,
     ) -> None:
         self.simulator = simulator
+        self.states = States(simulator, scene)
         self.heartbeat = heartbeat
         self.acting = acting
         self.clocks = Clocks()
@@ -134,6 +138,7 @@ class Stepper:
         Raises:
             DivergedError: joint or body state is not finite.
             ParityError: the world is not what it was, see `Watch`.
+            StateError: a state or a time is none, see `States`.
         """
         simulator, timestep = self.simulator, self.simulator.settings.timestep
         log_every = 0 if log_period is None else max(1, round(log_period / timestep))
@@ -141,8 +146,8 @@ class Stepper:
         watched = simulator.gui or self.real_time
         look_every = max(1, round((LOOK_PERIOD if watched else CHECK_PERIOD) / timestep))
         film_every = self.film.every if self.film is not None else 0
-        log, watch = Log(), self.watch
-        from_start, time_began = self.clocks.steps, simulator.time
+        log, states, from_time = Log(), self.states, self.states.time()
+        watch, from_start = self.watch, self.clocks.steps
         due = watch.due - from_start if watch is not None else 0
         step, command, clock = simulator.step, simulator.command, self._clock
         totals, keep_up = self.clocks, self.control.keep_up
@@ -174,14 +179,20 @@ class Stepper:
             if k == steps:
                 family.meet()
             totals.cpu += family.cpu() - cpu_began
-            if logs:
-                log.sample(simulator)
-            if k % check_every == 0 or k == due:
-                self._check_state(from_start + k, log if logs else None)
-                due = watch.due - from_start if watch is not None else 0
+            now = states.time_after(k, from_time)
+            checks = k % check_every == 0 or k in (steps, due)
+            if logs or checks:
+                joints, bodies = states.joints(), states.bodies()
+                if logs:
+                    log.sample(now, joints, bodies)
+                if checks:
+                    self._check_finite(now, joints, bodies)
+                    if watch is not None:
+                        watch.look(from_start + k, joints, bodies)
+                        due = watch.due - from_start
             if stopped - beat > HEARTBEAT_PERIOD:
                 beat = stopped
-                self.heartbeat(simulator.time)
+                self.heartbeat(now)
             if films and self.film is not None:
                 self.film.shoot()
             if simulator.gui and stopped > self._next_picture:
@@ -198,22 +209,12 @@ class Stepper:
             resumed, waited = clock()
         totals.steps += steps
         totals.simulated += steps * timestep
-        self._check_state(totals.steps)
-        if watch is not None:
-            watch.moved(time_began, steps)
         return log.arrays() if log.times else {}
 
-    def _check_state(self, number: int, log: Log | None = None) -> None:
-        """Look at the state after that step since loading, or at the log's last sample where that
-        is it."""
-        simulator = self.simulator
-        joints = log.joints[-1] if log else simulator.joint_state()
-        bodies = log.bodies[-1] if log else simulator.body_state()
+    def _check_finite(self, time: float, joints: FloatArray, bodies: FloatArray) -> None:
         for what, state in (("joints", joints), ("bodies", bodies)):
             if not np.isfinite(state).all():
                 raise DivergedError(
-                    f"the state of the {what} is not finite at t = {simulator.time:.3f} s with "
-                    f"{simulator.settings}; a smaller timestep may help"
+                    f"the state of the {what} is not finite at t = {time:.3f} s with "
+                    f"{self.simulator.settings}; a smaller timestep may help"
                 )
-        if self.watch is not None:
-            self.watch.look(number, joints, bodies)

@@ -4,7 +4,6 @@
   what it told when the world was loaded (`simulator.parity`).
 - What flies free accelerates as gravity has it.
 - Nothing jumps: bodies and joints move no farther than their speeds explain.
-- Time goes on by the steps that were made.
 
 All of it happens where the stepping looks at the state anyway, outside of its clocks.
 """
@@ -21,11 +20,13 @@ from numpy.typing import NDArray
 
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.scene.overlap import rotations
-from pytest_simbench.simulator import ParityError, Simulator
+from pytest_simbench.scene.plausibility import implausible
+from pytest_simbench.simulator import DivergedError, ParityError, Simulator
 from pytest_simbench.simulator.kinematics import link_poses
 from pytest_simbench.simulator.parity import Lasting
 from pytest_simbench.simulator.shapes import DIRECTIONS, OUTLINES
 from pytest_simbench.simulator.urdf import PreparedRobot
+from pytest_simbench.worker.state import checked_quantities
 
 WINDOW, GROWTH = 1.0, 4
 """One step is drawn in the first `WINDOW` of simulated time [s], and one in each time span that
@@ -49,9 +50,6 @@ GRAVITY_TOLERANCE = 0.05
 SURGE, JOINT_SURGE = 0.5, 5.0
 """Between two looks a body may be faster than anything at either by `SURGE` [m/s], a joint than at
 either by `JOINT_SURGE` [rad/s, m/s]: pushed and braked again, or moved out of another body."""
-
-STEPS_OFF = 0.25
-"""Time may be off by this share of a step, and by rounding."""
 
 NEVER = 1 << 62
 
@@ -90,6 +88,7 @@ class Watch:
         self._simulator, self._title = simulator, simulator.info.title
         self._lasting = Lasting(reported, scene, self._title)
         self._step = simulator.settings.timestep
+        self._scene = scene
         self._random = np.random.default_rng(seed)
         self._begin, self._end = 0, max(1, round(WINDOW / self._step))
         self._drawn = self._draw()
@@ -117,19 +116,6 @@ class Watch:
     def _draw(self) -> int:
         return int(self._random.integers(self._begin, self._end)) + 1
 
-    def moved(self, began: float, steps: int) -> None:
-        """After so many steps: whether the simulator's time went on by them.
-
-        Raises:
-            ParityError: it did not.
-        """
-        passed, asked = self._simulator.time - began, steps * self._step
-        if not abs(passed - asked) <= STEPS_OFF * self._step + 1e-6 * self._simulator.time:
-            raise ParityError(
-                f"{self._title} says that {passed:.6g} s passed in {steps} steps of "
-                f"{self._step:g} s, which are {asked:.6g} s"
-            )
-
     def restored(self, step: int, joints: FloatArray, bodies: FloatArray) -> None:
         """The world was put back to another state: what comes next is no jump."""
         self._last, self._ends = _Look(step, self._simulator.time, joints, bodies), NEVER
@@ -138,7 +124,8 @@ class Watch:
         """Look at the state after a step, counted since loading.
 
         Raises:
-            ParityError: something is as it cannot be.
+            ParityError: something jumps, falls otherwise than by gravity or changed.
+            DivergedError: something is where nothing can be.
         """
         now = _Look(step, self._simulator.time, joints, np.array(bodies))
         before, self._last = self._last, now
@@ -149,6 +136,11 @@ class Watch:
             np.abs(bodies[:, :3] - before.bodies[:, :3]).max(initial=0.0) <= SURGE * span / 2
             and np.abs(joints[0] - before.joints[0]).max(initial=0.0) <= JOINT_SURGE * span
         ):  # else no speed need be looked at
+            wrong = implausible(self._scene, bodies)
+            if wrong is not None:  # who explodes does not cheat
+                raise DivergedError(
+                    f"{wrong}, at t = {now.time:.3f} s; a smaller timestep may help"
+                )
             pair = np.stack([before.joints, joints]), np.stack([before.bodies, bodies])
             self._continuous(np.array([span]), *pair, np.array([now.time]))
         if step >= self._drawn:
@@ -183,7 +175,7 @@ class Watch:
             ParityError: something that lasts is another one than when the world was loaded.
         """
         began = time.perf_counter()
-        self._lasting.check(self._simulator.read_back(), self._simulator.time)
+        self._lasting.check(checked_quantities(self._simulator), self._simulator.time)
         self.seconds += time.perf_counter() - began
 
     def _continuous(

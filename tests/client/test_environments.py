@@ -17,6 +17,7 @@ from pytest_simbench.client.environments import (
     MARKER,
     Environment,
     cache_variables,
+    create_all,
     existing,
     interpreter,
     missing,
@@ -85,6 +86,39 @@ def test_what_is_there_and_removing_it(info: SimulatorInfo) -> None:
         assert list(existing()) == [environment.folder]
     remove(environment.folder)
     assert list(existing()) == []
+
+
+@pytest.mark.parametrize("kind", ["link", "dangling link", "file"])
+def test_what_else_is_in_its_place_is_left_alone(
+    info: SimulatorInfo, tmp_path: Path, kind: str
+) -> None:
+    environment, elsewhere = Environment.of(info), tmp_path / "elsewhere"
+    environment.folder.parent.mkdir()
+    if kind == "file":
+        environment.folder.touch()
+    else:
+        environment.folder.symlink_to(elsewhere)
+    if kind == "link":
+        elsewhere.mkdir()
+        (elsewhere / MARKER).write_text("mine")
+    for act in (environment.create, lambda: remove(environment.folder)):
+        with pytest.raises(SimulatorError, match="is a link|is no folder"):
+            act()
+    assert environment.folder.is_symlink() == (kind != "file")
+    assert kind != "link" or (elsewhere / MARKER).read_text() == "mine"
+
+
+def test_nothing_is_made_while_something_is_wrong_with_another(info: SimulatorInfo) -> None:
+    wrong = replace(info, name="wrong", requirements=())
+    with pytest.raises(SimulatorError, match="wrong needs no environment of its own"):
+        create_all([Environment.of(info), Environment.of(wrong)], print)
+    assert list(existing()) == []
+
+
+def test_a_folder_that_takes_none_is_one_sentence(info: SimulatorInfo, tmp_path: Path) -> None:
+    (tmp_path / "environments").touch()
+    with pytest.raises(SimulatorError, match="environments cannot be made in .*exists"):
+        Environment.of(info).create()
 
 
 def test_a_release_lives_in_its_own_even_where_the_engine_is_installed_here(

@@ -13,6 +13,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+from pytest_simbench.client import logs
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
@@ -87,7 +88,7 @@ def test_sending_has_the_repetition_s_time_out_too(case: Case) -> None:
 
 @pytest.mark.parametrize(
     ("fault", "phase"),
-    [("StopsBeingMade", "launch"), ("StopsLoading", "load"), ("StandsStill", "fall")],
+    [("StopsBeingMade", "launch"), ("StopsLoading", "load")],
 )
 def test_silence_in_each_phase_is_the_stall_limit(case: Case, fault: str, phase: str) -> None:
     with at_most(1.5 + STALL):
@@ -117,11 +118,16 @@ def test_a_worker_that_does_not_close(case: Case, monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_log_does_not_fill_the_disk(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
-    from pytest_simbench.client import logs
-
     assert failure(unruly(case, "FloodsTheLog", stall_timeout=3.0))[0] == "WorkerHung"
     (log,) = (case.folder / "logs").iterdir()
     assert log.stat().st_size < logs.LARGEST
+
+
+def test_a_log_is_cut_though_it_grew_at_once(case: Case) -> None:
+    record, _ = Repetition(Experiment(unruly(case, "FloodsAtOnce"), Falling()), 1).run()
+    assert record.status == "ok"
+    (log,) = (case.folder / "logs").iterdir()
+    assert log.stat().st_size < 2 * logs.KEPT
 
 
 @pytest.mark.parametrize("limit", [20.0, 60.0])
@@ -174,7 +180,7 @@ def kept(case: Case, task: Falling, jobs: int = 1, last: int = 1) -> tuple[list[
         ("StopsBetweenRequests", Sending()),
         ("HoldsTheInterpreter", Sending()),
         ("StopsLoading", Falling()),
-        ("StandsStill", Falling(1e6)),
+        ("Chatters", Falling()),
     ],
 )
 def test_interrupt(case: Case, fault: str, task: Falling, jobs: int) -> None:
@@ -202,6 +208,7 @@ def test_interrupt_while_starting(case: Case, tmp_path: object, jobs: int) -> No
     assert [(r.status, r.error.phase) for r in records if r.error] == [
         ("interrupted", "launch")
     ] * jobs
+    assert not any("python" in record.versions for record in records)  # so it can be resumed
 
 
 @pytest.mark.parametrize("apart", [0.0, 0.002, 0.02, 0.1])

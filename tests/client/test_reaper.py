@@ -140,6 +140,39 @@ def test_a_reaper_that_was_ended_is_started_again() -> None:
     assert second.poll() is None
 
 
+STOPPED = """
+import os, signal, sys
+from pytest_simbench.client import reaper
+reaper.new_mark()
+os.kill(reaper._run._script.pid, signal.SIGSTOP)
+print(reaper._run._script.pid)
+"""
+
+
+def test_a_reaper_that_was_stopped_ends_with_its_run() -> None:
+    output = subprocess.run([sys.executable, "-c", STOPPED], capture_output=True, check=True).stdout
+    assert gone([int(output)], 5.0)
+
+
+@pytest.mark.parametrize("killed", [False, True])
+def test_temporary_files_of_workers_go_with_them(tmp_path: Path, killed: bool) -> None:
+    """Whatever an engine leaves there, also when the run is killed."""
+    script = SCRIPT if killed else SCRIPT.replace("1e6", "0.1")
+    adapter, told = "tests.client.unruly:LeavesFiles", tmp_path / "ids"
+    program = subprocess.Popen([sys.executable, "-c", script, str(tmp_path), adapter])
+    while not (told.exists() and told.read_text()) and program.poll() is None:
+        time.sleep(0.05)
+    folder = Path(told.read_text())
+    assert folder.parent.name.startswith(reaper.FOLDERS)
+    if killed:
+        program.kill()
+    assert program.wait() == (-9 if killed else 0)
+    until = time.monotonic() + 10.0
+    while folder.parent.exists() and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not folder.parent.exists()
+
+
 def test_reaping_ends_those_of_the_mark_alone() -> None:
     def start(mark: str) -> subprocess.Popen[bytes]:
         return subprocess.Popen(["sleep", "600"], env={**os.environ, reaper.VARIABLE: mark})

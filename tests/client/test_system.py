@@ -86,6 +86,7 @@ def test_a_file_in_the_working_folder_is_no_engine(
     monkeypatch.delenv("PYTHONPATH", raising=False)
     monkeypatch.chdir(tmp_path)
     Path("another_absent_module.py").touch()
+    Path("json.py").write_text("raise RuntimeError('stray')")
     info = replace(info, modules=("another_absent_module",))
     assert "no module another_absent_module" in str(SystemPython(info).problem)
 

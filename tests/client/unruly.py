@@ -11,15 +11,18 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
+from pytest_simbench.sims.mujoco.settings import MuJoCoSettings
 
 from pytest_simbench.scene import Scene
-from pytest_simbench.simulator import ParityError, UnavailableError
+from pytest_simbench.simulator import Deviation, ParityError, UnavailableError
 from pytest_simbench.worker.server import Server
 
 FAULT_TIME = 0.3
@@ -78,14 +81,6 @@ class StopsClosing(MuJoCo):
         os.kill(os.getpid(), signal.SIGSTOP)
 
 
-class StandsStill(MuJoCo):
-    """Steps for ever, and does not get on."""
-
-    def step(self) -> None:
-        if self.time < FAULT_TIME:
-            super().step()
-
-
 class Chatters(MuJoCo):
     """Says that it is alive as often as it can, each time a little later."""
 
@@ -102,6 +97,57 @@ class FloodsTheLog(_AtTime):
         for _ in range(100):
             os.write(2, line * 10_000)
         time.sleep(600.0)
+
+
+class FloodsAtOnce(_AtTime):
+    """100 MB before anybody looks, and all goes on well."""
+
+    def fault(self) -> None:
+        for _ in range(100):
+            os.write(2, b"x" * 1_000_000)
+
+
+class Forks(_AtTime):
+    """Goes on in the child, too. The parent comes second."""
+
+    def fault(self) -> None:
+        if os.fork():
+            time.sleep(1.0)
+
+
+class LeavesFiles(MuJoCo):
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        with open(os.environ["UNRULY"], "w") as file:
+            file.write(tempfile.mkdtemp())
+
+
+@dataclass(frozen=True)
+class OddSettings(MuJoCoSettings):
+    def to_wire(self) -> Any:
+        return {3: 0.001}
+
+
+LIES: dict[str, dict[str, Any]] = {
+    "versions": {"versions": lambda self: {"mujoco": "3.3", "numpy": None}},
+    "names of versions": {"versions": lambda self: {"mujoco": "3.3", 3: "4"}},
+    "untested": {"untested": lambda self: 3},
+    "settings": {"profiles": {"tuned": OddSettings(0.001)}},
+    "deviations": {
+        "info": replace(MuJoCo.info, deviations=(*MuJoCo.info.deviations, Deviation("", 3))),  # type: ignore[arg-type]
+    },
+    "no dict of versions": {"versions": lambda self: 3},
+    "versions that cannot be sent": {
+        "versions": lambda self: {"mujoco": "3.3", "numpy": Unprintable}
+    },
+}
+"""What an adapter says, of another type than it must be."""
+
+
+def __getattr__(name: str) -> Any:
+    if name.startswith("Lies "):
+        return type("Lies", (MuJoCo,), LIES[name[5:]])
+    raise AttributeError(name)
 
 
 def _connections() -> list[int]:
@@ -157,6 +203,20 @@ class Unprintable(Exception):
     __repr__ = __str__
 
 
+class Unspeakable(Exception):
+    def __str__(self) -> str:
+        raise SystemExit(9)
+
+
+class Letters(str):
+    """A text that is no text to execnet."""
+
+
+class OwnText(Exception):
+    def __str__(self) -> str:
+        return Letters("mine")
+
+
 class Rude(BaseException):
     """An exception that no `except Exception` sees."""
 
@@ -169,6 +229,10 @@ RAISED: dict[str, Any] = {
     "surrogate": lambda: ValueError("bad \ud800 text"),
     "huge": lambda: ValueError("y" * 5_000_000),
     "no_text": Unprintable,
+    "exits_in_text": Unspeakable,
+    "own_text": OwnText,
+    "parity_without_text": lambda: type("Odd", (Unprintable, ParityError), {})(),
+    "exit_without_text": lambda: SystemExit(Unprintable()),
     "no_string": lambda: ValueError(b"bytes", {1: 2}, None),
     "interrupt": lambda: KeyboardInterrupt("from inside"),
     "generator": lambda: GeneratorExit("done"),

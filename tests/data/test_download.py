@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gzip
+import os
+import tarfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -58,6 +61,23 @@ def test_an_archive_that_is_cut_off_is_one_sentence(
     content = path.read_bytes()
     path.write_bytes(content[: int(share * len(content))])
     with pytest.raises(DataError, match="cube_tosses cannot be downloaded from"):
+        download(source, tmp_path / "data")
+
+
+@pytest.mark.parametrize("kind", ["unwanted", "long name", "pax header", "packed"])
+def test_nothing_of_an_archive_passes_the_limit(
+    source: Local, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    monkeypatch.setattr("pytest_simbench.data.download.LARGEST", 10**6)
+    header = tarfile.TarInfo("set/unwanted")
+    header.type = {"long name": tarfile.GNUTYPE_LONGNAME, "pax header": tarfile.XHDTYPE}.get(
+        kind, tarfile.REGTYPE
+    )
+    header.size = 2 * 10**6
+    content = header.tobuf() + (os.urandom if kind == "packed" else bytes)(header.size)
+    rest = gzip.decompress(Path(source.path).read_bytes())
+    Path(source.path).write_bytes(gzip.compress(content + rest, 1))
+    with pytest.raises(DataError, match="the archive is larger than any data set"):
         download(source, tmp_path / "data")
 
 

@@ -57,11 +57,16 @@ from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 class Newer(MuJoCo):
     info = replace(MuJoCo.info, name="newer", tested_version="3.9.0")
+
+class Unlisted(MuJoCo):  # as an engine of the system, which is no Python package
+    info = replace(MuJoCo.info, name="unlisted", distribution="no-such-package")
 """
     )
     package = pytester.mkdir("newer-1.0.dist-info")
     (package / "METADATA").write_text("Metadata-Version: 2.1\nName: newer\nVersion: 1.0\n")
-    (package / "entry_points.txt").write_text("[pytest_simbench.simulators]\nnewer = newer:Newer\n")
+    (package / "entry_points.txt").write_text(
+        "[pytest_simbench.simulators]\nnewer = newer:Newer\nunlisted = newer:Unlisted\n"
+    )
     pytester.makepyfile(
         test_it="""
 from tests.tiny import Falling
@@ -77,6 +82,13 @@ def test_falling(repeat):
     )  # fmt: skip
     assert result.ret == 0
     result.stdout.fnmatch_lines(["*UNTESTED VERSION: mujoco * is here, the*"])
+    result = pytester.run(
+        sys.executable, "-c",
+        "import sys, pytest; sys.path.insert(0, '.'); sys.exit(pytest.main(['--sims']))",
+    )  # fmt: skip
+    result.stdout.fnmatch_lines(
+        ["newer: *", "*UNTESTED*", "unlisted: *", "    version not known before it runs, installed"]
+    )
 
 
 def test_the_page_of_the_documentation_is_up_to_date(request: pytest.FixtureRequest) -> None:

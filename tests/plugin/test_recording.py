@@ -42,7 +42,6 @@ def test_each_repetition_gets_a_bag(pytester: pytest.Pytester, more: list[str]) 
     result.assert_outcomes(passed=1)
     result.stdout.fnmatch_lines(
         [
-            "recordings  repetition 1 of 2  ok after *",
             "recordings  repetition 2 of 2  ok after *",
             "*simulator comparison*",
             "2 recordings: o/recordings",

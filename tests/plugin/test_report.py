@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import json
 import re
 
@@ -26,6 +27,34 @@ def run(pytester: pytest.Pytester, *arguments: str) -> pytest.RunResult:
 @pytest.fixture(autouse=True)
 def test_file(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(test_it=TEST)
+
+
+@pytest.mark.parametrize(
+    ("what", "options", "message"),
+    [
+        ("run.write_report", (), "Exit: interrupted while the report was made; the records are "
+         "kept in */o, and pytest --sim-report */o makes the report"),
+        ("merge.summaries_of", ("--sim-report=o",), "--sim-report: interrupted; nothing that it "
+         "read was changed"),
+    ],
+)  # fmt: skip
+def test_an_interrupted_report_is_one_sentence(
+    pytester: pytest.Pytester, what: str, options: tuple[str, ...], message: str
+) -> None:
+    assert not options or run(pytester).ret == 0
+    pytester.makeconftest(
+        f"""
+        import signal
+        from pytest_simbench.plugin import merge, run
+        {what} = lambda *given: signal.raise_signal(signal.SIGINT)
+        """
+    )
+    result = pytester.runpytest_subprocess(*options) if options else run(pytester)
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    result_text = f"{result.stdout.str()}\n{result.stderr.str()}"
+    assert "Traceback" not in result_text
+    assert fnmatch.filter(result_text.splitlines(), message)
+    assert len((pytester.path / "o" / "records.jsonl").read_text().splitlines()) == 5
 
 
 def test_a_run_ends_with_its_page_and_the_answer(pytester: pytest.Pytester) -> None:

@@ -106,6 +106,15 @@ def test_versions_that_are_known_here_are_compared(case: Case, save: Save, name:
         save(*old).take(Experiment(case, Falling()), None)
 
 
+def test_versions_that_an_interrupted_start_never_told_are_not_compared(
+    case: Case, save: Save
+) -> None:
+    versions = {**expected(Experiment(case, Falling())).versions, "python": ""}
+    cut = replace(ended(case, Falling(), 2, versions=versions)[0], status="interrupted")
+    found = save(*ended(case, Falling(), 1), cut).take(Experiment(case, Falling()), None)
+    assert sorted(found) == [1]
+
+
 def test_versions_of_somebody_elses_interpreter_are_not_guessed(case: Case) -> None:
     other = replace(case, python="/somewhere/bin/python")
     assert list(expected(Experiment(other, Falling())).versions) == ["pytest-simbench"]

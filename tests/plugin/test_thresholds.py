@@ -29,7 +29,7 @@ def test_what_a_task_measures_and_what_a_test_asks_for_are_known(
         )
         result.assert_outcomes(passed=2)
         assert result.ret == pytest.ExitCode.OK
-        result.stdout.fnmatch_lines(["*inconclusive whether at least 90 %*"])
+        result.stdout.fnmatch_lines(["UNDECIDED *landed >= 90 %*"])
 
 
 @pytest.mark.parametrize("arguments", [[], ["-n2"]], ids=["plain", "xdist"])

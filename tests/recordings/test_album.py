@@ -27,7 +27,7 @@ def test_the_first_picture_of_a_phase_is_kept(tmp_path: Path) -> None:
     for time, phase in enumerate(("pick", "place", "pick", *HOSTILE[:3])):
         album.look(phase, time, render)
     assert asked == [SIZE] * 5
-    album.write(tmp_path / "pictures" / "x.npz")
+    album.write(tmp_path, "pictures/x.npz")
     read = Album.read(tmp_path / "pictures" / "x.npz")
     assert list(read.pictures) == [f"after {name}" for name in ("pick", "place", *HOSTILE[:3])]
     assert list(read.times.values()) == [0, 1, 3, 4, 5]

@@ -54,7 +54,7 @@ def pose(transform: Any) -> list[float]:
 @pytest.mark.parametrize("read", [messages, messages_of_mcap])
 def test_it_reads_back_as_the_trace(read: Any, tmp_path: Path) -> None:
     kept = trace()
-    kept.write(tmp_path / "x.npz")
+    kept.write(tmp_path, "x.npz")
     write_bag(Trace.read(tmp_path / "x.npz"), tmp_path / "x")
     found = read(tmp_path / "x")
     states = found["/joint_states"]

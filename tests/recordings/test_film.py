@@ -30,7 +30,7 @@ def shown(path: Path) -> list[tuple[float, float]]:
 
 
 def test_each_picture_stands_at_its_time(tmp_path: Path) -> None:
-    made = Film(tmp_path / "videos" / "x.mp4")
+    made = Film(tmp_path, "videos/x.mp4")
     for k, time in enumerate(TIMES):
         made.take(time, grey(50 * k))
     made.take(TIMES[0], grey(255))  # a task went back: the film does not
@@ -45,7 +45,7 @@ def test_each_picture_stands_at_its_time(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("frames", [0, 3])
 def test_nothing_stays_of_one_that_is_not_kept(tmp_path: Path, frames: int) -> None:
-    made = Film(tmp_path / "videos" / "x.mp4")
+    made = Film(tmp_path, "videos/x.mp4")
     for time in TIMES[:frames]:
         made.take(time, grey(0))
     made.finish(keep=frames == 0)
@@ -55,7 +55,7 @@ def test_nothing_stays_of_one_that_is_not_kept(tmp_path: Path, frames: int) -> N
 
 
 def test_odd_edges_lose_a_row(tmp_path: Path) -> None:
-    made = Film(tmp_path / "x.mp4")
+    made = Film(tmp_path, "x.mp4")
     made.take(0.0, grey(100, 37, 51))
     made.finish()
     assert made.problem == ""
@@ -64,7 +64,7 @@ def test_odd_edges_lose_a_row(tmp_path: Path) -> None:
 
 def test_what_cannot_be_written_is_told(tmp_path: Path) -> None:
     (tmp_path / "videos").write_text("no folder")
-    made = Film(tmp_path / "videos" / "x.mp4")
+    made = Film(tmp_path, "videos/x.mp4")
     for time in TIMES:
         made.take(time, grey(0))
     made.finish()

@@ -16,7 +16,7 @@ from tests.recordings.samples import motion, scene, trace
 
 def test_it_is_read_back_without_the_robots_files(tmp_path: Path) -> None:
     kept = trace(phases=[(0.0, "pick"), (0.1, "place")])
-    kept.write(tmp_path / "traces" / "x.npz")
+    kept.write(tmp_path, "traces/x.npz")
     read = Trace.read(tmp_path / "traces" / "x.npz")
     assert kept.figure is not None
     assert read.figure is not None
@@ -33,7 +33,7 @@ def test_it_is_read_back_without_the_robots_files(tmp_path: Path) -> None:
 
 
 def test_it_names_no_path_of_this_machine(tmp_path: Path) -> None:
-    trace().write(tmp_path / "x.npz")
+    trace().write(tmp_path, "x.npz")
     about = np.load(tmp_path / "x.npz")["about"].tobytes().decode()
     robot = scene().robot
     assert robot is not None
@@ -50,13 +50,13 @@ def test_meshes_are_the_files_triangles() -> None:
 
 def spoilt(path: Path, **changes: Any) -> None:
     """A written trace with some arrays replaced, or left out (None)."""
-    trace().write(path)
+    trace().write(path.parent, path.name)
     arrays = {**np.load(path), **changes}
     np.savez(path, **{name: value for name, value in arrays.items() if value is not None})
 
 
 def about(path: Path, **changes: Any) -> np.ndarray:
-    trace().write(path)
+    trace().write(path.parent, path.name)
     told = {**json.loads(np.load(path)["about"].tobytes()), **changes}
     return np.frombuffer(json.dumps(told).encode(), dtype=np.uint8)
 
@@ -109,7 +109,7 @@ def test_it_ends_where_numbers_do(tmp_path: Path) -> None:
     moved.bodies[5:, 1, 2] = np.nan
     found = Trace.of(scene(), moved, [])
     assert len(found.time) == len(found.bodies) == len(found.joints) == 5
-    found.write(tmp_path / "x.npz")
+    found.write(tmp_path, "x.npz")
     assert len(Trace.read(tmp_path / "x.npz").time) == 5
 
 
@@ -120,5 +120,5 @@ def test_bodies_at_rest_cost_nothing(tmp_path: Path) -> None:
     count = 30_000
     bodies = np.tile(rest.bodies[:1], (count, 1, 1)) + rng.normal(0, 1e-9, (count, 2, 13))
     still = Motion(np.arange(count) * 0.02, np.zeros((count, 2, 0)), bodies)
-    Trace.of(scene(robot=False), still, []).write(tmp_path / "x.npz")
+    Trace.of(scene(robot=False), still, []).write(tmp_path, "x.npz")
     assert (tmp_path / "x.npz").stat().st_size < bodies.astype(np.float32).nbytes / 10

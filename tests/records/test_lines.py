@@ -38,7 +38,7 @@ def test_a_truncated_line_is_reported_and_the_next_record_starts_its_own(tmp_pat
 
 
 def test_a_full_disk_keeps_the_records_and_moves_them_elsewhere(tmp_path: Path) -> None:
-    file = LinesFile("/dev/full", tmp_path, "record")
+    file = LinesFile(Path("/dev"), "full", tmp_path, "record")
     assert not file.append(record(0).to_json())
     assert not file.append(record(1).to_json())
     assert file.pending == 2
@@ -56,7 +56,7 @@ def test_a_full_disk_keeps_the_records_and_moves_them_elsewhere(tmp_path: Path) 
 def test_records_that_no_disk_takes_are_handed_back(tmp_path: Path) -> None:
     blocked = tmp_path / "a file"
     blocked.touch()
-    file = LinesFile("/dev/full", blocked)
+    file = LinesFile(Path("/dev"), "full", blocked)
     file.append(record(0).to_json())
     report = file.close()
     assert report
@@ -66,7 +66,7 @@ def test_records_that_no_disk_takes_are_handed_back(tmp_path: Path) -> None:
 
 def test_the_system_folder_is_the_fallback(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    file = LinesFile("/dev/full")
+    file = LinesFile(Path("/dev"), "full")
     file.append(record(0).to_json())
     fallback = file.close().fallback
     assert fallback is not None
@@ -76,7 +76,7 @@ def test_the_system_folder_is_the_fallback(tmp_path: Path, monkeypatch: pytest.M
 def test_records_wait_for_the_disk_and_keep_their_order(tmp_path: Path) -> None:
     parent = tmp_path / "run"
     parent.touch()  # a file where the folder should be
-    file = LinesFile(parent / RECORDS)
+    file = LinesFile(parent, RECORDS)
     assert not file.append(record(0).to_json())
     assert not file.append(record(1).to_json())
     parent.unlink()
@@ -91,10 +91,11 @@ def test_a_write_cut_short_by_a_full_disk_is_written_again(tmp_path: Path) -> No
     line = len(record(0).to_json()) + 1
     code = f"""
 import resource, signal, sys
+from pathlib import Path
 from pytest_simbench.records.lines import LinesFile
 from build import record
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-file = LinesFile({str(path)!r})
+file = LinesFile(Path({str(tmp_path)!r}), "{RECORDS}")
 assert file.append(record(0).to_json())
 resource.setrlimit(resource.RLIMIT_FSIZE, ({line + 50}, resource.RLIM_INFINITY))
 assert not file.append(record(1).to_json()) and file.pending == 1
@@ -111,14 +112,15 @@ def test_two_processes_append_without_mixing_lines(tmp_path: Path) -> None:
     path = tmp_path / RECORDS
     code = """
 import sys
+from pathlib import Path
 from pytest_simbench.records.lines import LinesFile
 from build import record
-file = LinesFile(sys.argv[1])
+file = LinesFile(Path(sys.argv[1]), "records.jsonl")
 for k in range(150):
     assert file.append(record(k, simulator=sys.argv[2], details={"log": "x" * 20_000}).to_json())
 """
     writers = [
-        subprocess.Popen([sys.executable, "-c", code, str(path), name], cwd=HERE)
+        subprocess.Popen([sys.executable, "-c", code, str(tmp_path), name], cwd=HERE)
         for name in ("one", "two")
     ]
     assert [writer.wait(timeout=60) for writer in writers] == [0, 0]
@@ -143,7 +145,7 @@ def test_each_record_is_on_the_disk_before_the_next_thing_happens(
         real(descriptor)
 
     monkeypatch.setattr(os, "fsync", fsync)
-    file = LinesFile(path)
+    file = LinesFile(tmp_path, RECORDS)
     for number in (1, 2, 3):
         assert file.append(record(number).to_json())
         assert synced == list(range(1, number + 1))
@@ -160,7 +162,7 @@ def test_a_new_file_is_on_the_disk_by_its_name(
         real(descriptor)
 
     monkeypatch.setattr(os, "fsync", fsync)
-    LinesFile(tmp_path / RECORDS).append("{}")
+    LinesFile(tmp_path, RECORDS).append("{}")
     assert True in folders
 
 
@@ -244,7 +246,7 @@ def test_much_is_kept_from_the_garbage_collector_and_freed_as_ever(
     path = tmp_path / "some.jsonl"
     path.write_text(json.dumps({"a": [1]}) + "\n")
     gc.unfreeze()
-    found = lines.read(path, lambda data, where: Kept(data))
+    found = lines.read(tmp_path, path.name, lambda data, where: Kept(data))
     assert gc.isenabled()
     assert (gc.get_freeze_count() > 0) == (much == 0)
     freed = weakref.ref(found.items[0])
@@ -263,7 +265,7 @@ def test_a_reader_that_raises_leaves_the_garbage_collector_on(
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
-        lines.read(tmp_path / "some.jsonl", broken)
+        lines.read(tmp_path, "some.jsonl", broken)
     assert gc.isenabled()
     gc.unfreeze()
 

@@ -120,7 +120,7 @@ def test_kept_and_read_back(tmp_path: Path) -> None:
             durations=[0.2, 0.2],
             seed=1 + (name == "c"),
         )
-        kept.save(tmp_path / FOLDER / f"{name}.npz")
+        kept.save(tmp_path, f"{FOLDER}/{name}.npz")
     read = Sample.load(tmp_path / FOLDER / "c.npz")
     assert (read.label, read.seed, read.bodies, read.counts) == (
         "c",
@@ -174,7 +174,7 @@ def test_engines_with_the_same_law_agree_until_things_collide(
 )
 def test_a_file_with_something_else_in_it(tmp_path: Path, wrong: dict[str, object]) -> None:
     path = tmp_path / "a.npz"
-    sample("a", TIMES, [0.2] * 4).save(path)
+    sample("a", TIMES, [0.2] * 4).save(path.parent, path.name)
     with np.load(path) as data:
         arrays = {**data, **wrong}
     np.savez(path, **{k: v for k, v in arrays.items() if v is not None})  # type: ignore[arg-type]

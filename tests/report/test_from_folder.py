@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -42,6 +44,18 @@ def test_a_folder_is_all_that_it_takes(tmp_path: Path) -> None:
     assert len(before) == 3
     write_report(RunFolder(tmp_path))
     assert {path: path.read_bytes() for path in before} == before
+
+
+def test_reading_loads_no_planner(tmp_path: Path) -> None:
+    """One of them prints what it has leaked when a process ends."""
+    for item in stacking_run():
+        RunFolder(tmp_path).append(item)
+    command = [sys.executable, "-X", "importtime", "-m", "pytest", "--sim-report", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=True)
+    imported = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
+    assert "pytest_simbench.tasks.base" in imported
+    assert not imported & {"ompl", "ruckig", "pytest_simbench.tasks.stacking"}
+    assert "leaked" not in done.stderr
 
 
 def test_without_descriptions_numbers_are_plain_and_a_note_says_why(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.report.progress import HEARTBEAT_SECONDS, Progress, duration
+from pytest_simbench.report.progress import HEARTBEAT_SECONDS, LOG_SECONDS, Progress, duration
 
 TEST = "test_stacking[mujoco-headless]"
 
@@ -130,21 +130,25 @@ def test_a_terminal_is_redrawn_ten_times_a_second_at_most() -> None:
     assert 9 <= len(desk.written) <= 12
 
 
-def test_a_log_has_one_plain_line_for_each_repetition() -> None:
+def test_a_log_has_a_line_every_ten_seconds_and_one_at_the_end() -> None:
     desk = Desk(is_tty=False)
     desk.progress.start_test(TEST, 3)
     desk.progress.repetition(1, seed=7)
     desk.progress.count(15, 15, "cubes")
-    desk.now += 9.5
-    desk.progress.end_repetition("ok", 9.5)
-    desk.repeat(2, 10.5, "failed")
-    desk.repeat(3, 10.0)
+    desk.now += 10.5
+    desk.progress.end_repetition("ok", 10.5)
+    desk.repeat(2, 9.5, "failed")
+    desk.repeat(3, 0.1)
     desk.progress.end_test()
     assert desk.text.splitlines() == [
-        f"{TEST}  repetition 1 of 3  ok after 9.5 s  15/15 cubes  about 19 s left",
-        f"{TEST}  repetition 2 of 3  failed after 10.5 s  about 10 s left",
-        f"{TEST}  repetition 3 of 3  ok after 10.0 s",
+        f"{TEST}  repetition 1 of 3  ok after 10.5 s  15/15 cubes  about 21 s left",
+        f"{TEST}  repetition 3 of 3  ok after 0.1 s  1 failed",
     ]
+    desk.written.clear()
+    desk.progress.start_test(TEST, 570)  # the study's tosses
+    for number in range(1, 571):
+        desk.repeat(number, 0.5)
+    assert len(desk.written) == 570 * 0.5 // LOG_SECONDS + 1
 
 
 def test_what_runs_on_a_cluster_says_where() -> None:
@@ -159,8 +163,9 @@ def test_what_runs_on_a_cluster_says_where() -> None:
     desk.now += 1.0
     desk.progress.phase("launch")
     assert desk.screen == f"{TEST}  repetition 1 of 2  on lab2  launch"
-    log.progress.end_repetition("ok", 9.5)
-    assert log.text == f"{TEST}  repetition 1 of 2  on lab1  ok after 9.5 s  about 10 s left\n"
+    log.now += 9.5
+    log.progress.end_repetition("ok", 10.5)
+    assert log.text == f"{TEST}  repetition 1 of 2  on lab1  ok after 10.5 s  about 10 s left\n"
 
 
 def test_a_log_of_a_long_repetition_shows_that_it_lives() -> None:

@@ -28,7 +28,7 @@ def keep(run: Path, made: Record, **phases: str) -> Record:
     for time, (phase, colour) in enumerate(phases.items()):
         picture = np.full((36, 48, 3), COLOURS[colour], dtype=np.uint8)
         album.add(phase, time, picture)
-    album.write(run / "pictures" / f"{file_stem_of(made)}.npz")
+    album.write(run, f"pictures/{file_stem_of(made)}.npz")
     return made
 
 
@@ -73,7 +73,7 @@ def test_a_moment_that_one_alone_has_stands_at_its_time(tmp_path: Path) -> None:
     path = tmp_path / "pictures" / f"{file_stem_of(kept[0])}.npz"
     album = Album.read(path)
     del album.pictures["later"]
-    album.write(path)
+    album.write(path.parent, path.name)
     picture = seen(sheets(tmp_path, kept)[0]["stacking"])
     height, width = picture.shape[:2]
     middle = width - int(1.5 * 220)
@@ -96,7 +96,7 @@ def test_hostile_names_do_no_harm(tmp_path: Path) -> None:
         made = record(text, test=f"t[{text}]")
         album = Album()
         album.add(text, 0.0, np.zeros((3, 4, 3), dtype=np.uint8))
-        album.write(tmp_path / "pictures" / f"{file_stem_of(made)}.npz")
+        album.write(tmp_path, f"pictures/{file_stem_of(made)}.npz")
         drawn, problems = sheets(tmp_path, [made])
         assert problems == []
         assert drawn["stacking"].startswith(b"\x89PNG")

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
+from pytest_simbench.report import columns
 from pytest_simbench.report.summary import summarise
 
 from .samples import METRICS, REFERENCES, STACKING, failed, record, stacking_run, throwing_run
@@ -141,3 +142,17 @@ def test_rows_carry_what_a_reader_must_know() -> None:
 def test_no_records_no_summaries() -> None:
     none: list[Record] = []
     assert summarise(none, METRICS) == []
+
+
+def test_a_tasks_own_reasons_are_counted_whatever_their_numbers() -> None:
+    runs = [
+        record(repetition=1, reasons=("cube_07 slipped at 3.2 s", "it never left the hand")),
+        record(repetition=2, reasons=("cube_11 slipped at 0.5 s",)),
+    ]
+    (found,) = summarise(runs, METRICS)
+    assert found.rows[0].reasons == (
+        ("cube_# slipped at # s", 2),
+        ("it never left the hand", 1),
+    )
+    tables = dict(columns.details(found))
+    assert tables["why the task fell short"][1].cells == [["2"], ["1"]]

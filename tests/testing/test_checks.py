@@ -13,7 +13,7 @@ from pytest_simbench.robot.registry import find
 from pytest_simbench.simulator import Simulator
 from pytest_simbench.testing import CHECKS, ConformanceFailure, ConformanceTest, Subject
 
-from . import wrong, wrong_robots
+from . import cheats, wrong, wrong_robots
 
 FAULTS: list[tuple[type[Simulator], str]] = [
     (wrong.ImportsEngine, "imports_without_engine"),
@@ -60,6 +60,9 @@ FAULTS: list[tuple[type[Simulator], str]] = [
     (wrong.EchoGroundFriction, "planted_faults_are_seen"),
     (wrong.EchoLinkInertia, "planted_faults_are_seen"),
     (wrong.EchoScene, "planted_faults_are_seen"),
+    (cheats.Welded, "pulled_grip_slips"),
+    (cheats.Snaps, "released_cube_is_let_be"),
+    (cheats.HalfFlight, "thrown_cube_flies_free"),
     (wrong_robots.StickyFingers, "squeeze_bounds_the_grip"),
     (wrong_robots.DoubleSqueeze, "squeeze_bounds_the_grip"),
     (wrong_robots.Teleports, "squeeze_bounds_the_grip"),
@@ -87,6 +90,21 @@ FAULTS: list[tuple[type[Simulator], str]] = [
     (wrong.Noisy, "reused_process_agrees"),
     (wrong.Blank, "picture_shows_something"),
 ]
+
+
+def test_a_copy_of_the_scene_is_no_fault_by_itself() -> None:
+    """Parity cannot tell it from what an engine holds: it follows each step."""
+    for name in ("parity_of_full_scene", "read_back_is_the_engines", "free_fall"):
+        ConformanceTest(Subject(cheats.Copied), CHECKS[name])()
+
+
+@pytest.mark.parametrize("quantity", cheats.ECHOES)
+def test_what_a_copy_of_the_scene_hides_is_felt(quantity: str) -> None:
+    """Parity passes: each quantity that it could hide has a law that measures it."""
+    subject = Subject(cheats.echo(quantity))
+    ConformanceTest(subject, CHECKS["parity_of_full_scene"])()
+    with pytest.raises(ConformanceFailure):
+        ConformanceTest(subject, CHECKS[cheats.ECHOES[quantity][1]])()
 
 
 @pytest.mark.parametrize(

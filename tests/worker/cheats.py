@@ -72,7 +72,6 @@ CHEATS: dict[str, dict[str, Cheat]] = {
         "time": lambda s: setattr(s.model.opt, "timestep", s.settings.timestep / 2),
         "snap": _snap,
         "nudge": lambda s: s.data.qpos.__setitem__(s._body_q[0, 1], 0.005),
-        "clock": lambda s: setattr(s, "pace", 0.5),
     },
     "PyBullet": {
         "friction": _grip,
@@ -102,7 +101,7 @@ def cheating(name: str) -> type[Simulator]:
     class Cheating(base):  # type: ignore[misc, valid-type]
         info = replace(base.info, name=name.lower())
         steps = 0
-        planted, pace = False, 1.0
+        planted = False
 
         def load(self, scene: Scene) -> None:
             super().load(scene)
@@ -123,7 +122,7 @@ def cheating(name: str) -> type[Simulator]:
 
         @property
         def time(self) -> float:
-            return self.pace * self.steps * self.settings.timestep
+            return self.steps * self.settings.timestep
 
     return Cheating
 

@@ -58,17 +58,39 @@ TIMES: dict[str, Change] = {
     "time of nothing": lambda t: None,
     "time complex": complex,
     "time an array": lambda t: np.array([t]),
+    "time not a number": lambda t: np.nan,
+}
+LATER_TIMES: dict[str, Change] = {
+    "time nan": lambda t: np.nan,
+    "time inf": lambda t: np.inf,
+    "time stands": lambda t: 0.3,
+    "time runs back": lambda t: 0.6 - t,
+    "time jumps": lambda t: t + 100.0,
+}
+BUILT: dict[str, Change] = {
+    "nothing read back": lambda found: None,
+    "texts read back": lambda found: {**found, "gravity": "downward"},
 }
 LATER: dict[str, Change] = {
     "later float32": lambda q: q.astype(np.float32),
     "later too few": lambda q: q[:, :-1],
+    "later nothing": lambda q: None,
+    "later a text": str,
 }
 
 
 class Misshapen(MuJoCo):
     @property
     def time(self) -> float:
-        return TIMES.get(os.environ["UNRULY"], lambda t: t)(super().time)  # type: ignore[no-any-return]
+        time, fault = super().time, os.environ["UNRULY"]
+        if fault == "time slow":
+            return time / 2
+        if time > 0.31:
+            time = LATER_TIMES.get(fault, lambda t: t)(time)
+        return TIMES.get(fault, lambda t: t)(time)  # type: ignore[no-any-return]
+
+    def read_back(self) -> dict[str, Any]:
+        return BUILT.get(os.environ["UNRULY"], lambda found: found)(super().read_back())  # type: ignore[no-any-return]
 
     def joint_state(self) -> FloatArray:
         state, fault = super().joint_state(), os.environ["UNRULY"]

@@ -61,7 +61,7 @@ def test_it_is_told_in_each_step_of_a_wait() -> None:
     simulator = Told()
     acting = Acting.of(simulator, PULLED)
     simulator.pushed.clear()
-    Stepper(simulator, lambda at: None, acting).wait(0.016, None)
+    Stepper(simulator, PULLED, lambda at: None, acting).wait(0.016, None)
     assert simulator.pushed == pytest.approx([0.0, 0.5, 1.0, 0.5, 0.0])
 
 

@@ -35,6 +35,7 @@ class Asked:
 
     def __init__(self) -> None:
         self.sent: list[Any] = []
+        self.number = 0
         self.server = Server(self.sent.append)
 
     def __call__(self, op: str, **arguments: Any) -> Any:
@@ -44,8 +45,11 @@ class Asked:
         return unpack(answer["ok"])
 
     def answer(self, op: str, **arguments: Any) -> Any:
-        self.server.answer({"op": op, **pack(arguments)})
-        return self.sent.pop()
+        self.number += 1
+        self.server.answer({"op": op, "number": self.number, **pack(arguments)})
+        answer = self.sent.pop()
+        assert answer.pop("number") == self.number
+        return answer
 
     def error(self, op: str, **arguments: Any) -> tuple[str, str]:
         """Type and message of what went wrong."""
@@ -237,7 +241,7 @@ def test_a_log_that_is_none_is_found(ask: Asked, monkeypatch: Any) -> None:
     kind, message = ask.error("wait", duration=0.04, log_period=0.02)
     assert kind == "StateError"
     assert message == (
-        "hosted: the logged joints must be an array of float64 (2, 2, 0), not float64 (2, 2, 1)"
+        "hosted: joint_state() must be an array of float64 (2, 0), not float64 (2, 1)"
     )
 
 
@@ -404,9 +408,11 @@ def test_an_unknown_request_is_an_answer_too(ask: Asked) -> None:
 
 
 def test_it_serves_until_it_is_told_to_close() -> None:
-    requests: list[dict[str, Any]] = [{"op": "hello"}, {"op": "close"}, {"op": "hello"}]
+    requests: list[dict[str, Any]] = [
+        {"op": op, "number": number} for number, op in enumerate(("hello", "close", "hello"))
+    ]
     sent: list[Any] = []
     serve(lambda: requests.pop(0), sent.append)
-    assert [list(answer) for answer in sent] == [["ok"], ["ok"]]
-    assert sent[1] == {"ok": None}
+    assert [(answer["number"], "ok" in answer) for answer in sent] == [(0, True), (1, True)]
+    assert sent[1]["ok"] is None
     assert len(requests) == 1

@@ -31,7 +31,7 @@ class Toy(Simulator):
         self.wall = self.burnt = 0.0
         self.steps = self.looked = self.pictures = 0
         self.commands: list[FloatArray] = []
-        self.bodies = np.zeros((1, 13))
+        self.bodies, self.joints = np.zeros((1, 13)), np.zeros((2, 0))
 
     def load(self, scene: Scene) -> None:
         pass
@@ -63,7 +63,7 @@ class Toy(Simulator):
         return self.bodies
 
     def joint_state(self) -> FloatArray:
-        return np.zeros((2, 0))
+        return self.joints
 
     def refresh_window(self) -> None:
         self.pictures += 1

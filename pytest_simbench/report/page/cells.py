@@ -76,7 +76,7 @@ def of(row: Row) -> Of:
 
 
 def study(summary: TaskSummary) -> Table:
-    """The study's table, coloured by who is ahead."""
+    """The first table: the task's own metrics, then costs; coloured by who is ahead."""
     rows = summary.rows
     columns: list[tuple[Heading, list[Cell]]] = [
         (Heading("simulator", left=True), [Cell([row.simulator, row.variant]) for row in rows]),
@@ -108,7 +108,8 @@ def study(summary: TaskSummary) -> Table:
     lines = [
         TableRow([found[place] for _, found in columns], of(row)) for place, row in enumerate(rows)
     ]
-    return Table("The study's table", [heading for heading, _ in columns], lines)
+    title = "The study's table" if summary.protocol == "paper" else "Outcomes and costs"
+    return Table(title, [heading for heading, _ in columns], lines)
 
 
 COST_COLUMNS = (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,9 +12,11 @@ from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import series
 from pytest_simbench.report import columns, repeatability, sweep, truth
+from pytest_simbench.report.again import command
 from pytest_simbench.report.answer import sentences
 from pytest_simbench.report.changes import DIFFERENT
 from pytest_simbench.report.changes import columns as change_columns
+from pytest_simbench.report.claims import Claims
 from pytest_simbench.report.headline import headline
 from pytest_simbench.report.page import Compared as Reported
 from pytest_simbench.report.page import setup
@@ -94,6 +95,8 @@ class Page:
         truth: of laws, the table of phenomena first; empty where none ran.
         repetitions: of all tasks, as plain data, in the order of the dots' numbers.
         problems: what could not be shown, as sentences.
+        claims: pass or fail, and why, which comes first.
+        claimed: its table.
     """
 
     title: str
@@ -107,6 +110,8 @@ class Page:
     setup: setup.Setup
     repetitions: Sequence[Mapping[str, Any]]
     problems: Sequence[str]
+    claims: Claims | None = None
+    claimed: Table | None = None
 
 
 def page(
@@ -117,6 +122,7 @@ def page(
     replays: Sequence[Group] = (),
     sheets: Mapping[str, bytes] | None = None,
     sweeps: Sequence[Swept] = (),
+    claims: Claims | None = None,
 ) -> Page:
     """What the page of a run tells; `render.render` makes HTML of it.
 
@@ -195,6 +201,8 @@ def page(
         setup.setup(summaries, records),
         repetitions,
         list(problems),
+        claims,
+        from_columns("Claims", claims.table) if claims and claims.table else None,
     )
 
 
@@ -279,40 +287,10 @@ def _repetition(record: Record, replay: str, video: str) -> dict[str, Any]:
         "repetition": record.repetition,
         "seed": str(record.seed),  # JavaScript keeps 53 bits of a number
         "status": record.status,
-        "cause": f"{error.cause}: {error.message}" if error else "",
+        "cause": f"{error.cause}: {error.message}" if error else "; ".join(record.reasons),
         "log": record.notes.log,
         "command": command(record),
         "replay": replay,
         "video": video,
     }
     return {k: for_terminal(v) if isinstance(v, str) else v for k, v in found.items()}
-
-
-def command(record: Record) -> str:
-    """What runs the same seed of the same test again; empty where its id is no plain one.
-
-    Settings that `--sim-set` changed are not in it. A profile, a robot or a time step in the id is
-    one of several that the run had: a run of this one alone has none there.
-    """
-    file, _, name = record.function.partition("::")
-    step = record.settings.get("timestep")
-    alone = f"{record.function}[{record.simulator}-{record.mode}"
-    ours_first = record.test.startswith(alone)
-    test = f"{'-'.join(filter(None, [alone, record.variant]))}]" if ours_first else record.test
-    fine = name and record.test.isprintable() and not file.startswith(("-", "/", "."))
-    if not fine or ".." in file or not file.endswith(".py"):
-        return ""
-    options = [
-        f"--sim-name={record.simulator}",
-        f"--sim-seed={record.seed}",
-        "--sim-reps=1",
-        f"--sim-profile={record.profile}",
-        f"--sim-protocol={record.protocol}",
-        f"--sim-jitter={record.jitter:g}",
-        *[f"--sim-robot={record.robot.get('name')}"] * bool(record.robot),
-        *["--sim-gui"] * (record.mode == "gui"),
-        *[f"--sim-set={record.simulator}.timestep={step!r}"] * record.swept,
-    ]
-    if not all(map(str.isprintable, options)):
-        return ""
-    return shlex.join(["pytest", test, *options])

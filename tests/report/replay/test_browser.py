@@ -45,7 +45,7 @@ def longer(seconds: float) -> Motion:
 def write(folder: Path, kept: list[tuple[Record, Trace]]) -> Path:
     """A replay of such repetitions."""
     for made, trace in kept:
-        trace.write(folder / "traces" / f"{file_stem_of(made)}.npz")
+        trace.write(folder, f"traces/{file_stem_of(made)}.npz")
     page, count, problems = replay_of(groups(folder, [made for made, _ in kept]))
     assert count
     assert problems == []
@@ -206,7 +206,7 @@ def test_hostile_names_stay_text(tmp_path: Path, opened: Opened) -> None:
 def test_a_dot_of_the_report_leads_to_its_replay(tmp_path: Path, opened: Opened) -> None:
     kept = [record("mujoco", k, metrics={"placed": k / 4}) for k in (1, 2)]
     Trace.of(scene(), longer(0.5), [(0.0, "task")]).write(
-        tmp_path / "traces" / f"{file_stem_of(kept[1])}.npz"
+        tmp_path, f"traces/{file_stem_of(kept[1])}.npz"
     )
     assert write_files(tmp_path, summarise(kept, METRICS, {}), kept, figures=False).complete
     page = opened(tmp_path / "report.html")

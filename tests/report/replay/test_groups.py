@@ -24,7 +24,7 @@ from tests.report.samples import METRICS, record
 def keep(run: Path, *records: Record) -> list[Record]:
     """Traces of these repetitions in a run folder."""
     for made in records:
-        trace().write(run / "traces" / f"{file_stem_of(made)}.npz")
+        trace().write(run, f"traces/{file_stem_of(made)}.npz")
     return list(records)
 
 

@@ -1,0 +1,77 @@
+"""What tests claimed, and what came of it: the first thing that a reader of a run looks for."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from pytest_simbench.records import checked
+from pytest_simbench.records.checked import Count, Name
+from pytest_simbench.records.record import plain
+
+SCHEMA = 1
+
+Verdict = Literal["PASS", "FAIL", "UNDECIDED"]
+
+Relation = Literal["at least", "at most"]
+
+
+class ClaimError(ValueError):
+    """What is no claim; the message says where, and what is wrong with it."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One claim of one test, and its verdict. Of several of one `identity` the last one holds.
+
+    Attributes:
+        test, function, variant, simulator, mode, profile, task: as in `record.Record`; `task` is
+            empty where the test as a whole failed.
+        metric, relation, threshold: what was claimed of which metric; empty where the test as a
+            whole failed.
+        verdict: what the repetitions say of it.
+        mean, low, high: what was measured, and the bounds that decided; None where there are none.
+        n, crashed: repetitions that were judged, and those of them that crashed.
+        advice: what to do about one that is not decided; why a test as a whole failed.
+    """
+
+    test: Name
+    function: Name
+    simulator: Name
+    mode: Name
+    profile: Name
+    verdict: Verdict
+    variant: Name = ""
+    task: Name = ""
+    metric: Name = ""
+    relation: Relation | None = None
+    threshold: float | None = None
+    mean: float | None = None
+    low: float | None = None
+    high: float | None = None
+    n: Count = 0
+    crashed: Count = 0
+    advice: str = ""
+
+    @property
+    def identity(self) -> tuple[object, ...]:
+        """What tells it from other claims of a run."""
+        return self.test, self.task, self.metric, self.relation
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data; bounds that are not finite are None."""
+        found: dict[str, Any] = plain({"schema": SCHEMA, **asdict(self)})
+        return found
+
+    @classmethod
+    def from_dict(cls, data: Any, where: str = "claim") -> Claim:
+        """The claim in `data`; `where` names it in messages.
+
+        Raises:
+            ClaimError: it is none, or of a newer schema.
+        """
+        try:
+            checked.schema(data, SCHEMA)
+            return checked.convert(checked.plain(data), cls)
+        except (checked.CheckError, RecursionError) as error:
+            raise ClaimError(f"{where}: {error}") from None
