@@ -5,8 +5,8 @@
 Without names: every simulator of this environment.
 
 Each pair of runs is made in two fresh processes, in turn. `clock` is the worker's own clock of
-stepping, `all` the whole request: message, log check, bookkeeping. All in CPU seconds,
-since these machines are shared.
+stepping, `all` the whole request: message, log check, bookkeeping, and watching whether the world
+stays the same (`unwatched`: without that). All in CPU seconds, since these machines are shared.
 """
 
 from __future__ import annotations
@@ -36,6 +36,8 @@ from pytest_simbench.tasks import Jitter, Stacking
 
 SCENE = Stacking().scene(1, Jitter())
 PAIRS = 7
+READINGS = 5
+"""Of what an engine holds, after the motion."""
 
 
 def motion() -> Trajectory:
@@ -89,8 +91,11 @@ def loop(name: str, **more: int) -> list[float]:
     return [float(line) for line in output.splitlines()[-1 - 2 * len(more) :]]
 
 
-def worker(name: str) -> tuple[float, float]:
-    """CPU seconds of the same motion in a worker: its own clock, and the whole request."""
+def worker(name: str, *, watched: bool = True) -> tuple[float, float, float]:
+    """CPU seconds of the same motion in a worker: its own clock, the whole request, and a reading.
+
+    Watched, as every repetition is: at some steps the engine is asked again what it holds.
+    """
     path, info = registered()[name].value, adapter(name).info
     launch = Launch(
         path,
@@ -103,30 +108,39 @@ def worker(name: str) -> tuple[float, float]:
     process = WorkerProcess(launch, Where(name, "headless"))
     process.construct()
     world = World(process, SCENE)
+    if watched:
+        world.watch(1)
     trajectory = motion()
     assert process.pid is not None
-    watched = psutil.Process(process.pid)
-    began = sum(watched.cpu_times()[:2])
+    itself = psutil.Process(process.pid)
+    began = sum(itself.cpu_times()[:2])
     world.follow(trajectory)
-    whole = sum(watched.cpu_times()[:2]) - began
+    whole = sum(itself.cpu_times()[:2]) - began
     clock = world.stats()["stepping"]["cpu"]
+    began = sum(itself.cpu_times()[:2])
+    for _ in range(READINGS):
+        world.read_again()
+    reading = (sum(itself.cpu_times()[:2]) - began) / READINGS
     process.close()
-    return clock, whole
+    return clock, whole, reading
 
 
 def main(names: list[str]) -> None:
     for name in names or [n for n in registered() if not missing(adapter(n).info)]:
-        clock, whole = [], []
+        clock, whole, unwatched, readings = [], [], [], []
         for _ in range(PAIRS):
             alone = bare(name)
-            mine, request = worker(name)
+            mine, request, reading = worker(name)
+            readings.append(1000 * reading)
             clock.append(mine / alone)
             whole.append(request / alone)
-        for title, ratios in (("clock", clock), ("all", whole)):
+            unwatched.append(worker(name, watched=False)[1] / alone)
+        for title, ratios in (("clock", clock), ("all", whole), ("all, unwatched", unwatched)):
             print(
                 f"{name}: {title} {statistics.median(ratios):.3f} x the bare loop "
                 f"(min {min(ratios):.3f}, max {max(ratios):.3f}, {PAIRS} pairs)"
             )
+        print(f"{name}: reading what it holds {statistics.median(readings):.0f} ms of CPU")
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 import msgspec
 import numpy as np
@@ -30,7 +30,10 @@ class Loaded(State):
 
 
 class Moved(State):
+    """`aside`: wall time of readings that are no part of the motion [s]."""
+
     log: dict[str, np.ndarray]
+    aside: NotRequired[float]
 
 
 class Stats(TypedDict):
@@ -43,6 +46,8 @@ ANSWERS: dict[str, Any] = {
     "construct": Constructed,
     "compile": None,
     "load": Loaded,
+    "watch": None,
+    "read_again": None,
     "read_back": dict[str, Any],
     "state": State,
     "follow": Moved,

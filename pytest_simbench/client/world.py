@@ -202,6 +202,7 @@ class World:
         motions = []
         for request in requests:
             answer = self.process.request(operation, log_period=period, **request)
+            self._leave_out(answer.get("aside", 0.0))
             motion = Motion(**answer["log"]) if answer["log"] else None
             if motion is not None and self._trace_period is not None and len(motion):
                 self.trace.append(self._thinned(motion))  # also where it ends in what cannot be
@@ -273,6 +274,29 @@ class World:
     ) -> None:
         """Offscreen pictures along the way, see `WorkerProcess.film`."""
         self.process.film(take, period, size)
+
+    def watch(self, seed: int) -> None:
+        """From now on, have the worker look whether the world stays as it was loaded.
+
+        What changes, jumps or falls as it must not ends the motion under way with
+        `WorldParityError`.
+
+        Args:
+            seed: draws the steps at which the engine is asked again what it holds.
+        """
+        self.process.request("watch", seed=seed)
+
+    def read_again(self) -> None:
+        """Ask the engine once more what it holds, if it is watched; errors as `watch`."""
+        began = time.perf_counter()
+        self.process.request("read_again")
+        self._leave_out(time.perf_counter() - began)
+
+    def _leave_out(self, seconds: float) -> None:
+        """Looking whether the world is still the same is no part of the repetition."""
+        self.stopwatch.leave_out(seconds)
+        if self.process.deadline is not None:
+            self.process.deadline += seconds
 
     def stats(self) -> dict[str, Any]:
         """The worker's clocks of stepping and its exact memory peak."""

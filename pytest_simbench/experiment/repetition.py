@@ -149,10 +149,12 @@ class Repetition:
             trace_period=self._trace_period(),
             after_phase=self._leave,
         )
+        world.watch(self.seed)
         if self._camera is not None:
             self._camera.enter(world, self.where.phase)
         outcome = self.experiment.task.perform(world, self.seed, self.hooks.count)
         self._stats = world.stats()
+        world.read_again()
         return outcome
 
     def _leave(self, world: World, phase: str) -> None:

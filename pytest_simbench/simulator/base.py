@@ -147,10 +147,6 @@ class Simulator(ABC):
     def refresh_window(self) -> None:  # noqa: B027 - a window may draw itself
         """Show the present state in the window; called about 30 times a second in GUI mode."""
 
-    def other_cpu(self) -> float:
-        """CPU time so far of other processes that simulate for this one [s]; 0 without any."""
-        return 0.0
-
     def close(self) -> None:  # noqa: B027 - there may be nothing to release
         """Release the engine's resources, also when `load` failed or was never called.
 

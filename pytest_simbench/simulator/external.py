@@ -126,9 +126,6 @@ class ExternalSimulator(Simulator):
     def time(self) -> float:
         return self.steps * self.settings.timestep
 
-    def other_cpu(self) -> float:
-        return 0.0 if self.program is None else self.program.cpu_time()
-
     def close(self) -> None:
         if self.program is not None:
             self.program.end(self.ask_to_end, self.end_limit)

@@ -60,7 +60,7 @@ class Program:
         log: int = 2,
     ) -> None:
         self.title, self._log = title, log
-        self._said, self._how, self._cpu = b"", "", 0.0
+        self._said, self._how = b"", ""
         self._deadline, self._overdue = math.inf, False
         self._silent, self._over = threading.Event(), threading.Event()
         try:
@@ -149,12 +149,6 @@ class Program:
             self._silent.wait(LAST_WORDS)
         said = " ".join(self._said.decode("utf-8", "replace").split())
         return f"its last words: {said}" if said else "it wrote nothing"
-
-    def cpu_time(self) -> float:
-        """CPU time that it has used so far, without its children [s]."""
-        with suppress(OSError):  # it has ended; the clock's number as in man clock_getcpuclockid
-            self._cpu = time.clock_gettime(~self.pid << 3 | 2)
-        return self._cpu
 
     def kill(self) -> None:
         """End its process group at once."""

@@ -53,7 +53,10 @@ from pytest_simbench.simulator.loops import reduced
 from pytest_simbench.simulator.self_collision import links_collide
 from pytest_simbench.simulator.settings import Settings
 from pytest_simbench.simulator.shapes import DIRECTIONS, outlines, reach, shape_points
-from pytest_simbench.simulator.urdf import PreparedRobot
+from pytest_simbench.simulator.urdf import ROOT, PreparedRobot
+
+MOVING = ("pose", "velocity", "initial_position")
+"""Kinds of quantities that change while a world is stepped."""
 
 
 def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
@@ -92,6 +95,15 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
         named = {name for name in quantities if fnmatchcase(name, pattern)}
         quantities |= dict.fromkeys(named - own, value)
     return quantities
+
+
+def constants(names: Iterable[str], scene: Scene) -> list[str]:
+    """Those of the quantities that stay as they are while the world is stepped.
+
+    Places and speeds change, but for the places of fixed bodies and of the robot's base.
+    """
+    still = {f"body/{body.name}/pose" for body in scene.fixed_bodies} | {f"link/{ROOT}/pose"}
+    return [n for n in names if n.rpartition("/")[2] not in MOVING or n in still]
 
 
 def _named(prefix: str, **values: Any) -> dict[str, Any]:
@@ -144,7 +156,8 @@ def touches(
 
     Args:
         can_touch: whether two of "ground", `body/NAME` and `link/NAME` can collide, as the engine
-            (or, for what is expected, the scene) has it; only asked where one of them can move.
+            (or, for what is expected, the scene) has it; only asked where one of them can move, and
+            once of each pair.
     """
     links = _links(prepared)
     bodies = [f"body/{body.name}" for body in scene.bodies]
@@ -152,10 +165,17 @@ def touches(
     if prepared is not None:
         still.add(f"link/{prepared.root}")
 
+    answers: dict[frozenset[str], bool] = {}
+
+    def touch(a: str, b: str) -> bool:
+        pair = frozenset((a, b))
+        if pair not in answers:
+            answers[pair] = bool(can_touch(a, b))
+        return answers[pair]
+
     def share(name: str, others: Iterable[str]) -> float:
         asked = [o for o in others if o != name and not (o in still and name in still)]
-        answers = [bool(can_touch(name, other)) for other in asked]
-        return float(np.mean(answers)) if answers else 0.0
+        return sum(touch(name, other) for other in asked) / len(asked) if asked else 0.0
 
     groups = (["ground"], bodies, links)
     return {

@@ -22,6 +22,9 @@ _GRID = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 DIRECTIONS: FloatArray = _GRID / np.linalg.norm(_GRID, axis=1, keepdims=True)
 """The 26 directions to faces, edges and corners of a cube, unit vectors, (26, 3)."""
 
+OUTLINES = ("boxes", "meshes", "rounds")
+"""The quantities of a body or link that `outlines` makes."""
+
 _ORDER = np.sqrt(np.arange(2.0, 28.0))
 """Weights of the directions that put shapes in an order of their own; roots, so that no
 symmetry makes two different shapes equal."""
@@ -70,8 +73,8 @@ def outlines(
     Returns:
         Of each kind the reaches in an order of their own, (n_shapes, 26) [m].
     """
-    kinds = {"boxes": boxes, "meshes": meshes, "rounds": rounds}
-    return {f"{prefix}/{kind}": _ordered(shapes) for kind, shapes in kinds.items()}
+    kinds = zip(OUTLINES, (boxes, meshes, rounds), strict=True)
+    return {f"{prefix}/{kind}": _ordered(shapes) for kind, shapes in kinds}
 
 
 def _ordered(reaches: Iterable[FloatArray]) -> FloatArray:

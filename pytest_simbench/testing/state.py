@@ -45,11 +45,16 @@ def require_same(what: str, a: Motion, b: Motion) -> None:
             )
 
 
-def swung(subject: Subject, **options: Any) -> Motion:
-    """What happens in a world of the busy scene while the arm swings; options of its making."""
+def swung(subject: Subject, *, watched: bool = False, **options: Any) -> Motion:
+    """What happens in a world of the busy scene while the arm swings; options of its making.
+    Watched, the engine is asked at a drawn step, and in the middle, what it holds."""
     scene = busy_scene(subject.arm)
     with subject.world(scene, **options) as world:
+        if watched:
+            world.watch(1)
         world.follow(_swing(scene, subject.timestep, 0.2))
+        if watched:
+            world.read_again()
         return logged(world.wait(1.0, log_period=0.02))
 
 

@@ -43,6 +43,7 @@ from pytest_simbench.worker.state import (
 )
 from pytest_simbench.worker.stepping import Film, Stepper
 from pytest_simbench.worker.text import LONGEST_LOGGED, named, readable, told
+from pytest_simbench.worker.watching import Watch
 from pytest_simbench.worker.wire import pack, unpack
 
 
@@ -76,6 +77,7 @@ class Server:
         self.simulator: Simulator | None = None
         self.stepper: Stepper | None = None
         self.scene = Scene("empty")
+        self.compared: tuple[dict[str, Any], dict[str, Any]] | None = None
         self.saved: dict[str, Any] = {}
         self.number = 0
 
@@ -150,12 +152,17 @@ class Server:
         self.stepper.real_time = self.real_time
         check_start(simulator, world)
         excused: list[str] = []
+        self.compared = None
         if parity:
-            expected = expected_quantities(world, simulator.settings)
+            expected, reported = (
+                expected_quantities(world, simulator.settings),
+                checked_quantities(simulator),
+            )
             info = simulator.info
             counting = (deviation for deviation in info.deviations if deviation.concerns(world))
             declared = [deviation.with_robot(world.robot) for deviation in counting]
-            excused = check(expected, checked_quantities(simulator), declared, info.name)
+            excused = check(expected, reported, declared, info.name)
+            self.compared = expected, reported
         if simulator.gui:
             simulator.refresh_window()
         return {
@@ -163,6 +170,17 @@ class Server:
             "timestep": simulator.settings.timestep,
             **self.do_state(),
         }
+
+    def do_watch(self, seed: int) -> None:
+        """From now on, look whether the world stays as it was loaded; see `Watch`."""
+        if self.compared is not None:
+            self._loaded().watch = Watch(self._constructed(), self.scene, *self.compared, seed)
+
+    def do_read_again(self) -> None:
+        """Whether the engine still holds what it held when the world was loaded, if watched."""
+        watch = self._loaded().watch
+        if watch is not None:
+            watch.read()
 
     def do_read_back(self, remember: dict[str, Any] | None = None) -> dict[str, Any]:
         """What the engine says; the adapter made to remember another scene meanwhile, if given."""
@@ -187,6 +205,10 @@ class Server:
         return self._moved(self._loaded().wait(duration, log_period))
 
     def _moved(self, log: dict[str, Any]) -> dict[str, Any]:
+        watch = self._loaded().watch
+        if watch is not None:
+            watch.check_log(log)
+            return {"log": log, "aside": watch.spent(), **self.do_state()}
         return {"log": log, **self.do_state()}
 
     def do_save(self, name: str) -> None:
@@ -194,7 +216,10 @@ class Server:
 
     def do_restore(self, name: str) -> dict[str, Any]:
         self._constructed().restore(self.saved[name])
-        return self.do_state()
+        state, stepper = self.do_state(), self._loaded()
+        if stepper.watch is not None:
+            stepper.watch.restored(stepper.clocks.steps, state["joints"], state["bodies"])
+        return state
 
     def do_contact_count(self) -> int:
         return self._constructed().contact_count()

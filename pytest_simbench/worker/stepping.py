@@ -13,7 +13,9 @@ from pytest_simbench.scene import FloatArray, Scene, Trajectory
 from pytest_simbench.simulator import DivergedError, Simulator
 from pytest_simbench.worker.acting import Acting
 from pytest_simbench.worker.control import Clock, Control
+from pytest_simbench.worker.family import Family
 from pytest_simbench.worker.state import States
+from pytest_simbench.worker.watching import Watch
 
 HEARTBEAT_PERIOD = 0.5
 """Wall time between two signs of life while stepping [s]."""
@@ -39,7 +41,7 @@ class Clocks:
         simulated: [s].
         wall: seconds in the stepping loop, without log, window, pacing and control [s].
         waited: how much of that the thread waited for a processor that others had [s].
-        cpu: CPU seconds in that time of this process, and of one that simulates for it [s].
+        cpu: CPU seconds in that time of this process and of all that it started [s].
     """
 
     steps: int = 0
@@ -88,6 +90,7 @@ class Stepper:
         film: pictures along the way, outside of the measured stepping time; None: none.
         clocks: totals since loading.
         control: the workload that shows the machine's speed meanwhile.
+        watch: what looks whether the world stays as it was loaded; None: nothing.
         real_time: wait for the wall clock after each step, as the study's simulators did.
     """
 
@@ -103,10 +106,11 @@ class Stepper:
         self.heartbeat = heartbeat
         self.acting = acting
         self.clocks = Clocks()
-        self._clock = Clock()
+        self._clock, self._family = Clock(), Family()
         self.control = Control(self._clock)
         self.real_time = False
         self.film: Film | None = None
+        self.watch: Watch | None = None
         self._next_picture = 0.0
 
     def follow(self, trajectory: Trajectory, log_period: float | None) -> dict[str, Any]:
@@ -133,6 +137,7 @@ class Stepper:
 
         Raises:
             DivergedError: joint or body state is not finite.
+            ParityError: the world is not what it was, see `Watch`.
             StateError: a state or a time is none, see `States`.
         """
         simulator, timestep = self.simulator, self.simulator.settings.timestep
@@ -142,10 +147,14 @@ class Stepper:
         look_every = max(1, round((LOOK_PERIOD if watched else CHECK_PERIOD) / timestep))
         film_every = self.film.every if self.film is not None else 0
         log, states, from_time = Log(), self.states, self.states.time()
+        watch, from_start = self.watch, self.clocks.steps
+        due = watch.due - from_start if watch is not None else 0
         step, command, clock = simulator.step, simulator.command, self._clock
         totals, keep_up = self.clocks, self.control.keep_up
         act = self.acting.steps() if self.acting is not None else None
-        cpu_began = self._cpu()
+        family = self._family
+        family.meet()
+        cpu_began = family.cpu()
         began, waited = clock()
         beat = resumed = began
         for k in range(1, steps + 1):
@@ -156,20 +165,31 @@ class Stepper:
             step()
             logs = log_every and k % log_every == 0
             films = film_every and (totals.steps + k) % film_every == 0
-            if not (logs or films) and k % look_every and k % check_every and k < steps:
+            if (
+                not (logs or films)
+                and k % look_every
+                and k % check_every
+                and k < steps
+                and k != due
+            ):
                 continue
             stopped, waited_now = clock()
             totals.wall += stopped - resumed
             totals.waited += waited_now - waited
-            totals.cpu += self._cpu() - cpu_began
+            if k == steps:
+                family.meet()
+            totals.cpu += family.cpu() - cpu_began
             now = states.time_after(k, from_time)
-            checks = k % check_every == 0 or k == steps
+            checks = k % check_every == 0 or k in (steps, due)
             if logs or checks:
                 joints, bodies = states.joints(), states.bodies()
                 if logs:
                     log.sample(now, joints, bodies)
                 if checks:
                     self._check_finite(now, joints, bodies)
+                    if watch is not None:
+                        watch.look(from_start + k, joints, bodies)
+                        due = watch.due - from_start
             if stopped - beat > HEARTBEAT_PERIOD:
                 beat = stopped
                 self.heartbeat(now)
@@ -185,15 +205,11 @@ class Stepper:
                     time.sleep(ahead)
             # The CPU time of an engine with threads, the wall time of a busy machine: the less.
             keep_up(min(totals.wall, totals.cpu))
-            cpu_began = self._cpu()
+            cpu_began = family.cpu()
             resumed, waited = clock()
         totals.steps += steps
         totals.simulated += steps * timestep
         return log.arrays() if log.times else {}
-
-    def _cpu(self) -> float:
-        """CPU time so far of all that simulates [s]."""
-        return time.process_time() + self.simulator.other_cpu()
 
     def _check_finite(self, time: float, joints: FloatArray, bodies: FloatArray) -> None:
         for what, state in (("joints", joints), ("bodies", bodies)):

@@ -18,7 +18,7 @@ from pytest_simbench.simulator.shapes import (
     round_reach,
 )
 
-from ..mujoco.readback import bounce
+from ..mujoco.bounces import bounce
 from .engine import array_of, numbers
 from .releases import centre_of_mass, of_collider
 

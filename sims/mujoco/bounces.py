@@ -47,3 +47,12 @@ def direct(restitution: float, timestep: float) -> tuple[float, float]:
     """`solref` of such a contact: minus stiffness [1/s^2] and damping [1/s] per mass."""
     frequency = SHARE / timestep
     return -(frequency**2), -2 * damping_ratio(restitution) * frequency
+
+
+def bounce(first: float, second: float) -> float:
+    """Restitution of a contact's linear spring and damper, from MuJoCo's `solref`.
+
+    That is (time constant, damping ratio), or minus stiffness and damping per mass.
+    """
+    ratio = second if first > 0 else -second / (2 * math.sqrt(-first)) if first < 0 else 0.0
+    return restitution_of(ratio)

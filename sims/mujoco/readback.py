@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -20,7 +19,7 @@ from pytest_simbench.simulator.shapes import (
     round_reach,
 )
 
-from .bounces import restitution_of
+from .bounces import bounce
 from .loops import closed
 
 mujoco = lazy_import("mujoco")
@@ -53,7 +52,10 @@ class ReadBack:
         self, model: Any, data: Any, scene: Scene, prepared: PreparedRobot | None, at: Numbers
     ) -> None:
         self.model, self.scene, self.prepared, self.at = model, scene, prepared, at
-        self.active = np.array(data.eq_active, dtype=bool)
+        self.off = {name for name in _OFF if _flag(model.opt.disableflags, f"mjDSBL_{name}")}
+        self.overridden = _flag(model.opt.enableflags, "mjENBL_OVERRIDE")
+        held = not self.off & {"CONSTRAINT", "EQUALITY"}
+        self.active = np.array(data.eq_active, dtype=bool) & held
         self.data = mujoco.MjData(model)  # of its own: what is read must not change the world
         self.data.qpos[:], self.data.qvel[:] = data.qpos, data.qvel
         mujoco.mj_kinematics(model, self.data)
@@ -63,9 +65,8 @@ class ReadBack:
     def all(self) -> dict[str, Any]:
         """Every quantity by its name."""
         model, at = self.model, self.at
-        weightless = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
         reported: dict[str, Any] = {
-            "gravity": np.zeros(3) if weightless else model.opt.gravity,
+            "gravity": np.zeros(3) if "GRAVITY" in self.off else model.opt.gravity,
             "timestep": model.opt.timestep,
             "ground/height": self.data.geom_xpos[at.ground, 2],
             "ground/friction": self._friction([at.ground]),
@@ -141,7 +142,8 @@ class ReadBack:
         if geoms:
             found[f"{prefix}/friction"] = self._friction(geoms)
             found[f"{prefix}/restitution"] = self._restitution(geoms)
-            found[f"{prefix}/margin"] = one_value(model.geom_margin[geoms])
+            margins = model.opt.o_margin if self.overridden else model.geom_margin[geoms]
+            found[f"{prefix}/margin"] = one_value(margins)
         return found
 
     def _round(self, geom: int, place: FloatArray, turn: FloatArray) -> FloatArray:
@@ -190,15 +192,27 @@ class ReadBack:
         return np.roll(found, 3)
 
     def _friction(self, geoms: list[int]) -> Any:
-        """Sliding friction of geoms, and of pairs with an own one that they are part of."""
+        """Sliding friction of geoms, and of pairs with an own one that they are part of; or the one
+        that overrides them all."""
         model = self.model
+        if self.overridden:
+            return one_value(model.opt.o_friction[:2])
         pairs = np.isin(model.pair_geom1, geoms) | np.isin(model.pair_geom2, geoms)
         own = model.pair_friction[pairs, :2].ravel()
         return one_value(np.concatenate([model.geom_friction[geoms, 0], own]))
 
     def _restitution(self, geoms: list[int]) -> Any:
-        """Speed after a bounce over that before it, of the contacts' springs and dampers."""
-        return one_value([bounce(*self.model.geom_solref[geom]) for geom in geoms])
+        """Speed after a bounce over that before it, of the contacts' springs and dampers.
+
+        Not a number where others override them.
+        """
+        model, option = self.model, self.model.opt
+        if self.overridden and not (
+            np.array_equal(model.geom_solref[geoms], [option.o_solref] * len(geoms))
+            and np.array_equal(model.geom_solimp[geoms], [option.o_solimp] * len(geoms))
+        ):
+            return np.nan
+        return one_value([bounce(*model.geom_solref[geom]) for geom in geoms])
 
     def _can_move(self, body: int) -> bool:
         """Whether the body has six degrees of freedom and nothing holds it."""
@@ -221,7 +235,7 @@ class ReadBack:
         kinds |= model.geom_conaffinity[first][:, None] & model.geom_contype[second]
         low, high = sorted(int(model.geom_bodyid[geoms[0]]) for geoms in (first, second))
         excluded = (low << 16) + high in model.exclude_signature
-        if excluded or model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT:
+        if excluded or self.off & {"CONTACT", "CONSTRAINT"}:
             return False
         links = a.startswith("link/") and b.startswith("link/")
         return bool(kinds.any() if links else kinds.all())
@@ -242,7 +256,9 @@ class ReadBack:
         drive = int(np.flatnonzero(model.actuator_trnid[:, 0] == joint)[0])
         gear = model.actuator_gear[drive, 0]
         gain, bias = model.actuator_gainprm[drive], model.actuator_biasprm[drive]
-        limits = model.jnt_range[joint] if model.jnt_limited[joint] else [-np.inf, np.inf]
+        limited = model.jnt_limited[joint] and not self.off & {"LIMIT", "CONSTRAINT"}
+        limits = model.jnt_range[joint] if limited else [-np.inf, np.inf]
+        drives = "ACTUATION" not in self.off
         ranges = [
             (model.actuator_forcerange[drive] * gear, model.actuator_forcelimited[drive]),
             (model.jnt_actfrcrange[joint], model.jnt_actfrclimited[joint]),
@@ -253,8 +269,9 @@ class ReadBack:
             f"{prefix}/axis": np.concatenate([still, axis] if slides else turning),
             f"{prefix}/limits": limits,
             f"{prefix}/effort_limit": one_value(ends or np.inf),
-            f"{prefix}/stiffness": one_value([gain[0] * gear, -bias[1] * gear**2]) + spring,
-            f"{prefix}/damping": np.ravel(model.dof_damping[dof])[0] - bias[2] * gear**2,
+            f"{prefix}/stiffness": spring
+            + drives * one_value([gain[0] * gear, -bias[1] * gear**2]),
+            f"{prefix}/damping": np.ravel(model.dof_damping[dof])[0] - drives * bias[2] * gear**2,
             f"{prefix}/friction": model.dof_frictionloss[dof],
             f"{prefix}/armature": model.dof_armature[dof],
             f"{prefix}/initial_position": self.data.qpos[model.jnt_qposadr[joint]],
@@ -279,13 +296,13 @@ class ReadBack:
         )
 
 
+_OFF = ("GRAVITY", "CONTACT", "CONSTRAINT", "EQUALITY", "LIMIT", "ACTUATION")
+"""What can be switched off as a whole, and is looked for."""
+
 _ROUND = ("SPHERE", "CYLINDER", "CAPSULE")
 
 
-def bounce(first: float, second: float) -> float:
-    """Restitution of a contact's linear spring and damper, from MuJoCo's `solref`.
-
-    That is (time constant, damping ratio), or minus stiffness and damping per mass.
-    """
-    ratio = second if first > 0 else -second / (2 * math.sqrt(-first)) if first < 0 else 0.0
-    return restitution_of(ratio)
+def _flag(flags: int, name: str) -> bool:
+    """Whether one of MuJoCo's switches, on or off, is set."""
+    kind = mujoco.mjtEnableBit if name.startswith("mjENBL") else mujoco.mjtDisableBit
+    return bool(flags & getattr(kind, name))

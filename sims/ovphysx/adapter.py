@@ -252,7 +252,8 @@ class OvPhysX(Simulator):
         return wrenches(buffer[0, order].astype(float), self.prepared, self.joint_state()[0])
 
     def read_back(self) -> dict[str, Any]:
-        return read_back(self.session, self.scene, self.prepared, self._unit, self._placed)
+        places = {} if self._steps else self._placed
+        return read_back(self.session, self.scene, self.prepared, self._unit, places)
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
         if not usd.reports_contacts(self.scene):

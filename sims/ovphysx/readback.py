@@ -48,8 +48,8 @@ def read_back(
         scene: the names of what was built; no value is taken from it.
         prepared: the names of the robot's joints and links.
         units: of the sessions' joint positions, (n_joints,) [rad or m].
-        places: where the stage put the links; PhysX's scene queries find them there until the
-            first step.
+        places: where the stage put the links, until the first step: PhysX's scene queries find
+            them there. Empty from then on: the queries find them where they are.
     """
     reported: dict[str, Any] = {"ground/height": session.height(usd.GROUND)}
     values = session.read("RIGID_BODY", *_ATTRIBUTES)
@@ -80,8 +80,9 @@ def _links(session: Session, prepared: PreparedRobot, places: Mapping[str, Pose]
     for index, (name, link) in enumerate(prepared.links.items()):
         path, prefix = usd.link_path(index), f"link/{name}"
         kinds: tuple[list[FloatArray], list[FloatArray]] = ([], [])
+        place = places[name] if places else _pose(values, path)
         for k, shape in enumerate(link.shapes[: int(values["shapeCount"][path])]):
-            found = session.reach(f"{path}/shape_{k}", places[name], shape.pose)
+            found = session.reach(f"{path}/shape_{k}", place, shape.pose)
             kinds[shape.size is None].append(found)
         reported |= _part(values, path, prefix) | outlines(prefix, *kinds)
         if name != prepared.root:

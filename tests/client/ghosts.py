@@ -32,10 +32,10 @@ class Sinking(Ghost):
 
 
 class Flying(Ghost):
-    """One cube is blown away, through whatever is in the way."""
+    """One cube is blown away, through whatever is in the way, at 10 m/s."""
 
     def haunt(self) -> None:
-        self.data.qpos[0] += 0.01
+        self.data.qvel[0] = 10.0
 
 
 class Merging(Ghost):

@@ -22,7 +22,6 @@ WRONG = {
     "untested": ("ProtocolError", "launch", "Expected `str`, got `int` - at `$.untested`"),
     "settings": ("ProtocolError", "launch", "got `int` - at `key` in `$.settings`"),
     "deviations": ("ProtocolError", "load", "Expected `str`, got `int` - at `$.excused["),
-    "stats": ("ProtocolError", "task", "got `numpy.ndarray` - at `$.stepping[...]`"),
     "no dict of versions": ("EngineFailed", "launch", "'int' object has no attribute 'get'"),
     "versions that cannot be sent": ("EngineFailed", "launch", "DumpError"),
 }

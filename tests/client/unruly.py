@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 from pytest_simbench.sims.mujoco.settings import MuJoCoSettings
 
@@ -137,7 +136,6 @@ LIES: dict[str, dict[str, Any]] = {
     "deviations": {
         "info": replace(MuJoCo.info, deviations=(*MuJoCo.info.deviations, Deviation("", 3))),  # type: ignore[arg-type]
     },
-    "stats": {"other_cpu": lambda self: np.zeros(1)},
     "no dict of versions": {"versions": lambda self: 3},
     "versions that cannot be sent": {
         "versions": lambda self: {"mujoco": "3.3", "numpy": Unprintable}

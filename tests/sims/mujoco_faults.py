@@ -79,6 +79,31 @@ def finger_shape(s: Any) -> None:
 BOUNCY = (0.02, 0.1)
 """MuJoCo's time constant and damping ratio of a contact that gives back most of the speed."""
 
+
+def override(array: str, value: Any) -> Plant:
+    """MuJoCo's contact parameters that replace those of all geoms."""
+
+    def plant(s: Any) -> None:
+        import mujoco
+
+        s.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_OVERRIDE
+        geom = s.model.geom("cube")
+        s.model.opt.o_solref, s.model.opt.o_solimp = geom.solref, geom.solimp
+        s.model.opt.o_friction[:2] = geom.friction[0]
+        getattr(s.model.opt, array)[: len(value)] = value
+
+    return plant
+
+
+def off(switch: str) -> Plant:
+    def plant(s: Any) -> None:
+        import mujoco
+
+        s.model.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{switch}")
+
+    return plant
+
+
 FAULTS: dict[str, Plant] = {
     "timestep": lambda s: setattr(s.model.opt, "timestep", 0.005),
     "ground/height": height,
@@ -98,6 +123,15 @@ FAULTS: dict[str, Plant] = {
     "joint/panda_joint4/friction": joint("dof_frictionloss", 0.5),
     "gripper/coupled": lambda s: s.data.eq_active.__setitem__(0, 0),
     "gripper/coupled, to another joint": lambda s: s.model.eq_obj1id.__setitem__(0, 0),
+    "body/cube/friction, overridden": override("o_friction", (20.0, 20.0)),
+    "link/panda_leftfinger/friction, overridden": override("o_friction", (20.0, 20.0)),
+    "ground/restitution, overridden softness": override("o_solimp", (0.1, 0.2)),
+    "body/cube/restitution, overridden springs": override("o_solref", (0.2, 1.0)),
+    "gravity, switched off": off("GRAVITY"),
+    "body/cube/touches, constraints switched off": off("CONSTRAINT"),
+    "gripper/coupled, equalities switched off": off("EQUALITY"),
+    "joint/panda_joint4/limits, switched off": off("LIMIT"),
+    "joint/panda_joint4/stiffness, switched off": off("ACTUATION"),
     "body/cube/mass": body("cube", "body_mass", 1.0),
     "body/cube/inertia": lambda s: s.model.body("cube").inertia.__imul__(1.2),
     "body/cube/friction": lambda s: s.model.geom("cube").friction.__setitem__(0, 0.5),

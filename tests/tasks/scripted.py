@@ -121,6 +121,10 @@ class ScriptedProcess:
     def do_state(self) -> dict[str, Any]:
         return {"time": self.time, "joints": self._joints(), "bodies": self._bodies()}
 
+    def do_watch(self, seed: int) -> None: ...
+
+    def do_read_again(self) -> None: ...
+
     def do_stats(self) -> dict[str, Any]:
         return {"stepping": {"wall": 0.0, "simulated": self.time}, "peak_rss_mb": None}
 

@@ -65,16 +65,6 @@ def stepping(
     return Stepper(toy, Scene("s", (CUBE,), robot), beat)
 
 
-def test_the_time_of_a_program_that_simulates_counts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """10 s of CPU a step, in another process."""
-    toy = Toy()
-    monkeypatch.setattr(toy, "other_cpu", lambda: 10.0 * toy.steps)
-    stepper = stepping(toy)
-    stepper.wait(0.5, None)
-    stepper.wait(0.5, CHECK_PERIOD)
-    assert stepper.clocks.cpu == pytest.approx(5000.0, abs=1.0)
-
-
 def test_the_wall_clock_is_that_of_the_steps_alone() -> None:
     """Not of looks at the state, windows, pacing, or the control workload."""
     toy = Toy(sleep=0.002, look=0.01)

@@ -1,0 +1,148 @@
+"""What an engine must not do while it is stepped, in MuJoCo and PyBullet, and what tells it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pytest_simbench.robot.panda import panda
+from pytest_simbench.scene import Scene, Wrench
+from pytest_simbench.worker.server import Server
+from pytest_simbench.worker.watching import Watch
+from pytest_simbench.worker.wire import pack
+from tests.conftest import ADAPTERS
+from tests.worker.cheats import CUBE, LATER, UNTIL
+from tests.worker.toys import Toy
+
+Operation = tuple[str, dict[str, Any]]
+"""A request to a worker, and its arguments."""
+
+SCENE = Scene("flight", (CUBE,), panda())
+
+PUSH = Wrench(force=(0.5, 0.0, 0.5), start=0.1, end=0.4)
+
+BUILT = r"\w+ built another world than the scene describes: "
+FALLS = r"accelerated 'cube' by \(.*, -4\.9\) m/s\^2 at t = {} s, where it flew free and gravity is"
+CHANGED = r"changed {} while it ran: {} when it was loaded, {} at t = "
+FINGERS = "link/panda_leftfinger/friction"
+
+TOLD = {
+    ("friction", "loaded"): rf"{BUILT}{FINGERS}: scene 1\., \w+ 20\.",
+    ("friction", "later"): CHANGED.format(FINGERS, r"1\.", r"20\."),
+    ("masses", "loaded"): rf"{BUILT}body/cube/mass: scene 0\.1, \w+ 1\.",
+    ("masses", "later"): CHANGED.format("body/cube/mass", r"0\.1", r"1\."),
+    ("gravity", "loaded"): rf"{BUILT}gravity: scene \[.* -9\.80665\], \w+ \[.* -4\.903325\]",
+    ("gravity", "later"): FALLS.format(r"0\.3\d+"),
+    ("lift", "loaded"): FALLS.format(r"0\.1\d+"),
+    ("lift", "later"): FALLS.format(r"0\.3\d+"),
+    ("time", "loaded"): rf"{BUILT}timestep: scene 0\.00\d+, \w+ 0\.00\d+",
+    ("time", "later"): FALLS.format(r"0\.3\d+"),
+    (
+        "snap",
+        "loaded",
+    ): r"starts a world at t = 0 s with speeds that differ from the scene's by up to 1",
+    (
+        "snap",
+        "later",
+    ): r"let 'cube' jump: it moved by 0\.9[78]\d* m in the 0\.09\d* s before t = 0\.300 s",
+}
+"""By cheat and time: the one sentence."""
+
+
+def wait(duration: float, log_period: float | None = None) -> Operation:
+    return "wait", {"duration": duration, "log_period": log_period}
+
+
+def told(
+    adapter: str, *operations: Operation, scene: Scene = SCENE, seed: int = 1, watched: bool = True
+) -> str:
+    """What ends a repetition; by default one in which the cube flies for 0.5 s, then lies."""
+    answers: list[Any] = []
+    server = Server(answers.append)
+    construct = {"profile": "tuned", "changes": {}, "gui": False, "real_time": False}
+    try:
+        for op, arguments in (
+            ("construct", {"adapter": adapter, **construct}),
+            ("load", {"scene": scene.to_wire(), "parity": True}),
+            *([("watch", {"seed": seed})] if watched else []),
+            *(operations or [wait(1.2)]),
+            ("read_again", {}),
+        ):
+            server.answer({"op": op, "number": len(answers) + 1, **pack(arguments)})
+            if "error" in answers[-1]:
+                return str(answers[-1]["error"]["message"])
+        return ""
+    finally:
+        server.do_close()
+
+
+@pytest.mark.parametrize(("cheat", "when"), TOLD)
+@pytest.mark.parametrize("engine", ["MuJoCo", "PyBullet"])
+def test_a_cheat_is_told_in_one_sentence(engine: str, cheat: str, when: str) -> None:
+    message = told(f"tests.worker.cheats:{engine}_{cheat}_{when}")
+    assert re.search(TOLD[cheat, when], message), message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_undone_again_is_told_by_a_step_drawn_meanwhile(seed: int) -> None:
+    """It lasts for 0.65 s of the first one, in which a step is drawn; at the end it is over."""
+    message = told("tests.worker.cheats:MuJoCo_friction_a_while", seed=seed + 1)
+    at = float(message.rpartition("t = ")[2].partition(" ")[0])
+    assert LATER < at < UNTIL
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
+@pytest.mark.parametrize(
+    ("scene", "operations"),
+    [
+        (SCENE, [wait(1.2)]),
+        (SCENE, [wait(1.2, 0.0)]),
+        (SCENE, [wait(0.1), ("save", {"name": "a"}), wait(0.8), ("restore", {"name": "a"})]),
+        (Scene("nothing"), [wait(1.2)]),
+        (Scene("arm", robot=panda()), [wait(1.2)]),
+        (Scene("air", (replace(CUBE, linear_damping=2.0),)), [wait(0.4)]),
+        (Scene("wind", (replace(CUBE, wrenches=(PUSH,)),)), [wait(0.5)]),
+    ],
+    ids=["unlogged", "logged", "restored", "nothing", "arm", "air", "pushed"],
+)  # fmt: skip
+def test_who_does_not_cheat_is_not_told(
+    engine: str, scene: Scene, operations: list[Operation]
+) -> None:
+    assert told(ADAPTERS[engine], *operations, scene=scene) == ""
+
+
+def test_a_jump_is_told_by_each_step_of_a_log_and_a_small_one_by_no_less() -> None:
+    """5 mm sideways: in a log of every step, and not in 0.1 s."""
+    adapter = "tests.worker.cheats:MuJoCo_nudge_later"
+    pattern = r"let 'cube' jump: it moved by 0\.00\d+ m in the 0\.001 s before t = 0\.25"
+    assert re.search(pattern, told(adapter, wait(1.2, 0.0)))
+    assert told(adapter) == ""
+
+
+def test_only_who_is_watched_is_told() -> None:
+    """The kit plants faults of its own, and finds them by its laws."""
+    assert told("tests.worker.cheats:MuJoCo_lift_later", watched=False) == ""
+
+
+def test_steps_are_drawn_in_spans_that_grow() -> None:
+    """In the first second, then up to 4, 16 and 64 s; other ones with another seed."""
+    drawn = []
+    for seed in range(20):
+        toy = Toy()
+        toy.bodies = np.zeros((0, 13))
+        watch = Watch(toy, Scene("toy"), {}, {}, seed)
+        steps = []
+        while toy.steps < 64 / 0.002:
+            steps.append(watch.due)
+            toy.steps = watch.due
+            watch.look(watch.due, toy.joint_state(), toy.bodies)
+        drawn.append(steps)
+        spans = [(0, 500), (500, 2000), (2000, 8000), (8000, 32000)]
+        assert all(a < step <= b for step, (a, b) in zip(steps, spans, strict=False))
+        assert len(steps) >= 4
+    assert len({steps[0] for steps in drawn}) > 10
