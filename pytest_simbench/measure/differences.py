@@ -30,7 +30,7 @@ from pytest_simbench.measure.comparison import (
     equivalence,
 )
 from pytest_simbench.measure.intervals import SEED, varies
-from pytest_simbench.measure.limits import FAILURES
+from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.measure.speed import POWER, control, evened
 from pytest_simbench.records.metrics import COSTS, Metric
 from pytest_simbench.records.record import Record
@@ -123,7 +123,7 @@ def differences(
     judged, given = list(metrics), references or {}
     own = {metric.name for metric in judged}
     costs = [m for m in COSTS if m.name in COMPARED_COSTS and m.name not in own]
-    families: dict[Family, list[Metric]] = {"outcome": [FAILURES, *judged], "cost": costs}
+    families: dict[Family, list[Metric]] = {"outcome": [CRASHED, *judged], "cost": costs}
     pairs = [pair for pair in combinations(sides, 2) if comparable(*pair)]
     ended = {key: [r for r in found if r.status != "interrupted"] for key, found in sides.items()}
     result: list[Difference] = []
@@ -144,7 +144,7 @@ Values = Mapping[int, float | None]
 
 def _values(ended: Mapping[Any, Sequence[Record]], metric: Metric) -> dict[Any, Values]:
     """By side."""
-    if metric is FAILURES:
+    if metric is CRASHED:
         return {key: {r.seed: float(not r.ok) for r in found} for key, found in ended.items()}
     found: dict[Any, Values] = {
         key: {r.seed: r.value(metric) for r in records} for key, records in ended.items()

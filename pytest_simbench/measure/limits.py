@@ -18,7 +18,6 @@ CRASHED = Metric(
 )
 """The share of crashed repetitions, as a metric of every task."""
 
-FAILURES = CRASHED
 ALIASES = {"failures": CRASHED.name}
 """Names of before, which users may still type."""
 

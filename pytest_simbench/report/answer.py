@@ -26,9 +26,9 @@ def sentences(summary: TaskSummary) -> list[str]:
     ]
     attempts = sum(row.attempts for row in summary.rows)
     if failed:
-        found.append(f"failures: {', '.join(failed)}.")
+        found.append(f"crashes: {', '.join(failed)}.")
     elif attempts:
-        found.append(f"failures: none in {attempts} repetitions.")
+        found.append(f"crashes: none in {attempts} repetitions.")
     return [sentence for sentence in [*found, *summary.modes] if sentence]
 
 

@@ -17,7 +17,7 @@ LONGEST = 60
 def badge(records: Sequence[Record], passed: bool | None) -> str:
     """The badge of a run, as JSON.
 
-    Green: every test passed and no repetition failed. Yellow: the tests passed although some did.
+    Green: every test passed and no repetition crashed. Yellow: the tests passed although some did.
     Red: a test or a limit failed. Grey: nothing was measured, or it is not known what passed.
 
     Args:
@@ -35,7 +35,7 @@ def badge(records: Sequence[Record], passed: bool | None) -> str:
     elif not passed:
         message, colour = f"{who}: failing", "red"
     elif failed:
-        message, colour = f"{who}: {failed} of {len(ended)} repetitions failed", "yellow"
+        message, colour = f"{who}: {failed} of {len(ended)} repetitions crashed", "yellow"
     else:
         message, colour = f"{who}: {len(ended)} repetitions passed", "brightgreen"
     data = {

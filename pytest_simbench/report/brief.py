@@ -71,7 +71,7 @@ def table(summary: TaskSummary, width: int) -> list[Column]:
     metrics = summary.study
     found = [
         Column("simulator", [[name] for name in short_labels(rows)], left=True),
-        Column("failed", [[f"{row.failed} of {row.attempts}"] for row in rows]),
+        Column("crashed", [[f"{row.failed} of {row.attempts}"] for row in rows]),
     ]
     for metric in metrics:
         values = [cells.mean_interval(row.metrics.get(metric.name), metric) for row in rows]
@@ -90,9 +90,9 @@ def table(summary: TaskSummary, width: int) -> list[Column]:
 
 
 def warnings(summaries: Sequence[TaskSummary]) -> list[str]:
-    """Failures by cause, then what a reader must know of the rows, those of one text together."""
+    """Crashes by cause, then what a reader must know of the rows, those of one text together."""
     failed = [
-        f"FAILED {summary.task}, {row.label}: {len(cause.repetitions)} x {cause.type}"
+        f"CRASHED {summary.task}, {row.label}: {len(cause.repetitions)} x {cause.type}"
         + (f" in {cause.phase}" if cause.phase else "")
         + f": {cause.message}"
         for summary in summaries

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import isfinite
 
 from pytest_simbench.measure.gate import GateReport
-from pytest_simbench.measure.limits import FAILURES
+from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.metrics import COSTS, Metric, significant
@@ -171,7 +171,7 @@ def _claimed(claim: Claim, metrics: Mapping[str, Sequence[Metric]]) -> str:
 
 
 def _metric(claim: Claim, metrics: Mapping[str, Sequence[Metric]]) -> Metric | None:
-    known = (*metrics.get(claim.task, ()), *COSTS, FAILURES)
+    known = (*metrics.get(claim.task, ()), *COSTS, CRASHED)
     return next((metric for metric in known if metric.name == claim.metric), None)
 
 

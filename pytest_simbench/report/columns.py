@@ -33,7 +33,7 @@ def study(summary: TaskSummary) -> list[Column]:
     rows = summary.rows
     return [
         labels(rows),
-        Column("failed", [cells.failures(row) for row in rows], "outcome"),
+        Column("crashed", [cells.failures(row) for row in rows], "outcome"),
         *(
             Column(
                 cells.heading(metric),
@@ -173,7 +173,7 @@ def _beaten(metrics: list[str], same: bool) -> list[str]:
 def details(summary: TaskSummary) -> list[tuple[str, list[Column]]]:
     """The tables below the first, each with its title; a table without columns is left out."""
     found = [
-        ("failures", failures(summary)),
+        ("crashes", failures(summary)),
         ("why the task fell short", reasons(summary)),
         ("further metrics: mean [95 % interval]", stricter(summary)),
         (MATRIX, matrix(summary)),

@@ -136,7 +136,7 @@ def draw(summary: TaskSummary, name: str, *, titled: bool = True) -> Any:
 
 def _failed(row: Row) -> str:
     """What a mean does not show: it is one of the repetitions that ended well."""
-    return f"\n{row.failed} of {row.failed + row.finished} failed" if row.failed else ""
+    return f"\n{row.failed} of {row.failed + row.finished} crashed" if row.failed else ""
 
 
 def _title(summary: TaskSummary, rows: Sequence[Row], what: str) -> str:

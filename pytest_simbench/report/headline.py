@@ -48,10 +48,10 @@ def _ran(summaries: Sequence[TaskSummary]) -> str:
         for row in rows:
             counts[row.simulator] += row.failed
         text += (
-            f"{failed} failed (" + _and([f"{_and([n])} {k}" for n, k in counts.items() if k]) + ")"
+            f"{failed} crashed (" + _and([f"{_and([n])} {k}" for n, k in counts.items() if k]) + ")"
         )
     else:
-        text += "none failed"
+        text += "none crashed"
     cut = sum(row.interrupted for row in rows)
     return text + (f", {cut} cut short" if cut else "") + "."
 

@@ -216,7 +216,7 @@ class Progress:
     def _log(self, test: _Test, ended: _Repetition, outcome: str) -> None:
         """One plain line for a repetition that ended."""
         where = f"repetition {ended.number} of {test.last}"
-        failed = f"{test.failed} failed" if test.failed and test.repetitions > 1 else ""
+        failed = f"{test.failed} crashed" if test.failed and test.repetitions > 1 else ""
         parts = [test.id, where, ended.place, outcome, ended.counted, failed, self._left(test)]
         self._write("  ".join(part for part in parts if part) + "\n")
         self._last = self._clock()
@@ -229,7 +229,7 @@ class Progress:
         plural = "s" if len(running) > 1 else ""
         of = f"{numbers or test.done} of {test.last}"
         full_where = f"repetition{plural} {of}" if running else f"{of} repetitions done"
-        failed = f"{test.failed} failed" if test.failed else ""
+        failed = f"{test.failed} crashed" if test.failed else ""
         full = [test.id, full_where, what, failed, self._left(test)]
         left = self._left(test).replace("about ", "")  # becomes 2m10s left
         for unit in ("h", "min", "s"):

@@ -64,7 +64,7 @@ def test_a_run_ends_with_its_page_and_the_answer(pytester: pytest.Pytester) -> N
     lines = result.stdout.lines
     start = next(k for k, line in enumerate(lines) if "simulator comparison" in line)
     end = next(k for k, line in enumerate(lines) if line.startswith("report: "))
-    assert lines[start + 1] == "mujoco did falling: 5 repetitions, none failed."
+    assert lines[start + 1] == "mujoco did falling: 5 repetitions, none crashed."
     assert lines[end] == "report: o/report.html"
     assert re.match(r"=+ .*1 passed", lines[end + 1])
     assert end - start < 40
@@ -72,7 +72,7 @@ def test_a_run_ends_with_its_page_and_the_answer(pytester: pytest.Pytester) -> N
     assert "declared deviations" not in result.stdout.str()
     page = (pytester.path / "o" / "report.html").read_text(encoding="utf-8")
     assert page.startswith("<!DOCTYPE html>")
-    assert "mujoco did falling: 5 repetitions, none failed." in page
+    assert "mujoco did falling: 5 repetitions, none crashed." in page
     assert json.loads((pytester.path / "site" / "badge.json").read_text()) == {
         "schemaVersion": 1,
         "label": "simulators",

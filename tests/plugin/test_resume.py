@@ -239,7 +239,7 @@ def test_on_the_command_line(pytester: pytest.Pytester) -> None:
 def test_a_newer_schema_is_one_sentence(pytester: pytest.Pytester, case: Case, save: Save) -> None:
     resumed = save(*ended(case, Falling(), 1))
     path = resumed.folder.path / "records.jsonl"
-    path.write_text(path.read_text().replace('"schema": 1', '"schema": 9'))
+    path.write_text(path.read_text().replace('"schema": 2', '"schema": 9'))
     result = pytester.runpytest_subprocess("--sim=mujoco", f"--sim-resume={resumed.folder.path}")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     result.stderr.fnmatch_lines(

@@ -70,7 +70,7 @@ def test_sample_runs() -> None:
         "[16.7, 50].",
         "at the end: mujoco 97 % [94, 99] is ahead of pybullet 77 % [62, 92], by 20 points "
         "[1.53, 38.5].",
-        "failures: pybullet 3 of 20.",
+        "crashes: pybullet 3 of 20.",
     ]
     (throwing,) = with_differences(
         summarise(throwing_run(), METRICS, ends=two_errors), throwing_run()
@@ -78,7 +78,7 @@ def test_sample_runs() -> None:
     assert sentences(throwing) == [
         "moved: mujoco 42 % [38, 45] and pybullet 39 % [34, 45]; a difference needs at least 6 "
         "pairs that differ; so far 1.",
-        "failures: none in 40 repetitions.",
+        "crashes: none in 40 repetitions.",
     ]
 
 
@@ -166,7 +166,7 @@ def test_a_metric_without_a_good_direction_is_not_ranked() -> None:
     metric = Metric("score", "landing", "m", None, study=True)
     assert sentences(task({"a": 1.1}, (), metric, failed=1)) == [
         "landing: a 1.1 m [1, 1.2] (of 20 that finished).",
-        "failures: a 1 of 21.",
+        "crashes: a 1 of 21.",
     ]
     two = sentences(task({"a": 1.1, "b": 2.1}, ("a!b",), metric))[0]
     assert two.endswith("; they differ, and no value is the right one.")

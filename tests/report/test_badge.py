@@ -23,7 +23,7 @@ ONE_FAILED = [*FINE, failed("WorkerDied", "load", "gone", repetition=11)]
     [
         (FINE, True, "2 simulators: 20 repetitions passed", "brightgreen"),
         (FINE[:10], True, "a: 10 repetitions passed", "brightgreen"),
-        (ONE_FAILED, True, "3 simulators: 1 of 21 repetitions failed", "yellow"),
+        (ONE_FAILED, True, "3 simulators: 1 of 21 repetitions crashed", "yellow"),
         (ONE_FAILED, False, "3 simulators: failing", "red"),
         (FINE, False, "2 simulators: failing", "red"),
         (FINE, None, "2 simulators: 20 repetitions, not judged", "lightgrey"),

@@ -44,7 +44,8 @@ def test_the_answer_comes_first_then_a_line_for_each_row() -> None:
     records = [*stacking_run(), *throwing_run()]
     assert render_brief(with_differences(summaries(records), records), 80) == text(
         """
-        2 simulators did stacking and throwing: 80 repetitions, 3 failed (pybullet 3).
+        2 simulators did stacking and throwing: 80 repetitions, 3 crashed (pybullet
+          3).
         Outcome: stacking, placed and at the end: mujoco ahead (behind: pybullet);
           throwing, moved: a difference needs at least 6 pairs that differ; so far 1.
         Cost: CPU s per simulated s, stacking and throwing: not compared; RAM,
@@ -53,21 +54,21 @@ def test_the_answer_comes_first_then_a_line_for_each_row() -> None:
 
         stacking: 20 repetitions each, protocol fast
                                            at the end      CPU  RAM  x real
-        simulator   failed      placed %            %  s/sim s   MB    time
+        simulator  crashed      placed %            %  s/sim s   MB    time
         -------------------------------------------------------------------
         mujoco     0 of 20  99 [79, 100]  97 [77, 99]    0.048  150      20
         pybullet   3 of 20   65 [40, 78]  77 [46, 91]    0.048  150      20
 
         throwing: 20 repetitions each, protocol fast
                                              CPU  RAM  x real
-        simulator   failed      moved %  s/sim s   MB    time
+        simulator  crashed      moved %  s/sim s   MB    time
         -----------------------------------------------------
         mujoco     0 of 20  42 [33, 54]    0.048  150      20
         pybullet   0 of 20  39 [27, 52]    0.048  150      20
 
-        FAILED stacking, pybullet headless tuned: 2 x WorkerHung in settle: no answer
+        CRASHED stacking, pybullet headless tuned: 2 x WorkerHung in settle: no answer
           within 60 s
-        FAILED stacking, pybullet headless tuned: 1 x WorkerDied in pick: the worker
+        CRASHED stacking, pybullet headless tuned: 1 x WorkerDied in pick: the worker
           was killed by SIGSEGV
         """
     )
@@ -83,7 +84,7 @@ def test_a_run_of_eight_is_a_screen(eight: list[TaskSummary], width: int) -> Non
     assert all(line == line.rstrip() for line in lines)
     for name in EIGHT:
         assert sum(line.startswith(f"{name} ") for line in lines) == 2
-    assert "failed" in report
+    assert "crashed" in report
     assert "placed %" in report
 
 
@@ -99,7 +100,7 @@ def test_warnings_take_what_is_left_and_say_how_many_more(width: int) -> None:
     lines = report.splitlines()
     assert len(lines) <= MOST_LINES
     assert max(map(len, lines)) <= width
-    assert "FAILED stacking, dart headless tuned: 1 x WorkerDied in" in report
+    assert "CRASHED stacking, dart headless tuned: 1 x WorkerDied in" in report
     assert re.fullmatch(r"\d+ more warnings with -v and in the report", lines[-1])
 
 
@@ -111,7 +112,7 @@ def test_notes_of_one_text_stand_together() -> None:
 
 def test_a_failure_names_its_cause() -> None:
     report = render_brief(summaries([failed("WorkerDied", "load", "gone")]), 100)
-    assert "FAILED stacking, mujoco headless tuned: 1 x WorkerDied in load: gone" in report
+    assert "CRASHED stacking, mujoco headless tuned: 1 x WorkerDied in load: gone" in report
     assert "1 of 1" in report
 
 

@@ -32,7 +32,7 @@ def test_markdown_tables_hold_one_line_per_row() -> None:
         "by 33.3 points [16.7, 50]."
     )
     assert lines[6:10] == [
-        "| simulator | failed | placed % | at the end % | CPU % | RAM MB | x real time "
+        "| simulator | crashed | placed % | at the end % | CPU % | RAM MB | x real time "
         "| CPU s/sim s | start s | end s |",
         "| :-- | --: | --: | --: | --: | --: | --: | --: | --: | --: |",
         "| mujoco headless tuned | 0 of 20 [0, 17] % "
@@ -68,7 +68,7 @@ def test_a_picture_of_means_tells_what_failed() -> None:
         (axis, *_) = draw(summary, "metrics").axes
         labels = [label.get_text() for label in axis.get_yticklabels()]
         (times,) = draw(summary, "times").axes
-    assert labels == ["drake\n1 of 1 failed", "mujoco", "pybullet\n3 of 20 failed"]
+    assert labels == ["drake\n1 of 1 crashed", "mujoco", "pybullet\n3 of 20 crashed"]
     assert [label.get_text() for label in times.get_yticklabels()] == ["mujoco", "pybullet"]
 
 

@@ -16,7 +16,7 @@ from .test_answer import SCORE, task
 def test_sample_runs() -> None:
     records = [*stacking_run(), *throwing_run()]
     assert headline(with_differences(summarise(records, METRICS), records)) == [
-        "2 simulators did stacking and throwing: 80 repetitions, 3 failed (pybullet 3).",
+        "2 simulators did stacking and throwing: 80 repetitions, 3 crashed (pybullet 3).",
         "Outcome: stacking, placed and at the end: mujoco ahead (behind: pybullet); "
         "throwing, moved: a difference needs at least 6 pairs that differ; so far 1.",
         "Cost: CPU s per simulated s, stacking and throwing: not compared; RAM, stacking and "
@@ -43,7 +43,7 @@ def test_who_beats_and_is_beaten_is_behind() -> None:
 def test_a_single_simulator_is_told_with_its_value() -> None:
     records = [record(repetition=k, metrics={"placed": 1.0, "at_end": 0.8}) for k in range(10)]
     found = headline(summarise(records, METRICS))
-    assert found[0] == "mujoco did stacking: 10 repetitions, none failed."
+    assert found[0] == "mujoco did stacking: 10 repetitions, none crashed."
     assert found[1].startswith("Outcome: stacking, placed: 100 % [")
     assert found[2] == "Cost: CPU s per simulated s: 0.048; RAM: 150 MB."
 
@@ -58,7 +58,7 @@ def test_few_repetitions_are_not_compared() -> None:
 def test_interrupted_repetitions_are_told() -> None:
     records = [record(metrics={"placed": 1.0}), record(repetition=2, status="interrupted")]
     assert headline(summarise(records, METRICS))[0] == (
-        "mujoco did stacking: 1 repetition, none failed, 1 cut short."
+        "mujoco did stacking: 1 repetition, none crashed, 1 cut short."
     )
 
 

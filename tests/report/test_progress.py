@@ -142,7 +142,7 @@ def test_a_log_has_a_line_every_ten_seconds_and_one_at_the_end() -> None:
     desk.progress.end_test()
     assert desk.text.splitlines() == [
         f"{TEST}  repetition 1 of 3  ok after 10.5 s  15/15 cubes  about 21 s left",
-        f"{TEST}  repetition 3 of 3  ok after 0.1 s  1 failed",
+        f"{TEST}  repetition 3 of 3  ok after 0.1 s  1 crashed",
     ]
     desk.written.clear()
     desk.progress.start_test(TEST, 570)  # the study's tosses
@@ -186,7 +186,7 @@ def test_failures_stay_in_sight() -> None:
     desk.repeat(1, 10.0, "failed")
     desk.now += 1
     desk.progress.repetition(2, seed=7)
-    assert desk.screen == f"{TEST}  repetition 2 of 4  1 failed  about 30 s left"
+    assert desk.screen == f"{TEST}  repetition 2 of 4  1 crashed  about 30 s left"
 
 
 def test_parallel_repetitions_report_each_for_itself() -> None:

@@ -34,9 +34,9 @@ def test_study_table_and_what_explains_it_at_100_columns() -> None:
         ============================================
         placed: mujoco 99 % [97, 100] and pybullet 65 % [52, 78]; not compared.
         at the end: mujoco 97 % [94, 99] and pybullet 77 % [62, 92]; not compared.
-        failures: pybullet 3 of 20.
+        crashes: pybullet 3 of 20.
 
-        simulator                           failed                 placed %            at the end %
+        simulator                          crashed                 placed %            at the end %
         -------------------------------------------------------------------------------------------
         mujoco headless tuned    0 of 20 [0, 17] %  93 / 99 / 100 [97, 100]  87 / 97 / 100 [94, 99]
         pybullet headless tuned  3 of 20 [3, 38] %     0 / 65 / 87 [52, 78]   0 / 77 / 100 [62, 92]
@@ -52,7 +52,7 @@ def test_study_table_and_what_explains_it_at_100_columns() -> None:
         headless tuned  [99, 99]  [150, 150]  [20, 20]  [0.048, 0.048]  [0.80, 0.80]  [9.8, 9.8]
                                   (peak 161)
 
-        stacking, failures
+        stacking, crashes
         simulator                count  failure     phase   repetitions  message
         ----------------------------------------------------------------------------------------------------
         pybullet headless tuned      2  WorkerHung  settle  8, 9         no answer within 60 s; last line of
@@ -84,7 +84,7 @@ def test_study_table_at_140_columns_is_one_table() -> None:
     assert render(columns.study(stacking()), 140) == text(
         """
                                                                                          x real
-        simulator          failed       placed %   at the end %     CPU %      RAM MB      time     CPU s/sim s       start s       end s
+        simulator         crashed       placed %   at the end %     CPU %      RAM MB      time     CPU s/sim s       start s       end s
         ---------------------------------------------------------------------------------------------------------------------------------
         mujoco            0 of 20  93 / 99 / 100  87 / 97 / 100   99 +- 3    150 +- 2        20           0.048          0.80         9.8
         headless tuned  [0, 17] %      [97, 100]       [94, 99]  [99, 99]  [150, 150]  [20, 20]  [0.048, 0.048]  [0.80, 0.80]  [9.8, 9.8]

@@ -99,7 +99,7 @@ def test_laws_come_first_and_have_no_tables_of_their_own() -> None:
     brief = render_brief(mixed, 100)
     assert brief.index("for sticking: mujoco") < brief.index("did stacking")
     assert "creep:" not in brief
-    assert "FAILED stick, pybullet" in brief
+    assert "CRASHED stick, pybullet" in brief
     whole = render_run(mixed, 100)
     assert whole.index("laws of sticking") < whole.index("did stacking")
     text = markdown.render_run(mixed)

@@ -8,13 +8,14 @@ import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pytest_simbench.sims.ode.adapter import ODE
-from pytest_simbench.sims.ode.contacts import APART, distinct
+from pytest_simbench.sims.ode.contacts import APART, _slip, distinct
 
 from pytest_simbench.client.environments import interpreter
 from pytest_simbench.client.world import World
@@ -195,3 +196,15 @@ def test_what_is_left_stands_for_all(contacts: list[Touch]) -> None:
         a.stands_for(b) for k, a in enumerate(kept) for m, b in enumerate(kept) if k != m
     )
     assert [one.depth for one in kept] == sorted((one.depth for one in kept), reverse=True)
+
+
+def test_slip_is_along_the_surface_whatever_its_direction() -> None:
+    def moving(*velocity: float) -> SimpleNamespace:
+        return SimpleNamespace(getPointVel=lambda place: velocity)
+
+    contact = SimpleNamespace(getContactGeomParams=lambda: ((0, 0, 0), (0, 0, 1), 0.0, None, None))
+    assert _slip(contact, moving(0.3, 0.4, 5.0), None) == pytest.approx((0.6, 0.8, 0.0))
+    assert _slip(contact, moving(0.1, 0.0, 0.0), moving(0.4, 0.4, 0.0)) == pytest.approx(
+        (-0.6, -0.8, 0.0)
+    )
+    assert _slip(contact, moving(0.0, 0.0, 1.0), None) is None

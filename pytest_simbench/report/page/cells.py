@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from pytest_simbench.measure.limits import FAILURES
+from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.report import cells
 from pytest_simbench.report.answer import short_labels, standing
@@ -82,8 +82,8 @@ def study(summary: TaskSummary) -> Table:
     columns: list[tuple[Heading, list[Cell]]] = [
         (Heading("simulator", left=True), [Cell([row.simulator, row.variant]) for row in rows]),
     ]
-    failed = _judged(map(_failures, rows), FAILURES.name, summary)
-    columns.append((Heading("failed", FAILURES.doc), failed))
+    failed = _judged(map(_failures, rows), CRASHED.name, summary)
+    columns.append((Heading("crashed", CRASHED.doc), failed))
     for metric in summary.study:
         values = (_spread(row.metrics.get(metric.name), metric) for row in rows)
         judged = _judged(values, metric.name, summary)

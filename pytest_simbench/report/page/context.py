@@ -230,7 +230,7 @@ def _sweep(found: Sequence[Swept]) -> tuple[Sweep, str]:
 
 def _tables(summary: TaskSummary) -> list[Table]:
     rows = labelled(summary)
-    found = [item for item in columns.details(summary) if item[0] != "failures"]
+    found = [item for item in columns.details(summary) if item[0] != "crashes"]
     found.append((columns.BY_PHASE, columns.by_phase(summary)))
     return [from_columns(name, table, rows=rows) for name, table in found if table]
 

@@ -40,7 +40,7 @@ def test_cells_are_coloured_by_the_corrected_tests() -> None:
     (summary,) = with_differences(summarise(stacking_run(), METRICS), stacking_run())
     found = verdicts(study(summary))
     assert found["placed %"] == found["at the end %"] == ["ahead", "behind"]
-    assert found["failed"] == found["RAM MB"] == ["open", "open"]
+    assert found["crashed"] == found["RAM MB"] == ["open", "open"]
     assert found["x real time"] == found["CPU s/sim s"] == ["", ""]  # no control was recorded
     assert found["CPU %"] == found["start s"] == found["simulator"] == ["", ""]
 
