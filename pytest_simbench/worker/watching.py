@@ -86,7 +86,8 @@ class Watch:
         seed: int,
     ) -> None:
         self._simulator, self._title = simulator, simulator.info.title
-        self._lasting = Lasting(reported, scene, self._title)
+        declared = [d.with_robot(scene.robot) for d in simulator.info.deviations]
+        self._lasting = Lasting(reported, scene, self._title, declared)
         self._step = simulator.settings.timestep
         self._scene = scene
         self._random = np.random.default_rng(seed)

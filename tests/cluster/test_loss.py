@@ -118,7 +118,9 @@ def test_a_process_killed_a_machine_cut_off_and_one_added(
     spread.mkdir()
     alone = pytest_in(straight, "--sim-output=out")
     assert alone.wait() == 0, alone.stdout and alone.stdout.read()
-    run = pytest_in(spread, "--sim-output=out", f"--sim-cluster={machines.address}")
+    run = pytest_in(
+        spread, "--sim-output=out", f"--sim-cluster={machines.address}", "--sim-crashes=1"
+    )
     trouble = machines.folder / "trouble"
     until(lambda: len(list(trouble.glob("*"))) >= 2)
     machines.cut("b")  # nothing comes from it any more, and nobody says so

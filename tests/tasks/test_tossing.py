@@ -14,6 +14,7 @@ from pytest_simbench.data.tosses import EDGE, RATE
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.records.choices import Seen
 from pytest_simbench.records.record import Record
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray
 from pytest_simbench.tasks import Jitter, Tossing
@@ -121,7 +122,7 @@ def test_a_free_flight_is_the_closed_form_and_one_worker_serves_all(case: Case, 
         depth = -STANDARD_GRAVITY[2] * time * record.settings["timestep"] / 2
         assert record.metrics["position_error"] == pytest.approx(100 * depth.mean() / EDGE, abs=0.1)
         assert 0 <= record.metrics["rotation_error"] < 0.5
-        assert record.details["data"] == ["cube_tosses", record.details["toss"]]
+        assert record.notes.sample == ("cube_tosses", record.details["toss"])
 
 
 @pytest.mark.parametrize("name", ["mujoco", "pybullet"])
@@ -137,9 +138,7 @@ def test_real_tosses_end_near_where_they_ended(case: Case, name: str) -> None:
     assert len({record.details["toss"] for record in records}) == 12
     assert all(record.details["toss"] % 2 for record in records)
     for record in records:
-        assert {"data": "cube_tosses", "first": 0, "last": 564, "step": 6} in record.details[
-            "chosen_on"
-        ]
+        assert Seen.motions("cube_tosses", 0, 564, 6) in record.notes.chosen_on
 
 
 def test_without_friction_the_cube_slides_on(case: Case) -> None:
