@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -255,11 +256,19 @@ class Run:
         """Take over records that came with a report, from an xdist worker for instance."""
         self.folder.take_over(Record.from_json(line) for line in lines)
 
-    def fail(self, tests: Iterable[Mapping[str, Any]]) -> None:
-        """Keep that tests failed as a whole."""
-        if self.folder.locked:
-            for test in tests:
-                self.folder.claim(Claim.from_dict(test))
+    def judge(self, failed: Iterable[Mapping[str, Any]], passed: Collection[str]) -> None:
+        """Keep which tests failed as a whole; those of the resumed run that pass now do so no more.
+
+        A run in which nothing was recorded keeps nothing.
+        """
+        if not self.folder.locked or not (self.folder.used or self.folder.holds_run):
+            return
+        for test in failed:
+            self.folder.claim(Claim.from_dict(test))
+        before = self.folder.scan().claims if self.resumed else ()
+        for claim in {claim.identity: claim for claim in before if not claim.metric}.values():
+            if claim.verdict == "FAIL" and claim.test in passed:
+                self.folder.claim(replace(claim, verdict="PASS", advice=""))
 
     def complete(self) -> None:
         """Read what all processes wrote; called when all tests have ended."""

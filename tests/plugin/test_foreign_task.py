@@ -185,7 +185,7 @@ def test_a_run_of_before_is_shown_with_a_note(pytester: pytest.Pytester, package
         result = run(
             pytester, "--reps=5", f"--sim-baseline={baseline}", "--sim-compare-fail=spill:1"
         )
-        result.stdout.fnmatch_lines(["*spill*3.3 ml*3.3 ml*passed, limit 1 ml*"])
+        result.stdout.fnmatch_lines(["*spill*3.5 ml*3.5 ml*passed, limit 1 ml*"])
     package.unlink()
     run(pytester, "--sim-merge", "a", "--sim-output=whole")
     assert "does not say what its metrics mean" in Path("whole/report.md").read_text()

@@ -49,8 +49,8 @@ TEST = """
             "--sim-threshold=placed=x: the value must be a finite number",
         ),
         (
-            ["--sim-threshold=failures=90"],
-            "--sim-threshold=failures=90: failures is a share, so its threshold lies between 0 and "
+            ["--sim-threshold=crashed=90"],
+            "--sim-threshold=crashed=90: crashed is a share, so its threshold lies between 0 and "
             "1, not at 90; did you mean 0.9?",
         ),
         (

@@ -33,7 +33,7 @@ FINE = {
     "sim_gui": {"zero"}, "sim_headless": {"zero"}, "sim_fresh": {"zero"}, "sim_pictures": {"zero"},
     "sim_install_missing": {"zero"},
     "sim_bisect": {"minus inf"},  # where a second value is missing then, for argparse
-    "sim_strict": {"zero"},
+    "sim_strict": {"zero"}, "sim_crashes": {"zero"},
 }  # fmt: skip
 """Values that an option may have after all."""
 

@@ -146,12 +146,26 @@ def test_trace(pytester: pytest.Pytester) -> None:
     assert list(trace["body_names"]) == ["left", "right"]
 
 
+FULL_DISK = """
+import errno, os, pathlib
+
+write = os.write
+
+def full(descriptor, data):
+    path = pathlib.Path(os.readlink(f"/proc/self/fd/{descriptor}"))
+    if path.name == "records.jsonl" and path.parent.name == "out":
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    return write(descriptor, data)
+
+os.write = full
+"""
+
+
 def test_full_disk_loses_nothing(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytester.makepyfile(TEST)
-    folder = pytester.mkdir("out")
-    (folder / "records.jsonl").symlink_to("/dev/full")
+    pytester.makeconftest(FULL_DISK)
     monkeypatch.setenv("TMPDIR", str(pytester.mkdir("spare")))
     result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=2", "--sim-output=out")
     result.assert_outcomes(passed=1)
