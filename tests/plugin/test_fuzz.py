@@ -29,14 +29,17 @@ from pytest_simbench.recordings.trace import Trace
 from pytest_simbench.records import repeatability
 from pytest_simbench.records.baseline import KEY, BaselineError, read_baseline, to_extra_info
 from pytest_simbench.records.choices import Seen
+from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import TaskDescription, Threshold
-from pytest_simbench.records.folder import RECORDS, TASKS, THRESHOLDS, Reading, RunFolder
+from pytest_simbench.records.folder import CLAIMS, RECORDS, TASKS, THRESHOLDS, Reading, RunFolder
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Failure, RecordError
 from pytest_simbench.repeatability.agreement import FOLDER as SAMPLES
-from pytest_simbench.report import history, sweep
+from pytest_simbench.report import history, markdown, sweep
 from pytest_simbench.report.brief import render_brief
 from pytest_simbench.report.changes import render_terminal
+from pytest_simbench.report.claims import claims_of
+from pytest_simbench.report.claims import lines as lines_of_claims
 from pytest_simbench.report.files import in_order, summaries_of, write_files
 from pytest_simbench.report.outcome import NAME as OUTCOME
 from pytest_simbench.report.outcome import Outcome
@@ -89,6 +92,11 @@ def folder() -> Path:
     for name, metrics in METRICS.items():
         run.describe(TaskDescription(name, metrics, {metrics[0].name: 0.5}))
     run.ask(Threshold(kept[0].test, "placed", 0.5))
+    whole = Claim(kept[0].test, "test_stacking", "mujoco", "headless", "tuned", "FAIL", advice="x")
+    placed = replace(whole, task="stacking", metric="placed", relation="at least", threshold=0.9)
+    run.claim(whole)
+    run.claim(replace(placed, mean=0.5, low=0.4, high=0.6, n=3, crashed=1, advice=""))
+    run.claim(replace(placed, simulator="drake", verdict="UNDECIDED", mean=0.9, n=3))
     run.close()
     for line in (LINE, REPLAY):
         repeatability.append(path, line)
@@ -118,14 +126,19 @@ def report(run: Path) -> None:
     outcome, wrong = Outcome.read(run)
     summaries, sweeps = summaries_of(reading), sweep.of_run(reading)
     histories = history.of_run(reading)
+    claims = claims_of(reading, outcome.compared and outcome.compared[1])
     found = in_order(reading.records)
-    written = write_files(run, summaries, found, False, outcome.compared, None, histories, sweeps)
+    written = write_files(
+        run, summaries, found, False, outcome.compared, None, histories, sweeps, claims
+    )
     tables, problems = write_tables(run, run)
     _, told = albums(run, found)
     for text in (*reading.problems, *written.problems, *filter(None, [wrong]), *problems, *told):
         one_sentence(text)
     render_repeatability(tables, 100)
     render_brief(summaries, 40)
+    lines_of_claims(claims, 40)
+    markdown.render_run(summaries, sweeps=sweeps, claims=claims)
     render_run(summaries, 100)
     history.lines(histories, 40)
     sweep.whole(sweeps, 40)
@@ -162,7 +175,7 @@ def names() -> list[str]:
     return sorted(str(p.relative_to(folder())) for p in folder().rglob("*") if p.is_file())
 
 
-TEXTS = (RECORDS, TASKS, THRESHOLDS, repeatability.NAME, OUTCOME, BENCHMARKS)
+TEXTS = (RECORDS, TASKS, THRESHOLDS, CLAIMS, repeatability.NAME, OUTCOME, BENCHMARKS)
 ODD = st.sampled_from(
     [None, True, 0, -1, 1e308, -1e-308, 10**20, 10**400, float("nan"), float("inf"), "", "x", "ok",
      "x" * 3000, "a\nb", "\ud800", "../x", "\x1b[2J", [], {}, [[]], [None], {"": {}}, {"a": "b"},
