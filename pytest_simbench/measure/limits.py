@@ -124,6 +124,7 @@ def check_threshold(metric: Metric, value: float) -> None:
     Raises:
         LimitError: it is no finite number, or lies outside what the metric can be.
     """
+    __tracebackhide__ = True
     if not isinstance(value, Real) or not math.isfinite(value):
         raise LimitError(f"a threshold of {metric.name} is a finite number, not {value!r:.80}")
     if metric.bounded and not 0 <= value <= 1:
