@@ -156,6 +156,9 @@ UNCLAIMED = "not claimed"
 
 NOT_MEASURED = "not measured"
 
+WHAT = "planted fault"
+"""The first column."""
+
 
 def in_time(subject: Subject, law: str, needs: Capability | None) -> str:
     if needs is not None and not subject.can(needs):
@@ -176,15 +179,16 @@ def column(subject: Subject) -> dict[str, str]:
 def main() -> None:
     names = sys.argv[1:] or [name for name in registered() if not missing(adapter(name).info)]
     with TABLE.open(newline="", encoding="utf-8") as file:
-        rows = {row["planted fault"]: row for row in csv.DictReader(file)}
+        rows = {row[WHAT]: row for row in csv.DictReader(file)}
     measured = {name: column(Subject(adapter(name))) for name in names}
-    columns = sorted({name for row in rows.values() for name in row} - {"planted fault"} | {*names})
+    known = {name for row in rows.values() for name in row} - {WHAT}
+    columns = [WHAT, *sorted(known | {*names})]
     with TABLE.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, ["planted fault", *columns], NOT_MEASURED, lineterminator="\n")
+        writer = csv.DictWriter(file, columns, NOT_MEASURED, lineterminator="\n")
         writer.writeheader()
         for what in [*(fault.what for fault in FAULTS.values()), *IN_THE_ENGINE, *IN_TIME]:
             now = {name: found[what] for name, found in measured.items()}
-            writer.writerow({**rows.get(what, {}), "planted fault": what, **now})
+            writer.writerow({**rows.get(what, {}), WHAT: what, **now})
 
 
 if __name__ == "__main__":

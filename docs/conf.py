@@ -6,7 +6,7 @@ from pathlib import Path
 from pytest_simbench import __version__
 
 sys.path.insert(0, str(Path(__file__).parent))
-import made  # noqa: E402
+import made
 
 project = "pytest-simbench"
 author = "pytest-simbench developers"

@@ -1,4 +1,4 @@
-"""Tables and pages that are made of docs/data: when the site is built (`conf.py`), and the README's.
+"""Tables and pages made of docs/data: those of the site when it is built, and the README's.
 
 python docs/made.py                        writes the README's table and the pictures
 python docs/made.py RUN...                 reads run folders into docs/data, each repetition into
@@ -8,8 +8,8 @@ python docs/made.py --as RULES COMMIT RUN...
                                            ones; RULES is a word of `published_runs.RULES`, COMMIT
                                            that of the code that ran
 
-A table stands where a page has the line `<!-- made: WORD WORD -->`, see `TABLES`. The README has its
-own in git, up to a line `<!-- end -->`.
+A table stands where a page has the line `<!-- made: WORD WORD -->`, see `TABLES`. The README has
+its own in git, up to a line `<!-- end -->`. `conf.py` calls `write_pages` and `filled`.
 """
 
 from __future__ import annotations
