@@ -1,4 +1,5 @@
-"""The table of planted faults: what finds each, in each engine. Writes docs/parity.md.
+"""The table of planted faults: what finds each, in each engine. Writes
+docs/data/planted_faults.csv, of which docs/parity.md has its table.
 
     python benchmarks/parity.py [SIMULATOR ...]
 
@@ -11,6 +12,7 @@ Columns of simulators that are not named, or not here, stay as they are.
 
 from __future__ import annotations
 
+import csv
 import sys
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -25,8 +27,9 @@ from pytest_simbench.testing.faults import FAULTS, rounds
 from pytest_simbench.testing.parity import planted
 from pytest_simbench.testing.robot_faults import Fault
 
-PAGE = Path(__file__).parent.parent / "docs" / "parity.md"
-EXPECTED = read_expected_failures(PAGE.parents[1] / "tests" / "sims" / "expected_failures.txt")
+ROOT = Path(__file__).parent.parent
+TABLE = ROOT / "docs" / "data" / "planted_faults.csv"
+EXPECTED = read_expected_failures(ROOT / "tests" / "sims" / "expected_failures.txt")
 
 IN_THE_ENGINE = {
     "what touches bounces": "body/*/restitution",
@@ -153,6 +156,9 @@ UNCLAIMED = "not claimed"
 
 NOT_MEASURED = "not measured"
 
+WHAT = "planted fault"
+"""The first column."""
+
 
 def in_time(subject: Subject, law: str, needs: Capability | None) -> str:
     if needs is not None and not subject.can(needs):
@@ -170,28 +176,19 @@ def column(subject: Subject) -> dict[str, str]:
     }
 
 
-def read(lines: list[str]) -> dict[str, dict[str, str]]:
-    """The columns of a table, by simulator and fault."""
-    (_, *names), _, *rows = (line.strip("| ").split(" | ") for line in lines)
-    return {name: {row[0]: row[1 + k] for row in rows} for k, name in enumerate(names)}
-
-
-def table(columns: dict[str, dict[str, str]]) -> list[str]:
-    names = sorted(columns)
-    rows = [["planted fault", *names], ["---"] * (1 + len(names))]
-    for what in [*(fault.what for fault in FAULTS.values()), *IN_THE_ENGINE, *IN_TIME]:
-        rows.append([what, *(columns[name].get(what, NOT_MEASURED) for name in names)])
-    return [f"| {' | '.join(row)} |" for row in rows]
-
-
 def main() -> None:
     names = sys.argv[1:] or [name for name in registered() if not missing(adapter(name).info)]
-    text = PAGE.read_text("utf-8")
-    before, _, rest = text.partition("<!-- table -->\n")
-    old, _, after = rest.partition("<!-- end -->")
+    with TABLE.open(newline="", encoding="utf-8") as file:
+        rows = {row[WHAT]: row for row in csv.DictReader(file)}
     measured = {name: column(Subject(adapter(name))) for name in names}
-    lines = "\n".join(table({**read(old.splitlines()), **measured}))
-    PAGE.write_text(f"{before}<!-- table -->\n{lines}\n<!-- end -->{after}", "utf-8")
+    known = {name for row in rows.values() for name in row} - {WHAT}
+    columns = [WHAT, *sorted(known | {*names})]
+    with TABLE.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, columns, NOT_MEASURED, lineterminator="\n")
+        writer.writeheader()
+        for what in [*(fault.what for fault in FAULTS.values()), *IN_THE_ENGINE, *IN_TIME]:
+            now = {name: found[what] for name, found in measured.items()}
+            writer.writerow({**rows.get(what, {}), WHAT: what, **now})
 
 
 if __name__ == "__main__":

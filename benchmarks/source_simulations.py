@@ -6,7 +6,7 @@ CLONE is a clone of the repository of the data set arm_pushes (docs/reality.md),
 Data/Simulation is no part of the set. It holds 20 runs of each of seven simulators and experiments,
 20 samples a second. Each is held against each held-out real run, hand against hand, from the first
 command on. `--write` puts the means into docs/data/source_simulations.csv, which
-docs/make_reality.py reads. Needs the data set arm_pushes.
+docs/make_tasks.py reads. Needs the data set arm_pushes.
 """
 
 from __future__ import annotations

@@ -1,6 +1,12 @@
 """Sphinx' settings of the site. Build it with `sphinx-build -W -b html docs docs/_build`."""
 
+import sys
+from pathlib import Path
+
 from pytest_simbench import __version__
+
+sys.path.insert(0, str(Path(__file__).parent))
+import made
 
 project = "pytest-simbench"
 author = "pytest-simbench developers"
@@ -22,3 +28,9 @@ autodoc_typehints_description_target = "documented_params"
 autodoc_default_options = {"members": True, "show-inheritance": True}
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True  # attributes of dataclasses are described in the class' docstring
+
+
+def setup(app):
+    """Makes the pages of docs/data, and the tables of all others."""
+    made.write_pages()
+    app.connect("source-read", lambda app, name, text: text.__setitem__(0, made.filled(text[0])))

@@ -1,57 +1,26 @@
-"""Makes every table of measured outcomes and costs, in README.md and docs/, from one source.
-
-python docs/make_results.py RUNS COMMIT    reads run folders into docs/data/*.csv, then the rest
-python docs/make_results.py                writes tables and pictures from docs/data/*.csv
-python docs/make_results.py --tables       the tables in the pages alone
-
-RUNS holds the folders RULES-PROFILE-TASK/SIMULATOR, for instance ours-tuned-stacking/mujoco. RULES
-are `ours`, `study` (`Stacking.study()`), or the name of a single rule (`published_runs.RULES`).
-COMMIT is that of the code that ran. A folder replaces what the CSV had of the same configuration.
-
-A table stands in a page between `<!-- made: NAME -->` and `<!-- end -->`.
-"""
+"""Tables and pages of stackings and throws, from stacking.csv and throwing.csv."""
 
 from __future__ import annotations
 
-import csv
-import re
 import statistics
-import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from published_runs import (
-    DATA,
-    METRICS,
-    PARTS,
-    PROFILES,
-    REPETITIONS,
-    RULES,
-    SETTINGS,
-    SIMULATORS,
-    TASKS,
-    Run,
-    Runs,
-    load,
-    read_folders,
-)
+from published_runs import METRICS, PARTS, PROFILES, REPETITIONS, RULES, SETTINGS, TASKS, Run, Runs
+from published_runs import load as load_runs
+from tables import DOCS, SIMULATORS, table
 
 from pytest_simbench.measure.comparison import compare_by_seed, holm
 from pytest_simbench.report import cells, markdown
 from pytest_simbench.report.figures import write_figures
 from pytest_simbench.report.matrix import with_differences
-from pytest_simbench.report.summary import summarise
+from pytest_simbench.report.summary import TaskSummary, summarise
 from pytest_simbench.tasks import Throwing
 
-DOCS = Path(__file__).resolve().parent
 PLURALS = {"stacking": "stackings", "throwing": "throws"}
 WORDS = {"ours": "our rules", "study": "the study's rules"}
-
-
-def table(headings: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> str:
-    marks = [":--" if k < left else "--:" for k in range(len(headings))]
-    return "\n".join(f"| {' | '.join(row)} |" for row in (headings, marks, *rows))
 
 
 def number(value: float | None, digits: str = ".3f") -> str:
@@ -111,7 +80,7 @@ def missing(runs: Runs) -> str:
     if not lacking:
         return ""
     names = "; ".join(_listed(names) + few for few, names in lacking.items())
-    return f"Not measured again yet: {names} ([earlier](docs/results.md#earlier-numbers))."
+    return f"Not measured again yet: {names}."
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -194,19 +163,6 @@ def engine(runs: Runs, simulator: str) -> str:
     return "\n\n".join(parts) or "This engine was not run again on the new seeds yet."
 
 
-def earlier(runs: Runs) -> str:
-    """Numbers of before, for what has no new run."""
-    with (DATA / "earlier.csv").open(encoding="utf-8", newline="") as file:
-        headings, *lines = csv.reader(file)
-    rows = []
-    for profile, task, simulator, *rest in lines:
-        run = runs.get(("ours", profile.split(",")[0], task, simulator))
-        if run is None or len(run.lines) < REPETITIONS:
-            rows.append([page_link(simulator), profile, task, *rest])
-    order = [headings[2], headings[0], headings[1], *headings[3:]]
-    return table(order, rows, 3) if rows else "Everything was measured again."
-
-
 def against_study(runs: Runs, task: str, metrics: Sequence[str]) -> str:
     """docs/study.md: ours and the study's rules on the same seeds, and what differs for certain."""
     pairs = [
@@ -285,7 +241,6 @@ def raw_links(runs: Runs) -> str:
 TABLES: dict[str, Callable[[Runs], str]] = {
     "overview": overview,
     "raw": raw_links,
-    "earlier": earlier,
     **{
         f"{rules} {profile} {task}": lambda runs, r=rules, p=profile, make=make: make(runs, r, p)
         for rules, profile in SETTINGS
@@ -305,60 +260,44 @@ TABLES: dict[str, Callable[[Runs], str]] = {
     ),
 }
 
-MADE = re.compile(r"(<!-- made: ([\w ]+) -->\n).*?(<!-- end -->)", re.S)
+load = cache(load_runs)
 
 
-def pages() -> dict[Path, str]:
-    """Every page with tables of ours, as it should be."""
-    runs = load()
-    found = {}
-    for path in (DOCS.parent / "README.md", *sorted(DOCS.rglob("*.md"))):
-        text = path.read_text("utf-8")
-        if "_build" not in path.parts and MADE.search(text):
-            found[path] = MADE.sub(lambda m: f"{m[1]}\n{TABLES[m[2]](runs)}\n\n{m[3]}", text)
-    return found
+def _summary(rules: str, profile: str, task: str) -> TaskSummary:
+    records = [r for _, run in _of(load(), rules, profile, task) for r in run.records()]
+    whole = TASKS[task].study() if rules == "study" else TASKS[task]
+    found = summarise(records, {task: whole.metrics}, {task: whole.references})
+    return with_differences(found, records)[0]
 
 
-def raw(runs: Runs) -> None:
-    """All numbers of each setting, and who beats whom; and the pictures."""
-    for rules, profile in SETTINGS:
-        for task in TASKS:
-            found = _of(runs, rules, profile, task)
-            if not found:
-                continue
-            records = [record for _, run in found for record in run.records()]
-            whole = TASKS[task].study() if rules == "study" else TASKS[task]
-            summary = with_differences(
-                summarise(records, {task: whole.metrics}, {task: whole.references}), records
-            )
-            name = f"{rules}_{profile}_{task}"
-            text = markdown.render_task(summary[0], 1).split("\n", 1)[1].strip()
-            title = f"# {task.capitalize()}, {WORDS[rules]}, `{profile}` settings"
-            seeds = sorted({record.seed for record in records})
-            commits = sorted({line["commit"] for _, run in found for line in run.lines})
-            head = (
-                f"Seeds {seeds[0]} to {seeds[-1]}, commit {', '.join(commits)}. Made by "
-                f"`docs/make_results.py` from [{task}.csv]({task}.csv), which has every repetition."
-                " What it says: [the numbers](../results.md)."
-            )
-            (DATA / f"{name}.md").write_text(f"{title}\n\n{head}\n\n{text}\n", "utf-8")
-            if rules == "ours":
-                with TemporaryDirectory() as folder:
-                    write_figures(Path(folder), summary)
-                    picture = Path(folder, f"{task}_metrics.png").read_bytes()
-                (DOCS / "pictures" / f"{profile}_{task}.png").write_bytes(picture)
+def raw(rules: str, profile: str, task: str) -> str:
+    """A page with all numbers of one setting, and who beats whom."""
+    found = [line for _, run in _of(load(), rules, profile, task) for line in run.lines]
+    seeds = sorted({int(line["seed"]) for line in found})
+    commits = ", ".join(sorted({line["commit"] for line in found}))
+    text = markdown.render_task(_summary(rules, profile, task), 1).split("\n", 1)[1].strip()
+    return (
+        f"# {task.capitalize()}, {WORDS[rules]}, `{profile}` settings\n\nSeeds {seeds[0]} to "
+        f"{seeds[-1]}, commit {commits}. [{task}.csv]({task}.csv) holds every repetition. "
+        f"What it says: [the numbers](../results.md).\n\n{text}\n"
+    )
 
 
-def main(arguments: list[str]) -> None:
-    if len(arguments) == 2:
-        read_folders(Path(arguments[0]), arguments[1])
-    elif arguments not in ([], ["--tables"]):
-        sys.exit(__doc__)
-    for path, text in pages().items():
-        path.write_text(text, "utf-8")
-    if arguments != ["--tables"]:
-        raw(load())
+PAGES: dict[str, Callable[[], str]] = {
+    f"{rules}_{profile}_{task}": lambda s=(rules, profile, task): raw(*s)
+    for rules, profile in SETTINGS
+    for task in TASKS
+}
+
+PICTURES = ("default_stacking", "tuned_throwing")
+"""Others would show equal lines."""
 
 
-if __name__ == "__main__":
-    main(sys.argv[1:])
+def draw() -> None:
+    """The pictures, by our rules."""
+    for name in PICTURES:
+        profile, task = name.split("_")
+        with TemporaryDirectory() as folder:
+            write_figures(Path(folder), [_summary("ours", profile, task)])
+            picture = Path(folder, f"{task}_metrics.png").read_bytes()
+        (DOCS / "pictures" / f"{name}.png").write_bytes(picture)

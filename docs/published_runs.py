@@ -1,12 +1,13 @@
-"""The runs behind the published numbers, as docs/data/*.csv holds them: see make_results.py."""
+"""The runs behind the published numbers, as stacking.csv and throwing.csv hold them."""
 
 from __future__ import annotations
 
-import csv
 import statistics
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from functools import partial
+
+from tables import SIMULATORS, Kept, Line
 
 from pytest_simbench.records.metrics import COSTS, Metric
 from pytest_simbench.records.record import Failure, Record
@@ -14,14 +15,9 @@ from pytest_simbench.report import cells
 from pytest_simbench.report.pooling import spread
 from pytest_simbench.tasks import Stacking, Throwing
 
-DATA = Path(__file__).resolve().parent / "data"
 TASKS = {"stacking": Stacking(), "throwing": Throwing()}
 REPETITIONS = 20
 
-SIMULATORS = {
-    "mujoco": "MuJoCo", "pybullet": "PyBullet", "sapien": "SAPIEN", "ovphysx": "Omniverse PhysX",
-    "drake": "Drake", "dart": "DART", "newton": "Newton", "genesis": "Genesis",
-}  # fmt: skip
 PROFILES = ("tuned", "default")
 SETTINGS = [(rules, profile) for rules in ("ours", "study") for profile in PROFILES]
 RULES = {
@@ -53,7 +49,7 @@ class Run:
     """The repetitions of one configuration at one task, as lines of the CSV."""
 
     task: str
-    lines: list[dict[str, str]]
+    lines: list[Line]
 
     def values(self, name: str) -> dict[int, float]:
         """By seed, of the repetitions that have a value; a crashed one has the worst, if there is
@@ -103,65 +99,42 @@ Runs = dict[tuple[str, str, str, str], Run]
 """By rules, profile, task and simulator."""
 
 
-def read_folders(runs: Path, commit: str) -> None:
-    """Put what the run folders hold into the CSV."""
-    for task in TASKS:
-        known = load().items()
-        lines = {key: run.lines for key, run in known if key[2] == task}
-        for folder in sorted(runs.glob(f"*-*-{task}/*/")):
-            rules, profile, _ = folder.parent.name.split("-")
-            path = folder / "records.jsonl"
-            text = path.read_text("utf-8") if path.exists() else ""
-            records = [Record.from_json(line) for line in text.splitlines()]
-            records = [r for r in records if r.status != "interrupted"]
-            if records:
-                found = sorted(records, key=lambda r: r.seed)
-                key = (rules, profile, task, folder.name)
-                lines[key] = [_line(record, rules, commit) for record in found]
-        names = [metric.name for metric in TASKS[task].metrics]
-        with (DATA / f"{task}.csv").open("w", encoding="utf-8", newline="") as file:
-            columns = [*IDENTITY, *names, *PARTS[task], *COST_NAMES]
-            writer = csv.DictWriter(file, columns, lineterminator="\n")
-            writer.writeheader()
-            for key in sorted(lines, key=_order):
-                writer.writerows(lines[key])
-
-
-def _line(record: Record, rules: str, commit: str) -> dict[str, str]:
+def _told(task: str, record: Record) -> Mapping[str, object] | None:
+    if record.task != task:
+        return None
     details = record.details
-    known: dict[str, Any] = {
-        **{"rules": rules, "profile": record.profile, "simulator": record.simulator},
-        **{"version": record.versions.get(record.simulator, ""), "commit": commit},
-        **{"seed": record.seed, "status": record.status, **record.metrics},
-        **{"cause": record.error.cause if record.error else ""},
-        **{name: record.cost(name) for name in COST_NAMES},
-    }
-    if record.task == "stacking":
+    more: dict[str, object] = {}
+    if task == "stacking":
         missed = {(pick["tower"], pick["level"]) for pick in details.get("failed_picks", ())}
         stood = {(pick["tower"], pick["level"]) for pick in details.get("picks", ())}
-        known["spare_places"] = len(missed & stood)
+        more["spare_places"] = len(missed & stood)
     else:
-        known["flight_x"] = details.get("flight_landing_x")
-        for name, share in details.get("limits", {}).items():
-            known[f"limits_{name}"] = 100 * share
-    return {name: _short(value) for name, value in known.items()}
+        limits = details.get("limits", {}).items()
+        more["flight_x"] = details.get("flight_landing_x")
+        more.update({f"limits_{name}": 100 * share for name, share in limits})
+    more["cause"] = record.error.cause if record.error else ""
+    return {**record.metrics, **more, **{name: record.cost(name) for name in COST_NAMES}}
 
 
-def _short(value: Any) -> str:
-    if value is None or isinstance(value, str):
-        return value or ""
-    return str(value) if isinstance(value, int) else f"{value:.6g}"
+PUBLISHED = {
+    name: Kept(
+        name,
+        ("rules", "profile", "simulator", "seed"),
+        (*IDENTITY, *(metric.name for metric in task.metrics), *PARTS[name], *COST_NAMES),
+        partial(_told, name),
+    )
+    for name, task in TASKS.items()
+}
+"""What is in no record must be told with it: `rules`, and the `commit` of the code that ran."""
 
 
 def load() -> Runs:
-    """What docs/data/*.csv holds."""
+    """By configuration, in order of their seeds."""
     found: Runs = {}
-    for task in TASKS:
-        path = DATA / f"{task}.csv"
-        with path.open(encoding="utf-8", newline="") as file:
-            for line in csv.DictReader(file):
-                key = (line["rules"], line["profile"], task, line["simulator"])
-                found.setdefault(key, Run(task, [])).lines.append(line)
+    for task, kept in PUBLISHED.items():
+        for line in sorted(kept.lines(), key=lambda line: int(line["seed"])):
+            key = (line["rules"], line["profile"], task, line["simulator"])
+            found.setdefault(key, Run(task, [])).lines.append(line)
     return {key: found[key] for key in sorted(found, key=_order)}
 
 
@@ -171,7 +144,7 @@ def _order(key: tuple[str, str, str, str]) -> tuple[int, ...]:
     return (*places, list(SIMULATORS).index(simulator))
 
 
-def _record(task: str, number: int, line: dict[str, str]) -> Record:
+def _record(task: str, number: int, line: Line) -> Record:
     value = {name: float(text) for name, text in line.items() if name in COST_NAMES and text}
     names = [metric.name for metric in TASKS[task].metrics if line[metric.name]]
     metrics = {name: _exact(task, name, float(line[name])) for name in names}
