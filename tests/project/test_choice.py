@@ -11,6 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from pytest_simbench.laws import LAWS
+from pytest_simbench.testing import CHECKS
+
 ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT / "docs" / "data"
 TABLE = (ROOT / "README.md").read_text("utf-8").partition("<!-- choose -->\n")[2]
@@ -47,8 +50,7 @@ def test_each_row_names_a_simulator_its_cost_who_is_wrong_and_the_page(need: str
     simulator = NAMES[take.split(",")[0]]
     assert because
     assert any(name in wrong for name in NAMES)
-    (page,) = re.findall(r"\[\w+\]\((docs/\w+\.md)\)", whence)
-    assert (ROOT / page).exists()
+    assert re.match(r"\[\w+\]\(docs/\w+\.md\)", whence)
     if simulator != "ode":  # its costs stand on its page alone
         measured = mean("stacking", "cpu_cost", rules="ours", profile="tuned", simulator=simulator)
         assert float(cost) == pytest.approx(measured, abs=0.006)
@@ -74,6 +76,23 @@ def test_who_keeps_all_laws_does(need: str, count: int, phenomena: list[str]) ->
     ]
     assert f"keeps all {count} laws" in ROWS[need][2]
     assert (len(found), max(found) <= 1) == (count, True)
+
+
+@pytest.mark.parametrize("simulator", sorted(set(NAMES.values())))
+def test_the_page_of_an_engine_says_how_many_laws_it_keeps(simulator: str) -> None:
+    page = " ".join((ROOT / "docs" / "engines" / f"{simulator}.md").read_text("utf-8").split())
+    ratios = [row["ratio"] for row in lines("truth", profile="tuned", simulator=simulator)]
+    kept = sum(bool(ratio) and float(ratio) <= 1 for ratio in ratios)
+    assert f" {kept} of {len(ratios)} laws are kept with `tuned`" in page
+
+
+def test_the_pages_count_laws_and_checks_right() -> None:
+    glossary = (ROOT / "docs" / "glossary.md").read_text("utf-8")
+    assert f"measures by {len(LAWS)} of them" in glossary
+    assert f"conformance kit asks of an adapter; there are {len(CHECKS)}" in glossary
+    assert f"conformance kit has {len(CHECKS)} checks" in " ".join(
+        (ROOT / "docs" / "add_a_simulator.md").read_text("utf-8").split()
+    )
 
 
 MM, CM = 1000, 100
@@ -113,6 +132,8 @@ MM, CM = 1000, 100
         ("rolling", "28 % too slowly", lambda: 100 * law("rolling_cylinder", "sapien")
          / law("rolling_cylinder", "sapien", "exact")),
         ("springs, force limits", "not 11", lambda: degrees(law("sag", "dart"))),
+        ("springs, force limits", "93 % of", lambda: 100 * law("effort_limit", "genesis", "value")
+         / law("effort_limit", "genesis", "exact")),
         ("push", "0.8 mm off", lambda: MM * mean("pushing", "position_error", robot="panda",
                                                   profile="tuned", simulator="dart", way="curve")),
         ("push", "ODE 88 mm", lambda: MM * mean("pushing", "position_error", robot="panda",
