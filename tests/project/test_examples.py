@@ -63,8 +63,8 @@ def test_commands_for_pytest_are_understood(
 def test_commands_of_simbench_are_understood(page: str, line: str) -> None:
     main = pytest.importorskip("pytest_simbench.cli.main")
     _, *words = shlex.split(line, comments=True)
-    if words[0] not in main.ELSEWHERE:
-        assert main.parser().parse_args(words)
+    _, left = main.parser().parse_known_args(words)
+    assert not left or words[0] in ("cluster", "replay", "swing")  # read their own arguments
 
 
 def test_example_workflow(pytester: pytest.Pytester) -> None:
