@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import sys
 import textwrap
 from pathlib import Path
@@ -35,13 +36,35 @@ def test_tasks(pytester: pytest.Pytester, page: str, shown: tuple[str, ...]) -> 
     result.stdout.fnmatch_lines(shown)
 
 
-def test_laws_that_shipped_engines_break() -> None:
-    """The page has each line of the file that the tests go by."""
-    page = (DOCS / "extending" / "known_failures.md").read_text("utf-8")
-    lines = (DOCS.parent / "tests" / "sims" / "expected_failures.txt").read_text("utf-8")
-    reasons = re.findall(r"^[^#\n]*?: *(.+)$", lines, re.MULTILINE)
-    assert reasons
-    assert [reason for reason in reasons if reason.replace("|", "\\|") not in page] == []
+def commands(program: str) -> list[tuple[str, str]]:
+    """Page and command line, of each line that begins with the program; $VARIABLES are 1."""
+    found = []
+    for path in sorted([DOCS.parent / "README.md", *DOCS.glob("*.md"), *DOCS.glob("e*/*.md")]):
+        text = re.sub(r" *\\\n *", " ", path.read_text("utf-8"))
+        for line in re.findall(rf"^(?:    )?({program} [^`\n]*)$", text, re.MULTILINE):
+            found.append((path.name, re.sub(r"\$\(\(.*?\)\)|\$\w+", "1", line)))
+    return found
+
+
+@pytest.mark.parametrize(("page", "line"), commands("pytest"))
+def test_commands_for_pytest_are_understood(
+    pytester: pytest.Pytester, page: str, line: str
+) -> None:
+    """No page names an option that is not there, or a value that is none; nothing is run."""
+    _, *words = shlex.split(line, comments=True)
+    config = pytester.parseconfig(*words)
+    for word in words:
+        if word.startswith("suites/"):
+            assert (DOCS.parent / word).exists()
+    assert config.invocation_params.args
+
+
+@pytest.mark.parametrize(("page", "line"), commands("simbench"))
+def test_commands_of_simbench_are_understood(page: str, line: str) -> None:
+    main = pytest.importorskip("pytest_simbench.cli.main")
+    _, *words = shlex.split(line, comments=True)
+    _, left = main.parser().parse_known_args(words)
+    assert not left or words[0] in ("cluster", "replay", "swing")  # read their own arguments
 
 
 def test_example_workflow(pytester: pytest.Pytester) -> None:
