@@ -92,7 +92,7 @@ class Album:
             ValueError: it is none; the message is a whole sentence.
         """
         arrays, found = read_arrays(path, LARGEST), cls()
-        names = list(map(str, arrays.get("phases", ())[:MOST]))
+        names = list(map(str, np.ravel(arrays.get("phases", ()))[:MOST]))
         times = arrays.get("times", np.zeros(0))
         if times.dtype != float or times.shape != (len(names),) or not np.isfinite(times).all():
             raise ValueError(f"{path} is no album of a repetition: it does not tell its times")

@@ -11,6 +11,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
+from copy import deepcopy
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -235,7 +236,7 @@ def spoil(value: Any, data: st.DataObject) -> Any:
             holder = holder[key]
         kind = data.draw(st.sampled_from(["odd", "odd", "gone", "number", "renamed"]))
         if kind == "odd":
-            holder[last] = data.draw(ODD)
+            holder[last] = deepcopy(data.draw(ODD))  # what comes next may spoil it, too
         elif kind == "number":
             holder[last] = data.draw(st.floats() | st.integers())
         elif kind == "gone" or not isinstance(holder, dict):

@@ -67,3 +67,10 @@ def test_what_is_no_album_is_refused(arrays: Any, tmp_path: Path) -> None:
     told = "(picture 0 is none|it does not tell its times)"
     with pytest.raises(ValueError, match=f"is no album of a repetition: {told}"):
         Album.read(tmp_path / "x.npz")
+
+
+def test_a_phase_that_is_no_list_is_refused(tmp_path: Path) -> None:
+    """Found by the fuzz test of run folders."""
+    np.savez(tmp_path / "x.npz", phases=np.array(3 + 2j), times=np.zeros(3))
+    with pytest.raises(ValueError, match="it does not tell its times"):
+        Album.read(tmp_path / "x.npz")
