@@ -179,7 +179,7 @@ def test_the_memory_limit_is_reported_once_and_can_end_the_process(start: Start)
     go(process)
     assert process.wait(timeout=15) == -signal.SIGKILL
     sampler.stop()
-    assert len(seen) == 1
+    until(lambda: len(seen) == 1)
     assert seen[0] > 100
 
 
@@ -190,7 +190,9 @@ def test_an_error_in_the_callback_does_not_end_the_sampling(start: Start) -> Non
         raise ProcessLookupError
 
     with ResourceSampler(process.pid, 0.02, limit_mb=0.1, on_limit=fail) as sampler:
-        until(lambda: len(sampler._samples) > 3)
+        until(lambda: sampler.callback_error is not None)
+        seen = len(sampler._samples)
+        until(lambda: len(sampler._samples) > seen + 1)
         assert isinstance(sampler.callback_error, ProcessLookupError)
 
 
@@ -199,7 +201,7 @@ def test_samples_of_a_process_that_dies_are_kept(start: Start) -> None:
     sampler = ResourceSampler(process.pid, 0.02)
     until(lambda: len(sampler._samples) > 3)
     process.kill()  # and stays a zombie: nobody waits for it yet
-    until(lambda: not sampler._thread.is_alive())
+    until(lambda: not sampler.active)
     use = sampler.stop()
     assert len(use.samples) > 3
     assert min(sample.rss_mb for sample in use.samples) > 1  # none of the dead process

@@ -107,7 +107,7 @@ def test_a_root_that_has_ended_ends_the_sampling_and_is_named(end: str) -> None:
 
 
 class Clock:
-    """Time that passes only when somebody waits or looks."""
+    """Time that passes only when somebody looks."""
 
     def __init__(self, looks: Sequence[float]) -> None:
         self.now = 0.0
@@ -116,31 +116,28 @@ class Clock:
     def perf_counter(self) -> float:
         return self.now
 
-    def wait(self, seconds: float) -> bool:
-        self.now += seconds
-        return not self.looks
-
     def look(self, now: float) -> tuple[float, float]:
         self.now += self.looks.pop(0)
         return 50.0, 100.0
 
 
-def sampled(
-    monkeypatch: pytest.MonkeyPatch, looks: Sequence[float], **options: Any
-) -> list[ResourceSample]:
+def sampler(interval: float = 0.1, **options: Any) -> ResourceSampler:
+    """Of this process, which nobody samples yet."""
+    found = ResourceSampler(psutil.Process().pid, interval, **options)
+    found.stop()
+    return found
+
+
+def sampled(monkeypatch: pytest.MonkeyPatch, looks: Sequence[float]) -> list[ResourceSample]:
     """What a sampler at 10 Hz takes whose looks last so long [s]."""
     clock = Clock(looks)
     monkeypatch.setattr(resources, "time", clock)
-    sampler = object.__new__(ResourceSampler)
-    state = {
-        **{"phase": "step", "interval": 0.1, "limit_mb": None, "callback_error": None},
-        **{"_on_limit": None, "_limit_hit": False, "_samples": [], "_began": 0.0},
-        **{"_stop": clock, "_tree": clock, **options},
-    }
-    for name, value in state.items():
-        setattr(sampler, name, value)
-    sampler._run()
-    return sampler._samples
+    found = sampler()
+    found._tree = clock  # type: ignore[assignment]
+    while clock.looks:
+        clock.now = found.due
+        found.take(found.look())
+    return found._samples
 
 
 @pytest.mark.parametrize(
@@ -158,25 +155,32 @@ def test_samples_come_in_a_rhythm_and_never_too_soon(
     assert [s.time for s in sampled(monkeypatch, looks)] == pytest.approx(times)
 
 
-def test_a_limit_is_exceeded_only_above_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    told: list[float] = []
-    sampled(monkeypatch, [0.0] * 3, limit_mb=100.0, _on_limit=told.append)
-    assert told == []
-    sampled(monkeypatch, [0.0] * 3, limit_mb=99.9, _on_limit=told.append)
-    assert told == [100.0]
+def test_a_limit_is_exceeded_only_above_it_and_told_once() -> None:
+    for limit, expected in ((100.0, []), (99.9, [100.0])):
+        told: list[float] = []
+        found = sampler(limit_mb=limit, on_limit=told.append)
+        for _ in range(3):
+            found.take(ResourceSample(0.1, "step", 50.0, 100.0))
+        for thread in threading.enumerate():
+            if thread.name == resources.TELLER:
+                thread.join()
+        assert told == expected
 
 
-def test_a_sampler_begins_in_the_phase_of_launching() -> None:
-    with ResourceSampler(psutil.Process().pid, 10.0) as sampler:
-        assert (sampler.phase, sampler.pid, sampler.callback_error) == (
-            *("launch", psutil.Process().pid),
-            None,
-        )
-        thread = sampler._thread
-        assert thread.daemon
-        assert thread.name == f"sampler-{sampler.pid}"
-        assert thread is not threading.main_thread()
-    assert not thread.is_alive()
+def test_one_thread_serves_all_and_ends_with_the_last() -> None:
+    pid = psutil.Process().pid
+    with ResourceSampler(pid, 0.01) as one, ResourceSampler(pid, 10.0) as other:
+        assert (one.phase, one.pid, one.callback_error) == ("launch", pid, None)
+        threads = [t for t in threading.enumerate() if t.name == resources.THREAD]
+        assert len(threads) == 1
+        assert threads[0].daemon
+        assert one.active
+        assert other.active
+    threads[0].join(5.0)
+    assert not threads[0].is_alive()
+    with ResourceSampler(pid, 0.01) as again:
+        while again.latest is None:
+            assert again.active
 
 
 def test_phases_have_their_own_peak_and_the_wire_three_decimals() -> None:
