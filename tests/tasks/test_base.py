@@ -10,7 +10,7 @@ import pytest
 
 from pytest_simbench.scene import Box, Pose
 from pytest_simbench.tasks import Jitter, LeaningTowers, Stacking, Throwing
-from pytest_simbench.tasks.base import CUBE_MASS, CUBE_SIZE, STUDY_TOLERANCE, cube, generators
+from pytest_simbench.tasks.base import CUBE_MASS, CUBE_SIZE, STUDY_TOLERANCE, Randomness, cube
 from tests.tiny import Falling
 
 AXES = ("x", "y", "angle")
@@ -81,9 +81,9 @@ def test_every_cube_of_every_seed_is_disturbed_by_itself(task: Stacking | Throwi
 
 
 def test_three_generators_by_seed() -> None:
-    first = [rng.random() for rng in generators(2022)]
-    assert first == [rng.random() for rng in generators(2022)]
-    assert len({*first, *(rng.random() for rng in generators(2023))}) == 6
+    first = [rng.random() for rng in Randomness.of(2022)]
+    assert first == [rng.random() for rng in Randomness.of(2022)]
+    assert len({*first, *(rng.random() for rng in Randomness.of(2023))}) == 6
     # numpy's streams do not change with its version; published seeds stay what they were
     assert first == pytest.approx(FIRST_DRAWS)
 
