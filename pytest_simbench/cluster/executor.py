@@ -21,7 +21,7 @@ from pytest_simbench.client.errors import Interrupted, NodeLost, Unavailable, Wh
 from pytest_simbench.cluster.job import Job, Packed, TaskFailed, heard
 from pytest_simbench.cluster.offers import Node
 from pytest_simbench.cluster.pool import Pool
-from pytest_simbench.experiment.executor import Carried, Executor
+from pytest_simbench.experiment.executor import Executor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import (
     file_stem,
@@ -30,7 +30,7 @@ from pytest_simbench.experiment.identity import (
     scene_digest,
     settings,
 )
-from pytest_simbench.experiment.repetition import Hooks
+from pytest_simbench.experiment.repetition import Carried, Ended, Hooks
 from pytest_simbench.recordings.trace import FOLDER as TRACES
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.paths import write_whole
@@ -95,7 +95,7 @@ class ClusterExecutor(Executor):
     ) -> Carried:
         return RemoteRepetition(self.pool, self.shared, experiment, number, hooks or Hooks())
 
-    def probe(self, experiment: Experiment) -> tuple[Record, BaseException | None]:
+    def probe(self, experiment: Experiment) -> Ended:
         return self.repetition(experiment, 0).run()
 
     def shared(self, experiment: Experiment) -> Shared:
@@ -140,7 +140,7 @@ class RemoteRepetition:
         """End it on its node, or its waiting for one."""
         self._stop.set()
 
-    def run(self) -> tuple[Record, BaseException | None]:
+    def run(self) -> Ended:
         """Carry it out; the record, and what ended it early if anything did."""
         began = time.monotonic()
         try:
@@ -248,7 +248,7 @@ class RemoteRepetition:
             raise _Lost(str(answer["lost"]))
         return answer
 
-    def _received(self, answer: Mapping[str, Any]) -> tuple[Record, BaseException | None]:
+    def _received(self, answer: Mapping[str, Any]) -> Ended:
         """The record that a node sent, with what only this side knows; its files are written."""
         assert self._node is not None
         record = Record.from_json(answer["record"], f"the answer of {self._node.name}")

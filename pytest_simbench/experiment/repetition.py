@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
+from typing import Protocol as Interface
 
 from pytest_simbench.client.errors import (
     DisplayError,
@@ -52,6 +53,20 @@ class Hooks:
     phase: Callable[[str], None] = lambda name: None
     count: Callable[[int, int], None] = lambda done, total: None
     interrupts: Interrupts = field(default_factory=Interrupts)
+
+
+Ended = tuple[Record, BaseException | None]
+"""The record of a repetition, and what ended it early if anything did."""
+
+
+class Carried(Interface):
+    """One repetition, carried out wherever."""
+
+    def run(self) -> Ended:
+        """Carry it out."""
+
+    def kill(self) -> None:
+        """End it at once, from any thread; `run` then returns an interrupted record."""
 
 
 class Repetition:
@@ -101,8 +116,8 @@ class Repetition:
         if self._process is not None:
             self._process.interrupt()
 
-    def run(self) -> tuple[Record, BaseException | None]:
-        """Carry it out; the record, and what ended it early if anything did."""
+    def run(self) -> Ended:
+        """Carry it out."""
         found, error = self._ended(self._perform)
         outcome = found if error is None else Outcome()
         resources = self._finish(error)
@@ -112,7 +127,7 @@ class Repetition:
         }
         return self._record(outcome, error, resources).noting(**noted), error
 
-    def probe(self) -> tuple[Record, BaseException | None]:
+    def probe(self) -> Ended:
         """Start and end the simulator alone: the record's settings and versions are what counts."""
         _, error = self._ended(self._construct)
         self._finish(error)

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from pytest_simbench.experiment.executor import ExecutorError
-from pytest_simbench.experiment.slots import Slots, key_of, slot
+from pytest_simbench.client.errors import ExecutorError
+from pytest_simbench.experiment.slots import NOW, Slots, key_of, slot
 
 
 @pytest.fixture
@@ -28,15 +28,17 @@ def held_for(slots: Slots, test: str, seconds: float) -> None:
         time.sleep(seconds)
 
 
-def test_the_longest_that_waits_comes_first_and_before_it_who_is_not_known(slots: Slots) -> None:
-    slots._ended |= {key_of("long"): (100, 6000.0), key_of("short"): (100, 100.0)}
+def test_the_unknown_come_first_then_the_longest_and_what_no_test_wants_last(
+    slots: Slots,
+) -> None:
+    slots._ended |= {NOW + key_of("long"): (100, 6000.0), NOW + key_of("short"): (100, 100.0)}
     order: list[str] = []
 
     def wait(test: str) -> None:
-        with slot(slots.address, test, lambda: False):
+        with slot(slots.address, test, lambda: False, later=test == "later"):
             order.append(test)
 
-    names = ["short", "long", "new", "short", "long"]
+    names = ["later", "short", "long", "new", "short", "long"]
     waiting = [threading.Thread(target=wait, args=(name,)) for name in names]
     with slot(slots.address, "first", lambda: False):
         for thread in waiting:
@@ -46,19 +48,19 @@ def test_the_longest_that_waits_comes_first_and_before_it_who_is_not_known(slots
         assert not order
     for thread in waiting:
         thread.join()
-    assert order == ["new", "long", "long", "short", "short"]
+    assert order == ["new", "long", "long", "short", "short", "later"]
 
 
 def test_it_is_told_how_long_a_repetition_took(slots: Slots) -> None:
     held_for(slots, "mine", 0.1)
     held_for(slots, "other", 0.0)  # now the end of the first was heard
-    assert 0.1 <= slots._mean(key_of("mine")) < float("inf")
+    assert 0.1 <= slots._rank(NOW + key_of("mine"))[1] < float("inf")
 
 
 def test_a_process_that_is_killed_gives_its_slot_back(slots: Slots) -> None:
     code = (
         "import socket, sys, time; found = socket.socket(socket.AF_UNIX); "
-        "found.connect(chr(0) + sys.argv[1]); found.send(b'x' * 16); print(found.recv(1)); "
+        "found.connect(chr(0) + sys.argv[1]); found.send(b'n' * 17); print(found.recv(1)); "
         "sys.stdout.flush(); time.sleep(600)"
     )
     with subprocess.Popen(
