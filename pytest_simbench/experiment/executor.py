@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import threading
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
-from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 
-from pytest_simbench.client.errors import Interrupted, Where
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.prefetch import Prefetch
 from pytest_simbench.experiment.repetition import Carried, Ended, Hooks, Repetition
@@ -70,7 +68,7 @@ class LocalExecutor(Executor):
         self._shared = False
         self._own = Slots(jobs) if jobs > 1 and not slots else None
         self._slots = self._own.address if self._own else slots
-        self._prefetch = Prefetch(jobs - 1, expected, self._ahead)
+        self._prefetch = Prefetch(jobs - 1, expected if jobs > 1 else (), self._queued)
 
     def repetition(
         self, experiment: Experiment, number: int, hooks: Hooks | None = None
@@ -79,14 +77,17 @@ class LocalExecutor(Executor):
         if begun := self._prefetch.take(experiment, number, hooks):
             return begun
         self._shared = experiment.task.shares_worker
-        return _Queued(self._slots, self._here(experiment), number, hooks, self._idle)
+        return self._queued(experiment, number, self._idle, hooks)
 
-    def _here(self, experiment: Experiment) -> Experiment:
-        return experiment.in_case(contended=True) if self.jobs > 1 else experiment
-
-    def _ahead(self, experiment: Experiment, idle: IdleWorkers) -> Carried:
-        """A first repetition before its test: it takes a slot that nobody else waits for."""
-        return _Queued(self._slots, self._here(experiment), 1, Hooks(), idle, later=True)
+    def _queued(
+        self, experiment: Experiment, number: int, idle: IdleWorkers, hooks: Hooks | None = None
+    ) -> Repetition:
+        """A repetition that waits for a slot; without hooks, until no test waits for one."""
+        test = f"{experiment.case.test} {experiment.task.name}"
+        wait = partial(slot, self._slots, test, later=hooks is None) if self._slots else None
+        if self.jobs > 1:
+            experiment = experiment.in_case(contended=True)
+        return Repetition(experiment, number, idle=idle, hooks=hooks, slot=wait)
 
     def probe(self, experiment: Experiment) -> Ended:
         return Repetition(experiment, 0).probe()
@@ -100,47 +101,3 @@ class LocalExecutor(Executor):
         self._idle.close()
         if self._own is not None:
             self._own.close()
-
-
-class _Queued:
-    """A repetition that begins when it has a slot."""
-
-    def __init__(
-        self,
-        slots: str,
-        experiment: Experiment,
-        number: int,
-        hooks: Hooks,
-        idle: IdleWorkers,
-        *,
-        later: bool = False,
-    ) -> None:
-        self._slots, self._later = slots, later
-        self._experiment, self._number = experiment, number
-        self._hooks, self._idle = hooks, idle
-        self._stop = threading.Event()
-        self._repetition: Repetition | None = None
-
-    def kill(self) -> None:
-        self._stop.set()
-        if self._repetition is not None:
-            self._repetition.kill()
-
-    def run(self) -> Ended:
-        experiment, number, case = self._experiment, self._number, self._experiment.case
-        with self._slot() as granted:
-            if not granted:
-                where = Where(case.simulator, case.mode, number, experiment.seed(number))
-                raise Interrupted("the run was interrupted", where)
-            self._hooks.begin("")
-            repetition = Repetition(experiment, number, idle=self._idle, hooks=self._hooks)
-            self._repetition = repetition
-            if self._stop.is_set():  # just before there was something to kill
-                repetition.kill()
-            return repetition.run()
-
-    def _slot(self) -> AbstractContextManager[bool]:
-        if not self._slots:
-            return nullcontext(True)
-        test = f"{self._experiment.case.test} {self._experiment.task.name}"
-        return slot(self._slots, test, self._stop.is_set, later=self._later)

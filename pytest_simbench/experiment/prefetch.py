@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.repetition import Carried, Ended, Hooks
 from pytest_simbench.experiment.workers import IdleWorkers
 
-Make = Callable[[Experiment, IdleWorkers], Carried]
-"""Gives the first repetition of an experiment; it may take one of the workers."""
+Make = Callable[[Experiment, int, IdleWorkers], Carried]
+"""Gives a repetition of an experiment, by its number; it may take one of the workers."""
 
 
 class Prefetch:
@@ -29,25 +29,14 @@ class Prefetch:
         make: gives each.
     """
 
-    def __init__(
-        self,
-        threads: int,
-        expected: Iterable[Experiment],
-        make: Make,
-    ) -> None:
+    def __init__(self, threads: int, expected: Iterable[Experiment], make: Make) -> None:
         self._make = make
-        self._lock = threading.Lock()
-        self._groups: dict[tuple[object, ...], list[Experiment]] = {}
+        self._groups: dict[object, list[_Begun]] = {}
         for experiment in expected:
-            self._groups.setdefault(_worker(experiment), []).append(experiment)
-        self._begun: list[_Begun] = []
-        self._threads: list[threading.Thread] = []
-        if self._groups:
-            self._threads = [
-                threading.Thread(target=self._work, name=f"simbench-prefetch-{k}")
-                for k in range(threads)
-            ]
-        self._started = False
+            self._groups.setdefault(_worker(experiment), []).append(_Begun(experiment))
+        self._lock = threading.Lock()
+        self._pool = ThreadPoolExecutor(max(1, threads), thread_name_prefix="simbench-prefetch")
+        self._under_way: dict[object, Future[None]] = {}
 
     def take(self, experiment: Experiment, number: int, hooks: Hooks) -> Carried | None:
         """What a test has come to, if it was begun before; with the first test the threads begin.
@@ -56,45 +45,34 @@ class Prefetch:
             experiment, number: that the test asks for.
             hooks: are told that it begins; of the rest nothing is told.
         """
+        worker = _worker(experiment)
         with self._lock:
-            self._groups.pop(_worker(experiment), None)
-            found = [begun for begun in self._begun if begun.experiment == experiment]
-            if number == 1 and found:
-                self._begun.remove(found[0])
-            first, self._started = not self._started, True
-        for thread in self._threads if first else ():
-            thread.start()
-        if number != 1 or not found:
-            return None
+            if worker not in self._under_way or self._under_way[worker].cancel():
+                self._groups.pop(worker, None)
+            if not self._under_way:
+                for other, group in reversed(self._groups.items()):
+                    self._under_way[other] = self._pool.submit(self._carry_out, group)
+            found = [b for b in self._groups.get(worker, ()) if b.experiment == experiment]
+            if number != 1 or not found:
+                return None
+            self._groups[worker].remove(found[0])
         hooks.begin("")
         found[0].interrupts = hooks.interrupts
         return found[0]
 
-    def _work(self) -> None:
-        while group := self._next_group():
-            idle = IdleWorkers()
-            for begun in group:
-                begun.carry_out(self._make, idle)
-            idle.close()
-
-    def _next_group(self) -> list[_Begun]:
-        with self._lock:
-            if not self._groups:
-                return []
-            _, experiments = self._groups.popitem()
-            group = [_Begun(experiment) for experiment in experiments]
-            self._begun += group
-            return group
+    def _carry_out(self, group: Iterable[_Begun]) -> None:
+        idle = IdleWorkers()
+        for begun in tuple(group):
+            begun.carry_out(self._make, idle)
+        idle.close()
 
     def close(self) -> None:
         """End what no test has come to."""
-        with self._lock:
-            self._groups.clear()
-            left = list(self._begun)
-        for begun in left:
+        for future in self._under_way.values():
+            future.cancel()
+        for begun in [begun for group in self._groups.values() for begun in group]:
             begun.kill()
-        for thread in self._threads if self._started else ():
-            thread.join()
+        self._pool.shutdown()
 
 
 class _Begun:
@@ -112,7 +90,7 @@ class _Begun:
 
     def carry_out(self, make: Make, idle: IdleWorkers) -> None:
         try:
-            self._repetition = make(self.experiment, idle)
+            self._repetition = make(self.experiment, 1, idle)
             if self._ended.set_running_or_notify_cancel():
                 self._ended.set_result(self._repetition.run())
         except BaseException as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 from typing import Protocol as Interface
@@ -69,6 +70,10 @@ class Carried(Interface):
         """End it at once, from any thread; `run` then returns an interrupted record."""
 
 
+Slot = Callable[[Callable[[], bool]], AbstractContextManager[bool]]
+"""Waits for a slot until it is told to stop, and holds it; whether there is one."""
+
+
 class Repetition:
     """One repetition of a task. `run` once; `kill` from any thread.
 
@@ -78,7 +83,8 @@ class Repetition:
         experiment: the task, the simulator and its settings.
         number: of the repetition, from 1.
         idle: where workers come from and go to, if the case reuses them.
-        hooks: what is told of it; not that it begins.
+        hooks: what is told of it.
+        slot: what it waits for before it begins; None: nothing.
         camera: takes pictures by the engine's own renderer, see there; default: one for the film
             that the case asks for of every repetition.
     """
@@ -90,6 +96,7 @@ class Repetition:
         *,
         idle: IdleWorkers | None = None,
         hooks: Hooks | None = None,
+        slot: Slot | None = None,
         camera: Camera | None = None,
     ) -> None:
         self.experiment = experiment
@@ -99,6 +106,7 @@ class Repetition:
         self.seed = experiment.seed(number)
         self.where = Where(case.simulator, case.mode, number, self.seed)
         self.stopwatch = Stopwatch()
+        self._slot = slot or (lambda stop: nullcontext(True))
         self._camera = camera or self._filming()
         self._idle = idle if idle is not None and experiment.reuses_worker else None
         self._reused = False
@@ -117,7 +125,20 @@ class Repetition:
             self._process.interrupt()
 
     def run(self) -> Ended:
-        """Carry it out."""
+        """Wait for a slot, and carry it out.
+
+        Raises:
+            Interrupted: it was killed before it had one.
+            ExecutorError: there are no slots any more.
+        """
+        with self._slot(self._killed.is_set) as granted:
+            if not granted:
+                raise Interrupted("the run was interrupted", self.where)
+            self.hooks.begin("")
+            self.stopwatch = Stopwatch()
+            return self._run()
+
+    def _run(self) -> Ended:
         found, error = self._ended(self._perform)
         outcome = found if error is None else Outcome()
         resources = self._finish(error)

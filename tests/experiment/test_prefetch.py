@@ -124,7 +124,7 @@ def test_one_that_waits_for_a_slot_can_be_ended(case: Case, executor: Make) -> N
     waiting = both.repetition(long, 3)
     with ThreadPoolExecutor(3) as threads:
         running = [threads.submit(repetition.run) for repetition in held]
-        while sum(repetition._repetition is not None for repetition in held) < 2:  # type: ignore[attr-defined]
+        while sum(repetition._process is not None for repetition in held) < 2:  # type: ignore[attr-defined]
             time.sleep(0.01)
         last = threads.submit(waiting.run)
         waiting.kill()
