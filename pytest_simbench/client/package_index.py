@@ -1,19 +1,18 @@
 """Which releases of a distribution a package index has for this Python.
 
-Asked is the index that pip is configured with, by the simple repository API (PEP 503, and PEP 691
-where the index speaks it). pip itself does not tell which releases were taken back.
+Asked is the index that pip is configured with, by the pages of the simple repository API (PEP 503),
+which every index has. pip itself does not tell which releases were taken back.
 """
 
 from __future__ import annotations
 
 import base64
-import json
 import os
 import subprocess
 import sys
 import urllib.error
 import urllib.request
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from html.parser import HTMLParser
@@ -34,9 +33,6 @@ from pytest_simbench.simulator.errors import SimulatorError
 
 PYPI = "https://pypi.org/simple"
 """Where pip asks when nothing is configured."""
-
-ACCEPT = "application/vnd.pypi.simple.v1+json, text/html;q=0.1"
-"""Of PEP 691: JSON, else the older HTML."""
 
 TIMEOUT = 30.0
 """For an index to answer [s]."""
@@ -173,7 +169,7 @@ def _indexes() -> list[str]:
     return [configured.get("index-url", PYPI), *configured.get("extra-index-url", "").split()]
 
 
-def _ask(url: str) -> Iterator[File]:
+def _ask(url: str) -> Sequence[File]:
     """The files that an index has of a distribution.
 
     Raises:
@@ -183,7 +179,7 @@ def _ask(url: str) -> Iterator[File]:
     parts = urlsplit(url)
     if parts.scheme == "file":
         url += "index.html"
-    headers = {"Accept": ACCEPT}
+    headers = {"Accept": "text/html"}
     if parts.username:  # urllib does not take them out of the address
         user = f"{unquote(parts.username)}:{unquote(parts.password or '')}"
         headers["Authorization"] = f"Basic {base64.b64encode(user.encode()).decode()}"
@@ -191,26 +187,18 @@ def _ask(url: str) -> Iterator[File]:
     try:
         request = urllib.request.Request(url, headers=headers)
         with urllib.request.urlopen(request, timeout=TIMEOUT) as answer:
-            kind, text = answer.headers.get_content_type(), answer.read().decode("utf-8")
+            text = answer.read().decode("utf-8")
     except urllib.error.HTTPError as error:
         if error.code == 404:  # this index does not know it, another may
-            return iter(())
+            return ()
         raise
     except urllib.error.URLError:
         if parts.scheme == "file":
-            return iter(())
+            return ()
         raise
-    if kind.endswith("json"):
-        return _from_json(text)
     page = _Page()
     page.feed(text)
-    return iter(page.files)
-
-
-def _from_json(text: str) -> Iterator[File]:
-    for file in json.loads(text)["files"]:
-        python = file.get("requires-python") or ""
-        yield File(file["filename"], bool(file.get("yanked")), python)
+    return page.files
 
 
 class _Page(HTMLParser):

@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from statistics import fmean, stdev
 from typing import Any, NamedTuple
 
 import psutil
@@ -44,9 +45,7 @@ class MeanAndStd:
     def of(cls, values: Iterable[float]) -> MeanAndStd:
         """Of at least one value."""
         found = list(values)
-        mean = sum(found) / len(found)
-        squares = sum((value - mean) ** 2 for value in found)
-        return cls(mean, (squares / (len(found) - 1)) ** 0.5 if len(found) > 1 else 0.0)
+        return cls(fmean(found), stdev(found) if len(found) > 1 else 0.0)
 
     def to_wire(self) -> dict[str, float]:
         return {"mean": round(self.mean, 3), "std": round(self.std, 3)}

@@ -143,36 +143,29 @@ def test_one_that_does_not_install_stays_half_made(info: SimulatorInfo) -> None:
     assert "half installed: pytest --sim-install sixth" in str(missing(info))
 
 
-def test_an_engine_of_this_environment_has_none(info: SimulatorInfo) -> None:
-    with pytest.raises(SimulatorError, match="needs no environment of its own"):
-        Environment.of(replace(info, requirements=())).create()
-
-
-def test_absent(info: SimulatorInfo) -> None:
-    assert "not there yet: pytest --sim-install sixth" in str(missing(info))
-
-
-def test_cut_off_while_installing(info: SimulatorInfo) -> None:
-    half_made(info)
-    assert "half installed" in str(missing(info))
-
-
-@pytest.mark.parametrize("content", ["", "[]", "{}", "7"])
-def test_spoilt_marker(info: SimulatorInfo, content: str) -> None:
-    (half_made(info).folder / MARKER).write_text(content)
-    assert "half installed" in str(missing(info))
-
-
-def test_other_requirements_than_wanted(info: SimulatorInfo) -> None:
-    (half_made(info).folder / MARKER).write_text(json.dumps({"requirements": ["six==1.15.0"]}))
-    assert "holds six==1.15.0 instead of six==1.16.0" in str(missing(info))
-
-
-def test_lost_interpreter(info: SimulatorInfo) -> None:
-    environment = half_made(info)
-    environment.python.unlink()
-    (environment.folder / MARKER).write_text(json.dumps({"requirements": ["six==1.16.0"]}))
-    assert "lost its interpreter" in str(missing(info))
+@pytest.mark.parametrize(
+    ("marker", "python", "said"),
+    [
+        (None, False, "not there yet: pytest --sim-install sixth"),
+        (None, True, "half installed"),
+        ("", True, "half installed"),
+        ("[]", True, "half installed"),
+        ("{}", True, "half installed"),
+        ("7", True, "half installed"),
+        ('{"requirements": ["six==1.15.0"]}', True, "holds six==1.15.0 instead of six==1.16.0"),
+        ('{"requirements": ["six==1.16.0"]}', False, "lost its interpreter"),
+    ],
+)
+def test_what_is_wrong_with_one(
+    info: SimulatorInfo, marker: str | None, python: bool, said: str
+) -> None:
+    if python or marker is not None:
+        environment = half_made(info)
+        if marker is not None:
+            (environment.folder / MARKER).write_text(marker)
+        if not python:
+            environment.python.unlink()
+    assert said in str(missing(info))
 
 
 def test_caches_are_kept_beside_it_unless_the_user_says_where(

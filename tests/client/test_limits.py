@@ -25,12 +25,12 @@ from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.repetition import Hooks, Repetition
 from pytest_simbench.records.record import Record
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
-from tests.client.test_faults import Silent
+from tests.client.failing import STALL, Silent, failure, faulty
 from tests.conftest import workers
 from tests.tiny import Falling
 
-STALL, DEADLINE = 2.0, 5.0
-"""Limits of these tests [s]."""
+DEADLINE = 5.0
+"""Of a repetition [s]."""
 
 SLACK = 4.0
 """Wall time that noticing, killing and recording may take on a busy machine [s]."""
@@ -49,11 +49,6 @@ class Sending(Falling):
         return Outcome()
 
 
-def unruly(case: Case, name: str, **changes: object) -> Case:
-    options = {"stall_timeout": STALL, "timeout": 60.0, **changes}
-    return replace(case, adapter=f"tests.client.unruly:{name}", **options)  # type: ignore[arg-type]
-
-
 @contextmanager
 def at_most(seconds: float) -> Iterator[None]:
     began, before = time.monotonic(), workers()
@@ -62,24 +57,17 @@ def at_most(seconds: float) -> Iterator[None]:
     assert not workers() - before
 
 
-def failure(case: Case, task: Falling | None = None) -> tuple[str, str, str]:
-    record, _ = Repetition(Experiment(case, task or Falling()), 1).run()
-    assert record.status == "failed"
-    assert record.error is not None
-    return record.error.type, record.error.phase, record.error.message
-
-
 @pytest.mark.parametrize("fault", ["StopsBetweenRequests", "HoldsTheInterpreter"])
 def test_sending_to_a_worker_that_does_not_read(case: Case, fault: str) -> None:
     with at_most(1.5 + STALL):
-        kind, phase, message = failure(unruly(case, fault), Sending())
+        kind, phase, message = failure(faulty(case, fault), Sending())
     assert (kind, phase) == ("WorkerHung", "send")
     assert "for 2 s" in message
     assert "--sim-stall-timeout" in message
 
 
 def test_sending_has_the_repetition_s_time_out_too(case: Case) -> None:
-    case = unruly(case, "StopsBetweenRequests", stall_timeout=60.0, timeout=DEADLINE)
+    case = faulty(case, "StopsBetweenRequests", stall_timeout=60.0, timeout=DEADLINE)
     with at_most(DEADLINE):
         kind, phase, message = failure(case, Sending())
     assert (kind, phase) == ("RepetitionTimeout", "send")
@@ -92,12 +80,12 @@ def test_sending_has_the_repetition_s_time_out_too(case: Case) -> None:
 )
 def test_silence_in_each_phase_is_the_stall_limit(case: Case, fault: str, phase: str) -> None:
     with at_most(1.5 + STALL):
-        assert failure(unruly(case, fault), Falling(1e6))[:2] == ("WorkerHung", phase)
+        assert failure(faulty(case, fault), Falling(1e6))[:2] == ("WorkerHung", phase)
 
 
 def test_signs_of_life_do_not_put_off_the_repetition_s_time_out(case: Case) -> None:
     with at_most(DEADLINE):
-        kind, phase, _ = failure(unruly(case, "Chatters", timeout=DEADLINE))
+        kind, phase, _ = failure(faulty(case, "Chatters", timeout=DEADLINE))
     assert (kind, phase) == ("RepetitionTimeout", "fall")
 
 
@@ -107,24 +95,24 @@ def test_signs_of_life_do_not_put_off_the_repetition_s_time_out(case: Case) -> N
 )
 def test_a_connection_that_is_none(case: Case, fault: str, kind: str) -> None:
     with at_most(1.5 + STALL):
-        found, phase, _ = failure(unruly(case, fault))
+        found, phase, _ = failure(faulty(case, fault))
     assert (found, phase) == (kind, "fall")
 
 
 def test_a_worker_that_does_not_close(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
-    record, _ = Repetition(Experiment(unruly(case, "StopsClosing"), Falling()), 1).run()
+    record, _ = Repetition(Experiment(faulty(case, "StopsClosing"), Falling()), 1).run()
     assert record.status == "ok"
     assert record.notes.closing == "the worker did not close within 10 s"
 
 
 def test_a_log_does_not_fill_the_disk(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert failure(unruly(case, "FloodsTheLog", stall_timeout=3.0))[0] == "WorkerHung"
+    assert failure(faulty(case, "FloodsTheLog", stall_timeout=3.0))[0] == "WorkerHung"
     (log,) = (case.folder / "logs").iterdir()
     assert log.stat().st_size < logs.LARGEST
 
 
 def test_a_log_is_cut_though_it_grew_at_once(case: Case) -> None:
-    record, _ = Repetition(Experiment(unruly(case, "FloodsAtOnce"), Falling()), 1).run()
+    record, _ = Repetition(Experiment(faulty(case, "FloodsAtOnce"), Falling()), 1).run()
     assert record.status == "ok"
     (log,) = (case.folder / "logs").iterdir()
     assert log.stat().st_size < 2 * logs.KEPT
@@ -184,7 +172,7 @@ def kept(case: Case, task: Falling, jobs: int = 1, last: int = 1) -> tuple[list[
     ],
 )
 def test_interrupt(case: Case, fault: str, task: Falling, jobs: int) -> None:
-    case = unruly(case, fault, stall_timeout=60.0)
+    case = faulty(case, fault, stall_timeout=60.0)
     thread = interrupt_after(4.0)
     with at_most(4.0):
         records, raised = kept(case, task, jobs, last=jobs)
@@ -276,7 +264,7 @@ def test_a_time_out_is_a_failure_also_while_the_run_is_interrupted(case: Case) -
 
 
 def test_an_episode_has_the_time_out_that_was_given(case: Case) -> None:
-    handle = SimulatorHandle(unruly(case, "Chatters", timeout=3.0, stall_timeout=60.0))
+    handle = SimulatorHandle(faulty(case, "Chatters", timeout=3.0, stall_timeout=60.0))
     scene = Falling().scene(1, Jitter())
     with at_most(5.0):
         with pytest.raises(Exception, match="--sim-timeout"), handle.episode(scene) as world:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 
-import numpy as np
 import pytest
 
-from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.protocol import PROTOCOLS
 from pytest_simbench.experiment.repetition import Hooks, Repetition, group
-from pytest_simbench.tasks.base import Count, Outcome, Task
+from pytest_simbench.tasks.base import Task
 from tests.tiny import Falling
 
 
@@ -82,38 +79,6 @@ def test_a_record_says_what_it_was(case: Case) -> None:
     assert record.notes.log.startswith("logs/")
 
 
-@dataclass(frozen=True)
-class Placed(Falling):
-    """Tells where the cubes started."""
-
-    def perform(self, world: World, seed: int, count: Count) -> Outcome:
-        outcome = super().perform(world, seed, count)
-        starts = {body.name: body.pose.position[:2] for body in world.scene.free_bodies}
-        outcome.details["starts"] = [list(starts[name]) for name in ("left", "right")]
-        return outcome
-
-
-def starts(case: Case, jitter: float, number: int) -> np.ndarray:
-    record, error = Repetition(Experiment(replace(case, jitter=jitter), Placed()), number).run()
-    assert error is None
-    return np.array(record.details["starts"])
-
-
-def test_zero_jitter_repeats_the_nominal_scene(case: Case) -> None:
-    for number in (1, 2):
-        assert np.array_equal(starts(case, 0.0, number), [[0.0, 0.0], [0.2, 0.0]])
-
-
-def test_jitter_disturbs_each_cube_by_its_scale_in_both_directions(case: Case) -> None:
-    """1 is up to 1 mm in x and in y, another for each cube and seed."""
-    offsets = np.array([starts(case, 1.0, n) - [[0.0, 0.0], [0.2, 0.0]] for n in range(1, 5)])
-    assert 0.0004 < np.abs(offsets).max() <= 0.001
-    assert offsets.min() < 0 < offsets.max()
-    assert len(np.unique(offsets)) == offsets.size
-    half = starts(case, 0.5, 1) - [[0.0, 0.0], [0.2, 0.0]]
-    assert np.allclose(half, offsets[0] / 2)
-
-
 @pytest.mark.parametrize(
     ("phase", "told"),
     [
@@ -129,19 +94,3 @@ def test_jitter_disturbs_each_cube_by_its_scale_in_both_directions(case: Case) -
 )
 def test_phases_that_count_on_are_told_together_and_no_others(phase: str, told: str) -> None:
     assert group(phase) == told
-
-
-@dataclass(frozen=True)
-class Settling(Falling):
-    """Waits before and after."""
-
-    def perform(self, world: World, seed: int, count: Count) -> Outcome:
-        for phase in ("settle start", "settle"):
-            with world.phase(phase):
-                time.sleep(0.5)
-        return super().perform(world, seed, count)
-
-
-def test_settling_before_and_after_are_sampled_apart(case: Case) -> None:
-    record, _ = Repetition(Experiment(case, Settling()), 1).run()
-    assert {"settle start", "settle"} <= set(record.resources["phases"])
