@@ -44,7 +44,9 @@ def test_jitter_in_x_y_and_angle_are_independent() -> None:
 
 def test_the_jitter_of_the_study_cubes() -> None:
     assert Jitter() == Jitter(distance=0.001, angle=np.deg2rad(1.0))
-    assert np.abs(offsets(Jitter())).max(axis=0) == pytest.approx([1e-3, 1e-3, np.pi / 180], 0.05)
+    found, most = offsets(Jitter()), [1e-3, 1e-3, np.pi / 180]
+    assert found.max(axis=0) == pytest.approx(most, 0.05)
+    assert -found.min(axis=0) == pytest.approx(most, 0.05)
 
 
 def test_each_amplitude_is_its_own_and_three_numbers_are_always_drawn() -> None:
