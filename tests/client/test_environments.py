@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
-from pytest_simbench.client import installing
+from pytest_simbench.client import environments
 from pytest_simbench.client.environments import (
     MARKER,
     Environment,
@@ -69,7 +69,7 @@ def test_create(info: SimulatorInfo) -> None:
 def test_two_that_make_the_same_wait_for_each_other(info: SimulatorInfo) -> None:
     """The second one finds it made, and says meanwhile what it waits for."""
     environment, told = Environment.of(info), []
-    with ThreadPoolExecutor() as pool, installing.alone(environment.folder, told.append):
+    with ThreadPoolExecutor() as pool, environments.alone(environment.folder, told.append):
         second = pool.submit(environment.create, told.append)
         while not told:
             assert not second.done()
@@ -85,7 +85,7 @@ def test_two_that_make_the_same_wait_for_each_other(info: SimulatorInfo) -> None
 def test_what_is_there_and_removing_it(info: SimulatorInfo) -> None:
     assert list(existing()) == []
     environment = half_made(info)
-    with installing.alone(environment.folder, print):
+    with environments.alone(environment.folder, print):
         assert list(existing()) == [environment.folder]
     remove(environment.folder)
     assert list(existing()) == []
@@ -136,7 +136,7 @@ def test_a_release_lives_in_its_own_even_where_the_engine_is_installed_here(
 def test_pips_configuration_is_uvs_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("UV_INDEX", "mine")
     told = {"index-url": "a", "extra-index-url": "b c", "find-links": "d e", "timeout": "9"}
-    assert installing._as_uv(told) == {"UV_DEFAULT_INDEX": "a", "UV_FIND_LINKS": "d,e"}
+    assert environments._as_uv(told) == {"UV_DEFAULT_INDEX": "a", "UV_FIND_LINKS": "d,e"}
 
 
 def test_one_that_does_not_install_stays_half_made(info: SimulatorInfo) -> None:
