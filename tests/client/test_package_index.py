@@ -28,7 +28,7 @@ PAGE = """<!DOCTYPE html><html><body>
 
 @pytest.fixture(autouse=True)
 def forget() -> None:
-    package_index._files.cache_clear()
+    package_index.releases.cache_clear()
 
 
 def test_what_can_be_installed_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
