@@ -95,9 +95,6 @@ class ClusterExecutor(Executor):
     ) -> Carried:
         return RemoteRepetition(self.pool, self.shared, experiment, number, hooks or Hooks())
 
-    def probe(self, experiment: Experiment) -> Ended:
-        return self.repetition(experiment, 0).run()
-
     def shared(self, experiment: Experiment) -> Shared:
         """What an experiment's repetitions share, made once: meshes and data sets are large.
 

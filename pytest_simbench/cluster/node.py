@@ -168,7 +168,7 @@ def carry_out(
         hooks = Hooks(phase=progress.enter, count=progress.count)
         repetition = Repetition(experiment, number, idle=bench.idle, hooks=hooks)
         started(repetition)
-        record, error = repetition.run() if number else repetition.probe()
+        record, error = repetition.run()
         if isinstance(error, OSError) and error.errno in OF_THE_MACHINE:
             raise error
         lines = "" if error is None else "".join(traceback.format_exception(error))

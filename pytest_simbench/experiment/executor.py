@@ -8,7 +8,7 @@ from functools import partial
 
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.prefetch import Prefetch
-from pytest_simbench.experiment.repetition import Carried, Ended, Hooks, Repetition
+from pytest_simbench.experiment.repetition import Carried, Hooks, Repetition
 from pytest_simbench.experiment.slots import Slots, slot
 from pytest_simbench.experiment.workers import IdleWorkers
 
@@ -33,13 +33,10 @@ class Executor(ABC):
 
         Args:
             experiment: that is repeated.
-            number: of the repetition, from 1.
+            number: of the repetition, from 1; 0 starts and ends the simulator alone, so that
+                the record tells its settings and versions.
             hooks: what is told of it.
         """
-
-    @abstractmethod
-    def probe(self, experiment: Experiment) -> Ended:
-        """Start and end the simulator alone: the record's settings and versions are what counts."""
 
     def end_test(self) -> None:  # noqa: B027 (nothing to do is fine)
         """The repetitions of one test have ended."""
@@ -88,9 +85,6 @@ class LocalExecutor(Executor):
         if self.jobs > 1:
             experiment = experiment.in_case(contended=True)
         return Repetition(experiment, number, idle=idle, hooks=hooks, slot=wait)
-
-    def probe(self, experiment: Experiment) -> Ended:
-        return Repetition(experiment, 0).probe()
 
     def end_test(self) -> None:
         if not self._shared:

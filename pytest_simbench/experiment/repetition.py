@@ -81,7 +81,7 @@ class Repetition:
 
     Args:
         experiment: the task, the simulator and its settings.
-        number: of the repetition, from 1.
+        number: of the repetition, from 1; 0 starts and ends the simulator alone.
         idle: where workers come from and go to, if the case reuses them.
         hooks: what is told of it.
         slot: what it waits for before it begins; None: nothing.
@@ -139,7 +139,7 @@ class Repetition:
             return self._run()
 
     def _run(self) -> Ended:
-        found, error = self._ended(self._perform)
+        found, error = self._ended()
         outcome = found if error is None else Outcome()
         resources = self._finish(error)
         noted = {
@@ -148,17 +148,11 @@ class Repetition:
         }
         return self._record(outcome, error, resources).noting(**noted), error
 
-    def probe(self) -> Ended:
-        """Start and end the simulator alone: the record's settings and versions are what counts."""
-        _, error = self._ended(self._construct)
-        self._finish(error)
-        return self._record(Outcome(), error, {}), error
-
-    def _ended(self, do: Callable[[], Any]) -> tuple[Any, BaseException | None]:
-        """What `do` returned, or what it raised; nothing interrupts from here on."""
+    def _ended(self) -> tuple[Any, BaseException | None]:
+        """What the task found, or what it raised; nothing interrupts from here on."""
         result, error = None, None
         try:
-            result = do()
+            result = self._perform()
             self.hooks.interrupts.hold()
         except BaseException as raised:
             self.hooks.interrupts.hold()
@@ -177,6 +171,8 @@ class Repetition:
 
     def _perform(self) -> Outcome:
         process = self._construct()
+        if not self.number:
+            return Outcome()
         world = self._world = World(
             process,
             self.experiment.scene(self.seed),

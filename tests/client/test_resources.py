@@ -106,20 +106,6 @@ def test_cpu_seconds_agree_with_the_processs_own(start: Start) -> None:
     assert seconds == pytest.approx(0.8, abs=0.1)  # the kernel counts in 10 ms
 
 
-def test_memory_of_a_child_counts_as_the_workers(start: Start) -> None:
-    process = start(
-        """
-        import subprocess, sys
-        child = subprocess.Popen(
-            [sys.executable, "-c", "b = bytearray(b'x') * (100_000_000); print('ready'); input()"],
-            stdin=subprocess.PIPE)
-        child.wait()
-        """
-    )
-    with ResourceSampler(process.pid, 0.05) as sampler:
-        until(lambda: sampler.latest is not None and sampler.latest.rss_mb > 100)
-
-
 def test_a_child_that_comes_later_and_goes_is_followed(start: Start) -> None:
     process = start(
         """
@@ -155,21 +141,6 @@ def test_samples_carry_the_phase_of_their_moment(start: Start) -> None:
     assert step is not None
     assert step.mean == pytest.approx(psutil.Process(process.pid).memory_info().rss / 1e6, rel=0.01)
     assert sum(len(phase.samples) for phase in phases.values()) == len(use.samples)
-
-
-def test_memory_is_in_millions_of_bytes(start: Start) -> None:
-    """Not in MiB, which are 5 % more: samples, mean and peak."""
-    process = start(ALLOCATE)
-    go(process)
-    look = psutil.Process(process.pid)
-    until(lambda: look.memory_info().rss > 200e6)
-    with ResourceSampler(process.pid, 0.02) as sampler:
-        until(lambda: len(sampler._samples) > 3)
-    use, now = sampler.stop(), look.memory_info().rss
-    assert use.rss_mb is not None
-    assert 1e6 * use.samples[-1].rss_mb == pytest.approx(now, rel=0.01)
-    assert 1e6 * use.rss_mb.mean == pytest.approx(now, rel=0.01)
-    assert 1e6 * (use.peak_mb or 0) == pytest.approx(now, rel=0.01)
 
 
 def test_the_memory_limit_is_reported_once_and_can_end_the_process(start: Start) -> None:
