@@ -1,12 +1,12 @@
 """Adapters that misbehave on purpose: a real engine, with one fault each.
 
-Workers load them as `tests.client.faulty:NAME`; those of `FAULTS` on one of two engines as
-`ENGINE_FAULT`, `MuJoCo_Killed` for instance, and those of `LIES` and `RAISED` as `Lies KEY` and
-`Raises KEY`.
+Workers load them as `tests.client.faulty:NAME`. Those of `FAULTS` and `OTHERS` are on MuJoCo or, as
+`PyBullet_NAME`, on PyBullet; those of `LIES` and `RAISED` are `Lies KEY` and `Raises KEY`.
 """
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import gc
 import os
@@ -67,58 +67,6 @@ class Blind(MuJoCo):
         raise self._missing("offscreen picture")
 
 
-class Faulty(Simulator):
-    """Does `fault` once its time has come."""
-
-    def step(self) -> None:
-        super().step()  # type: ignore[safe-super]  # the engine comes next in the method order
-        if self.time >= FAULT_TIME:
-            self.fault()
-
-    def fault(self) -> None:
-        raise NotImplementedError
-
-
-class Killed(Faulty):
-    def fault(self) -> None:
-        os.kill(os.getpid(), signal.SIGKILL)
-
-
-class Crashed(Faulty):
-    def fault(self) -> None:
-        ctypes.string_at(0)  # reads address 0: a true segmentation fault
-
-
-class Stopped(Faulty):
-    def fault(self) -> None:
-        os.kill(os.getpid(), signal.SIGSTOP)
-
-
-class Hung(Faulty):
-    """Hangs in C code that holds the GIL, so that no other thread of the worker runs either."""
-
-    def fault(self) -> None:
-        ctypes.PyDLL(None).sleep(600)
-
-
-class Raising(Faulty):
-    def fault(self) -> None:
-        raise ValueError("the engine is unhappy")
-
-
-class NotANumber(Faulty):
-    def fault(self) -> None:
-        SPOIL[self.info.name](self)
-
-
-class Greedy(Faulty):
-    """Takes 20 MB more at every step."""
-
-    def fault(self) -> None:
-        self.__dict__.setdefault("hoard", []).append(np.ones(2_500_000))
-        time.sleep(0.01)
-
-
 class Chatty(Simulator):
     """Writes garbage to the real stdout, where execnet's messages would go."""
 
@@ -169,27 +117,6 @@ class Restless(Simulator):
     loads = 0
 
 
-FAULTS: tuple[type[Simulator], ...] = (
-    Killed, Crashed, Stopped, Hung, Raising, NotANumber, Greedy, Chatty, CrashesClosing,
-    WrongGravity, Costly, NeverCompiled, Restless,
-)  # fmt: skip
-
-
-class _AtTime(MuJoCo):
-    """Does `fault` once, in the middle of the motion."""
-
-    done = False
-
-    def step(self) -> None:
-        super().step()
-        if self.time >= FAULT_TIME and not self.done:
-            self.done = True
-            self.fault()
-
-    def fault(self) -> None:
-        raise NotImplementedError
-
-
 def hold_the_interpreter(seconds: float) -> None:
     """No other thread of this process runs meanwhile, that which reads messages included."""
     ctypes.PyDLL(None).usleep(ctypes.c_uint(int(seconds * 1e6)))
@@ -237,30 +164,6 @@ class Chatters(MuJoCo):
             server.send({"alive": self.time + k})
 
 
-class FloodsTheLog(_AtTime):
-    def fault(self) -> None:
-        line = b"x" * 99 + b"\n"
-        for _ in range(100):
-            os.write(2, line * 10_000)
-        time.sleep(600.0)
-
-
-class FloodsAtOnce(_AtTime):
-    """100 MB before anybody looks, and all goes on well."""
-
-    def fault(self) -> None:
-        for _ in range(100):
-            os.write(2, b"x" * 1_000_000)
-
-
-class Forks(_AtTime):
-    """Goes on in the child, too. The parent comes second."""
-
-    def fault(self) -> None:
-        if os.fork():
-            time.sleep(1.0)
-
-
 class LeavesFiles(MuJoCo):
     def load(self, scene: Scene) -> None:
         super().load(scene)
@@ -288,52 +191,6 @@ LIES: dict[str, dict[str, Any]] = {
     },
 }
 """What an adapter says, of another type than it must be."""
-
-
-def _connections() -> list[int]:
-    """execnet's descriptors: the pipes other than stdin, stdout and stderr."""
-    found = []
-    for name in os.listdir("/proc/self/fd"):
-        try:
-            target = os.readlink(f"/proc/self/fd/{name}")
-        except OSError:
-            continue
-        if int(name) > 2 and target.startswith("pipe:"):
-            found.append(int(name))
-    return found
-
-
-class HangsUp(_AtTime):
-    """Closes its connection and lives on."""
-
-    def fault(self) -> None:
-        for descriptor in _connections():
-            os.close(descriptor)
-        time.sleep(600.0)
-
-
-class HalfAnswer(_AtTime):
-    """Begins a message of 1000 bytes and sends ten."""
-
-    def fault(self) -> None:
-        for descriptor in _connections():
-            try:
-                os.write(descriptor, b"\4\0\0\0\1\0\0\3\350" + b"0123456789")
-            except OSError:  # the other direction
-                continue
-        time.sleep(600.0)
-
-
-class Garbage(_AtTime):
-    """Writes a message of no known kind where the messages go."""
-
-    def fault(self) -> None:
-        for descriptor in _connections():
-            try:
-                os.write(descriptor, b"c" + bytes(8))
-            except OSError:
-                continue
-        time.sleep(600.0)
 
 
 class Unprintable(Exception):
@@ -384,28 +241,9 @@ RAISED: dict[str, Any] = {
 }
 
 
-class Raises(_AtTime):
-    """Raises one of `RAISED`."""
-
-    key = ""
-
-    def fault(self) -> None:
-        raise RAISED[self.key]()
-
-
 class ExitsLoading(MuJoCo):
     def load(self, scene: Scene) -> None:
         sys.exit(5)
-
-
-class ExitsAtOnce(_AtTime):
-    def fault(self) -> None:
-        os._exit(7)
-
-
-class Aborts(_AtTime):
-    def fault(self) -> None:
-        os.abort()
 
 
 class Parent(MuJoCo):
@@ -485,16 +323,119 @@ class Merging(Ghost):
         self.data.qvel[:] = 0.0
 
 
+class Faulty(Simulator):
+    """Does `fault` once its time has come, until that is done."""
+
+    done = False
+    fault: Callable[[Any], object]
+
+    def step(self) -> None:
+        super().step()  # type: ignore[safe-super]  # the engine comes next in the method order
+        if self.time >= FAULT_TIME and not self.done:
+            self.done = bool(self.fault())
+
+
+def crash(simulator: Any) -> None:
+    ctypes.string_at(0)  # reads address 0: a true segmentation fault
+
+
+def hold(simulator: Any) -> None:
+    """In C code that holds the GIL, so that no other thread of the worker runs either."""
+    ctypes.PyDLL(None).sleep(600)
+
+
+def complain(simulator: Any) -> None:
+    raise ValueError("the engine is unhappy")
+
+
+def eat(simulator: Any) -> None:
+    """20 MB more at every step."""
+    simulator.__dict__.setdefault("hoard", []).append(np.ones(2_500_000))
+    time.sleep(0.01)
+
+
+def flood(simulator: Any) -> bool:
+    """100 MB before anybody looks, and all goes on well."""
+    for _ in range(100):
+        os.write(2, (b"x" * 99 + b"\n") * 10_000)
+    return True
+
+
+def fork(simulator: Any) -> bool:
+    """Go on in the child, too. The parent comes second."""
+    if os.fork():
+        time.sleep(1.0)
+    return True
+
+
+def _connections() -> list[int]:
+    """execnet's descriptors: the pipes other than stdin, stdout and stderr."""
+    found = []
+    for name in os.listdir("/proc/self/fd"):
+        try:
+            target = os.readlink(f"/proc/self/fd/{name}")
+        except OSError:
+            continue
+        if int(name) > 2 and target.startswith("pipe:"):
+            found.append(int(name))
+    return found
+
+
+def hang_up(simulator: Any) -> None:
+    """Close the connection and live on."""
+    for descriptor in _connections():
+        os.close(descriptor)
+    time.sleep(600.0)
+
+
+def send(message: bytes) -> None:
+    """Where the messages go, and nothing after it."""
+    for descriptor in _connections():
+        with contextlib.suppress(OSError):  # the other direction
+            os.write(descriptor, message)
+    time.sleep(600.0)
+
+
+FAULTS: dict[str, Callable[[Any], object]] = {
+    "Killed": lambda simulator: os.kill(os.getpid(), signal.SIGKILL),
+    "Stopped": lambda simulator: os.kill(os.getpid(), signal.SIGSTOP),
+    "Crashed": crash,
+    "Hung": hold,
+    "Raising": complain,
+    "NotANumber": lambda simulator: SPOIL[simulator.info.name](simulator),
+    "Greedy": eat,
+    "ExitsAtOnce": lambda simulator: os._exit(7),
+    "Aborts": lambda simulator: os.abort(),
+    "FloodsTheLog": lambda simulator: (flood(simulator), time.sleep(600.0)),
+    "FloodsAtOnce": flood,
+    "Forks": fork,
+    "HangsUp": hang_up,
+    "HalfAnswer": lambda simulator: send(b"\4\0\0\0\1\0\0\3\350" + b"0123456789"),  # of 1000 bytes
+    "Garbage": lambda simulator: send(b"c" + bytes(8)),  # a message of no known kind
+}
+"""What an engine does in the middle of a motion."""
+
+OTHERS = (Chatty, CrashesClosing, WrongGravity, Costly, NeverCompiled, Restless)
+
+
+def raise_one(key: str) -> None:
+    raise RAISED[key]()
+
+
 def __getattr__(name: str) -> Any:
     kind, _, key = name.partition(" ")
     if kind == "Lies" and key:
         return type("Lies", (MuJoCo,), LIES[key])
     if kind == "Raises" and key:
-        return type("Raises", (Raises,), {"key": key})
-    engine, _, fault = name.partition("_")
-    for made in FAULTS:
-        if engine in ENGINES and made.__name__ == fault:
-            cls = ENGINES[engine]
+        return type("Raises", (Faulty, MuJoCo), {"fault": lambda simulator: raise_one(key)})
+    engine, fault = f"MuJoCo_{name}".split("_")[-2:]  # MuJoCo unless it says another
+    if engine not in ENGINES:
+        raise AttributeError(name)
+    cls = ENGINES[engine]
+    if fault in FAULTS:
+        return type(name, (Faulty, cls), {"fault": FAULTS[fault]})
+    for made in OTHERS:
+        if made.__name__ == fault:
             info = replace(cls.info, costly_start=fault in ("Costly", "NeverCompiled", "Restless"))
             return type(name, (made, cls), {"info": info})
     raise AttributeError(name)

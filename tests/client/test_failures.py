@@ -171,7 +171,7 @@ def test_the_log_tail_shows_where_it_crashed(engine: Case) -> None:
     record = run(with_fault(engine, "Crashed"))
     assert record.error is not None
     assert "Segmentation fault" in record.error.log_tail
-    assert "in fault" in record.error.log_tail
+    assert "in crash" in record.error.log_tail
 
 
 def test_a_worker_that_eats_memory_is_killed(engine: Case) -> None:
