@@ -18,19 +18,19 @@ from pathlib import Path
 from typing import Any
 
 from pytest_simbench.client.errors import Interrupted, NodeLost, Unavailable, Where
-from pytest_simbench.cluster.job import Job, Packed, TaskFailed, heard
+from pytest_simbench.cluster.job import Job, Packed, TaskFailed, error_from_wire
 from pytest_simbench.cluster.offers import Node
 from pytest_simbench.cluster.pool import Pool
 from pytest_simbench.experiment.executor import Executor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import (
+    describe_robot,
     file_stem,
     record_of,
-    robot_told,
     scene_digest,
     settings,
 )
-from pytest_simbench.experiment.repetition import Carried, Ended, Hooks
+from pytest_simbench.experiment.repetition import AnyRepetition, Ended, Hooks
 from pytest_simbench.recordings.trace import FOLDER as TRACES
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.paths import write_whole
@@ -69,7 +69,7 @@ class Shared:
         task, robot = experiment.task, experiment.robot
         told: dict[str, Any] = {}
         if robot is not None:
-            told = {"scene": scene_digest(task), "robot": robot_told(robot)}
+            told = {"scene": scene_digest(task), "robot": describe_robot(robot)}
         return cls(Job.of(experiment, client).pack(), told)
 
 
@@ -92,7 +92,7 @@ class ClusterExecutor(Executor):
 
     def repetition(
         self, experiment: Experiment, number: int, hooks: Hooks | None = None
-    ) -> Carried:
+    ) -> AnyRepetition:
         return RemoteRepetition(self.pool, self.shared, experiment, number, hooks or Hooks())
 
     def shared(self, experiment: Experiment) -> Shared:
@@ -257,7 +257,7 @@ class RemoteRepetition:
             record = record.noting(trace=f"the trace could not be written: {problem}")
         host = {**record.host, "node": self._node.name}
         record = replace(record.noting(lost_nodes=tuple(self._lost)), host=host, **of_robot)
-        return record, heard(answer["error"], self.where)
+        return record, error_from_wire(answer["error"], self.where)
 
     def _keep(self, name: str, folder: str, data: bytes | None) -> str:
         """Write a file of the node's into a folder of the run; why that failed, or nothing."""

@@ -8,7 +8,7 @@ from functools import partial
 
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.prefetch import Prefetch
-from pytest_simbench.experiment.repetition import Carried, Hooks, Repetition
+from pytest_simbench.experiment.repetition import AnyRepetition, Hooks, Repetition
 from pytest_simbench.experiment.slots import Slots, slot
 from pytest_simbench.experiment.workers import IdleWorkers
 
@@ -28,7 +28,7 @@ class Executor(ABC):
     @abstractmethod
     def repetition(
         self, experiment: Experiment, number: int, hooks: Hooks | None = None
-    ) -> Carried:
+    ) -> AnyRepetition:
         """A repetition that has not begun.
 
         Args:
@@ -69,7 +69,7 @@ class LocalExecutor(Executor):
 
     def repetition(
         self, experiment: Experiment, number: int, hooks: Hooks | None = None
-    ) -> Carried:
+    ) -> AnyRepetition:
         hooks = hooks or Hooks()
         if begun := self._prefetch.take(experiment, number, hooks):
             return begun

@@ -12,10 +12,10 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.interrupts import Interrupts
-from pytest_simbench.experiment.repetition import Carried, Ended, Hooks
+from pytest_simbench.experiment.repetition import AnyRepetition, Ended, Hooks
 from pytest_simbench.experiment.workers import IdleWorkers
 
-Make = Callable[[Experiment, int, IdleWorkers], Carried]
+Make = Callable[[Experiment, int, IdleWorkers], AnyRepetition]
 """Gives a repetition of an experiment, by its number; it may take one of the workers."""
 
 
@@ -38,7 +38,7 @@ class Prefetch:
         self._pool = ThreadPoolExecutor(max(1, threads), thread_name_prefix="simbench-prefetch")
         self._under_way: dict[object, Future[None]] = {}
 
-    def take(self, experiment: Experiment, number: int, hooks: Hooks) -> Carried | None:
+    def take(self, experiment: Experiment, number: int, hooks: Hooks) -> AnyRepetition | None:
         """What a test has come to, if it was begun before; with the first test the threads begin.
 
         Args:
@@ -86,7 +86,7 @@ class _Begun:
         self.experiment = experiment
         self.interrupts = Interrupts()
         self._ended: Future[Ended] = Future()
-        self._repetition: Carried | None = None
+        self._repetition: AnyRepetition | None = None
 
     def carry_out(self, make: Make, idle: IdleWorkers) -> None:
         try:

@@ -13,7 +13,7 @@ from pytest_simbench.client.errors import Unavailable, WorkerError, WorldParityE
 from pytest_simbench.experiment.executor import Executor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.interrupts import Interrupts
-from pytest_simbench.experiment.repetition import Carried, Ended, Hooks
+from pytest_simbench.experiment.repetition import AnyRepetition, Ended, Hooks
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import short
@@ -45,7 +45,7 @@ class Repeater:
     executor: Executor
     progress: ProgressLine
     keep: Callable[[Record], None]
-    _active: set[Carried] = field(default_factory=set, init=False)
+    _active: set[AnyRepetition] = field(default_factory=set, init=False)
     _stopping: threading.Event = field(default_factory=threading.Event, init=False)
 
     def run(self, numbers: Iterable[int]) -> ResultSet:

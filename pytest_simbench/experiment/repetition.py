@@ -60,7 +60,7 @@ Ended = tuple[Record, BaseException | None]
 """The record of a repetition, and what ended it early if anything did."""
 
 
-class Carried(Interface):
+class AnyRepetition(Interface):
     """One repetition, carried out wherever."""
 
     def run(self) -> Ended:

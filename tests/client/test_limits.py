@@ -1,19 +1,24 @@
-"""No wait for a worker is without a limit, and Ctrl-C works in each of them."""
+"""No wait for a worker is without a limit, and Ctrl-C works in each; a full machine is told."""
 
 from __future__ import annotations
 
 import _thread
+import os
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from pytest_simbench.client import logs
+from pytest_simbench.client.crowding import crowding, scheduled
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
@@ -278,3 +283,67 @@ def test_signals_reach_their_handler_when_the_block_ends() -> None:
         _thread.interrupt_main()
         reached = True
     assert reached
+
+
+@contextmanager
+def core_shared_with(others: int, pid: int) -> Iterator[None]:
+    """A process's main thread has one core, which `others` processes use without rest.
+
+    Each is in a session of its own: Linux shares a core out among sessions (`man 7 sched`).
+    """
+    cores = os.sched_getaffinity(pid)
+    os.sched_setaffinity(pid, {min(cores)})
+    command = ["taskset", "-c", str(min(cores)), sys.executable, "-c", "while True: pass"]
+    hogs = [subprocess.Popen(command, start_new_session=True) for _ in range(others)]
+    try:
+        yield
+    finally:
+        for hog in hogs:
+            hog.kill()
+            hog.wait()
+
+
+class Crowded(Falling):
+    """Falls for ever, on a core that is shared with four others once the world is there."""
+
+    def perform(self, world: World, seed: int, count: Count) -> Outcome:
+        assert world.process.pid is not None
+        with core_shared_with(4, world.process.pid), world.phase("fall"):
+            world.wait(1e6)
+        return Outcome()
+
+
+def threads(proc: Path, *stats: str) -> None:
+    for number, stat in enumerate(stats):
+        folder = proc / "7" / "task" / str(number)
+        folder.mkdir(parents=True)
+        (folder / "schedstat").write_text(stat)
+
+
+def test_a_late_worker_on_a_full_core_says_so(case: Case) -> None:
+    record, _ = Repetition(Experiment(replace(case, timeout=8.0), Crowded()), 1).run()
+    assert record.error is not None
+    assert (record.error.type, record.error.phase) == ("RepetitionTimeout", "fall")
+    assert "waited" in record.error.message
+    assert "--sim-jobs" in record.error.message
+
+
+def test_all_threads_count(tmp_path: Path) -> None:
+    threads(tmp_path, "3000000000 500000000 12\n", "1000000000 1500000000 5\n")
+    assert scheduled(7, tmp_path) == (4.0, 2.0)
+
+
+@pytest.mark.parametrize("stat", ["", "nothing"])
+def test_a_kernel_that_does_not_tell_is_no_full_machine(tmp_path: Path, stat: str) -> None:
+    threads(tmp_path, stat)
+    assert scheduled(7, tmp_path) == (0.0, 0.0)
+    assert scheduled(8, tmp_path) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(("waited", "told"), [(2.4, False), (2.6, True)])
+def test_a_little_waiting_is_not_told(
+    monkeypatch: pytest.MonkeyPatch, waited: float, told: bool
+) -> None:
+    """A fifth of the time is the limit: 2.5 of 12.5 s."""
+    monkeypatch.setattr("pytest_simbench.client.crowding.scheduled", lambda pid: (10.0, waited))
+    assert bool(crowding(7)) is told
