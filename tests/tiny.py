@@ -8,7 +8,7 @@ from typing import ClassVar
 from pytest_simbench.client.world import World
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Pose, Scene
-from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, cube, generators
+from pytest_simbench.tasks.base import Count, Jitter, Outcome, Randomness, Task, cube
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
 
@@ -27,7 +27,7 @@ class Falling(Task):
         return (Metric("landed", "landed", kind="share", of=2, study=True),)
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
-        rng = generators(seed)[0]
+        rng = Randomness.of(seed).start
         cubes = [
             cube(name, jitter.disturbed(Pose.at(x, 0.0, 0.1), rng), WHITE)
             for name, x in (("left", 0.0), ("right", 0.2))

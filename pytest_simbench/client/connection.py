@@ -1,9 +1,9 @@
 """execnet's channel to a worker, without its waits: whatever the other side does, none is for ever.
 
 execnet starts, sends and says goodbye without a time-out: a worker that is stopped, or that holds
-its interpreter's lock, blocks the caller in the pipe as soon as the pipe is full. Here each of
-these runs in a thread of its own, and its caller waits for one thing only, the inbox, for as long
-as it likes. Ending the process breaks the pipes and so frees the threads.
+its interpreter's lock, blocks the caller in the pipe as soon as the pipe is full. Here another
+thread does that, and the caller waits for one thing only, the inbox, for as long as it likes.
+Ending the process breaks the pipes and so frees the threads.
 """
 
 from __future__ import annotations
@@ -83,6 +83,7 @@ class Connection:
         self._environment = environment
         self._log = log
         self._inbox: SimpleQueue[Any] = SimpleQueue()
+        self._outbox: SimpleQueue[Any] = SimpleQueue()
         self._channel: Any = None
         self._cut = False
         self._spec = execnet.XSpec(spec or "popen//execmodel=main_thread_only")
@@ -103,10 +104,13 @@ class Connection:
                 channel.send(configuration)
                 self._channel = channel
                 self._inbox.put(OPENED)
+                while (message := self._outbox.get()) is not _END:
+                    channel.send(message)
             except BaseException as error:
-                self._inbox.put(error)
+                lost = self._channel is not None and isinstance(error, OSError)
+                self._inbox.put(_END if lost else error)
 
-        threading.Thread(target=work, name="simbench-launch", daemon=True).start()
+        threading.Thread(target=work, name="simbench-connection", daemon=True).start()
 
     def _start(self, command: list[str], **pipes: Any) -> subprocess.Popen[bytes]:
         """Called by execnet, in the thread of `open`."""
@@ -138,16 +142,7 @@ class Connection:
 
     def send(self, message: Any) -> None:
         """Begin to send plain data; if that fails, `receive` says so."""
-
-        def work() -> None:
-            try:
-                self._channel.send(message)
-            except OSError:
-                self._inbox.put(_END)
-            except BaseException as error:
-                self._inbox.put(error)
-
-        threading.Thread(target=work, name="simbench-send", daemon=True).start()
+        self._outbox.put(message)
 
     @property
     def unread(self) -> bool:
@@ -191,6 +186,7 @@ class Connection:
             with contextlib.suppress(OSError):
                 self.popen.kill()
         self._inbox.put(_END)
+        self._outbox.put(_END)
 
     def close(self) -> None:
         """Let execnet tidy up, once the process is gone."""

@@ -4,28 +4,50 @@ One folder per simulator and release, a plain virtual environment with the adapt
 requirements and nothing else: the worker's code reaches it from here. `pytest --sim-install NAME`
 makes it, and it is found by its place. A marker file, written last, tells a finished environment
 from half of one and remembers what was installed. Compiled kernels are kept in its `cache` folder.
+
+uv makes it where that is there, else venv and pip. uv is quick, and environments share what they
+have in common in its cache. It is told what pip is configured with, so that both ask the same
+package index.
 """
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import shutil
+import subprocess
+import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import distributions
 from pathlib import Path
 
-from pytest_simbench.client import installing, package_index
+from pytest_simbench.client import package_index
 from pytest_simbench.client.system import SystemPython
 from pytest_simbench.ground.versions import RELEASE, VersionedName
-from pytest_simbench.records.paths import write_whole
+from pytest_simbench.records.paths import opened, write_whole
 from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.info import SimulatorInfo, alternatives, importable, no_module
 
 MARKER = "simbench.json"
 VARIABLE = "SIMBENCH_ENVIRONMENTS"
+
+LOOK_PERIOD = 0.5
+"""Between two looks at what is there already [s]."""
+
+UV_VARIABLES = {
+    "index-url": "UV_DEFAULT_INDEX",
+    "extra-index-url": "UV_INDEX",
+    "find-links": "UV_FIND_LINKS",
+    "cert": "SSL_CERT_FILE",
+}
+"""uv's names for what pip's configuration says."""
+
+Tell = Callable[[str], None]
+"""Shows progress: lines that end, and lines that the next one overwrites."""
 
 
 def default_folder() -> Path:
@@ -110,30 +132,51 @@ class Environment:
             raise SimulatorError(wrong)
         self._check_release()
 
-    def create(self, tell: installing.Tell = lambda text: None) -> None:
+    def create(self, tell: Tell = lambda text: None) -> None:
         """Make it anew, unless another process has made it meanwhile.
-
-        Args:
-            tell: shows progress: lines that end, and lines that the next one overwrites.
 
         Raises:
             SimulatorError: see `check`; or the packages do not install, or the folder cannot be
                 written to; what is there stays half installed.
         """
         self.check()
-        with installing.alone(self.folder, tell):
+        with alone(self.folder, tell):
             if self.folder.exists() and self.problem is None:
                 return
-            began = time.monotonic()
             try:
-                installing.install(self.folder, self.info.requirements, tell)
+                self._install(tell)
                 marker = {"requirements": list(self.info.requirements)}
                 write_whole(self.folder, MARKER, f"{json.dumps(marker)}\n".encode())
             except (SimulatorError, OSError) as error:
                 raise SimulatorError(
                     f"the environment of {self.info.name} is only half installed: {error}"
                 ) from None
-            tell(f"{installing.progress(self.folder, time.monotonic() - began)}\n")
+
+    def _install(self, tell: Tell) -> None:
+        """What is there is lost."""
+        folder, requirements, program = self.folder, self.info.requirements, uv()
+        if folder.exists():
+            shutil.rmtree(folder)
+        python, variables = str(self.python), {}
+        if program is not None:
+            variables = _as_uv(package_index.pip_configuration())
+            commands = [
+                [program, "venv", "--quiet", "--python", sys.executable, str(folder)],
+                [program, "pip", "install", "--quiet", "--python", python,
+                 "--index-strategy", "unsafe-best-match", *requirements],
+            ]  # fmt: skip
+        else:
+            pip = [python, "-P", "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+            commands = [[sys.executable, "-P", "-m", "venv", str(folder)], [*pip, *requirements]]
+        began = time.monotonic()
+
+        def look(end: str = "") -> None:
+            seconds = time.monotonic() - began
+            tell(f"\r{folder.name}: {size_mb(folder):.0f} MB, {seconds:.0f} s {end}")
+
+        for command in commands:
+            _run(command, variables, look)
+        look("\n")
 
     def _check_release(self) -> None:
         """Complain of a release that there is not, where a package index can be asked."""
@@ -149,7 +192,7 @@ class Environment:
             raise SimulatorError(f"{self.info.name}: {problem}")
 
 
-def create_all(environments: Sequence[Environment], tell: installing.Tell) -> None:
+def create_all(environments: Sequence[Environment], tell: Tell) -> None:
     """Make those that are not ready, once nothing is wrong with any of them.
 
     Raises:
@@ -160,6 +203,86 @@ def create_all(environments: Sequence[Environment], tell: installing.Tell) -> No
         environment.check()
     for environment in wanted:
         environment.create(tell)
+
+
+def uv() -> str | None:
+    """The program uv: on the PATH, or beside this interpreter."""
+    beside = Path(sys.executable).with_name("uv")
+    return str(beside) if os.access(beside, os.X_OK) else shutil.which("uv")
+
+
+@contextmanager
+def alone(folder: Path, tell: Tell) -> Iterator[None]:
+    """Only one process makes an environment at a time; another one waits until that is done.
+
+    The lock ends with its process, however that ends.
+
+    Raises:
+        SimulatorError: their folder cannot be written to.
+    """
+    try:
+        lock = opened(folder.parent, f".{folder.name}.lock", os.O_RDWR | os.O_CREAT)
+    except OSError as error:
+        raise SimulatorError(
+            f"environments cannot be made in {folder.parent} ({error.strerror})"
+        ) from None
+    try:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            tell(f"another run is making the environment {folder.name}; waiting for it\n")
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(lock)
+
+
+def size_mb(folder: Path) -> float:
+    """What a folder holds [MB]."""
+    sizes = 0
+    for place, _, names in os.walk(folder):
+        for name in names:
+            try:
+                sizes += os.lstat(os.path.join(place, name)).st_size
+            except OSError:  # gone while we looked
+                continue
+    return sizes / 1e6
+
+
+def _run(command: Sequence[str], variables: Mapping[str, str], look: Callable[[], None]) -> None:
+    process = subprocess.Popen(
+        command,
+        env={**os.environ, **variables},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+    )
+    with process:
+        try:
+            while True:
+                try:
+                    said, _ = process.communicate(timeout=LOOK_PERIOD)
+                    break
+                except subprocess.TimeoutExpired:
+                    look()
+        except BaseException:
+            process.kill()
+            raise
+    if process.returncode:
+        reason = " ".join(said.split())[-600:]
+        raise SimulatorError(f"{' '.join(command)} failed: {reason}")
+
+
+def _as_uv(configuration: Mapping[str, str]) -> dict[str, str]:
+    """pip's configuration in uv's variables, but for those that the user has set."""
+    found = {}
+    for option, variable in UV_VARIABLES.items():
+        if option in configuration and variable not in os.environ:
+            separator = "," if option == "find-links" else " "
+            found[variable] = separator.join(configuration[option].split())
+    return found
 
 
 def foreign(folder: Path) -> str:
@@ -180,7 +303,7 @@ def remove(folder: Path) -> None:
     """
     if wrong := foreign(folder):
         raise SimulatorError(wrong)
-    with installing.alone(folder, lambda text: None):
+    with alone(folder, lambda text: None):
         # Without its marker, what a break leaves is half installed.
         (folder / MARKER).unlink(missing_ok=True)
         shutil.rmtree(folder)

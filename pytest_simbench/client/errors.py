@@ -102,6 +102,10 @@ class EngineFailed(WorkerError):
     """The engine or its adapter raised an exception, or rejected the scene or settings."""
 
 
+class ExecutorError(Exception):
+    """Nothing can be carried out any more: a cluster is gone, for instance. One sentence."""
+
+
 class DisplayError(Exception):
     """There is no display to be had."""
 

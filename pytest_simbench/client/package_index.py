@@ -1,20 +1,19 @@
 """Which releases of a distribution a package index has for this Python.
 
-Asked is the index that pip is configured with, by the simple repository API (PEP 503, and PEP 691
-where the index speaks it). pip itself does not tell which releases were taken back.
+Asked is the index that pip is configured with, by the pages of the simple repository API (PEP 503),
+which every index has. pip itself does not tell which releases were taken back.
 """
 
 from __future__ import annotations
 
 import base64
-import json
 import os
 import subprocess
 import sys
 import urllib.error
 import urllib.request
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable
+from contextlib import suppress
 from functools import cache
 from html.parser import HTMLParser
 from urllib.parse import unquote, urlsplit, urlunsplit
@@ -35,9 +34,6 @@ from pytest_simbench.simulator.errors import SimulatorError
 PYPI = "https://pypi.org/simple"
 """Where pip asks when nothing is configured."""
 
-ACCEPT = "application/vnd.pypi.simple.v1+json, text/html;q=0.1"
-"""Of PEP 691: JSON, else the older HTML."""
-
 TIMEOUT = 30.0
 """For an index to answer [s]."""
 
@@ -46,21 +42,7 @@ class PackageIndexError(SimulatorError):
     """The package index cannot be asked."""
 
 
-@dataclass(frozen=True)
-class File:
-    """One file of a distribution.
-
-    Attributes:
-        name: of the file.
-        yanked: whether it was taken back.
-        python: which versions of Python it is for, as a specifier; empty for all.
-    """
-
-    name: str
-    yanked: bool = False
-    python: str = ""
-
-
+@cache
 def releases(distribution: str) -> list[str]:
     """The releases that can be installed here, oldest first.
 
@@ -70,22 +52,19 @@ def releases(distribution: str) -> list[str]:
     Raises:
         PackageIndexError: no index answers, or none knows the distribution.
     """
-    return usable(_files(canonicalize_name(distribution)))
-
-
-def usable(files: Iterable[File]) -> list[str]:
-    """Versions, oldest first, of those files that can be installed here."""
-    here, tags = ".".join(map(str, sys.version_info[:3])), frozenset(sys_tags())
-    found = set()
-    for file in files:
+    page, problems = _Page(), []
+    for index in _indexes():
         try:
-            fits = not file.python or here in SpecifierSet(file.python)
-            version = _version(file.name, tags)
-        except (InvalidSpecifier, InvalidSdistFilename, InvalidWheelFilename):
-            continue
-        if version is not None and fits and not file.yanked and not version.is_prerelease:
-            found.add(version)
-    return [str(version) for version in sorted(found)]
+            page.feed(_ask(f"{index.rstrip('/')}/{canonicalize_name(distribution)}/"))
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "reason", None) or error
+            problems.append(f"{urlsplit(index).hostname or 'a local index'}: {reason}")
+    if not page.files:
+        raise PackageIndexError(
+            f"no package index tells the releases of {distribution} ({'; '.join(problems)}); "
+            "check the network and pip's configuration (pip config list)"
+        )
+    return [str(version) for version in sorted(page.versions)]
 
 
 def newest_of_minors(versions: Iterable[str]) -> list[str]:
@@ -121,34 +100,6 @@ def unreleased(distribution: str, version: str, known: Iterable[str]) -> str:
     )
 
 
-def _version(name: str, tags: frozenset[object]) -> Version | None:
-    """The version of a file; None of a wheel for another Python or machine, and of other files."""
-    if name.endswith(".whl"):
-        _, version, _, fits = parse_wheel_filename(name)
-        return version if tags & fits else None
-    if name.endswith((".tar.gz", ".zip")):
-        return parse_sdist_filename(name)[1]
-    return None
-
-
-@cache
-def _files(distribution: str) -> tuple[File, ...]:
-    found: list[File] = []
-    problems = []
-    for index in _indexes():
-        try:
-            found += _ask(f"{index.rstrip('/')}/{distribution}/")
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "reason", None) or error
-            problems.append(f"{urlsplit(index).hostname or 'a local index'}: {reason}")
-    if not found:
-        raise PackageIndexError(
-            f"no package index tells the releases of {distribution} ({'; '.join(problems)}); "
-            "check the network and pip's configuration (pip config list)"
-        )
-    return tuple(found)
-
-
 def pip_configuration() -> dict[str, str]:
     """What pip is configured with, by the option's name; empty where pip is not installed.
 
@@ -173,8 +124,8 @@ def _indexes() -> list[str]:
     return [configured.get("index-url", PYPI), *configured.get("extra-index-url", "").split()]
 
 
-def _ask(url: str) -> Iterator[File]:
-    """The files that an index has of a distribution.
+def _ask(url: str) -> str:
+    """The page that an index has of a distribution; empty where it does not know it.
 
     Raises:
         OSError: no answer.
@@ -183,7 +134,7 @@ def _ask(url: str) -> Iterator[File]:
     parts = urlsplit(url)
     if parts.scheme == "file":
         url += "index.html"
-    headers = {"Accept": ACCEPT}
+    headers = {"Accept": "text/html"}
     if parts.username:  # urllib does not take them out of the address
         user = f"{unquote(parts.username)}:{unquote(parts.password or '')}"
         headers["Authorization"] = f"Basic {base64.b64encode(user.encode()).decode()}"
@@ -191,38 +142,52 @@ def _ask(url: str) -> Iterator[File]:
     try:
         request = urllib.request.Request(url, headers=headers)
         with urllib.request.urlopen(request, timeout=TIMEOUT) as answer:
-            kind, text = answer.headers.get_content_type(), answer.read().decode("utf-8")
+            return str(answer.read().decode("utf-8"))
     except urllib.error.HTTPError as error:
-        if error.code == 404:  # this index does not know it, another may
-            return iter(())
-        raise
+        if error.code != 404:
+            raise
     except urllib.error.URLError:
-        if parts.scheme == "file":
-            return iter(())
-        raise
-    if kind.endswith("json"):
-        return _from_json(text)
-    page = _Page()
-    page.feed(text)
-    return iter(page.files)
-
-
-def _from_json(text: str) -> Iterator[File]:
-    for file in json.loads(text)["files"]:
-        python = file.get("requires-python") or ""
-        yield File(file["filename"], bool(file.get("yanked")), python)
+        if parts.scheme != "file":
+            raise
+    return ""  # another one may know it
 
 
 class _Page(HTMLParser):
-    """An index's page of a distribution, by PEP 503."""
+    """Indexes' pages of a distribution, by PEP 503.
+
+    Attributes:
+        files: how many there are.
+        versions: of those that can be installed here.
+    """
 
     def __init__(self) -> None:
         super().__init__()
-        self.files: list[File] = []
+        self.files = 0
+        self.versions: set[Version] = set()
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         found = dict(attrs)
-        if tag == "a" and found.get("href"):
-            name = unquote(urlsplit(str(found["href"])).path.rpartition("/")[2])
-            python = found.get("data-requires-python") or ""
-            self.files.append(File(name, "data-yanked" in found, python))
+        if tag != "a" or not found.get("href"):
+            return
+        self.files += 1
+        name = unquote(urlsplit(str(found["href"])).path.rpartition("/")[2])
+        here = ".".join(map(str, sys.version_info[:3]))
+        with suppress(InvalidSpecifier, InvalidSdistFilename, InvalidWheelFilename):
+            version = _version(name)
+            fits = here in SpecifierSet(found.get("data-requires-python") or "")
+            if version and fits and not version.is_prerelease and "data-yanked" not in found:
+                self.versions.add(version)
+
+
+def _version(name: str) -> Version | None:
+    """The version of a file; None of a wheel for another Python or machine, and of other files."""
+    if name.endswith(".whl"):
+        _, version, _, tags = parse_wheel_filename(name)
+        return None if tags.isdisjoint(_tags()) else version
+    return parse_sdist_filename(name)[1] if name.endswith((".tar.gz", ".zip")) else None
+
+
+@cache
+def _tags() -> frozenset[object]:
+    """Of wheels for this Python and machine."""
+    return frozenset(sys_tags())

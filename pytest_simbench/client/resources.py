@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from statistics import fmean, stdev
 from typing import Any, NamedTuple
 
 import psutil
@@ -17,8 +18,8 @@ import psutil
 MB = 1e6
 """Bytes of one MB here and in the records, as the worker counts its own peak."""
 
-STOP_TIMEOUT = 5.0
-"""Wall seconds that a look which is under way may still take; then its sample is left out."""
+THREAD, TELLER = "simbench-sampler", "simbench-memory"
+"""Names of the threads that look, and that tell of too much memory."""
 
 LISTING_INTERVAL = 1.0
 """Wall seconds between two looks for new children: listing reads every process of the machine."""
@@ -44,9 +45,7 @@ class MeanAndStd:
     def of(cls, values: Iterable[float]) -> MeanAndStd:
         """Of at least one value."""
         found = list(values)
-        mean = sum(found) / len(found)
-        squares = sum((value - mean) ** 2 for value in found)
-        return cls(mean, (squares / (len(found) - 1)) ** 0.5 if len(found) > 1 else 0.0)
+        return cls(fmean(found), stdev(found) if len(found) > 1 else 0.0)
 
     def to_wire(self) -> dict[str, float]:
         return {"mean": round(self.mean, 3), "std": round(self.std, 3)}
@@ -141,16 +140,20 @@ class _Tree:
 
 
 class ResourceSampler:
-    """A thread that samples a process and all its children until stopped or the process ends.
+    """Samples a process and all its children until it is stopped or the process ends.
 
     Set `phase` at any time: every sample is tagged with the phase of its moment. A process that
-    dies ends the sampling and keeps the samples; one that is already gone gives none.
+    dies ends the sampling and keeps the samples; one that is already gone gives none. One thread
+    serves all samplers of this process.
 
     Args:
         pid: the worker's.
         interval: between two samples [s]; the study's 10 Hz.
         limit_mb: memory the tree may use [MB], or None.
-        on_limit: called once from the sampling thread, with the RSS [MB], when it uses more.
+        on_limit: called once, in a thread of its own, with the RSS [MB], when it uses more.
+
+    Attributes:
+        due: `time.perf_counter()` of the next sample [s].
     """
 
     def __init__(
@@ -167,18 +170,15 @@ class ResourceSampler:
         self.limit_mb = limit_mb
         self.callback_error: Exception | None = None
         self._on_limit = on_limit
-        self._limit_hit = False
         self._samples: list[ResourceSample] = []
-        self._stop = threading.Event()
         self._began = time.perf_counter()
-        self._tree: _Tree | None = None
+        self.due = self._began + interval
         try:
             self._tree = _Tree(psutil.Process(pid))
             self._tree.look(self._began)
         except psutil.Error:
-            self._tree = None
-        self._thread = threading.Thread(target=self._run, name=f"sampler-{pid}", daemon=True)
-        self._thread.start()
+            return
+        _looks.add(self)
 
     def __enter__(self) -> ResourceSampler:
         return self
@@ -191,41 +191,102 @@ class ResourceSampler:
         """The last sample, for a live display."""
         return self._samples[-1] if self._samples else None
 
+    @property
+    def active(self) -> bool:
+        """Whether samples may still come."""
+        return self in _looks
+
     def stop(self, peak_mb: float | None = None) -> ResourceUse:
         """End the sampling; what was used so far. May be called again.
 
         Args:
             peak_mb: the exact peak [MB] that the worker itself reported (VmHWM), if any.
         """
-        self._stop.set()
-        if self._thread is not threading.current_thread():
-            self._thread.join(STOP_TIMEOUT)
+        _looks.remove(self)
         samples = tuple(self._samples)
         peaks = [sample.rss_mb for sample in samples]
         if peak_mb is not None:
             peaks.append(peak_mb)
         return ResourceUse(samples, max(peaks, default=None))
 
-    def _run(self) -> None:
-        due = self._began
-        while self._tree is not None:
-            now = time.perf_counter()
-            due += self.interval
-            if due < now + self.interval / 2:  # late: CPU over a very short time is all rounding
-                due = now + self.interval
-            if self._stop.wait(due - now):
-                return
-            now = time.perf_counter()
-            phase = self.phase
+    def look(self) -> ResourceSample:
+        """Look once, and say when to look again.
+
+        Raises:
+            psutil.NoSuchProcess: the process has ended.
+        """
+        phase, began = self.phase, time.perf_counter()
+        cpu, rss = self._tree.look(began)
+        now = time.perf_counter()
+        self.due += self.interval
+        if self.due < now + self.interval / 2:  # late: CPU over a very short time is all rounding
+            self.due = now + self.interval
+        return ResourceSample(began - self._began, phase, cpu, rss)
+
+    def take(self, sample: ResourceSample) -> None:
+        """Keep a sample, and tell of a tree that uses too much memory."""
+        self._samples.append(sample)
+        limit, tell = self.limit_mb, self._on_limit
+        if limit is not None and tell is not None and sample.rss_mb > limit:
+            self._on_limit = None
+            arguments = tell, sample.rss_mb
+            threading.Thread(target=self._tell, args=arguments, name=TELLER, daemon=True).start()
+
+    def _tell(self, tell: Callable[[float], object], rss_mb: float) -> None:
+        try:
+            tell(rss_mb)
+        except Exception as error:  # sampling goes on; the owner can look at it
+            self.callback_error = error
+
+
+class _Looks:
+    """One thread that looks for all samplers, each when it is due, until there are none."""
+
+    def __init__(self) -> None:
+        self._samplers: list[ResourceSampler] = []
+        self._changed = threading.Condition()
+        self._thread: threading.Thread | None = None
+
+    def __contains__(self, sampler: ResourceSampler) -> bool:
+        return sampler in self._samplers
+
+    def add(self, sampler: ResourceSampler) -> None:
+        with self._changed:
+            self._samplers.append(sampler)
+            if self._thread is None or not self._thread.is_alive():  # after a fork it is not
+                self._thread = threading.Thread(target=self._work, name=THREAD, daemon=True)
+                self._thread.start()
+            self._changed.notify()
+
+    def remove(self, sampler: ResourceSampler) -> None:
+        """Once this has returned the sampler gets no sample any more."""
+        with self._changed:
+            if sampler in self._samplers:
+                self._samplers.remove(sampler)
+                self._changed.notify()
+
+    def _work(self) -> None:
+        while sampler := self._next():
             try:
-                cpu, rss = self._tree.look(now)
+                sample = sampler.look()
             except psutil.Error:
-                return
-            self._samples.append(ResourceSample(now - self._began, phase, cpu, rss))
-            if self.limit_mb is not None and rss > self.limit_mb and not self._limit_hit:
-                self._limit_hit = True
-                if self._on_limit is not None:
-                    try:
-                        self._on_limit(rss)
-                    except Exception as error:  # sampling goes on; the owner can look at it
-                        self.callback_error = error
+                self.remove(sampler)
+                continue
+            with self._changed:
+                if sampler in self._samplers:
+                    sampler.take(sample)
+
+    def _next(self) -> ResourceSampler | None:
+        """The first that is due, when it is; None when there are no more."""
+        with self._changed:
+            while self._samplers:
+                first = min(self._samplers, key=lambda sampler: sampler.due)
+                seconds = first.due - time.perf_counter()
+                if seconds <= 0.0:
+                    return first
+                self._changed.wait(seconds)
+            self._thread = None
+            return None
+
+
+_looks = _Looks()

@@ -18,19 +18,19 @@ from pathlib import Path
 from typing import Any
 
 from pytest_simbench.client.errors import Interrupted, NodeLost, Unavailable, Where
-from pytest_simbench.cluster.job import Job, Packed, TaskFailed, heard
+from pytest_simbench.cluster.job import Job, Packed, TaskFailed, error_from_wire
 from pytest_simbench.cluster.offers import Node
 from pytest_simbench.cluster.pool import Pool
-from pytest_simbench.experiment.executor import Carried, Executor
+from pytest_simbench.experiment.executor import Executor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import (
+    describe_robot,
     file_stem,
     record_of,
-    robot_told,
     scene_digest,
     settings,
 )
-from pytest_simbench.experiment.repetition import Hooks
+from pytest_simbench.experiment.repetition import AnyRepetition, Ended, Hooks
 from pytest_simbench.recordings.trace import FOLDER as TRACES
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.paths import write_whole
@@ -69,7 +69,7 @@ class Shared:
         task, robot = experiment.task, experiment.robot
         told: dict[str, Any] = {}
         if robot is not None:
-            told = {"scene": scene_digest(task), "robot": robot_told(robot)}
+            told = {"scene": scene_digest(task), "robot": describe_robot(robot)}
         return cls(Job.of(experiment, client).pack(), told)
 
 
@@ -92,11 +92,8 @@ class ClusterExecutor(Executor):
 
     def repetition(
         self, experiment: Experiment, number: int, hooks: Hooks | None = None
-    ) -> Carried:
+    ) -> AnyRepetition:
         return RemoteRepetition(self.pool, self.shared, experiment, number, hooks or Hooks())
-
-    def probe(self, experiment: Experiment) -> tuple[Record, BaseException | None]:
-        return self.repetition(experiment, 0).run()
 
     def shared(self, experiment: Experiment) -> Shared:
         """What an experiment's repetitions share, made once: meshes and data sets are large.
@@ -140,7 +137,7 @@ class RemoteRepetition:
         """End it on its node, or its waiting for one."""
         self._stop.set()
 
-    def run(self) -> tuple[Record, BaseException | None]:
+    def run(self) -> Ended:
         """Carry it out; the record, and what ended it early if anything did."""
         began = time.monotonic()
         try:
@@ -248,7 +245,7 @@ class RemoteRepetition:
             raise _Lost(str(answer["lost"]))
         return answer
 
-    def _received(self, answer: Mapping[str, Any]) -> tuple[Record, BaseException | None]:
+    def _received(self, answer: Mapping[str, Any]) -> Ended:
         """The record that a node sent, with what only this side knows; its files are written."""
         assert self._node is not None
         record = Record.from_json(answer["record"], f"the answer of {self._node.name}")
@@ -260,7 +257,7 @@ class RemoteRepetition:
             record = record.noting(trace=f"the trace could not be written: {problem}")
         host = {**record.host, "node": self._node.name}
         record = replace(record.noting(lost_nodes=tuple(self._lost)), host=host, **of_robot)
-        return record, heard(answer["error"], self.where)
+        return record, error_from_wire(answer["error"], self.where)
 
     def _keep(self, name: str, folder: str, data: bytes | None) -> str:
         """Write a file of the node's into a folder of the run; why that failed, or nothing."""

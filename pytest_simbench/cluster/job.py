@@ -181,7 +181,7 @@ class TaskFailed(Exception):
     """The task's own code raised on the node; the message ends with the node's traceback."""
 
 
-def told(error: BaseException | None, traceback: str = "") -> dict[str, str] | None:
+def error_to_wire(error: BaseException | None, traceback: str = "") -> dict[str, str] | None:
     """What ended a repetition early, as texts."""
     if error is None:
         return None
@@ -192,7 +192,7 @@ def told(error: BaseException | None, traceback: str = "") -> dict[str, str] | N
     return {"type": type(error).__name__, **found}
 
 
-def heard(said: Mapping[str, str] | None, where: Where) -> BaseException | None:
+def error_from_wire(said: Mapping[str, str] | None, where: Where) -> BaseException | None:
     """The same as an error of this process."""
     if said is None:
         return None

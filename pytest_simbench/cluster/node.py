@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_simbench.client.display import Displays
-from pytest_simbench.cluster.job import Job, Packed, told
+from pytest_simbench.cluster.job import Job, Packed, error_to_wire
 from pytest_simbench.experiment.identity import file_stem
 from pytest_simbench.experiment.repetition import Hooks, Repetition
 from pytest_simbench.experiment.workers import IdleWorkers
@@ -126,7 +126,7 @@ def displays() -> Displays:
 
 
 @dataclass
-class Progress:
+class JobProgress:
     """How far a repetition is, as its hooks tell."""
 
     phase: str = ""
@@ -144,7 +144,7 @@ def carry_out(
     job: Job,
     number: int,
     slots: int,
-    progress: Progress,
+    progress: JobProgress,
     started: Callable[[Repetition], object],
 ) -> dict[str, Any]:
     """Carry a repetition out.
@@ -157,7 +157,8 @@ def carry_out(
         started: told of the repetition before it runs, so that another thread may kill it.
 
     Returns:
-        `record` (a line of JSON), `error` (see `job.told`), `log` and `trace` (bytes, or None).
+        `record` (a line of JSON), `error` (see `job.error_to_wire`), `log` and `trace` (bytes, or
+        None).
 
     Raises:
         OSError: this machine cannot carry it out: its disk is full, for instance.
@@ -168,7 +169,7 @@ def carry_out(
         hooks = Hooks(phase=progress.enter, count=progress.count)
         repetition = Repetition(experiment, number, idle=bench.idle, hooks=hooks)
         started(repetition)
-        record, error = repetition.run() if number else repetition.probe()
+        record, error = repetition.run()
         if isinstance(error, OSError) and error.errno in OF_THE_MACHINE:
             raise error
         lines = "" if error is None else "".join(traceback.format_exception(error))
@@ -176,7 +177,7 @@ def carry_out(
         trace = bench.folder / TRACES / f"{file_stem(experiment, number)}.npz"
         return {
             "record": record.to_json(),
-            "error": told(error, lines),
+            "error": error_to_wire(error, lines),
             "log": _read(bench.folder / name) if name else None,
             "trace": _taken(trace),
         }
@@ -236,17 +237,17 @@ def run(packed: Packed, number: int) -> dict[str, Any]:
         return {"unknown": packed.digest}
     worker = get_worker()
     key = worker.get_current_task()
-    progress, ended = Progress(), threading.Event()
+    progress, ended = JobProgress(), threading.Event()
 
     def watch(repetition: Repetition) -> None:
         """Tell of the progress, and end what nobody wants any more."""
-        before = Progress()
+        before = JobProgress()
         while not ended.wait(LOOK_PERIOD):
             task = worker.state.tasks.get(key)
             if task is None or task.state in ("cancelled", "released", "forgotten"):
                 repetition.kill()
                 return
-            now = Progress(progress.phase, progress.done, progress.total)
+            now = JobProgress(progress.phase, progress.done, progress.total)
             if now != before:
                 worker.log_event(TOPIC, {"key": key, **vars(now)})
                 before = now

@@ -17,10 +17,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
+from pytest_simbench.client.errors import ExecutorError
 from pytest_simbench.cluster import node as node_side
 from pytest_simbench.cluster.job import Packed
 from pytest_simbench.cluster.offers import Node
-from pytest_simbench.experiment.executor import ExecutorError
 
 if TYPE_CHECKING:
     from distributed import Client, Future

@@ -1,28 +1,16 @@
-"""Where repetitions are carried out: in workers of this machine, or elsewhere."""
+"""Where repetitions are carried out: in workers of this machine, or elsewhere (`cluster`)."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Protocol as Interface
+from collections.abc import Iterable
+from functools import partial
 
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.repetition import Hooks, Repetition
+from pytest_simbench.experiment.prefetch import Prefetch
+from pytest_simbench.experiment.repetition import AnyRepetition, Hooks, Repetition
+from pytest_simbench.experiment.slots import Slots, slot
 from pytest_simbench.experiment.workers import IdleWorkers
-from pytest_simbench.records.record import Record
-
-
-class ExecutorError(Exception):
-    """Nothing can be carried out any more: a cluster is gone, for instance. One sentence."""
-
-
-class Carried(Interface):
-    """One repetition, carried out wherever; `repetition.Repetition` is one."""
-
-    def run(self) -> tuple[Record, BaseException | None]:
-        """Carry it out; the record, and what ended it early if anything did."""
-
-    def kill(self) -> None:
-        """End it at once, from any thread; `run` then returns an interrupted record."""
 
 
 class Executor(ABC):
@@ -40,18 +28,15 @@ class Executor(ABC):
     @abstractmethod
     def repetition(
         self, experiment: Experiment, number: int, hooks: Hooks | None = None
-    ) -> Carried:
+    ) -> AnyRepetition:
         """A repetition that has not begun.
 
         Args:
             experiment: that is repeated.
-            number: of the repetition, from 1.
+            number: of the repetition, from 1; 0 starts and ends the simulator alone, so that
+                the record tells its settings and versions.
             hooks: what is told of it.
         """
-
-    @abstractmethod
-    def probe(self, experiment: Experiment) -> tuple[Record, BaseException | None]:
-        """Start and end the simulator alone: the record's settings and versions are what counts."""
 
     def end_test(self) -> None:  # noqa: B027 (nothing to do is fine)
         """The repetitions of one test have ended."""
@@ -61,34 +46,52 @@ class Executor(ABC):
 
 
 class LocalExecutor(Executor):
-    """Workers of this machine. Several side by side mark their records contended.
+    """Workers of this machine, never more at once than there are slots. Several side by side mark
+    their records contended.
 
     Args:
-        jobs: workers side by side.
+        jobs: number of the slots.
+        expected: of these the first repetition will be asked for, in this order, see `Prefetch`.
+        slots: address of the slots where several processes share them; empty: this one has its own.
     """
 
     jobs: int = 1
 
-    def __init__(self, jobs: int = 1) -> None:
+    def __init__(
+        self, jobs: int = 1, *, expected: Iterable[Experiment] = (), slots: str = ""
+    ) -> None:
         self.jobs = jobs
         self._idle = IdleWorkers()
         self._shared = False
+        self._own = Slots(jobs) if jobs > 1 and not slots else None
+        self._slots = self._own.address if self._own else slots
+        self._prefetch = Prefetch(jobs - 1, expected if jobs > 1 else (), self._queued)
 
     def repetition(
         self, experiment: Experiment, number: int, hooks: Hooks | None = None
-    ) -> Carried:
+    ) -> AnyRepetition:
         hooks = hooks or Hooks()
-        hooks.begin("")
+        if begun := self._prefetch.take(experiment, number, hooks):
+            return begun
         self._shared = experiment.task.shares_worker
-        experiment = experiment.in_case(contended=True) if self.jobs > 1 else experiment
-        return Repetition(experiment, number, idle=self._idle, hooks=hooks)
+        return self._queued(experiment, number, self._idle, hooks)
 
-    def probe(self, experiment: Experiment) -> tuple[Record, BaseException | None]:
-        return Repetition(experiment, 0).probe()
+    def _queued(
+        self, experiment: Experiment, number: int, idle: IdleWorkers, hooks: Hooks | None = None
+    ) -> Repetition:
+        """A repetition that waits for a slot; without hooks, until no test waits for one."""
+        test = f"{experiment.case.test} {experiment.task.name}"
+        wait = partial(slot, self._slots, test, later=hooks is None) if self._slots else None
+        if self.jobs > 1:
+            experiment = experiment.in_case(contended=True)
+        return Repetition(experiment, number, idle=idle, hooks=hooks, slot=wait)
 
     def end_test(self) -> None:
         if not self._shared:
             self._idle.close()
 
     def close(self) -> None:
+        self._prefetch.close()
         self._idle.close()
+        if self._own is not None:
+            self._own.close()

@@ -64,7 +64,7 @@ def record_of(
         settings={**settings, **experiment.parameters},
         versions={"pytest-simbench": __version__, **versions},
         scene=scene_digest(experiment.task),
-        robot=robot_told(experiment.robot),
+        robot=describe_robot(experiment.robot),
         limits=experiment.limits,
         contended=case.contended,
         attempt=case.attempt,
@@ -106,13 +106,17 @@ def versions(case: Case) -> dict[str, str]:
     return {}  # somebody's own interpreter
 
 
-def robot_told(robot: Robot | None) -> dict[str, str]:
+def describe_robot(robot: Robot | None) -> dict[str, str]:
     """Name of a robot and twelve digits of everything that it is; empty for a task's own robot."""
-    return {} if robot is None else dict(_robot_told(robot, robot.limits, robot.swing, robot.stand))
+    return (
+        {}
+        if robot is None
+        else dict(_describe_robot(robot, robot.limits, robot.swing, robot.stand))
+    )
 
 
 @lru_cache(maxsize=16)
-def _robot_told(
+def _describe_robot(
     robot: Robot, limits: MotionLimits | None, swing: object, stand: Pose | None
 ) -> dict[str, str]:
     """The same; what is no part of a robot's equality is an argument."""

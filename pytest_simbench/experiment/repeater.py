@@ -10,10 +10,10 @@ from queue import Empty, SimpleQueue
 from typing import Protocol as Interface
 
 from pytest_simbench.client.errors import Unavailable, WorkerError, WorldParityError
-from pytest_simbench.experiment.executor import Carried, Executor
+from pytest_simbench.experiment.executor import Executor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.interrupts import Interrupts
-from pytest_simbench.experiment.repetition import Hooks
+from pytest_simbench.experiment.repetition import AnyRepetition, Ended, Hooks
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import short
@@ -45,7 +45,7 @@ class Repeater:
     executor: Executor
     progress: ProgressLine
     keep: Callable[[Record], None]
-    _active: set[Carried] = field(default_factory=set, init=False)
+    _active: set[AnyRepetition] = field(default_factory=set, init=False)
     _stopping: threading.Event = field(default_factory=threading.Event, init=False)
 
     def run(self, numbers: Iterable[int]) -> ResultSet:
@@ -83,7 +83,7 @@ class Repeater:
             return False
         return isinstance(error, WorldParityError) or not isinstance(error, WorkerError)
 
-    def _kept(self, number: int, interrupts: Interrupts) -> tuple[Record, BaseException | None]:
+    def _kept(self, number: int, interrupts: Interrupts) -> Ended:
         """Run one repetition and keep its record."""
         progress, experiment = self.progress, self.experiment
         begun = False

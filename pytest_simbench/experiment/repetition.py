@@ -5,8 +5,10 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any
+from typing import Protocol as Interface
 
 from pytest_simbench.client.errors import (
     DisplayError,
@@ -54,6 +56,24 @@ class Hooks:
     interrupts: Interrupts = field(default_factory=Interrupts)
 
 
+Ended = tuple[Record, BaseException | None]
+"""The record of a repetition, and what ended it early if anything did."""
+
+
+class AnyRepetition(Interface):
+    """One repetition, carried out wherever."""
+
+    def run(self) -> Ended:
+        """Carry it out."""
+
+    def kill(self) -> None:
+        """End it at once, from any thread; `run` then returns an interrupted record."""
+
+
+Slot = Callable[[Callable[[], bool]], AbstractContextManager[bool]]
+"""Waits for a slot until it is told to stop, and holds it; whether there is one."""
+
+
 class Repetition:
     """One repetition of a task. `run` once; `kill` from any thread.
 
@@ -61,9 +81,10 @@ class Repetition:
 
     Args:
         experiment: the task, the simulator and its settings.
-        number: of the repetition, from 1.
+        number: of the repetition, from 1; 0 starts and ends the simulator alone.
         idle: where workers come from and go to, if the case reuses them.
-        hooks: what is told of it; not that it begins.
+        hooks: what is told of it.
+        slot: what it waits for before it begins; None: nothing.
         camera: takes pictures by the engine's own renderer, see there; default: one for the film
             that the case asks for of every repetition.
     """
@@ -75,6 +96,7 @@ class Repetition:
         *,
         idle: IdleWorkers | None = None,
         hooks: Hooks | None = None,
+        slot: Slot | None = None,
         camera: Camera | None = None,
     ) -> None:
         self.experiment = experiment
@@ -84,6 +106,7 @@ class Repetition:
         self.seed = experiment.seed(number)
         self.where = Where(case.simulator, case.mode, number, self.seed)
         self.stopwatch = Stopwatch()
+        self._slot = slot or (lambda stop: nullcontext(True))
         self._camera = camera or self._filming()
         self._idle = idle if idle is not None and experiment.reuses_worker else None
         self._reused = False
@@ -101,9 +124,22 @@ class Repetition:
         if self._process is not None:
             self._process.interrupt()
 
-    def run(self) -> tuple[Record, BaseException | None]:
-        """Carry it out; the record, and what ended it early if anything did."""
-        found, error = self._ended(self._perform)
+    def run(self) -> Ended:
+        """Wait for a slot, and carry it out.
+
+        Raises:
+            Interrupted: it was killed before it had one.
+            ExecutorError: there are no slots any more.
+        """
+        with self._slot(self._killed.is_set) as granted:
+            if not granted:
+                raise Interrupted("the run was interrupted", self.where)
+            self.hooks.begin("")
+            self.stopwatch = Stopwatch()
+            return self._run()
+
+    def _run(self) -> Ended:
+        found, error = self._ended()
         outcome = found if error is None else Outcome()
         resources = self._finish(error)
         noted = {
@@ -112,17 +148,11 @@ class Repetition:
         }
         return self._record(outcome, error, resources).noting(**noted), error
 
-    def probe(self) -> tuple[Record, BaseException | None]:
-        """Start and end the simulator alone: the record's settings and versions are what counts."""
-        _, error = self._ended(self._construct)
-        self._finish(error)
-        return self._record(Outcome(), error, {}), error
-
-    def _ended(self, do: Callable[[], Any]) -> tuple[Any, BaseException | None]:
-        """What `do` returned, or what it raised; nothing interrupts from here on."""
+    def _ended(self) -> tuple[Any, BaseException | None]:
+        """What the task found, or what it raised; nothing interrupts from here on."""
         result, error = None, None
         try:
-            result = do()
+            result = self._perform()
             self.hooks.interrupts.hold()
         except BaseException as raised:
             self.hooks.interrupts.hold()
@@ -141,6 +171,8 @@ class Repetition:
 
     def _perform(self) -> Outcome:
         process = self._construct()
+        if not self.number:
+            return Outcome()
         world = self._world = World(
             process,
             self.experiment.scene(self.seed),

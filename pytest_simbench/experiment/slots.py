@@ -1,8 +1,9 @@
-"""Slots of one machine that the processes of a run share: pytest-xdist's workers.
+"""The queue of a machine: repetitions wait in it for a slot, those of all processes of a run.
 
 With `--sim-jobs 4 -n 6` six tests run at once and ask for repetitions, and four repetitions run. So
 the last repetitions of a test leave no core idle. A free slot goes to the longest repetition that
-waits, by the mean of those of its test that ended; a test of which none has ended comes first.
+waits, by the mean of those of its test that ended; a test of which none has ended comes first. What
+no test has asked for yet (`prefetch`) waits until nobody else does.
 
 A repetition holds its slot as long as its connection, so a process that ends in whatever way gives
 its slots back.
@@ -19,13 +20,15 @@ from contextlib import contextmanager, suppress
 from hashlib import blake2b
 from uuid import uuid4
 
-from pytest_simbench.experiment.executor import ExecutorError
+from pytest_simbench.client.errors import ExecutorError
 
 LOOK_PERIOD = 0.25
 """Between two looks of a repetition that waits whether the run has ended [s]."""
 
 KEY = 16
-"""Of the name of a test, as it is sent [bytes]."""
+"""Of the name of a test, as it is sent [bytes]; before it stands one of these."""
+
+NOW, LATER = b"n", b"l"
 
 
 class Slots:
@@ -69,7 +72,7 @@ class Slots:
         """A repetition begins to wait, or has ended."""
         key = b""
         with suppress(OSError):
-            key = connection.recv(KEY)
+            key = connection.recv(1 + KEY)
         if key:
             self._waiting[connection] = key
             return
@@ -83,15 +86,15 @@ class Slots:
 
     def _give(self) -> None:
         while self._waiting and len(self._held) < self.number:
-            connection = max(self._waiting, key=lambda waits: self._mean(self._waiting[waits]))
+            connection = max(self._waiting, key=lambda waits: self._rank(self._waiting[waits]))
             self._held[connection] = self._waiting.pop(connection), time.monotonic()
             with suppress(OSError):  # it has left, and is heard of next
                 connection.send(b"1")
 
-    def _mean(self, key: bytes) -> float:
-        """Seconds of a repetition of that test."""
+    def _rank(self, key: bytes) -> tuple[bool, float]:
+        """Whether its test waits for it, and the mean time of the repetitions of that test [s]."""
         number, seconds = self._ended.get(key, (0, 0.0))
-        return seconds / number if number else float("inf")
+        return key.startswith(NOW), seconds / number if number else float("inf")
 
     def close(self) -> None:
         """Give no slot any more."""
@@ -107,13 +110,16 @@ def key_of(test: str) -> bytes:
 
 
 @contextmanager
-def slot(address: str, test: str, stop: Callable[[], bool]) -> Iterator[bool]:
+def slot(
+    address: str, test: str, stop: Callable[[], bool], *, later: bool = False
+) -> Iterator[bool]:
     """Wait for a slot, and hold it in this block.
 
     Args:
         address: of the slots.
         test: whose repetition asks for it.
         stop: whether to wait no longer.
+        later: after all that are asked for without it.
 
     Yields:
         Whether there is one; there is none when stopped.
@@ -125,7 +131,7 @@ def slot(address: str, test: str, stop: Callable[[], bool]) -> Iterator[bool]:
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         try:
             connection.connect(f"\0{address}")
-            connection.send(key_of(test))
+            connection.send((LATER if later else NOW) + key_of(test))
         except OSError:
             raise gone from None
         connection.settimeout(LOOK_PERIOD)

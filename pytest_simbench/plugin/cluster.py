@@ -45,9 +45,9 @@ def pool(config: pytest.Config) -> Pool:
                 f"{given}: leave out --sim-jobs; each node says itself how many repetitions it "
                 "takes at once (--slots)"
             )
+        from pytest_simbench.client.errors import ExecutorError
         from pytest_simbench.cluster.offers import refusal
         from pytest_simbench.cluster.pool import Pool
-        from pytest_simbench.experiment.executor import ExecutorError
 
         with options.refusing(ExecutorError, given):
             found = Pool(options.value(config, "sim_cluster"))

@@ -10,8 +10,8 @@ from pytest_simbench.client.environments import (
     default_folder,
     existing,
     remove,
+    size_mb,
 )
-from pytest_simbench.client.installing import size_mb
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.plugin import options
 from pytest_simbench.plugin.simulator_names import progress

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.client.errors import ExecutorError
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.executor import ExecutorError
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.sequential import Plan, SequentialResultSet

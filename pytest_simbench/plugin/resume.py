@@ -151,7 +151,7 @@ class Resumed:
         others = [r for r in ended if (r.simulator, r.mode) == (case.simulator, case.mode)]
         if not of_test and not others:
             return
-        now, error = executor.probe(experiment)
+        now, error = executor.repetition(experiment, 0).run()
         if error is not None:
             raise error
         # Another test of the same simulator has a task and settings of its own.

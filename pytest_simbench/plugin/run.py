@@ -16,10 +16,8 @@ import pytest
 
 from pytest_simbench.client.display import Displays
 from pytest_simbench.cluster.executor import ClusterExecutor
-from pytest_simbench.experiment.ahead import AheadExecutor
 from pytest_simbench.experiment.executor import Executor, LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.sharing import SharingExecutor
 from pytest_simbench.experiment.slots import Slots
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.plugin import cluster, options, recording, thresholds
@@ -59,7 +57,7 @@ class Run:
         mistake: in what was typed, found when the tests had ended; one sentence.
         resumed: the interrupted run that this one completes, if it does.
         page: to look at, once the whole report is written.
-        expected: what later tests will ask for, see `ahead`; set before the first one asks.
+        expected: what later tests will ask for, see `prefetch`; set before the first one asks.
     """
 
     def __init__(self, config: pytest.Config) -> None:
@@ -146,11 +144,8 @@ class Run:
         if cluster.asked(self.config):
             return ClusterExecutor(cluster.pool(self.config))
         jobs = options.value(self.config, "sim_jobs")
-        if self._shared_by is not None and "simbench_slots" in self._shared_by:
-            return SharingExecutor(jobs, self._shared_by["simbench_slots"])
-        if jobs > 1:
-            return AheadExecutor(jobs, self.expected())
-        return LocalExecutor(jobs)
+        slots = (self._shared_by or {}).get("simbench_slots", "")
+        return LocalExecutor(jobs, expected=self.expected(), slots=slots)
 
     @cached_property
     def slots(self) -> Slots | None:

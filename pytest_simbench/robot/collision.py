@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from itertools import product
 
 import coal
@@ -11,8 +12,8 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull
 
-from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.scene import Body, FloatArray, Pose, Scene
+from pytest_simbench.robot.model import RobotModel, last_change
+from pytest_simbench.scene import Body, FloatArray, Pose, Robot, Scene
 from pytest_simbench.simulator.robot_files import description_xml
 
 MARGIN = 0.012
@@ -49,18 +50,8 @@ class PlanningScene:
         self.scale = scale
         self.opening = model.robot.gripper.opened
         self.held: str | None = None
-        robot = model.robot
-        urdf = ET.tostring(description_xml(robot), encoding="unicode")
-        geometry = pin.buildGeomFromUrdfString(
-            model.pin, urdf, pin.GeometryType.COLLISION, package_dirs=[]
-        )
-        for shape in geometry.geometryObjects:
-            if isinstance(shape.geometry, coal.BVHModelBase):
-                shape.geometry = convex_hull(np.asarray(shape.geometry.vertices()))
+        geometry = _links(model.robot, last_change(model.robot)).copy()
         self._links = list(range(len(geometry.geometryObjects)))
-        geometry.addAllCollisionPairs()
-        if robot.srdf:
-            pin.removeCollisionPairs(model.pin, geometry, robot.srdf)
         inverse = model.base.inverse()
         self._free = {body.name: body for body in scene.free_bodies}
         self._bodies: dict[str, int] = {}
@@ -225,6 +216,26 @@ class PlanningScene:
                         return objects[first].name, objects[second].name
                 return "robot", "obstacle"
         return None
+
+
+@lru_cache(maxsize=64)
+def _links(robot: Robot, changed: tuple[int, ...]) -> pin.GeometryModel:
+    """The shapes of a robot's links and the pairs to check, made once: each repetition asks for it.
+
+    Args:
+        robot: whose files are sound.
+        changed: see `last_change`.
+    """
+    model = RobotModel(robot).pin
+    urdf = ET.tostring(description_xml(robot), encoding="unicode")
+    geometry = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION, package_dirs=[])
+    for shape in geometry.geometryObjects:
+        if isinstance(shape.geometry, coal.BVHModelBase):
+            shape.geometry = convex_hull(np.asarray(shape.geometry.vertices()))
+    geometry.addAllCollisionPairs()
+    if robot.srdf:
+        pin.removeCollisionPairs(model, geometry, robot.srdf)
+    return geometry
 
 
 def convex_hull(points: FloatArray) -> coal.Convex:

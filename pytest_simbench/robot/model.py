@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+from contextlib import suppress
+from functools import lru_cache
+
 import numpy as np
 import pinocchio as pin
 
@@ -25,18 +29,7 @@ class RobotModel:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        check_robot(robot)
-        try:
-            self.pin = pin.buildModelFromUrdf(robot.urdf, mimic=False)
-        except TypeError:
-            self.pin = pin.buildModelFromUrdf(robot.urdf)
-        except Exception as error:
-            raise DescriptionError(
-                f"cannot use the robot description {robot.urdf}: {error}"
-            ) from None
-        names = list(self.pin.names)[1:]
-        if names != list(robot.joint_names):
-            raise DescriptionError(f"{robot.urdf} has joints {names}, not {robot.joint_names}")
+        self.pin = _checked(robot, last_change(robot)).copy()  # gravity and armature are set in it
         self.pin.gravity.linear = np.zeros(3)
         self.data = self.pin.createData()
         self.arm = len(robot.arm_joints)
@@ -181,3 +174,32 @@ class RobotModel:
             model.appendBodyToJoint(tool.parentJoint, inertia, tool.placement)
             self._loaded[key] = model
         return self._loaded[key]
+
+
+def last_change(robot: Robot) -> tuple[int, ...]:
+    """When the files were written that describe a robot [ns]: what was read before may be stale."""
+    found = []
+    for path in filter(None, (robot.urdf, robot.srdf)):
+        with suppress(OSError):  # whoever reads it tells
+            found.append(os.stat(path).st_mtime_ns)
+    return tuple(found)
+
+
+@lru_cache(maxsize=64)
+def _checked(robot: Robot, changed: tuple[int, ...]) -> pin.Model:
+    """Pinocchio's model of a robot whose files are sound, read once: each repetition asks for it.
+
+    Raises:
+        DescriptionError: the URDF cannot be read.
+    """
+    check_robot(robot)
+    try:
+        model = pin.buildModelFromUrdf(robot.urdf, mimic=False)
+    except TypeError:
+        model = pin.buildModelFromUrdf(robot.urdf)
+    except Exception as error:
+        raise DescriptionError(f"cannot use the robot description {robot.urdf}: {error}") from None
+    names = list(model.names)[1:]
+    if names != list(robot.joint_names):
+        raise DescriptionError(f"{robot.urdf} has joints {names}, not {robot.joint_names}")
+    return model

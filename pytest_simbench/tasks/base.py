@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -190,11 +190,20 @@ def distance(a: Pose, b: Pose) -> float:
     return float(np.linalg.norm(np.subtract(a.position, b.position)))
 
 
-def generators(seed: int) -> tuple[np.random.Generator, np.random.Generator, np.random.Generator]:
-    """Independent random generators of a repetition: start jitter, cube order, planner."""
-    jitter, order, planner = np.random.SeedSequence(seed).spawn(3)
-    return (
-        np.random.default_rng(jitter),
-        np.random.default_rng(order),
-        np.random.default_rng(planner),
-    )
+class Randomness(NamedTuple):
+    """Independent random generators of a repetition, one for each thing that chance decides.
+
+    Attributes:
+        start: disturbs the start.
+        order: of the cubes.
+        planner: whatever the planner draws.
+    """
+
+    start: np.random.Generator
+    order: np.random.Generator
+    planner: np.random.Generator
+
+    @classmethod
+    def of(cls, seed: int) -> Randomness:
+        """Those of a repetition's seed."""
+        return cls(*map(np.random.default_rng, np.random.SeedSequence(seed).spawn(3)))

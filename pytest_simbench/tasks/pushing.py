@@ -25,7 +25,7 @@ from pytest_simbench.robot.panda import panda
 from pytest_simbench.robot.scale import scale_of
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene, Vector3
 from pytest_simbench.tasks.arm import Arm
-from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, distance, generators
+from pytest_simbench.tasks.base import Count, Jitter, Outcome, Randomness, Task, distance
 from pytest_simbench.tasks.manipulator import APPROACH
 from pytest_simbench.tasks.moments import Moment
 from pytest_simbench.tasks.sliding import smallest_turning_radius
@@ -149,7 +149,7 @@ class Pushing(Task):
         return replace(self, length=self.length / 4, turn=self.turn / 4)
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
-        pose = jitter.disturbed(self.begin, generators(seed)[0])
+        pose = jitter.disturbed(self.begin, Randomness.of(seed).start)
         block = Box("block", self.block, pose, BLOCK_MASS * self.scale**3, FRICTION, RED)
         return Scene("pushing", (block,), self.arm, ground_friction=FRICTION)
 
@@ -190,7 +190,7 @@ class Pushing(Task):
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         with world.phase("settle start"):
             world.wait(0.2)
-        hand = Arm(world, generators(seed)[2])
+        hand = Arm(world, Randomness.of(seed).planner)
         first, *others = self.tools()
         pushed: Motion | None = None
         details: dict[str, object] = {}

@@ -27,10 +27,10 @@ from pytest_simbench.tasks.base import (
     Count,
     Jitter,
     Outcome,
+    Randomness,
     Task,
     cube,
     distance,
-    generators,
     scaled,
 )
 from pytest_simbench.tasks.manipulator import Manipulator
@@ -173,7 +173,7 @@ class Stacking(Task):
         )
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
-        rng = generators(seed)[0]
+        rng = Randomness.of(seed).start
         cubes = [
             cube(
                 f"cube_{number:02d}",
@@ -213,12 +213,12 @@ class Stacking(Task):
         ]
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
-        _, order_rng, planner_rng = generators(seed)
+        randomness = Randomness.of(seed)
         with world.phase("settle start"):
             world.wait(0.2)
         start = world.poses()
-        unused = [str(name) for name in order_rng.permutation(sorted(start))]
-        manipulator = Manipulator(world, planner_rng, self.speeds, self.scale)
+        unused = [str(name) for name in randomness.order.permutation(sorted(start))]
+        manipulator = Manipulator(world, randomness.planner, self.speeds, self.scale)
         picks = _Picks()
         world.mark("start")
         for place in self.places():

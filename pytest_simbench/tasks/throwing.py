@@ -41,9 +41,9 @@ from pytest_simbench.tasks.base import (
     Count,
     Jitter,
     Outcome,
+    Randomness,
     Task,
     cube,
-    generators,
     scaled,
 )
 from pytest_simbench.tasks.impact import impact
@@ -175,7 +175,7 @@ class Throwing(Task):
         return replace(self, wind_up_speed=0.5, speeds=STUDY_SPEEDS, feasible=False, by_throw=False)
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
-        rng = generators(seed)[0]
+        rng = Randomness.of(seed).start
         start = jitter.disturbed(scaled(PROJECTILE.position, self.scale), rng)
         cubes = [cube("projectile", start, RED, self.scale)]
         for number, (y, z) in enumerate(PYRAMID, start=1):
@@ -196,7 +196,7 @@ class Throwing(Task):
         with world.phase("settle start"):
             world.wait(SETTLE_START)
         before = world.poses()
-        manipulator = Manipulator(world, generators(seed)[2], self.speeds, self.scale)
+        manipulator = Manipulator(world, Randomness.of(seed).planner, self.speeds, self.scale)
         world.mark("start")
         metrics: dict[str, float | None] = {metric.name: None for metric in self.metrics}
         details: dict[str, object] = {}

@@ -1,24 +1,34 @@
 """Adapters that misbehave on purpose: a real engine, with one fault each.
 
-They are loaded by workers as `tests.client.faulty:ENGINE_FAULT`, `MuJoCo_Killed` for instance.
+Workers load them as `tests.client.faulty:NAME`. Those of `FAULTS` and `OTHERS` are on MuJoCo or, as
+`PyBullet_NAME`, on PyBullet; those of `LIES` and `RAISED` are `Lies KEY` and `Raises KEY`.
 """
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
+import gc
 import os
 import signal
+import subprocess
+import sys
+import tempfile
+import threading
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
+from pytest_simbench.sims.mujoco.settings import MuJoCoSettings
 from pytest_simbench.sims.pybullet.adapter import PyBullet
 
 from pytest_simbench.scene import Scene
-from pytest_simbench.simulator import Simulator
+from pytest_simbench.simulator import Deviation, ParityError, Simulator, UnavailableError
+from pytest_simbench.worker.server import Server
 
 FAULT_TIME = 0.3
 """Simulated time at which the fault happens [s]."""
@@ -55,58 +65,6 @@ class Blind(MuJoCo):
 
     def render(self, width: int, height: int) -> Any:
         raise self._missing("offscreen picture")
-
-
-class Faulty(Simulator):
-    """Does `fault` once its time has come."""
-
-    def step(self) -> None:
-        super().step()  # type: ignore[safe-super]  # the engine comes next in the method order
-        if self.time >= FAULT_TIME:
-            self.fault()
-
-    def fault(self) -> None:
-        raise NotImplementedError
-
-
-class Killed(Faulty):
-    def fault(self) -> None:
-        os.kill(os.getpid(), signal.SIGKILL)
-
-
-class Crashed(Faulty):
-    def fault(self) -> None:
-        ctypes.string_at(0)  # reads address 0: a true segmentation fault
-
-
-class Stopped(Faulty):
-    def fault(self) -> None:
-        os.kill(os.getpid(), signal.SIGSTOP)
-
-
-class Hung(Faulty):
-    """Hangs in C code that holds the GIL, so that no other thread of the worker runs either."""
-
-    def fault(self) -> None:
-        ctypes.PyDLL(None).sleep(600)
-
-
-class Raising(Faulty):
-    def fault(self) -> None:
-        raise ValueError("the engine is unhappy")
-
-
-class NotANumber(Faulty):
-    def fault(self) -> None:
-        SPOIL[self.info.name](self)
-
-
-class Greedy(Faulty):
-    """Takes 20 MB more at every step."""
-
-    def fault(self) -> None:
-        self.__dict__.setdefault("hoard", []).append(np.ones(2_500_000))
-        time.sleep(0.01)
 
 
 class Chatty(Simulator):
@@ -159,17 +117,325 @@ class Restless(Simulator):
     loads = 0
 
 
-FAULTS: tuple[type[Simulator], ...] = (
-    Killed, Crashed, Stopped, Hung, Raising, NotANumber, Greedy, Chatty, CrashesClosing,
-    WrongGravity, Costly, NeverCompiled, Restless,
-)  # fmt: skip
+def hold_the_interpreter(seconds: float) -> None:
+    """No other thread of this process runs meanwhile, that which reads messages included."""
+    ctypes.PyDLL(None).usleep(ctypes.c_uint(int(seconds * 1e6)))
 
 
-def __getattr__(name: str) -> type[Simulator]:
-    engine, _, fault = name.partition("_")
-    for made in FAULTS:
-        if engine in ENGINES and made.__name__ == fault:
-            cls = ENGINES[engine]
+class StopsBetweenRequests(MuJoCo):
+    """Answers `load`, and a moment later stops, so that nobody reads the next request."""
+
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGSTOP)).start()
+
+
+class HoldsTheInterpreter(MuJoCo):
+    """Answers `load`; then a thread of its own lets no other run."""
+
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        threading.Timer(0.3, hold_the_interpreter, (600.0,)).start()
+
+
+class StopsLoading(MuJoCo):
+    def load(self, scene: Scene) -> None:
+        os.kill(os.getpid(), signal.SIGSTOP)
+
+
+class StopsBeingMade(MuJoCo):
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        os.kill(os.getpid(), signal.SIGSTOP)
+
+
+class StopsClosing(MuJoCo):
+    def close(self) -> None:
+        os.kill(os.getpid(), signal.SIGSTOP)
+
+
+class Chatters(MuJoCo):
+    """Says that it is alive as often as it can, each time a little later."""
+
+    def step(self) -> None:
+        super().step()
+        server = next(o for o in gc.get_objects() if isinstance(o, Server))
+        for k in range(10**9):
+            server.send({"alive": self.time + k})
+
+
+class LeavesFiles(MuJoCo):
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        with open(os.environ["UNRULY"], "w") as file:
+            file.write(tempfile.mkdtemp())
+
+
+@dataclass(frozen=True)
+class OddSettings(MuJoCoSettings):
+    def to_wire(self) -> Any:
+        return {3: 0.001}
+
+
+LIES: dict[str, dict[str, Any]] = {
+    "versions": {"versions": lambda self: {"mujoco": "3.3", "numpy": None}},
+    "names of versions": {"versions": lambda self: {"mujoco": "3.3", 3: "4"}},
+    "untested": {"untested": lambda self: 3},
+    "settings": {"profiles": {"tuned": OddSettings(0.001)}},
+    "deviations": {
+        "info": replace(MuJoCo.info, deviations=(*MuJoCo.info.deviations, Deviation("", 3))),  # type: ignore[arg-type]
+    },
+    "no dict of versions": {"versions": lambda self: 3},
+    "versions that cannot be sent": {
+        "versions": lambda self: {"mujoco": "3.3", "numpy": Unprintable}
+    },
+}
+"""What an adapter says, of another type than it must be."""
+
+
+class Unprintable(Exception):
+    def __str__(self) -> str:
+        raise RuntimeError("no text")
+
+    __repr__ = __str__
+
+
+class Unspeakable(Exception):
+    def __str__(self) -> str:
+        raise SystemExit(9)
+
+
+class Letters(str):
+    """A text that is no text to execnet."""
+
+
+class OwnText(Exception):
+    def __str__(self) -> str:
+        return Letters("mine")
+
+
+class Rude(BaseException):
+    """An exception that no `except Exception` sees."""
+
+
+class Derived(UnavailableError):
+    """An adapter's own kind of one of ours."""
+
+
+RAISED: dict[str, Any] = {
+    "surrogate": lambda: ValueError("bad \ud800 text"),
+    "huge": lambda: ValueError("y" * 5_000_000),
+    "no_text": Unprintable,
+    "exits_in_text": Unspeakable,
+    "own_text": OwnText,
+    "parity_without_text": lambda: type("Odd", (Unprintable, ParityError), {})(),
+    "exit_without_text": lambda: SystemExit(Unprintable()),
+    "no_string": lambda: ValueError(b"bytes", {1: 2}, None),
+    "interrupt": lambda: KeyboardInterrupt("from inside"),
+    "generator": lambda: GeneratorExit("done"),
+    "rude": lambda: Rude("hm"),
+    "exit": lambda: SystemExit(3),
+    "exit_text": lambda: SystemExit("tired"),
+    "parity": lambda: ParityError("\udfff" * 3000),
+    "derived": lambda: Derived("no driver"),
+}
+
+
+class ExitsLoading(MuJoCo):
+    def load(self, scene: Scene) -> None:
+        sys.exit(5)
+
+
+class Parent(MuJoCo):
+    """Starts processes that want to stay: a child, one with another session and parent, and one
+    that has thrown its environment away as well. Their ids are in the file of `UNRULY`, in this
+    order."""
+
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        sleep = "import os,time; print(os.getpid(), flush=True); time.sleep(600)"
+        daemon = (
+            "import os,sys\nif os.fork(): os._exit(0)\nos.setsid()\nif os.fork(): os._exit(0)\n"
+        )
+        with open(os.environ["UNRULY"], "ab") as ids:
+            subprocess.Popen([sys.executable, "-c", sleep], stdout=ids)
+            for number, environment in enumerate((None, {}), 1):
+                self._wait_for(number)
+                subprocess.run(
+                    [sys.executable, "-c", daemon + sleep],
+                    stdout=ids,
+                    env=environment,
+                    check=True,
+                )
+        self._wait_for(3)
+
+    def _wait_for(self, number: int) -> None:
+        while Path(os.environ["UNRULY"]).read_text().count("\n") < number:
+            time.sleep(0.01)
+
+
+class ParentThatDies(Parent):
+    def step(self) -> None:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+HAUNTED = 0.5
+"""Simulated time from which on cubes do what no cube can [s]."""
+
+
+def without_contacts(simulator: MuJoCo) -> None:
+    import mujoco
+
+    simulator.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+
+
+class Ghost(MuJoCo):
+    def step(self) -> None:
+        super().step()
+        if self.time >= HAUNTED:
+            self.haunt()
+
+    def haunt(self) -> None:
+        raise NotImplementedError
+
+
+class Sinking(Ghost):
+    """Nothing touches anything any more."""
+
+    def haunt(self) -> None:
+        without_contacts(self)
+
+
+class Flying(Ghost):
+    """One cube is blown away, through whatever is in the way, at 10 m/s."""
+
+    def haunt(self) -> None:
+        self.data.qvel[0] = 10.0
+
+
+class Merging(Ghost):
+    """One cube stands where another one stands, and nothing drives them apart."""
+
+    def haunt(self) -> None:
+        without_contacts(self)
+        self.model.opt.gravity[:] = 0.0
+        self.data.qpos[:3] = self.data.qpos[7:10]
+        self.data.qvel[:] = 0.0
+
+
+class Faulty(Simulator):
+    """Does `fault` once its time has come, until that is done."""
+
+    done = False
+    fault: Callable[[Any], object]
+
+    def step(self) -> None:
+        super().step()  # type: ignore[safe-super]  # the engine comes next in the method order
+        if self.time >= FAULT_TIME and not self.done:
+            self.done = bool(self.fault())
+
+
+def crash(simulator: Any) -> None:
+    ctypes.string_at(0)  # reads address 0: a true segmentation fault
+
+
+def hold(simulator: Any) -> None:
+    """In C code that holds the GIL, so that no other thread of the worker runs either."""
+    ctypes.PyDLL(None).sleep(600)
+
+
+def complain(simulator: Any) -> None:
+    raise ValueError("the engine is unhappy")
+
+
+def eat(simulator: Any) -> None:
+    """20 MB more at every step."""
+    simulator.__dict__.setdefault("hoard", []).append(np.ones(2_500_000))
+    time.sleep(0.01)
+
+
+def flood(simulator: Any) -> bool:
+    """100 MB before anybody looks, and all goes on well."""
+    for _ in range(100):
+        os.write(2, (b"x" * 99 + b"\n") * 10_000)
+    return True
+
+
+def fork(simulator: Any) -> bool:
+    """Go on in the child, too. The parent comes second."""
+    if os.fork():
+        time.sleep(1.0)
+    return True
+
+
+def _connections() -> list[int]:
+    """execnet's descriptors: the pipes other than stdin, stdout and stderr."""
+    found = []
+    for name in os.listdir("/proc/self/fd"):
+        try:
+            target = os.readlink(f"/proc/self/fd/{name}")
+        except OSError:
+            continue
+        if int(name) > 2 and target.startswith("pipe:"):
+            found.append(int(name))
+    return found
+
+
+def hang_up(simulator: Any) -> None:
+    """Close the connection and live on."""
+    for descriptor in _connections():
+        os.close(descriptor)
+    time.sleep(600.0)
+
+
+def send(message: bytes) -> None:
+    """Where the messages go, and nothing after it."""
+    for descriptor in _connections():
+        with contextlib.suppress(OSError):  # the other direction
+            os.write(descriptor, message)
+    time.sleep(600.0)
+
+
+FAULTS: dict[str, Callable[[Any], object]] = {
+    "Killed": lambda simulator: os.kill(os.getpid(), signal.SIGKILL),
+    "Stopped": lambda simulator: os.kill(os.getpid(), signal.SIGSTOP),
+    "Crashed": crash,
+    "Hung": hold,
+    "Raising": complain,
+    "NotANumber": lambda simulator: SPOIL[simulator.info.name](simulator),
+    "Greedy": eat,
+    "ExitsAtOnce": lambda simulator: os._exit(7),
+    "Aborts": lambda simulator: os.abort(),
+    "FloodsTheLog": lambda simulator: (flood(simulator), time.sleep(600.0)),
+    "FloodsAtOnce": flood,
+    "Forks": fork,
+    "HangsUp": hang_up,
+    "HalfAnswer": lambda simulator: send(b"\4\0\0\0\1\0\0\3\350" + b"0123456789"),  # of 1000 bytes
+    "Garbage": lambda simulator: send(b"c" + bytes(8)),  # a message of no known kind
+}
+"""What an engine does in the middle of a motion."""
+
+OTHERS = (Chatty, CrashesClosing, WrongGravity, Costly, NeverCompiled, Restless)
+
+
+def raise_one(key: str) -> None:
+    raise RAISED[key]()
+
+
+def __getattr__(name: str) -> Any:
+    kind, _, key = name.partition(" ")
+    if kind == "Lies" and key:
+        return type("Lies", (MuJoCo,), LIES[key])
+    if kind == "Raises" and key:
+        return type("Raises", (Faulty, MuJoCo), {"fault": lambda simulator: raise_one(key)})
+    engine, fault = f"MuJoCo_{name}".split("_")[-2:]  # MuJoCo unless it says another
+    if engine not in ENGINES:
+        raise AttributeError(name)
+    cls = ENGINES[engine]
+    if fault in FAULTS:
+        return type(name, (Faulty, cls), {"fault": FAULTS[fault]})
+    for made in OTHERS:
+        if made.__name__ == fault:
             info = replace(cls.info, costly_start=fault in ("Costly", "NeverCompiled", "Restless"))
             return type(name, (made, cls), {"info": info})
     raise AttributeError(name)

@@ -1,15 +1,25 @@
-"""What execnet does by itself, and must not: stray modules, and words on the terminal."""
+"""Workers that execnet starts, on other hosts too, and what it must not do by itself."""
 
 from __future__ import annotations
 
+import os
+import shutil
+import socket
 import subprocess
 import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
+import psutil
 import pytest
 from execnet.gateway_io import popen_bootstrapline
 
 from pytest_simbench.client.connection import BOOTSTRAP
+from pytest_simbench.client.errors import Where
+from pytest_simbench.client.launch import Launch
+from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
@@ -52,3 +62,78 @@ def test_an_error_that_nobody_asked_for_is_not_printed(tmp_path: Path) -> None:
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )
     assert (done.stdout, done.stderr) == ("True\n", "")
+
+
+SSHD = shutil.which("sshd") or "/usr/sbin/sshd"
+
+
+@pytest.fixture
+def host(tmp_path: Path) -> Iterator[str]:
+    """An execnet specification of a host behind a real ssh server, on this machine's loopback."""
+    if not os.path.exists(SSHD):
+        pytest.skip("no ssh server here: apt-get install openssh-server")
+    for name in ("host", "user"):
+        command = ["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(tmp_path / name)]
+        subprocess.run(command, check=True)
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    if os.geteuid() == 0:
+        Path("/run/sshd").mkdir(exist_ok=True)
+    (tmp_path / "sshd_config").write_text(
+        f"Port {port}\nListenAddress 127.0.0.1\nHostKey {tmp_path / 'host'}\n"
+        f"AuthorizedKeysFile {tmp_path / 'user.pub'}\nStrictModes no\nPidFile none\n"
+        "PermitRootLogin yes\n"
+    )
+    (tmp_path / "ssh_config").write_text(
+        f"Host lab\n  HostName 127.0.0.1\n  Port {port}\n  IdentityFile {tmp_path / 'user'}\n"
+        "  StrictHostKeyChecking no\n  UserKnownHostsFile /dev/null\n  LogLevel ERROR\n"
+    )
+    server = subprocess.Popen([SSHD, "-D", "-e", "-f", str(tmp_path / "sshd_config")])
+    for _ in range(100):
+        with socket.socket() as trial:
+            if trial.connect_ex(("127.0.0.1", port)) == 0:
+                break
+        time.sleep(0.1)
+    yield f"ssh=lab//ssh_config={tmp_path / 'ssh_config'}//python={sys.executable}"
+    server.terminate()
+    server.wait()
+
+
+def test_another_host(case: Case, host: str) -> None:
+    local, _ = Repetition(Experiment(case, Falling()), 1).run()
+    remote, error = Repetition(Experiment(replace(case, spec=host), Falling()), 1).run()
+    assert error is None
+    assert remote.metrics == local.metrics
+    assert remote.versions == local.versions
+    assert remote.resources.get("rss_mb") is None  # its processes cannot be watched from here
+
+
+def test_a_host_without_this_run_folder(case: Case, tmp_path: Path) -> None:
+    """The worker logs to a temporary folder of its own there; on this machine it goes with it."""
+    launch = Launch(case.adapter, log=tmp_path / "not here" / "worker.log")
+    process = WorkerProcess(launch, Where("mujoco", "headless"))
+    assert process.request("hello")["pid"] == process.pid
+    assert process.pid is not None
+    folder = Path(psutil.Process(process.pid).cwd())
+    assert folder.name.startswith("simbench-")
+    assert (folder / "worker.log").exists()
+    process.close()
+    assert not folder.exists()
+
+
+def test_an_unknown_host(case: Case) -> None:
+    spec = "ssh=-o ConnectTimeout=2 no-such-host.invalid//python=python3"
+    record, _ = Repetition(
+        Experiment(replace(case, spec=spec, stall_timeout=10.0), Falling()), 1
+    ).run()
+    assert record.error is not None
+    assert record.error.type == "WorkerStartError"
+    assert "no-such-host.invalid" in record.error.message
+
+
+def test_a_popen_specification(case: Case) -> None:
+    spec = f"popen//execmodel=main_thread_only//python={sys.executable}"
+    record, error = Repetition(Experiment(replace(case, spec=spec), Falling()), 1).run()
+    assert (record.status, error) == ("ok", None)
+    assert record.resources["rss_mb"]["peak"] > 20

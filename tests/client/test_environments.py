@@ -1,9 +1,10 @@
-"""Interpreters of engines that cannot share pytest's: made for real, with a small package."""
+"""Interpreters of engines that cannot share pytest's: made for real, or the system's."""
 
 from __future__ import annotations
 
 import json
 import os
+import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -12,7 +13,7 @@ from pathlib import Path
 import pytest
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
-from pytest_simbench.client import installing
+from pytest_simbench.client import environments
 from pytest_simbench.client.environments import (
     MARKER,
     Environment,
@@ -21,8 +22,10 @@ from pytest_simbench.client.environments import (
     existing,
     interpreter,
     missing,
+    outside,
     remove,
 )
+from pytest_simbench.client.system import SystemPython
 from pytest_simbench.simulator import SimulatorInfo
 from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.registry import adapter
@@ -66,7 +69,7 @@ def test_create(info: SimulatorInfo) -> None:
 def test_two_that_make_the_same_wait_for_each_other(info: SimulatorInfo) -> None:
     """The second one finds it made, and says meanwhile what it waits for."""
     environment, told = Environment.of(info), []
-    with ThreadPoolExecutor() as pool, installing.alone(environment.folder, told.append):
+    with ThreadPoolExecutor() as pool, environments.alone(environment.folder, told.append):
         second = pool.submit(environment.create, told.append)
         while not told:
             assert not second.done()
@@ -82,7 +85,7 @@ def test_two_that_make_the_same_wait_for_each_other(info: SimulatorInfo) -> None
 def test_what_is_there_and_removing_it(info: SimulatorInfo) -> None:
     assert list(existing()) == []
     environment = half_made(info)
-    with installing.alone(environment.folder, print):
+    with environments.alone(environment.folder, print):
         assert list(existing()) == [environment.folder]
     remove(environment.folder)
     assert list(existing()) == []
@@ -133,7 +136,7 @@ def test_a_release_lives_in_its_own_even_where_the_engine_is_installed_here(
 def test_pips_configuration_is_uvs_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("UV_INDEX", "mine")
     told = {"index-url": "a", "extra-index-url": "b c", "find-links": "d e", "timeout": "9"}
-    assert installing._as_uv(told) == {"UV_DEFAULT_INDEX": "a", "UV_FIND_LINKS": "d,e"}
+    assert environments._as_uv(told) == {"UV_DEFAULT_INDEX": "a", "UV_FIND_LINKS": "d,e"}
 
 
 def test_one_that_does_not_install_stays_half_made(info: SimulatorInfo) -> None:
@@ -143,36 +146,29 @@ def test_one_that_does_not_install_stays_half_made(info: SimulatorInfo) -> None:
     assert "half installed: pytest --sim-install sixth" in str(missing(info))
 
 
-def test_an_engine_of_this_environment_has_none(info: SimulatorInfo) -> None:
-    with pytest.raises(SimulatorError, match="needs no environment of its own"):
-        Environment.of(replace(info, requirements=())).create()
-
-
-def test_absent(info: SimulatorInfo) -> None:
-    assert "not there yet: pytest --sim-install sixth" in str(missing(info))
-
-
-def test_cut_off_while_installing(info: SimulatorInfo) -> None:
-    half_made(info)
-    assert "half installed" in str(missing(info))
-
-
-@pytest.mark.parametrize("content", ["", "[]", "{}", "7"])
-def test_spoilt_marker(info: SimulatorInfo, content: str) -> None:
-    (half_made(info).folder / MARKER).write_text(content)
-    assert "half installed" in str(missing(info))
-
-
-def test_other_requirements_than_wanted(info: SimulatorInfo) -> None:
-    (half_made(info).folder / MARKER).write_text(json.dumps({"requirements": ["six==1.15.0"]}))
-    assert "holds six==1.15.0 instead of six==1.16.0" in str(missing(info))
-
-
-def test_lost_interpreter(info: SimulatorInfo) -> None:
-    environment = half_made(info)
-    environment.python.unlink()
-    (environment.folder / MARKER).write_text(json.dumps({"requirements": ["six==1.16.0"]}))
-    assert "lost its interpreter" in str(missing(info))
+@pytest.mark.parametrize(
+    ("marker", "python", "said"),
+    [
+        (None, False, "not there yet: pytest --sim-install sixth"),
+        (None, True, "half installed"),
+        ("", True, "half installed"),
+        ("[]", True, "half installed"),
+        ("{}", True, "half installed"),
+        ("7", True, "half installed"),
+        ('{"requirements": ["six==1.15.0"]}', True, "holds six==1.15.0 instead of six==1.16.0"),
+        ('{"requirements": ["six==1.16.0"]}', False, "lost its interpreter"),
+    ],
+)
+def test_what_is_wrong_with_one(
+    info: SimulatorInfo, marker: str | None, python: bool, said: str
+) -> None:
+    if python or marker is not None:
+        environment = half_made(info)
+        if marker is not None:
+            (environment.folder / MARKER).write_text(marker)
+        if not python:
+            environment.python.unlink()
+    assert said in str(missing(info))
 
 
 def test_caches_are_kept_beside_it_unless_the_user_says_where(
@@ -186,3 +182,112 @@ def test_caches_are_kept_beside_it_unless_the_user_says_where(
         assert cache_variables(info.caches, tmp_path) == {}
     finally:
         del os.environ["SIXTH_CACHE"]
+
+
+ABSENT = "no_such_module_here"
+
+
+@pytest.fixture
+def packaged() -> SimulatorInfo:
+    """A simulator whose engine no interpreter has."""
+    return replace(
+        MuJoCo.info,
+        name="packaged",
+        distribution="pip",
+        modules=(ABSENT,),
+        system_packages=("python3-numpy", "python3-packaged"),
+        install="apt-get install python3-numpy python3-packaged",
+    )
+
+
+def home(monkeypatch: pytest.MonkeyPatch, path: str | Path) -> None:
+    """Let another interpreter be the system's."""
+    monkeypatch.setattr(SystemPython, "python", Path(path))
+
+
+def script(folder: Path, text: str) -> Path:
+    """An executable that is no Python."""
+    path = folder / "python3"
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(0o755)
+    return path
+
+
+def test_absent_engine(packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch) -> None:
+    home(monkeypatch, sys.executable)
+    assert missing(packaged) == (
+        f"packaged comes with packages of the system, and {sys.executable} has no module {ABSENT}; "
+        "on Debian and Ubuntu: apt-get install python3-numpy python3-packaged; or name another: "
+        "--sim-python packaged=PATH"
+    )
+    assert interpreter(packaged) is None
+
+
+def test_one_module_of_several_is_enough(
+    packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A package that is not there has no modules; asking for one is an error in Python."""
+    home(monkeypatch, sys.executable)
+    versions = f"{ABSENT}.eight|{ABSENT}.nine"
+    assert SystemPython(replace(packaged, modules=(f"{versions}|json.decoder",))).problem is None
+    told = str(missing(replace(packaged, modules=(versions,))))
+    assert f"has no module {ABSENT}.eight or {ABSENT}.nine; on Debian" in told
+
+
+def test_engine_in_the_systems_python(
+    packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The system's Python finds a module that this process does not find."""
+    home(monkeypatch, sys.executable)
+    (tmp_path / f"{ABSENT}.py").write_text("raise SystemExit('a probe imports no engine')\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    packaged = replace(packaged, distribution="numpy")
+    other = outside(packaged)
+    assert isinstance(other, SystemPython)
+    assert missing(packaged) is None
+    assert interpreter(packaged) == sys.executable
+    assert other.version() == sys.modules["numpy"].__version__
+    assert other.place == f"in the system's Python, {sys.executable}"
+
+
+def test_a_file_in_the_working_folder_is_no_engine(
+    packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    home(monkeypatch, sys.executable)
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    monkeypatch.chdir(tmp_path)
+    Path("another_absent_module.py").touch()
+    Path("json.py").write_text("raise RuntimeError('stray')")
+    packaged = replace(packaged, modules=("another_absent_module",))
+    assert "no module another_absent_module" in str(SystemPython(packaged).problem)
+
+
+def test_an_engine_that_is_importable_here_runs_here(packaged: SimulatorInfo) -> None:
+    packaged = replace(packaged, modules=("json",))
+    assert outside(packaged) is None
+    assert missing(packaged) is None
+    assert interpreter(packaged) is None
+
+
+def test_no_such_interpreter(
+    packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    home(monkeypatch, tmp_path / "python3")
+    assert f"{tmp_path / 'python3'} does not run" in str(missing(packaged))
+    assert SystemPython(packaged).version() is None
+
+
+@pytest.mark.parametrize("text", ["exit 1", "echo hello", "kill -9 $$"])
+def test_something_that_is_no_interpreter(
+    packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, text: str
+) -> None:
+    home(monkeypatch, script(tmp_path, text))
+    assert "does not run" in str(missing(packaged))
+
+
+def test_python_that_is_too_old(
+    packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    answer = '{"python": [3, 10, 12], "version": "1", "absent": []}'
+    home(monkeypatch, script(tmp_path, f"echo '{answer}'"))
+    assert "is Python 3.10.12, older than 3.11" in str(missing(packaged))

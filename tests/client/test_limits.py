@@ -1,19 +1,24 @@
-"""No wait for a worker is without a limit, and Ctrl-C works in each of them."""
+"""No wait for a worker is without a limit, and Ctrl-C works in each; a full machine is told."""
 
 from __future__ import annotations
 
 import _thread
+import os
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from pytest_simbench.client import logs
+from pytest_simbench.client.crowding import crowding, scheduled
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
@@ -25,12 +30,12 @@ from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.repetition import Hooks, Repetition
 from pytest_simbench.records.record import Record
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
-from tests.client.test_faults import Silent
+from tests.client.failing import STALL, Silent, failure, faulty
 from tests.conftest import workers
 from tests.tiny import Falling
 
-STALL, DEADLINE = 2.0, 5.0
-"""Limits of these tests [s]."""
+DEADLINE = 5.0
+"""Of a repetition [s]."""
 
 SLACK = 4.0
 """Wall time that noticing, killing and recording may take on a busy machine [s]."""
@@ -49,11 +54,6 @@ class Sending(Falling):
         return Outcome()
 
 
-def unruly(case: Case, name: str, **changes: object) -> Case:
-    options = {"stall_timeout": STALL, "timeout": 60.0, **changes}
-    return replace(case, adapter=f"tests.client.unruly:{name}", **options)  # type: ignore[arg-type]
-
-
 @contextmanager
 def at_most(seconds: float) -> Iterator[None]:
     began, before = time.monotonic(), workers()
@@ -62,24 +62,17 @@ def at_most(seconds: float) -> Iterator[None]:
     assert not workers() - before
 
 
-def failure(case: Case, task: Falling | None = None) -> tuple[str, str, str]:
-    record, _ = Repetition(Experiment(case, task or Falling()), 1).run()
-    assert record.status == "failed"
-    assert record.error is not None
-    return record.error.type, record.error.phase, record.error.message
-
-
 @pytest.mark.parametrize("fault", ["StopsBetweenRequests", "HoldsTheInterpreter"])
 def test_sending_to_a_worker_that_does_not_read(case: Case, fault: str) -> None:
     with at_most(1.5 + STALL):
-        kind, phase, message = failure(unruly(case, fault), Sending())
+        kind, phase, message = failure(faulty(case, fault), Sending())
     assert (kind, phase) == ("WorkerHung", "send")
     assert "for 2 s" in message
     assert "--sim-stall-timeout" in message
 
 
 def test_sending_has_the_repetition_s_time_out_too(case: Case) -> None:
-    case = unruly(case, "StopsBetweenRequests", stall_timeout=60.0, timeout=DEADLINE)
+    case = faulty(case, "StopsBetweenRequests", stall_timeout=60.0, timeout=DEADLINE)
     with at_most(DEADLINE):
         kind, phase, message = failure(case, Sending())
     assert (kind, phase) == ("RepetitionTimeout", "send")
@@ -92,12 +85,12 @@ def test_sending_has_the_repetition_s_time_out_too(case: Case) -> None:
 )
 def test_silence_in_each_phase_is_the_stall_limit(case: Case, fault: str, phase: str) -> None:
     with at_most(1.5 + STALL):
-        assert failure(unruly(case, fault), Falling(1e6))[:2] == ("WorkerHung", phase)
+        assert failure(faulty(case, fault), Falling(1e6))[:2] == ("WorkerHung", phase)
 
 
 def test_signs_of_life_do_not_put_off_the_repetition_s_time_out(case: Case) -> None:
     with at_most(DEADLINE):
-        kind, phase, _ = failure(unruly(case, "Chatters", timeout=DEADLINE))
+        kind, phase, _ = failure(faulty(case, "Chatters", timeout=DEADLINE))
     assert (kind, phase) == ("RepetitionTimeout", "fall")
 
 
@@ -107,24 +100,24 @@ def test_signs_of_life_do_not_put_off_the_repetition_s_time_out(case: Case) -> N
 )
 def test_a_connection_that_is_none(case: Case, fault: str, kind: str) -> None:
     with at_most(1.5 + STALL):
-        found, phase, _ = failure(unruly(case, fault))
+        found, phase, _ = failure(faulty(case, fault))
     assert (found, phase) == (kind, "fall")
 
 
 def test_a_worker_that_does_not_close(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
-    record, _ = Repetition(Experiment(unruly(case, "StopsClosing"), Falling()), 1).run()
+    record, _ = Repetition(Experiment(faulty(case, "StopsClosing"), Falling()), 1).run()
     assert record.status == "ok"
     assert record.notes.closing == "the worker did not close within 10 s"
 
 
 def test_a_log_does_not_fill_the_disk(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert failure(unruly(case, "FloodsTheLog", stall_timeout=3.0))[0] == "WorkerHung"
+    assert failure(faulty(case, "FloodsTheLog", stall_timeout=3.0))[0] == "WorkerHung"
     (log,) = (case.folder / "logs").iterdir()
     assert log.stat().st_size < logs.LARGEST
 
 
 def test_a_log_is_cut_though_it_grew_at_once(case: Case) -> None:
-    record, _ = Repetition(Experiment(unruly(case, "FloodsAtOnce"), Falling()), 1).run()
+    record, _ = Repetition(Experiment(faulty(case, "FloodsAtOnce"), Falling()), 1).run()
     assert record.status == "ok"
     (log,) = (case.folder / "logs").iterdir()
     assert log.stat().st_size < 2 * logs.KEPT
@@ -184,7 +177,7 @@ def kept(case: Case, task: Falling, jobs: int = 1, last: int = 1) -> tuple[list[
     ],
 )
 def test_interrupt(case: Case, fault: str, task: Falling, jobs: int) -> None:
-    case = unruly(case, fault, stall_timeout=60.0)
+    case = faulty(case, fault, stall_timeout=60.0)
     thread = interrupt_after(4.0)
     with at_most(4.0):
         records, raised = kept(case, task, jobs, last=jobs)
@@ -276,7 +269,7 @@ def test_a_time_out_is_a_failure_also_while_the_run_is_interrupted(case: Case) -
 
 
 def test_an_episode_has_the_time_out_that_was_given(case: Case) -> None:
-    handle = SimulatorHandle(unruly(case, "Chatters", timeout=3.0, stall_timeout=60.0))
+    handle = SimulatorHandle(faulty(case, "Chatters", timeout=3.0, stall_timeout=60.0))
     scene = Falling().scene(1, Jitter())
     with at_most(5.0):
         with pytest.raises(Exception, match="--sim-timeout"), handle.episode(scene) as world:
@@ -290,3 +283,67 @@ def test_signals_reach_their_handler_when_the_block_ends() -> None:
         _thread.interrupt_main()
         reached = True
     assert reached
+
+
+@contextmanager
+def core_shared_with(others: int, pid: int) -> Iterator[None]:
+    """A process's main thread has one core, which `others` processes use without rest.
+
+    Each is in a session of its own: Linux shares a core out among sessions (`man 7 sched`).
+    """
+    cores = os.sched_getaffinity(pid)
+    os.sched_setaffinity(pid, {min(cores)})
+    command = ["taskset", "-c", str(min(cores)), sys.executable, "-c", "while True: pass"]
+    hogs = [subprocess.Popen(command, start_new_session=True) for _ in range(others)]
+    try:
+        yield
+    finally:
+        for hog in hogs:
+            hog.kill()
+            hog.wait()
+
+
+class Crowded(Falling):
+    """Falls for ever, on a core that is shared with four others once the world is there."""
+
+    def perform(self, world: World, seed: int, count: Count) -> Outcome:
+        assert world.process.pid is not None
+        with core_shared_with(4, world.process.pid), world.phase("fall"):
+            world.wait(1e6)
+        return Outcome()
+
+
+def threads(proc: Path, *stats: str) -> None:
+    for number, stat in enumerate(stats):
+        folder = proc / "7" / "task" / str(number)
+        folder.mkdir(parents=True)
+        (folder / "schedstat").write_text(stat)
+
+
+def test_a_late_worker_on_a_full_core_says_so(case: Case) -> None:
+    record, _ = Repetition(Experiment(replace(case, timeout=8.0), Crowded()), 1).run()
+    assert record.error is not None
+    assert (record.error.type, record.error.phase) == ("RepetitionTimeout", "fall")
+    assert "waited" in record.error.message
+    assert "--sim-jobs" in record.error.message
+
+
+def test_all_threads_count(tmp_path: Path) -> None:
+    threads(tmp_path, "3000000000 500000000 12\n", "1000000000 1500000000 5\n")
+    assert scheduled(7, tmp_path) == (4.0, 2.0)
+
+
+@pytest.mark.parametrize("stat", ["", "nothing"])
+def test_a_kernel_that_does_not_tell_is_no_full_machine(tmp_path: Path, stat: str) -> None:
+    threads(tmp_path, stat)
+    assert scheduled(7, tmp_path) == (0.0, 0.0)
+    assert scheduled(8, tmp_path) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(("waited", "told"), [(2.4, False), (2.6, True)])
+def test_a_little_waiting_is_not_told(
+    monkeypatch: pytest.MonkeyPatch, waited: float, told: bool
+) -> None:
+    """A fifth of the time is the limit: 2.5 of 12.5 s."""
+    monkeypatch.setattr("pytest_simbench.client.crowding.scheduled", lambda pid: (10.0, waited))
+    assert bool(crowding(7)) is told

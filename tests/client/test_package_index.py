@@ -8,13 +8,11 @@ import pytest
 
 from pytest_simbench.client import package_index
 from pytest_simbench.client.package_index import (
-    File,
     PackageIndexError,
     nearest,
     newest_of_minors,
     releases,
     unreleased,
-    usable,
 )
 
 PAGE = """<!DOCTYPE html><html><body>
@@ -30,7 +28,7 @@ PAGE = """<!DOCTYPE html><html><body>
 
 @pytest.fixture(autouse=True)
 def forget() -> None:
-    package_index._files.cache_clear()
+    package_index.releases.cache_clear()
 
 
 def test_what_can_be_installed_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -49,15 +47,6 @@ def test_an_index_that_does_not_answer_is_one_sentence(monkeypatch: pytest.Monke
     monkeypatch.setenv("PIP_EXTRA_INDEX_URL", "http://127.0.0.1:9/more")
     with pytest.raises(PackageIndexError, match=r"127.0.0.1: .*refused.*; check the network"):
         releases("engine")
-
-
-def test_json_of_an_index() -> None:
-    text = """{"files": [
-        {"filename": "e-1.0.tar.gz", "requires-python": ">=3.9", "yanked": false},
-        {"filename": "e-1.1.tar.gz", "yanked": "a reason"}, {"filename": "e-1.2.tar.gz"}]}"""
-    found = list(package_index._from_json(text))
-    assert found[0] == File("e-1.0.tar.gz", False, ">=3.9")
-    assert usable(found) == ["1.0", "1.2"]
 
 
 def test_the_last_of_each_minor_version() -> None:

@@ -17,7 +17,7 @@ from pytest_simbench.client import reaper
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
-from tests.client.test_limits import unruly
+from tests.client.failing import faulty
 from tests.conftest import workers
 from tests.tiny import Falling
 
@@ -42,7 +42,7 @@ def lives(pid: int) -> bool:
 @pytest.mark.parametrize(("fault", "status"), [("Parent", "ok"), ("ParentThatDies", "failed")])
 def test_children_of_an_engine(case: Case, tmp_path: Path, fault: str, status: str) -> None:
     ids = tmp_path / "ids"
-    case = unruly(case, fault, environment={"UNRULY": str(ids)}, stall_timeout=20.0)
+    case = faulty(case, fault, environment={"UNRULY": str(ids)}, stall_timeout=20.0)
     record, _ = Repetition(Experiment(case, Falling()), 1).run()
     assert record.status == status
     pids = [int(line) for line in ids.read_text().split()]
@@ -92,7 +92,7 @@ def started(folder: Path, adapter: str) -> tuple[subprocess.Popen[bytes], list[p
 @pytest.mark.parametrize(
     "adapter",
     ["pytest_simbench.sims.mujoco.adapter:MuJoCo", "tests.client.faulty:MuJoCo_Hung",
-     "tests.client.faulty:MuJoCo_Stopped", "tests.client.unruly:Parent"],
+     "tests.client.faulty:MuJoCo_Stopped", "tests.client.faulty:Parent"],
 )  # fmt: skip
 def test_a_killed_run_leaves_nothing(tmp_path: Path, adapter: str, number: int) -> None:
     program, family = started(tmp_path, adapter)
@@ -158,7 +158,7 @@ def test_a_reaper_that_was_stopped_ends_with_its_run() -> None:
 def test_temporary_files_of_workers_go_with_them(tmp_path: Path, killed: bool) -> None:
     """Whatever an engine leaves there, also when the run is killed."""
     script = SCRIPT if killed else SCRIPT.replace("1e6", "0.1")
-    adapter, told = "tests.client.unruly:LeavesFiles", tmp_path / "ids"
+    adapter, told = "tests.client.faulty:LeavesFiles", tmp_path / "ids"
     program = subprocess.Popen([sys.executable, "-c", script, str(tmp_path), adapter])
     while not (told.exists() and told.read_text()) and program.poll() is None:
         time.sleep(0.05)

@@ -12,12 +12,12 @@ import pytest
 
 from pytest_simbench.client.errors import Diverged, Where, WorkerError
 from pytest_simbench.cluster.executor import ClusterExecutor
-from pytest_simbench.cluster.job import Job, Packed, TaskFailed, heard, told
+from pytest_simbench.cluster.job import Job, Packed, TaskFailed, error_from_wire, error_to_wire
 from pytest_simbench.cluster.node import LatestJobs
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.identity import expected, robot_told
+from pytest_simbench.experiment.identity import describe_robot, expected
 from pytest_simbench.robot.registry import find
 from pytest_simbench.tasks import Stacking
 from tests.cluster.test_pool import A, Told
@@ -68,10 +68,10 @@ def test_a_robot_travels_by_content(
     assert there.robot is not None
     assert Path(there.robot.urdf).parent == tmp_path
     assert Path(there.robot.srdf).parent == tmp_path
-    assert robot_told(there.robot) == robot_told(robot)
+    assert describe_robot(there.robot) == describe_robot(robot)
     assert there.problem() is None
     own = Job.unpack(Job.of(Experiment(case, Stacking(robot=robot))).pack().data or b"")
-    assert robot_told(own.experiment(tmp_path).task.robot) == robot_told(robot)  # type: ignore[attr-defined]
+    assert describe_robot(own.experiment(tmp_path).task.robot) == describe_robot(robot)  # type: ignore[attr-defined]
 
 
 def test_it_is_packed_once_for_all_repetitions(case: Case) -> None:
@@ -105,22 +105,26 @@ def test_it_goes_to_a_node_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_errors_come_back_as_what_they_are() -> None:
     where = Where("mujoco", "headless", 1, 2022, "settle")
-    found = heard(
-        told(Diverged("cube_02 is not finite", where, "log")), Where("mujoco", "headless")
+    found = error_from_wire(
+        error_to_wire(Diverged("cube_02 is not finite", where, "log")), Where("mujoco", "headless")
     )
     assert isinstance(found, Diverged)
     assert (found.what, found.phase, found.log_tail) == ("cube_02 is not finite", "settle", "log")
-    other = heard(told(ZeroDivisionError("division by zero"), "Traceback ..."), where)
+    other = error_from_wire(
+        error_to_wire(ZeroDivisionError("division by zero"), "Traceback ..."), where
+    )
     assert isinstance(other, TaskFailed)
     assert not isinstance(other, WorkerError)
     assert str(other) == "ZeroDivisionError: division by zero\nTraceback ..."
-    assert heard(told(None), where) is None
+    assert error_from_wire(error_to_wire(None), where) is None
 
 
 def test_one_machine_marks_what_runs_side_by_side(case: Case) -> None:
     experiment = Experiment(case, Falling())
-    contended = [LocalExecutor(jobs).repetition(experiment, 1).case.contended for jobs in (1, 2)]
-    assert contended == [False, True]
+    for jobs in (1, 2):
+        executor = LocalExecutor(jobs)
+        assert executor.repetition(experiment, 1).case.contended == (jobs > 1)  # type: ignore[attr-defined]
+        executor.close()
 
 
 @pytest.mark.parametrize(

@@ -1,16 +1,97 @@
-"""Which node a repetition goes to, without any network."""
+"""What nodes offer, which of them a repetition goes to, and what is said where none will do."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Iterable
+from pathlib import Path
 
 import pytest
 
 from pytest_simbench.cluster import pool as module
-from pytest_simbench.cluster.offers import Node
+from pytest_simbench.cluster.offers import PLUGIN, PYTHON, Node, here, refusal, unmet
 from pytest_simbench.cluster.pool import Pool
-from tests.cluster.test_offers import lab
+from pytest_simbench.simulator.registry import adapter
+from tests.cluster.machines import release_in
+
+
+def node(name: str, *offers: str, slots: int = 1) -> Node:
+    found = Node.of(f"tcp://{name}:1", name, dict.fromkeys(("simbench", *offers), float(slots)))
+    assert found is not None
+    return found
+
+
+def lab(name: str, *offers: str) -> Node:
+    return node(name, PLUGIN, PYTHON, *offers)
+
+
+def test_a_machine_offers_what_is_ready_on_it() -> None:
+    offers = here(3, ["mujoco"])
+    assert set(offers.values()) == {3.0}
+    found = Node.of("tcp://here:1", "here", offers)
+    assert found is not None
+    assert found.slots == 3
+    assert found.version("mujoco")
+    assert found.has("mujoco", "headless")
+    assert not found.has("pybullet", "headless")
+    assert not found.stranger
+
+
+def test_a_release_with_an_environment_of_its_own_is_offered_by_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path))
+    name = release_in(tmp_path)
+    (tmp_path / "mujoco==0.1").mkdir()  # half made
+    (tmp_path / "nothing==1.0").mkdir()
+    found = Node.of("tcp://here:1", "here", here(1))
+    assert found is not None
+    assert found.has(name, "headless")
+    assert found.version("mujoco") == adapter("mujoco").info.tested_version
+    assert [offer for offer in found.offers if offer.count("==") == 2] == [f"{name}==unknown"]
+    assert f", {name}," in str(found)
+    assert str(unmet([lab("lab1", "mujoco==4.0.0")], name, ["headless"])) == (
+        f"no node of the cluster offers {name}: lab1 has mujoco 4.0.0; on one of them: pytest "
+        f"--sim-install {name}, and start it again"
+    )
+
+
+def test_a_worker_of_somebody_elses_is_no_node() -> None:
+    assert Node.of("tcp://other:1", "other", {"GPU": 2.0}) is None
+
+
+def test_a_simulator_that_nobody_has_is_named_with_what_each_has() -> None:
+    nodes = [lab("lab1", "mujoco==3.3.7"), lab("lab2", "drake==1.51.1", "display", "vulkan")]
+    assert unmet(nodes, "mujoco", ["headless"]) is None
+    assert unmet(nodes, "sapien", ["headless"]) == (
+        "no node of the cluster offers sapien: lab1 has mujoco 3.3.7; "
+        "lab2 has drake 1.51.1, display, vulkan"
+    )
+    assert unmet(nodes, "drake", ["headless", "gui"]) is None
+    assert str(unmet(nodes, "mujoco", ["gui"])).startswith(
+        "no node of the cluster offers mujoco with a display: "
+    )
+
+
+def test_two_versions_of_an_engine_do_not_make_one_result() -> None:
+    nodes = [lab("lab1", "mujoco==3.3.7"), lab("lab2", "mujoco==3.4.0"), lab("lab3")]
+    assert "3.3.7 (lab1), 3.4.0 (lab2)" in str(unmet(nodes, "mujoco", ["headless"]))
+
+
+@pytest.mark.parametrize(
+    ("stranger", "words"),
+    [
+        (node("old", "simbench==0.0.1", PYTHON), "runs pytest-simbench 0.0.1, and this is"),
+        (node("old", PLUGIN, "python==2.7"), "runs Python 2.7, and this is"),
+    ],
+)  # fmt: skip
+def test_other_versions_are_refused(stranger: Node, words: str) -> None:
+    told = refusal([lab("lab1"), stranger])
+    assert told.startswith(f"old {words}")
+    assert "install the same version" in told
+    assert not stranger.has("mujoco", "headless")
+    assert not refusal([lab("lab1")])
+    assert "start one" in refusal([])
 
 
 class Told(Pool):

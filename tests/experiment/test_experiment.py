@@ -1,4 +1,4 @@
-"""A task in a case: what all repetitions of a test have in common."""
+"""What all repetitions of a test have in common, protocols, and the record of a repetition."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import pytest
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.protocol import PROTOCOLS
-from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.experiment.repetition import Hooks, Repetition, group
 from pytest_simbench.simulator.errors import SimulatorError
-from pytest_simbench.tasks.base import Jitter
+from pytest_simbench.tasks.base import Jitter, Task
 from tests.tiny import Falling
 
 
@@ -59,3 +59,85 @@ def test_a_case_of_a_registered_simulator(case: Case) -> None:
     assert Case.of("mujoco", python="/a/python", **told).python == "/a/python"
     with pytest.raises(SimulatorError, match="mujoco"):
         Case.of("mojuco", **told)
+
+
+@dataclass(frozen=True)
+class Versions(Falling):
+    """A task that says which version of it this is."""
+
+    version: str = "as asked for"
+
+    def smoke(self) -> Versions:
+        return replace(self, version="the smallest")
+
+    def study(self) -> Versions:
+        return replace(self, version="the study's")
+
+
+def test_paper_runs_in_real_time_and_records_before(case: Case) -> None:
+    paper = replace(PROTOCOLS["paper"], before=1.0)
+    record, error = Repetition(
+        Experiment(replace(case, protocol=paper), Falling(duration=1.5)), 1
+    ).run()
+    assert error is None
+    began, ended = record.timeline["start"], record.timeline["end"]
+    assert began > 1.0
+    assert 1.45 < ended - began < 3.0
+    assert record.resources["phases"]["before"]["samples"] >= 7
+    assert record.stepping["wall"] < 0.5  # waiting for the clock is not the simulator's time
+
+
+def test_phases_follow_each_other(case: Case) -> None:
+    phases: list[str] = []
+    Repetition(Experiment(case, Falling()), 1, hooks=Hooks(phase=phases.append)).run()
+    assert [name for k, name in enumerate(phases) if phases[k - 1 : k] != [name]] == [
+        *("launch", "load", "launch", "task", "fall", "task"),
+    ]
+
+
+def test_fast_does_not_wait(case: Case) -> None:
+    record, _ = Repetition(Experiment(case, Falling(duration=100.0)), 1).run()
+    assert record.timeline["end"] - record.timeline["start"] < 50.0
+
+
+def test_each_protocol_has_its_version_of_a_task(case: Case) -> None:
+    def version(name: str, task: Task) -> Task:
+        return Experiment(replace(case, protocol=PROTOCOLS[name]), task).task
+
+    assert {name: version(name, Versions()) for name in PROTOCOLS} == {
+        "fast": Versions(version="as asked for"),
+        "paper": Versions(version="the study's"),
+        "smoke": Versions(version="the smallest"),
+    }
+    tiny = Falling(duration=0.1)  # a task with one version only
+    assert all(version(name, tiny) == tiny for name in PROTOCOLS)
+
+
+def test_a_record_says_what_it_was(case: Case) -> None:
+    case = replace(case, changes={"timestep": "0.002"}, seed=7, jitter=0.5)
+    record, _ = Repetition(Experiment(case, Falling()), 3).run()
+    assert (record.seed, record.repetition, record.jitter) == (9, 3, 0.5)
+    assert record.settings["timestep"] == 0.002
+    assert record.settings["task.duration"] == 0.6
+    assert {"mujoco", "python", "pytest-simbench"} <= set(record.versions)
+    assert record.stepping["simulated"] == pytest.approx(0.6)
+    assert record.resources["rss_mb"]["peak"] > 20
+    assert set(record.seconds) == {*("launch", "compile", "load", "plan", "step", "other", "total")}
+    assert record.notes.log.startswith("logs/")
+
+
+@pytest.mark.parametrize(
+    ("phase", "told"),
+    [
+        ("pick cube 3 of 15", "pick"),
+        ("recover from cube 12 of 15", "recover from"),
+        ("settle start", "settle start"),
+        ("settle", "settle"),
+        ("go home", "go home"),
+        ("wind up", "wind up"),
+        ("3 of 5", "3 of 5"),
+        ("step 3", "step"),
+    ],
+)
+def test_phases_that_count_on_are_told_together_and_no_others(phase: str, told: str) -> None:
+    assert group(phase) == told

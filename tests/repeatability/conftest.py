@@ -16,7 +16,7 @@ from pytest_simbench.records.metrics import Metric
 from pytest_simbench.repeatability.episode import Episodes
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.tasks import Jitter, LeaningTowers
-from pytest_simbench.tasks.base import Count, Outcome, Task, cube, generators
+from pytest_simbench.tasks.base import Count, Outcome, Randomness, Task, cube
 from tests.conftest import ADAPTERS
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
@@ -34,7 +34,7 @@ class Tumbling(Task):
     )
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
-        rng = generators(seed)[0]
+        rng = Randomness.of(seed).start
         cubes = [
             cube(
                 f"cube_{n}",

@@ -15,7 +15,7 @@ from pytest_simbench.robot.planning import MotionPlanner
 from pytest_simbench.scene import Box, Pose, Scene, Trajectory
 from pytest_simbench.tasks import Jitter, Stacking
 from pytest_simbench.tasks.arm import FULL_SPEED, LostCube, Speeds
-from pytest_simbench.tasks.base import generators
+from pytest_simbench.tasks.base import Randomness
 from pytest_simbench.tasks.manipulator import Manipulator
 from tests.tasks.scripted import Mishap, ScriptedProcess, ScriptedWorld, drop, move, put, slip
 
@@ -34,7 +34,7 @@ class Arm:
         scene = Stacking().scene(seed, Jitter(0.0, 0.0))
         self.world = ScriptedWorld(self.process, scene)
         self.process.where.phase = "it"
-        self.manipulator = Manipulator(self.world, generators(seed)[2], speeds)
+        self.manipulator = Manipulator(self.world, Randomness.of(seed).planner, speeds)
 
     @property
     def tools(self) -> list[Pose]:

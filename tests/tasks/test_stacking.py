@@ -16,7 +16,7 @@ from pytest_simbench.robot.files import read_robot
 from pytest_simbench.robot.registry import find
 from pytest_simbench.scene import Box, Pose
 from pytest_simbench.tasks import Jitter, Stacking
-from pytest_simbench.tasks.base import generators
+from pytest_simbench.tasks.base import Randomness
 from pytest_simbench.tasks.stacking import GRID, TABLE, TOWERS, Place, _placed, _strict
 from tests.robot.small_arm import TOML, URDF, small_arm
 from tests.tasks.scripted import (
@@ -302,7 +302,7 @@ def test_the_scene_is_the_studys() -> None:
 
 def test_the_start_is_disturbed_by_the_first_generator_of_the_seed() -> None:
     """Published seeds have their starts."""
-    rng = generators(2022)[0]
+    rng = Randomness.of(2022).start
     expected = [Jitter().disturbed(Pose.at(x, y, 0.325), rng) for x, y in GRID]
     assert [body.pose for body in Stacking().scene(2022, Jitter()).free_bodies] == expected
 

@@ -11,7 +11,7 @@ import pytest
 from pytest_simbench.robot.panda import READY
 from pytest_simbench.tasks import Jitter, Stacking, stacking
 from pytest_simbench.tasks.arm import Speeds
-from pytest_simbench.tasks.base import generators
+from pytest_simbench.tasks.base import Randomness
 from pytest_simbench.tasks.manipulator import Manipulator
 from tests.tasks.scripted import (
     Mishap,
@@ -73,7 +73,7 @@ def test_the_published_seeds_have_their_order() -> None:
     """By name, not by where the simulator lists them: records of other days stay comparable."""
     _, process = perform(Stacking(), seed=2022)
     names = sorted(body.name for body in Stacking().scene(2022, Jitter()).free_bodies)
-    expected = generators(2022)[1].permutation(names)
+    expected = Randomness.of(2022).order.permutation(names)
     assert [name for name, _ in process.released] == list(expected[:15])
     assert [name for name, _ in process.released][:3] == FIRST_OF_2022
 
@@ -90,7 +90,7 @@ def test_the_planner_has_a_generator_of_its_own(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(stacking, "Manipulator", Spy)
     perform(ONE, seed=5)
-    assert seen == [generators(5)[2].bit_generator.state]
+    assert seen == [Randomness.of(5).planner.bit_generator.state]
 
 
 # The study's rules

@@ -21,7 +21,7 @@ from pytest_simbench.simulator import ParityError, StateError
 from pytest_simbench.tasks import Stacking
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
 from pytest_simbench.worker.state import check_following, check_start, checked_state
-from tests.client.test_faults import Silent
+from tests.client.failing import Silent
 from tests.tiny import Falling
 from tests.worker.misshapen import BODIES, BUILT, JOINTS, LATER, LATER_TIMES, TIMES
 

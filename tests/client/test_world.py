@@ -1,13 +1,17 @@
-"""What a world keeps of its motion: samples and phases, along the way to its present state."""
+"""What a world keeps of its motion, and pictures along the way."""
 
 from __future__ import annotations
 
 import dataclasses
+import time
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from pytest_simbench.client.errors import Diverged, Where
+from pytest_simbench.client.frame import Frame
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.experiment.case import Case
@@ -66,3 +70,59 @@ def test_a_long_wait_is_kept_out_of_the_simulators_memory(case: Case) -> None:
     np.testing.assert_allclose(motion.time, np.arange(1, 2251) * 0.02)
     assert motion.bodies.nbytes > 55e6
     assert peaks[1] - peaks[0] < 20.0
+
+
+SIZE = (48, 36)
+
+
+def fallen(case: Case, film: bool) -> tuple[World, list[Frame]]:
+    process = WorkerProcess(case.launch("x"), Where(case.simulator, case.mode))
+    process.construct()
+    world, frames = World(process, SCENE), []
+    deadline = process.deadline = time.monotonic() + 100.0
+    if film:
+        world.film(frames.append, 0.04, SIZE)
+    world.wait(0.1)
+    world.wait(0.11)
+    if film:
+        world.film(None, 0.04, SIZE)
+        spent = sum(frame.seconds for frame in frames)
+        assert process.deadline == pytest.approx(deadline + spent)
+        assert (spent > 0) == (frames[0].picture is not None)
+    world.wait(0.1)
+    process.close()
+    return world, frames
+
+
+def test_pictures_are_evenly_spaced_and_change_nothing(case: Case) -> None:
+    world, frames = fallen(case, film=True)
+    assert [frame.time for frame in frames] == pytest.approx([0.04, 0.08, 0.12, 0.16, 0.2])
+    for frame in frames:
+        assert frame.problem == ""
+        assert frame.picture is not None
+        assert frame.picture.shape == (36, 48, 3)
+    without, none = fallen(case, film=False)
+    assert none == []
+    np.testing.assert_array_equal(world.bodies, without.bodies)
+
+
+def test_a_picture_that_cannot_be_drawn_ends_the_film_alone(case: Case) -> None:
+    world, frames = fallen(replace(case, adapter="tests.client.faulty:Blind"), film=True)
+    assert [frame.problem for frame in frames] == ["mujoco has no offscreen picture"]
+    assert world.time == pytest.approx(0.31)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        None,
+        {},
+        {"time": 0.0, "seconds": 0.0, "picture": "x"},
+        {"time": 0.0, "seconds": 0.0, "picture": {"__array__": ["|u1", [2, 2], b"1234"]}},
+        {"time": 0.0, "seconds": 0.0, "picture": {"__array__": ["<f8", [1], b"12345678"]}},
+    ],
+)
+def test_what_is_no_picture_is_a_problem(data: Any) -> None:
+    frame = Frame.from_wire(data, SIZE)
+    assert frame.picture is None
+    assert frame.problem.startswith("the engine drew what is no picture of (48, 36): ")
