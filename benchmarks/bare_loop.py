@@ -20,7 +20,6 @@ def main() -> None:
     import numpy as np
 
     from pytest_simbench.scene import Scene, Trajectory
-    from pytest_simbench.worker.stepping import Log
 
     module, _, name = order["adapter"].partition(":")
     cls = getattr(importlib.import_module(module), name)
@@ -37,18 +36,7 @@ def main() -> None:
     for row in commands:
         simulator.command(*row)
         simulator.step()
-    stepping = time.process_time() - began
-    if samples := order.get("samples"):  # benchmarks/traces.py
-        log, began = Log(), time.process_time()
-        for _ in range(samples):
-            log.sample(simulator)
-        print(json.dumps((time.process_time() - began) / samples))
-        began = time.process_time()
-        for _ in range(samples):  # as the worker's look for what is not finite does
-            simulator.joint_state()
-            simulator.body_state()
-        print(json.dumps((time.process_time() - began) / samples))
-    print(json.dumps(stepping))
+    print(time.process_time() - began)
 
 
 main()

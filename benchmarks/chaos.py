@@ -2,10 +2,10 @@
 
     python benchmarks/chaos.py [REPETITIONS] [SEED]
 
-Each repetition is a tiny task on one of four engines with one fault, drawn at random; the faults in
-workers are in chaos_faults.py, those of the run (Ctrl-C, killed pytest, killed display) here. Told
-at the end: records lost or with the wrong status, cause or seed; processes left behind; repetitions
-that took longer than their limits allow; differences between the tables and the truth.
+Each repetition is a tiny task on one of four engines with one fault, drawn at random; all faults
+are in chaos_faults.py, what happens in the run (Ctrl-C, killed pytest, killed display) is done
+here. Told at the end: records lost or with the wrong status, cause or seed; processes left behind;
+repetitions that took longer than their limits allow; differences between the tables and the truth.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ import threading
 import time
 import uuid
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 import psutil
-from chaos_faults import ADAPTERS, LATER
+from chaos_faults import ADAPTERS, FAULTS, Fault
+from common import arguments
 
 from pytest_simbench.client import reaper
 from pytest_simbench.client.display import Displays
@@ -40,11 +40,10 @@ from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.records.folder import RunFolder
-from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.summary import summarise
-from pytest_simbench.scene import Pose, Scene
-from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, cube
+from pytest_simbench.report.files import summaries_of
+from pytest_simbench.tasks.base import Count, Outcome
+from tests import tiny
 
 STALL, TIMEOUT, MEMORY = 5.0, 15.0, 200.0
 """Limits of every repetition: silence [s], time from launch [s], memory [MB]."""
@@ -55,123 +54,35 @@ WINDOW_STALL = 12.0
 SLACK = 15.0
 """Wall time beyond the limits for noticing, closing (10 s at most) and recording [s]."""
 
-DURATION = 0.6
-"""Simulated time that the task takes [s]; faults come at a random moment of its first 0.5 s."""
+ANYWHERE = ("", "ProtocolError", "OutOfMemory", "DisplayLost", "KeyboardInterrupt")
+"""Causes that may be seen in any phase; all others in that of the motion."""
 
-
-@dataclass(frozen=True)
-class Fault:
-    """What happens, and what the record must say.
-
-    Attributes:
-        name: of `chaos_faults`, or of this file.
-        status: of the record.
-        cause: type of its error, and a part of its message.
-        phase: of its error; None for any.
-    """
-
-    name: str
-    status: str = "failed"
-    cause: tuple[str, str] = ("", "")
-    phase: str | None = "fall"
-
-
-HUNG = ("WorkerHung", "no sign of life")
-FAULTS = (
-    Fault("none", "ok"),
-    Fault("SIGSEGV", cause=("WorkerExited", "SIGSEGV")),
-    Fault("SIGABRT", cause=("WorkerExited", "SIGABRT")),
-    Fault("SIGKILL", cause=("WorkerExited", "SIGKILL")),
-    Fault("SIGBUS", cause=("WorkerExited", "SIGBUS")),
-    Fault("SIGTERM of the worker", cause=("WorkerExited", "SIGTERM")),
-    Fault("SIGSTOP while starting", cause=HUNG, phase="launch"),
-    Fault("SIGSTOP while loading", cause=HUNG, phase="load"),
-    Fault("SIGSTOP while stepping", cause=HUNG),
-    Fault("SIGSTOP between requests", cause=HUNG),
-    Fault("SIGSTOP while closing", "ok"),
-    Fault("interpreter kept between requests", cause=HUNG),
-    Fault("hang, interpreter kept", cause=HUNG),
-    Fault("hang, interpreter free", cause=HUNG),
-    Fault("garbage on stdout", "ok"),
-    Fault("garbage among the messages", cause=("WorkerExited", "broke the connection")),
-    Fault("half a message", cause=HUNG),
-    Fault("connection closed", cause=("WorkerExited", "broke the connection")),
-    Fault("sys.exit", cause=("WorkerExited", "sys.exit(4)")),
-    Fault("os._exit", cause=("WorkerExited", "status 5")),
-    Fault("exception while starting", cause=("EngineFailed", "no licence"), phase="launch"),
-    Fault("exception while loading", cause=("EngineFailed", "no such shape"), phase="load"),
-    Fault("exception while reading back", cause=("EngineFailed", "cannot tell"), phase="load"),
-    Fault("exception while stepping", cause=("EngineFailed", "unhappy")),
-    Fault("exception while closing", "ok"),
-    Fault("base exception", cause=("EngineFailed", "from inside")),
-    Fault("huge message", cause=("EngineFailed", "more characters")),
-    Fault("surrogate message", cause=("EngineFailed", "\\ud800")),
-    Fault("endless recursion", cause=("EngineFailed", "RecursionError")),
-    Fault("state not a number", cause=("Diverged", "not finite")),
-    *(Fault(f"state {what}", cause=("BadState", "float64")) for what in ("of nothing", "a text")),
-    *(
-        Fault(f"time {what}", cause=("BadState", "the time must be"))
-        for what in ("not a number", "infinite", "stands still", "runs back", "jumps")
-    ),
-    Fault("versions of numbers", cause=("ProtocolError", "$.versions"), phase="launch"),
-    Fault("fork that answers", cause=("ProtocolError", "engine forks"), phase=None),
-    Fault("wrong shape", cause=("BadState", "float64 (2, 13)"), phase="load"),
-    Fault("wrong type of number", cause=("BadState", "float32"), phase="load"),
-    Fault("bodies in another order", cause=("BadState", "order"), phase="load"),
-    Fault("memory up to the limit", cause=("OutOfMemory", "--sim-memory-limit"), phase=None),
-    Fault("memory refused", cause=("OutOfMemory", "allocate")),
-    Fault("slow", cause=("RepetitionTimeout", "--sim-timeout")),
-    Fault("child left behind", "ok"),
-    Fault("child stopped, left behind", "ok"),
-    Fault("child stopped, waited for", cause=HUNG),
-    Fault("SIGSEGV of a child", cause=("EngineFailed", "SIGSEGV")),
-    Fault("daemon left behind", "ok"),
-    Fault("full disk for the log", "ok"),
-    Fault("log deleted", "ok"),
-    Fault("folder deleted", "ok"),
-    Fault("log flooded", "ok"),
-    Fault("display killed", cause=("DisplayLost", "SIGKILL"), phase=None),
-    Fault("Ctrl-C", "interrupted", ("KeyboardInterrupt", ""), None),
-    Fault("Ctrl-C three times", "interrupted", ("KeyboardInterrupt", ""), None),
-    Fault("SIGKILL of pytest"),
-    Fault("SIGTERM of pytest"),
-)
 OF_PYTEST = {"SIGKILL of pytest": signal.SIGKILL, "SIGTERM of pytest": signal.SIGTERM}
+CTRL_C = {"Ctrl-C": 1, "Ctrl-C three times": 3}
 WINDOWS = ("mujoco", "pybullet", "dart")
 """Engines whose window needs nothing but a display."""
 
 
 @dataclass(frozen=True)
-class Falling(Task):
-    """Two cubes fall and are counted on the ground."""
+class Falling(tiny.Falling):
+    """Two cubes fall for 0.6 s; faults come at a random moment of the first 0.5 s."""
 
-    name: ClassVar[str] = "falling"
     study_timeout: ClassVar[float] = TIMEOUT
 
-    fault: str = ""
-
-    @property
-    def metrics(self) -> tuple[Metric, ...]:
-        return (Metric("landed", "landed", kind="share", of=2, study=True),)
-
-    def scene(self, seed: int, jitter: Jitter) -> Scene:
-        places = (("left", 0.0), ("right", 0.2))
-        bodies = [cube(name, Pose.at(x, 0, 0.1), (1, 1, 1, 1)) for name, x in places]
-        return Scene("falling", tuple(bodies))
+    fault: str = "none"
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         with world.phase("fall"):
-            if self.fault in LATER:  # and then send more than a pipe holds
+            if FAULTS[self.fault].when == "later":  # and then send more than a pipe holds
                 time.sleep(1.0)
                 world.process.request("read_back", ballast=np.zeros(1_000_000))
             if self.fault == "display killed":
                 for child in psutil.Process().children():
                     if child.name() == "Xvfb":
                         child.kill()
-            if self.fault.startswith("Ctrl-C") or self.fault == "slow":
+            if self.fault in (*CTRL_C, "slow"):
                 world.wait(1e6)
-            world.wait(DURATION)
-        return Outcome({"landed": sum(p.position[2] < 0.03 for p in world.poses().values()) / 2})
+        return super().perform(world, seed, count)
 
 
 class Silent:
@@ -197,83 +108,79 @@ class Tally:
             print(f"    WRONG: {sentence}", flush=True)
 
 
-@contextmanager
-def ctrl_c(times: int, after: float) -> Iterator[None]:
-    """Interrupt this process a moment from now, once or more."""
-
-    def work() -> None:
-        time.sleep(after)
-        for _ in range(times):
-            _thread.interrupt_main()
-            time.sleep(0.01)
-
-    thread = threading.Thread(target=work)
-    if times:
-        thread.start()
-    yield
-    if times:
-        thread.join()
+def interrupt(times: int, after: float) -> None:
+    """Interrupt the main thread a moment from now, once or more."""
+    time.sleep(after)
+    for _ in range(times):
+        _thread.interrupt_main()
+        time.sleep(0.01)
 
 
-def one(case: Case, fault: Fault, number: int, rng: random.Random, tally: Tally) -> None:
+def one(case: Case, name: str, number: int, rng: random.Random, tally: Tally) -> None:
     """One repetition with one fault, in this process."""
     kept: list[Record] = []
-    folder = RunFolder(case.folder)
+    folder, fault, title = RunFolder(case.folder), FAULTS[name], f"{number} {case.simulator} {name}"
 
     def keep(record: Record) -> None:
         kept.append(record)
         folder.append(record)
 
-    times = {"Ctrl-C": 1, "Ctrl-C three times": 3}.get(fault.name, 0)
-    title = f"{number} {case.simulator} {fault.name}"
-    experiment = Experiment(case, Falling(fault.name))
+    experiment, times = Experiment(case, Falling(fault=name)), CTRL_C.get(name, 0)
+    folder.describe(experiment.task)
     repeater = Repeater(experiment, LocalExecutor(1), Silent(), keep)  # type: ignore[arg-type]
+    thread = threading.Thread(target=interrupt, args=(times, rng.uniform(0.5, 6.0)))
     try:
-        with ctrl_c(times, rng.uniform(0.5, 6.0)):
-            repeater.run([number])
+        if times:
+            thread.start()
+        repeater.run([number])
+        if times:
+            thread.join()
         tally.check(not times, f"{title}: Ctrl-C got lost")
     except KeyboardInterrupt:
         tally.check(bool(times), f"{title}: an interrupt came from nowhere")
     tally.lost += len(kept) != 1
     tally.check(len(kept) == 1, f"{title}: {len(kept)} records")
     for record in kept[:1]:
-        error = record.error
-        found = (record.status, error.type if error else "", error.phase if error else "")
-        wanted = (fault.status, fault.cause[0], found[2] if fault.phase is None else fault.phase)
-        if fault.status == "ok":
-            wanted = ("ok", "", "")
-        message = error.message if error else ""
-        tally.check(found == wanted, f"{title}: {found} instead of {wanted}: {message[:300]}")
-        tally.check(fault.cause[1] in message, f"{title}: the message is {message[:300]!r}")
-        tally.check(len(message) < 3000, f"{title}: a message of {len(message)} characters")
+        check_record(record, fault, title, tally)
         tally.check(record.seed == case.seed + number - 1, f"{title}: seed {record.seed}")
         tally.truth[case.simulator, case.mode, fault.status] += 1
+
+
+def check_record(record: Record, fault: Fault, title: str, tally: Tally) -> None:
+    """Status, cause and phase are those of the fault."""
+    error = record.error
+    found = (record.status, error.type if error else "")
+    message, phase = (error.message, error.phase) if error else ("", "")
+    tally.check(found == (fault.status, fault.cause[0]), f"{title}: {found}: {message[:300]}")
+    tally.check(fault.cause[1] in message, f"{title}: the message is {message[:300]!r}")
+    tally.check(len(message) < 3000, f"{title}: a message of {len(message)} characters")
+    tally.check(phase == "fall" or found[1] in ANYWHERE, f"{title}: in the phase {phase}")
 
 
 PYTEST = """
 from chaos import Falling
 def test_falling(repeat):
-    repeat(Falling("Ctrl-C"))
+    repeat(Falling())
 """
 
 
 def killed(engine: str, number: int, title: str, rng: random.Random, tally: Tally) -> None:
     """A pytest of its own, killed at a random moment of its second repetition or before."""
     folder, mark = Path(tempfile.mkdtemp(prefix="simbench-chaos-")), uuid.uuid4().hex
-    (folder / "test_chaos.py").write_text(PYTEST.replace('"Ctrl-C"', '""'))
-    environment = {**os.environ, "CHAOS_RUN": mark, "PYTHONPATH": str(Path(__file__).parent)}
+    (folder / "test_chaos.py").write_text(PYTEST)
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"--sim={engine}"]
     program = subprocess.Popen(
         [*command, "--reps=50", "--sim-output=out"],
         cwd=folder,
-        env=environment,
+        env={**os.environ, "CHAOS_RUN": mark, "PYTHONPATH": str(Path(__file__).parent)},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         start_new_session=True,
     )
     time.sleep(rng.uniform(0.5, 12.0))
     tally.check(program.poll() is None, f"{title}: pytest ended by itself")
-    os.killpg(program.pid, number)
+    with suppress(ProcessLookupError):
+        os.killpg(program.pid, number)
     program.wait()
     tally.check(not left("CHAOS_RUN", mark, 5.0, tally), f"{title}: processes were left behind")
     records = folder / "out" / "records.jsonl"
@@ -309,11 +216,10 @@ def check_tables(folder: Path, tally: Tally) -> None:
     reading = RunFolder(folder).read()
     tally.check(not reading.problems, f"records: {reading.problems}")
     tally.check(len(reading.records) == tally.truth.total(), f"{len(reading.records)} records")
-    (summary,) = summarise(reading.records, {"falling": Falling().metrics})
     found: Counter[tuple[str, str, str]] = Counter()
-    for row in summary.rows:  # one a configuration: each fault has an adapter with its settings
+    for row in (row for summary in summaries_of(reading) for row in summary.rows):
         counts = {"ok": row.finished, "failed": row.failed, "interrupted": row.interrupted}
-        for status, count in counts.items():
+        for status, count in counts.items():  # each fault has a row, as it has an adapter
             found[row.simulator, row.mode, status] += count
     for key in sorted(found | tally.truth):
         print(f"{' '.join(key)}: {found[key]}")
@@ -321,25 +227,23 @@ def check_tables(folder: Path, tally: Tally) -> None:
         tally.check(found[key] == tally.truth[key], told)
 
 
-def main(repetitions: str = "300", seed: str = "1") -> int:
+def main() -> int:
+    given = arguments(__doc__, {"repetitions": 300, "seed": 1})
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's & leaves it ignored
-    rng, tally, displays = random.Random(int(seed)), Tally(), Displays()
+    rng, tally, displays = random.Random(given.seed), Tally(), Displays()
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         os.environ.pop(name, None)
     folder = Path(tempfile.mkdtemp(prefix="simbench-chaos-"))
-    count = int(repetitions)
-    plan = [FAULTS[k % len(FAULTS)] for k in range(count)]
+    plan = [list(FAULTS)[k % len(FAULTS)] for k in range(given.repetitions)]
     rng.shuffle(plan)
-    run = reaper.new_mark().partition(".")[0]
-    began = time.monotonic()
-    for number, fault in enumerate(plan, start=1):
-        window = fault.name == "display killed"
+    run, began = reaper.new_mark().partition(".")[0], time.monotonic()
+    for number, name in enumerate(plan, start=1):
+        window, started = name == "display killed", time.monotonic()
         engine = rng.choice(WINDOWS if window else list(ADAPTERS))
-        title = f"{number} {engine} {fault.name}"
+        title = f"{number} {engine} {name}"
         print(title, flush=True)
-        started = time.monotonic()
-        if fault.name in OF_PYTEST:
-            killed(engine, OF_PYTEST[fault.name], title, rng, tally)
+        if name in OF_PYTEST:
+            killed(engine, OF_PYTEST[name], title, rng, tally)
         else:
             case = Case(
                 "chaos::test_falling",
@@ -348,23 +252,23 @@ def main(repetitions: str = "300", seed: str = "1") -> int:
                 "tuned",
                 f"chaos_faults:{engine}",
                 folder,
-                environment={"CHAOS": fault.name, "CHAOS_AT": str(rng.uniform(0.0, 0.5))},
+                environment={"CHAOS": name, "CHAOS_AT": str(rng.uniform(0.0, 0.5))},
                 display=displays if window else None,
                 timeout=TIMEOUT,
                 stall_timeout=WINDOW_STALL if window else STALL,
-                memory_limit=MEMORY if fault.name == "memory up to the limit" else None,
+                memory_limit=MEMORY if name == "memory up to the limit" else None,
             )
-            one(case, fault, number, rng, tally)
+            one(case, name, number, rng, tally)
         displays.close()
         took = time.monotonic() - started
         tally.seconds.append((took, title))
         tally.check(took < TIMEOUT + SLACK, f"{title}: {took:.1f} s")
-        reaper_only = left(reaper.VARIABLE, f"{run}.", 0.0, tally)
-        tally.check(not reaper_only, f"{title}: processes were left behind")
+        own = left(reaper.VARIABLE, f"{run}.", 0.0, tally)
+        tally.check(not own, f"{title}: processes were left behind")
     check_tables(folder, tally)
     longest, title = max(tally.seconds)
     print(
-        f"{count} repetitions with {len(FAULTS)} kinds of fault on {len(ADAPTERS)} engines in "
+        f"{len(plan)} repetitions with {len(FAULTS)} kinds of fault on {len(ADAPTERS)} engines in "
         f"{(time.monotonic() - began) / 60:.0f} min: {tally.lost} records lost, {tally.orphans} "
         f"processes left behind, longest {longest:.1f} s ({title}; limits {STALL:g} s of silence, "
         f"{TIMEOUT:g} s in all), {len(tally.wrong)} things wrong, {threading.active_count()} "
@@ -376,4 +280,4 @@ def main(repetitions: str = "300", seed: str = "1") -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:]))
+    sys.exit(main())

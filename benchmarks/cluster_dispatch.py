@@ -1,15 +1,14 @@
-"""What a cluster costs a repetition beside its work: 10,000 empty jobs on two nodes here.
+"""What a cluster costs a repetition beside its work: empty jobs on two nodes here.
 
     python benchmarks/cluster_dispatch.py [--jobs 10000] [--robot xarm7]
 
 All but the simulator is real: the repeater's threads, a slot for each job, the job packed and sent,
-a whole record sent back, read and written. Memory of this process is looked at on the way.
+a whole record sent back, read and written. The files of `--robot` go to the nodes too. Memory of
+this process is looked at on the way.
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
 import tempfile
 import time
 from dataclasses import replace
@@ -18,24 +17,18 @@ from pathlib import Path
 from typing import Any
 
 import psutil
+from common import REAL, arguments, case
 
-ROOT = Path(__file__).parent.parent
-sys.path.insert(0, str(ROOT))
-
-from pytest_simbench.cluster.executor import ClusterExecutor  # noqa: E402
-from pytest_simbench.cluster.pool import Pool  # noqa: E402
-from pytest_simbench.experiment.case import Case  # noqa: E402
-from pytest_simbench.experiment.experiment import Experiment  # noqa: E402
-from pytest_simbench.experiment.repeater import Repeater  # noqa: E402
-from pytest_simbench.records.folder import RunFolder  # noqa: E402
-from pytest_simbench.records.record import Record  # noqa: E402
-from pytest_simbench.report.progress import Progress  # noqa: E402
-from pytest_simbench.robot.registry import find  # noqa: E402
-from pytest_simbench.tasks import Stacking  # noqa: E402
-from tests.cluster.machines import Machines  # noqa: E402
-
-REAL = ROOT / "tests" / "measure" / "stacking_records.jsonl"
-"""Real records, for their size."""
+from pytest_simbench.cluster.executor import ClusterExecutor
+from pytest_simbench.cluster.pool import Pool
+from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.repeater import Repeater
+from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.records.record import Record
+from pytest_simbench.report.progress import Progress
+from pytest_simbench.robot.registry import find
+from pytest_simbench.tasks import Stacking
+from tests.cluster.machines import Machines
 
 
 def empty(line: str, job: Any, number: int) -> dict[str, Any]:
@@ -44,42 +37,35 @@ def empty(line: str, job: Any, number: int) -> dict[str, Any]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--jobs", type=int, default=10_000)
-    parser.add_argument("--robot", help="whose files go to the nodes; the Panda is there")
-    given = parser.parse_args()
-    jobs = given.jobs
-    process = psutil.Process()
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        with Machines(folder) as machines:
-            machines.wait("head")
-            for node in "ab":
-                machines.node(node, "--sim", "mujoco", "--slots", "8")
-            machines.wait()
-            case = Case.of("mujoco", test="t[m]", mode="headless", profile="tuned", folder=folder)
-            if given.robot:
-                case = replace(case, robot=find(given.robot))
-            experiment = Experiment(case, Stacking())
-            run = RunFolder(folder)
-            run.lock()
-            pool = Pool(machines.address)
-            pool.call = partial(empty, REAL.read_text().splitlines()[0])
-            memory: list[tuple[int, float]] = []
+    given = arguments(__doc__, {}, jobs=10_000, robot="")
+    with tempfile.TemporaryDirectory() as name, Machines(Path(name)) as machines:
+        machines.wait("head")
+        for node in "ab":
+            machines.node(node, "--sim", "mujoco", "--slots", "8")
+        machines.wait()
+        robot = find(given.robot) if given.robot else None
+        experiment = Experiment(case("mujoco", Path(name), robot=robot), Stacking())
+        run = RunFolder(Path(name))
+        run.lock()
+        pool = Pool(machines.address)
+        pool.call = partial(empty, REAL.read_text().splitlines()[0])
+        memory: dict[int, int] = {}
 
-            def keep(record: Record) -> None:
-                run.append(replace(record, repetition=len(run.own) + 1))
-                if len(run.own) % (jobs // 5) == 0:
-                    memory.append((len(run.own), process.memory_info().rss / 1e6))
+        def keep(record: Record) -> None:
+            run.append(replace(record, repetition=len(run.own) + 1))
+            if len(run.own) % (given.jobs // 5) == 0:
+                memory[len(run.own)] = round(psutil.Process().memory_info().rss / 1e6)
 
-            progress = Progress(lambda text: None, is_tty=True)
-            began, cpu = time.monotonic(), time.process_time()
-            Repeater(experiment, ClusterExecutor(pool), progress, keep).run(range(1, jobs + 1))
-            wall, cpu = time.monotonic() - began, time.process_time() - cpu
-            print(f"{jobs} jobs: {1e3 * wall / jobs:.2f} ms each, {1e3 * cpu / jobs:.2f} ms of CPU")
-            print("MB of memory:", ", ".join(f"{n}: {mb:.0f}" for n, mb in memory))
-            pool.close()
-            run.close()
+        repeater = Repeater(
+            experiment, ClusterExecutor(pool), Progress(lambda text: None, is_tty=True), keep
+        )
+        began, cpu = time.monotonic(), time.process_time()
+        repeater.run(range(1, given.jobs + 1))
+        wall, cpu = (1e3 * (time.monotonic() - began), 1e3 * (time.process_time() - cpu))
+        print(f"each job: {wall / given.jobs:.2f} ms, {cpu / given.jobs:.2f} ms of CPU here")
+        print("MB of memory, by jobs:", memory)
+        pool.close()
+        run.close()
 
 
 if __name__ == "__main__":

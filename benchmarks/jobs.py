@@ -2,6 +2,8 @@
 
     python benchmarks/jobs.py [--sim mujoco,pybullet,drake,sapien] [--reps 5] [--rounds 1]
 
+Bound: N jobs on N idle cores are at least 0.9 N times as fast.
+
 Each simulator lets the towers lean and throws, in a test each. Repetitions are real ones. `span` is
 from the beginning of the first test to the end of the last; `busy` is what the repetitions took
 together, as a share of the span of all jobs; `times` is the span with one job over this one.
@@ -12,7 +14,6 @@ root: `chrt -r 1 python benchmarks/jobs.py`.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import statistics
@@ -20,6 +21,8 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+from common import arguments
 
 TEST = """
 import os
@@ -53,13 +56,13 @@ WAYS = {
 }
 
 
-def measure(sims: str, reps: int, arguments: list[str]) -> tuple[float, float]:
+def measure(sims: str, reps: int, options: list[str]) -> tuple[float, float]:
     """Seconds of the span, and of all repetitions together."""
     with tempfile.TemporaryDirectory(prefix="simbench-jobs-") as name:
         folder = Path(name)
         (folder / "test_it.py").write_text(TEST)
         command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
-        command += [f"--sim={sims}", f"--reps={reps}", "--sim-output=out", *arguments]
+        command += [f"--sim={sims}", f"--reps={reps}", "--sim-output=out", *options]
         subprocess.run(
             command,
             cwd=folder,
@@ -74,29 +77,19 @@ def measure(sims: str, reps: int, arguments: list[str]) -> tuple[float, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--sim", default="mujoco,pybullet,drake,sapien")
-    parser.add_argument("--reps", type=int, default=5)
-    parser.add_argument("--rounds", type=int, default=1)
-    given = parser.parse_args()
+    given = arguments(__doc__, {}, sim="mujoco,pybullet,drake,sapien", reps=5, rounds=1)
     spans: dict[str, list[float]] = {way: [] for way in WAYS}
     busy: dict[str, list[float]] = {way: [] for way in WAYS}
     for _ in range(given.rounds):
-        for way, arguments in WAYS.items():
-            span, seconds = measure(given.sim, given.reps, arguments)
-            jobs = int(arguments[0][-1])
+        for way, options in WAYS.items():
+            span, seconds = measure(given.sim, given.reps, options)
             spans[way].append(span)
-            busy[way].append(seconds / jobs / span)
-            alone = statistics.median(spans["--sim-jobs 1"])
-            print(
-                f"{way:20} span {span:6.1f} s  repetitions {seconds:6.1f} s  "
-                f"busy {100 * busy[way][-1]:3.0f} %  {alone / span:.2f} times",
-                flush=True,
-            )
-    alone = statistics.median(spans["--sim-jobs 1"])
-    for way in WAYS:
-        span, share = statistics.median(spans[way]), statistics.median(busy[way])
-        print(f"| `{way}` | {span:.1f} s | {100 * share:.0f} % | {alone / span:.2f} |")
+            busy[way].append(seconds / int(options[0][-1]) / span)
+            print(f"{way:20} span {span:6.1f} s  repetitions {seconds:6.1f} s", flush=True)
+    middle = {way: statistics.median(found) for way, found in spans.items()}
+    for way, span in middle.items():
+        times, share = next(iter(middle.values())) / span, statistics.median(busy[way])
+        print(f"| `{way}` | {span:.1f} s | {100 * share:.0f} % | {times:.2f} |")
 
 
 if __name__ == "__main__":

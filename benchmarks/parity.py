@@ -13,20 +13,20 @@ from __future__ import annotations
 
 import sys
 from fnmatch import fnmatchcase
-from pathlib import Path
 
-from pytest_simbench.client.environments import missing
+from common import ROOT, arguments, present
+
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.parity import ParityResult
-from pytest_simbench.simulator.registry import adapter, registered
+from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.testing import CHECKS, Subject
 from pytest_simbench.testing.expected import read_expected_failures, reason_for
 from pytest_simbench.testing.faults import FAULTS, rounds
 from pytest_simbench.testing.parity import planted
 from pytest_simbench.testing.robot_faults import Fault
 
-PAGE = Path(__file__).parent.parent / "docs" / "parity.md"
-EXPECTED = read_expected_failures(PAGE.parents[1] / "tests" / "sims" / "expected_failures.txt")
+PAGE = ROOT / "docs" / "parity.md"
+EXPECTED = read_expected_failures(ROOT / "tests" / "sims" / "expected_failures.txt")
 
 IN_THE_ENGINE = {
     "what touches bounces": "body/*/restitution",
@@ -87,13 +87,22 @@ MEASURED = {
 }
 """The law of the kit that measures a quantity which an engine does not tell, first match."""
 
-
 NEEDING = {Capability.SELF_COLLIDE: "links_collide_when_asked"}
 """The law that finds a fault of what only some engines can."""
 
-
 HAS_NONE = (" has no ", " have no ", "neither ")
 """In a deviation's reason: the engine lacks the thing, so it cannot be wrong there."""
+
+BY_ANOTHER = {
+    ("pybullet", "joint/*/friction"): "`limp_arm_falls`",  # told as loaded, whatever came later
+    ("pybullet", "body/*/damping"): "`cube_spins_on`",
+}
+"""What an engine changes by itself, found by another law than what the scene changes."""
+
+UNCLAIMED = "not claimed"
+"""The adapter does not claim the capability, so nobody asks it."""
+
+NOT_MEASURED = "not measured"
 
 
 def by_law(subject: Subject, law: str) -> str:
@@ -111,33 +120,18 @@ def silent(subject: Subject, quantity: str) -> str:
     return by_law(subject, name)
 
 
-def cells(subject: Subject) -> dict[str, str]:
-    """What finds each of the faults, by its name."""
-    print(subject.name, file=sys.stderr, flush=True)
-    return {
-        name: cell(subject, fault, found)
-        for faults in rounds(subject.cls.info.capabilities)
-        for found in [planted(subject, faults.values())]
-        for name, fault in faults.items()
-    }
-
-
-def cell(subject: Subject, fault: Fault, found: ParityResult) -> str:
+def built(subject: Subject, fault: Fault, found: ParityResult) -> str:
+    """What finds a fault that the scene can have."""
     if fault.quantity in found.wrong:
         return "parity"
-    if fault.quantity in found.untold and fault.needs in NEEDING:
-        return by_law(subject, NEEDING[fault.needs])
-    return silent(subject, fault.quantity) if fault.quantity in found.untold else "**missed**"
-
-
-BY_ANOTHER = {
-    ("pybullet", "joint/*/friction"): "`limp_arm_falls`",  # told as loaded, whatever came later
-    ("pybullet", "body/*/damping"): "`cube_spins_on`",
-}
-"""What an engine changes by itself, found by another law than what the scene changes."""
+    if fault.quantity not in found.untold:
+        return "**missed**"
+    law = NEEDING.get(fault.needs)
+    return by_law(subject, law) if law else silent(subject, fault.quantity)
 
 
 def looked_up(subject: Subject, quantity: str) -> str:
+    """What finds a fault that only the engine's own functions can make."""
     if quantity.startswith("closure/") and not subject.can(Capability.LOOPS):
         return UNCLAIMED
     if (subject.name, quantity) in BY_ANOTHER:
@@ -148,26 +142,21 @@ def looked_up(subject: Subject, quantity: str) -> str:
     return silent(subject, example) if untold else "parity"
 
 
-UNCLAIMED = "not claimed"
-"""The adapter does not claim the capability, so nobody asks it."""
-
-NOT_MEASURED = "not measured"
-
-
 def in_time(subject: Subject, law: str, needs: Capability | None) -> str:
-    if needs is not None and not subject.can(needs):
-        return UNCLAIMED
-    return by_law(subject, law)
+    """What finds a fault of what happens in time."""
+    can = needs is None or subject.can(needs)
+    return by_law(subject, law) if can else UNCLAIMED
 
 
 def column(subject: Subject) -> dict[str, str]:
     """What finds each fault in one engine, by the fault in plain words."""
-    found = cells(subject)
-    return {
-        **{fault.what: found.get(name, UNCLAIMED) for name, fault in FAULTS.items()},
-        **{what: looked_up(subject, quantity) for what, quantity in IN_THE_ENGINE.items()},
-        **{what: in_time(subject, *law) for what, law in IN_TIME.items()},
-    }
+    print(subject.name, file=sys.stderr, flush=True)
+    column = {fault.what: UNCLAIMED for fault in FAULTS.values()}
+    for faults in rounds(subject.cls.info.capabilities):
+        found = planted(subject, faults.values())
+        column |= {fault.what: built(subject, fault, found) for fault in faults.values()}
+    column |= {what: looked_up(subject, quantity) for what, quantity in IN_THE_ENGINE.items()}
+    return column | {what: in_time(subject, *law) for what, law in IN_TIME.items()}
 
 
 def read(lines: list[str]) -> dict[str, dict[str, str]]:
@@ -185,7 +174,7 @@ def table(columns: dict[str, dict[str, str]]) -> list[str]:
 
 
 def main() -> None:
-    names = sys.argv[1:] or [name for name in registered() if not missing(adapter(name).info)]
+    names = arguments(__doc__, {"simulators": []}).simulators or present()
     text = PAGE.read_text("utf-8")
     before, _, rest = text.partition("<!-- table -->\n")
     old, _, after = rest.partition("<!-- end -->")

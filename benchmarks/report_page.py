@@ -1,70 +1,39 @@
-"""Size of `report.html`, and how long it takes to write and to open, for a run of eight simulators.
+"""Size of `report.html`, and how long it takes to write and to open in Chromium.
 
-Real records of few simulators are resampled to eight simulators x 2 tasks x 20 repetitions: each
-repetition is a recorded one, drawn with a fixed seed, under another name.
+    python benchmarks/report_page.py [RUN...] [--times 5]
 
-    python benchmarks/report_page.py RUN... [--keep FOLDER]
+Bounds: 8 MB, and 2 s from the address to the load event. The records of the run folders (without
+them: recorded ones of stacking) are resampled for 8 simulators, 20 repetitions of each task.
 """
 
 from __future__ import annotations
 
-import argparse
-import random
 import shutil
-import statistics
 import tempfile
 import time
-from dataclasses import replace
 from pathlib import Path
 
-from pytest_simbench.records.record import Record
-from pytest_simbench.report.matrix import with_differences
+from common import arguments, spread, write_run
+
+from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.report.files import in_order, summaries_of
 from pytest_simbench.report.page import PAGE_NAME, page_of
-from pytest_simbench.report.summary import summarise
-from pytest_simbench.tasks import Stacking, Throwing
 
-SIMULATORS, REPETITIONS, OPENED = 8, 20, 5
 LARGEST, LONGEST = 8.0, 2.0
-"""Of the page [MB], and from its address to its load event in a browser [s]."""
+"""Of the page [MB], and of the time to open it [s]."""
 
 
-def resampled(records: list[Record]) -> list[Record]:
-    """So many repetitions of so many simulators, of each task that the records have."""
-    draw = random.Random(0)
-    found = []
-    for task in sorted({record.task for record in records}):
-        names = sorted({r.simulator for r in records if r.task == task and r.ok})
-        for number in range(SIMULATORS):
-            name = names[number % len(names)]
-            new = name if number < len(names) else f"{name}_{number}"
-            pool = [r for r in records if (r.task, r.simulator) == (task, name) and r.ok]
-            for repetition in range(1, REPETITIONS + 1):
-                drawn = draw.choice(pool)
-                found.append(
-                    replace(
-                        drawn,
-                        simulator=new,
-                        test=drawn.test.replace(f"[{name}-", f"[{new}-"),
-                        repetition=repetition,
-                        seed=1000 + repetition,
-                        settings=pool[0].settings,
-                        versions=pool[0].versions,
-                    )
-                )
-    return found
-
-
-def opening(path: Path) -> list[float]:
+def opening(path: Path, number: int) -> list[float]:
     """Seconds from the address to the load event, each in a fresh context of the browser."""
     from playwright.sync_api import sync_playwright
 
-    browser_path = shutil.which("chromium")
-    if browser_path is None:
+    program = shutil.which("chromium")
+    if program is None:
         raise SystemExit("no chromium here: apt-get install chromium")
     times = []
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=browser_path, args=["--no-sandbox"])
-        for _ in range(OPENED):
+        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        for _ in range(number):
             page = browser.new_context(viewport={"width": 1400, "height": 900}).new_page()
             start = time.perf_counter()
             page.goto(path.as_uri(), wait_until="load")
@@ -75,40 +44,24 @@ def opening(path: Path) -> list[float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("run", type=Path, nargs="+", help="run folders with records.jsonl")
-    parser.add_argument("--keep", type=Path, help="write the page here")
-    given = parser.parse_args()
-    lines = [line for run in given.run for line in (run / "records.jsonl").open()]
-    records = resampled([Record.from_json(line) for line in lines])
-    tasks = (Stacking(), Throwing())
-    summaries = with_differences(
-        summarise(
-            records,
-            {task.name: task.metrics for task in tasks},
-            {task.name: task.references for task in tasks},
-        ),
-        records,
-    )
-    folder = given.keep or Path(tempfile.mkdtemp())
-    folder.mkdir(parents=True, exist_ok=True)
-    start = time.perf_counter()
-    page = page_of(folder, summaries, records)
-    written = time.perf_counter() - start
-    path = folder / PAGE_NAME
-    path.write_text(page, encoding="utf-8")
-    size = path.stat().st_size / 1e6
-    times = opening(path.resolve())
-    rows = sum(len(summary.rows) for summary in summaries)
-    dots = page.count('class="dot"')
-    print(f"{len(records)} repetitions in {rows} rows; {dots} dots")
+    given = arguments(__doc__, {"run": []}, times=5)
+    source = [record for run in given.run for record in RunFolder(Path(run)).read().records]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_run(folder, 160, source=source)
+        reading = RunFolder(folder).read()
+        summaries = summaries_of(reading)
+        start = time.perf_counter()
+        page = page_of(folder, summaries, in_order(reading.records))
+        written = time.perf_counter() - start
+        path = folder / PAGE_NAME
+        path.write_text(page, encoding="utf-8")
+        size = path.stat().st_size / 1e6
+        times = opening(path, given.times)
+    rows, dots = sum(len(s.rows) for s in summaries), page.count('class="dot"')
+    print(f"{len(reading.records)} repetitions in {rows} rows; {dots} dots")
     print(f"page: {size:.2f} MB (at most {LARGEST:g}), written in {written:.1f} s")
-    print(
-        f"opened in {statistics.median(times):.2f} s, slowest {max(times):.2f} s "
-        f"(at most {LONGEST:g})"
-    )
-    if given.keep is None:
-        shutil.rmtree(folder)
+    print(f"opened, s: {spread(times, '.2f')} (at most {LONGEST:g})")
     if size > LARGEST or max(times) > LONGEST:
         raise SystemExit("larger or slower than it may be")
 

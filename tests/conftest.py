@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import signal
+from importlib.util import find_spec
 from pathlib import Path
 
 # pytester takes out again what a test imports first; of matplotlib a part would then come twice.
@@ -70,6 +71,30 @@ def case_of(case: Case, name: str) -> Case:
 def workers() -> set[psutil.Process]:
     """Living processes that this one's workers are, or that these left behind."""
     return set(reaper.marked(reaper.new_mark().partition(".")[0]))
+
+
+WITH_ENGINE = {"mujoco": "testing/test_checks.py", "pybullet": "worker/test_watching.py"}
+"""Tests that cannot even be imported without this engine: their cheats derive from its adapter."""
+
+collect_ignore = [path for engine, path in WITH_ENGINE.items() if find_spec(engine) is None]
+
+ENGINE_ROOMS = {"sims", "testing"}
+"""Folders in which nearly every test asks an engine."""
+
+ENGINE_FIXTURES = {"case", "pytester", "machines"}
+"""Of tests that run MuJoCo, pytest with simulators, or a cluster of them."""
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Mark what the quick tier leaves out, `pytest tests -m "not engine"`.
+
+    A test that needs an engine and is not known here has the mark in its file. One that has
+    neither fails in the quick tier, which runs without any engine.
+    """
+    fixtures = set(getattr(item, "fixturenames", ()))
+    rooms = set(item.path.relative_to(Path(__file__).parent).parts)
+    if rooms & ENGINE_ROOMS or item.path.name == "test_browser.py" or fixtures & ENGINE_FIXTURES:
+        item.add_marker("engine")
 
 
 @pytest.fixture(autouse=True)
