@@ -6,8 +6,8 @@ has neither this package nor pytest nor a planner; numpy and the engine are all 
 
 from __future__ import annotations
 
-import importlib
 import json
+import pkgutil
 import runpy
 import sys
 import time
@@ -21,8 +21,7 @@ def main() -> None:
 
     from pytest_simbench.scene import Scene, Trajectory
 
-    module, _, name = order["adapter"].partition(":")
-    cls = getattr(importlib.import_module(module), name)
+    cls = pkgutil.resolve_name(order["adapter"])
     simulator = cls(cls.profiles["tuned"])
     scene = Scene.from_wire(order["scene"])
     if cls.info.costly_start:

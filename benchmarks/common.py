@@ -17,9 +17,8 @@ sys.path.insert(0, str(ROOT))  # for what the tests share
 from pytest_simbench.client.environments import missing  # noqa: E402
 from pytest_simbench.experiment.case import Case  # noqa: E402
 from pytest_simbench.records.folder import RunFolder  # noqa: E402
-from pytest_simbench.records.record import Record  # noqa: E402
 from pytest_simbench.simulator.registry import adapter, registered  # noqa: E402
-from pytest_simbench.tasks import Stacking, Throwing  # noqa: E402
+from pytest_simbench.tasks import Stacking  # noqa: E402
 
 REAL = ROOT / "tests" / "measure" / "stacking_records.jsonl"
 """Records of real repetitions."""
@@ -31,7 +30,7 @@ def arguments(doc: str | None, words: Mapping[str, Any], **options: Any) -> argp
     Args:
         doc: of the script.
         words: positional arguments and their defaults; a list takes all that are left.
-        options: `--name` for each, and its default; False makes a switch of it.
+        options: `--name` for each, and its default.
     """
     raw = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(description=doc, formatter_class=raw)
@@ -40,10 +39,7 @@ def arguments(doc: str | None, words: Mapping[str, Any], **options: Any) -> argp
         kind = str if many else type(default)
         parser.add_argument(name, nargs="*" if many else "?", type=kind, default=default)
     for name, default in options.items():
-        if default is False:
-            parser.add_argument(f"--{name}", action="store_true")
-        else:
-            parser.add_argument(f"--{name}", type=type(default), default=default)
+        parser.add_argument(f"--{name}", type=type(default), default=default)
     return parser.parse_args()
 
 
@@ -63,33 +59,29 @@ def spread(values: Sequence[float], form: str = ".3f") -> str:
     return f"{middle:{form}} (min {low:{form}}, max {high:{form}}, {len(values)} times)"
 
 
-def write_run(
-    folder: Path, number: int, *, simulators: int = 8, source: Sequence[Record] = ()
-) -> None:
-    """Write a run of so many records of each task, in turn of so many simulators.
+def write_run(folder: Path, number: int, simulators: int = 8) -> None:
+    """Write a run of so many records, in turn of so many simulators.
 
-    Each is a real one (of `source`, or of `REAL`) under another repetition and seed, drawn with a
-    fixed seed.
+    Each is a real one under another name, repetition and seed, drawn with a fixed seed.
     """
-    real = [r for r in source or RunFolder.of(REAL).read().records if r.ok]
+    real = [r for r in RunFolder.of(REAL).read().records if r.ok]
+    names = sorted({r.simulator for r in real})
+    pools = {name: [r for r in real if r.simulator == name] for name in names}
     draw, run = random.Random(0), RunFolder(folder)
     run.lock()
-    for task in (Stacking(), Throwing()):
-        names = sorted({r.simulator for r in real if r.task == task.name})
-        pools = {n: [r for r in real if (r.task, r.simulator) == (task.name, n)] for n in names}
-        for k in range(number if names else 0):
-            which, name = k % simulators, names[k % simulators % len(names)]
-            drawn = draw.choice(pools[name])
-            run.append(
-                replace(
-                    drawn,
-                    simulator=f"{name}_{which}",
-                    test=drawn.test.replace(f"[{name}-", f"[{name}_{which}-"),
-                    repetition=k // simulators + 1,
-                    seed=1000 + k // simulators,
-                    settings=pools[name][0].settings,
-                    versions=pools[name][0].versions,
-                )
+    run.describe(Stacking())
+    for k in range(number):
+        name = names[k % simulators % len(names)]
+        new, drawn = f"{name}_{k % simulators}", draw.choice(pools[name])
+        run.append(
+            replace(
+                drawn,
+                simulator=new,
+                test=drawn.test.replace(f"[{name}-", f"[{new}-"),
+                repetition=k // simulators + 1,
+                seed=1000 + k // simulators,
+                settings=pools[name][0].settings,
+                versions=pools[name][0].versions,
             )
-        run.describe(task)
+        )
     run.close()

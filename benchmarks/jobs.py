@@ -25,13 +25,9 @@ from pathlib import Path
 from common import arguments
 
 TEST = """
-import os
-import time
-
+import os, time
 import pytest
-
 from pytest_simbench.tasks import LeaningTowers, Throwing
-
 
 @pytest.fixture(autouse=True)
 def span():
@@ -40,20 +36,13 @@ def span():
     with open(os.environ["SPANS"], "a") as file:
         print(began, time.monotonic(), file=file)
 
-
 def test_towers(repeat):
     repeat(LeaningTowers())
-
 
 def test_throwing(repeat):
     repeat(Throwing())
 """
-WAYS = {
-    "--sim-jobs 1": ["--sim-jobs=1"],
-    "--sim-jobs 2": ["--sim-jobs=2"],
-    "--sim-jobs 2 -n 2": ["--sim-jobs=2", "-n2"],
-    "--sim-jobs 2 -n 4": ["--sim-jobs=2", "-n4"],
-}
+WAYS = ("--sim-jobs 1", "--sim-jobs 2", "--sim-jobs 2 -n 2", "--sim-jobs 2 -n 4")
 
 
 def measure(sims: str, reps: int, options: list[str]) -> tuple[float, float]:
@@ -63,33 +52,27 @@ def measure(sims: str, reps: int, options: list[str]) -> tuple[float, float]:
         (folder / "test_it.py").write_text(TEST)
         command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
         command += [f"--sim={sims}", f"--reps={reps}", "--sim-output=out", *options]
-        subprocess.run(
-            command,
-            cwd=folder,
-            check=True,
-            env={**os.environ, "SPANS": str(folder / "spans")},
-            stdout=subprocess.DEVNULL,
-        )
-        spans = [tuple(map(float, s.split())) for s in (folder / "spans").read_text().splitlines()]
+        spans = {**os.environ, "SPANS": str(folder / "spans")}
+        quiet = subprocess.DEVNULL
+        subprocess.run(command, cwd=folder, check=True, env=spans, stdout=quiet)
+        found = [tuple(map(float, s.split())) for s in (folder / "spans").read_text().splitlines()]
         records = map(json.loads, (folder / "out" / "records.jsonl").read_text().splitlines())
         busy = sum(record["seconds"]["total"] for record in records)
-    return max(end for _, end in spans) - min(begin for begin, _ in spans), busy
+    return max(end for _, end in found) - min(begin for begin, _ in found), busy
 
 
 def main() -> None:
     given = arguments(__doc__, {}, sim="mujoco,pybullet,drake,sapien", reps=5, rounds=1)
-    spans: dict[str, list[float]] = {way: [] for way in WAYS}
-    busy: dict[str, list[float]] = {way: [] for way in WAYS}
+    found: dict[str, list[tuple[float, float]]] = {way: [] for way in WAYS}
     for _ in range(given.rounds):
-        for way, options in WAYS.items():
-            span, seconds = measure(given.sim, given.reps, options)
-            spans[way].append(span)
-            busy[way].append(seconds / int(options[0][-1]) / span)
+        for way, measured in found.items():
+            span, seconds = measure(given.sim, given.reps, way.split())
+            measured.append((span, seconds / int(way.split()[1]) / span))
             print(f"{way:20} span {span:6.1f} s  repetitions {seconds:6.1f} s", flush=True)
-    middle = {way: statistics.median(found) for way, found in spans.items()}
-    for way, span in middle.items():
-        times, share = next(iter(middle.values())) / span, statistics.median(busy[way])
-        print(f"| `{way}` | {span:.1f} s | {100 * share:.0f} % | {times:.2f} |")
+    medians = {way: tuple(map(statistics.median, zip(*found[way], strict=True))) for way in WAYS}
+    for way, (span, busy) in medians.items():
+        times = medians[WAYS[0]][0] / span
+        print(f"| `{way}` | {span:.1f} s | {100 * busy:.0f} % | {times:.2f} |")
 
 
 if __name__ == "__main__":

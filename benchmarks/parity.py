@@ -1,4 +1,4 @@
-"""The table of planted faults: what finds each, in each engine. Writes docs/parity.md.
+"""The table of planted faults, docs/data/planted_faults.csv: what finds each, in each engine.
 
     python benchmarks/parity.py [SIMULATOR ...]
 
@@ -11,6 +11,7 @@ Columns of simulators that are not named, or not here, stay as they are.
 
 from __future__ import annotations
 
+import csv
 import sys
 from fnmatch import fnmatchcase
 
@@ -25,7 +26,7 @@ from pytest_simbench.testing.faults import FAULTS, rounds
 from pytest_simbench.testing.parity import planted
 from pytest_simbench.testing.robot_faults import Fault
 
-PAGE = ROOT / "docs" / "parity.md"
+TABLE = ROOT / "docs" / "data" / "planted_faults.csv"
 EXPECTED = read_expected_failures(ROOT / "tests" / "sims" / "expected_failures.txt")
 
 IN_THE_ENGINE = {
@@ -87,9 +88,6 @@ MEASURED = {
 }
 """The law of the kit that measures a quantity which an engine does not tell, first match."""
 
-NEEDING = {Capability.SELF_COLLIDE: "links_collide_when_asked"}
-"""The law that finds a fault of what only some engines can."""
-
 HAS_NONE = (" has no ", " have no ", "neither ")
 """In a deviation's reason: the engine lacks the thing, so it cannot be wrong there."""
 
@@ -99,10 +97,8 @@ BY_ANOTHER = {
 }
 """What an engine changes by itself, found by another law than what the scene changes."""
 
-UNCLAIMED = "not claimed"
-"""The adapter does not claim the capability, so nobody asks it."""
-
-NOT_MEASURED = "not measured"
+WHAT, UNCLAIMED = "planted fault", "not claimed"
+"""The first column; and of an adapter that does not claim a capability, so nobody asks it."""
 
 
 def by_law(subject: Subject, law: str) -> str:
@@ -126,8 +122,9 @@ def built(subject: Subject, fault: Fault, found: ParityResult) -> str:
         return "parity"
     if fault.quantity not in found.untold:
         return "**missed**"
-    law = NEEDING.get(fault.needs)
-    return by_law(subject, law) if law else silent(subject, fault.quantity)
+    if fault.needs is Capability.SELF_COLLIDE:
+        return by_law(subject, "links_collide_when_asked")
+    return silent(subject, fault.quantity)
 
 
 def looked_up(subject: Subject, quantity: str) -> str:
@@ -142,12 +139,6 @@ def looked_up(subject: Subject, quantity: str) -> str:
     return silent(subject, example) if untold else "parity"
 
 
-def in_time(subject: Subject, law: str, needs: Capability | None) -> str:
-    """What finds a fault of what happens in time."""
-    can = needs is None or subject.can(needs)
-    return by_law(subject, law) if can else UNCLAIMED
-
-
 def column(subject: Subject) -> dict[str, str]:
     """What finds each fault in one engine, by the fault in plain words."""
     print(subject.name, file=sys.stderr, flush=True)
@@ -156,31 +147,27 @@ def column(subject: Subject) -> dict[str, str]:
         found = planted(subject, faults.values())
         column |= {fault.what: built(subject, fault, found) for fault in faults.values()}
     column |= {what: looked_up(subject, quantity) for what, quantity in IN_THE_ENGINE.items()}
-    return column | {what: in_time(subject, *law) for what, law in IN_TIME.items()}
-
-
-def read(lines: list[str]) -> dict[str, dict[str, str]]:
-    """The columns of a table, by simulator and fault."""
-    (_, *names), _, *rows = (line.strip("| ").split(" | ") for line in lines)
-    return {name: {row[0]: row[1 + k] for row in rows} for k, name in enumerate(names)}
-
-
-def table(columns: dict[str, dict[str, str]]) -> list[str]:
-    names = sorted(columns)
-    rows = [["planted fault", *names], ["---"] * (1 + len(names))]
-    for what in [*(fault.what for fault in FAULTS.values()), *IN_THE_ENGINE, *IN_TIME]:
-        rows.append([what, *(columns[name].get(what, NOT_MEASURED) for name in names)])
-    return [f"| {' | '.join(row)} |" for row in rows]
+    for what, (law, needs) in IN_TIME.items():
+        can = needs is None or subject.can(needs)
+        column[what] = by_law(subject, law) if can else UNCLAIMED
+    return column
 
 
 def main() -> None:
     names = arguments(__doc__, {"simulators": []}).simulators or present()
-    text = PAGE.read_text("utf-8")
-    before, _, rest = text.partition("<!-- table -->\n")
-    old, _, after = rest.partition("<!-- end -->")
     measured = {name: column(Subject(adapter(name))) for name in names}
-    lines = "\n".join(table({**read(old.splitlines()), **measured}))
-    PAGE.write_text(f"{before}<!-- table -->\n{lines}\n<!-- end -->{after}", "utf-8")
+    rows: dict[str, dict[str, str]] = {}
+    if TABLE.exists():
+        with TABLE.open(newline="", encoding="utf-8") as file:
+            rows = {row[WHAT]: row for row in csv.DictReader(file)}
+    known = {name for row in rows.values() for name in row} - {WHAT}
+    with TABLE.open("w", newline="", encoding="utf-8") as file:
+        columns = [WHAT, *sorted(known | {*names})]
+        writer = csv.DictWriter(file, columns, "not measured", lineterminator="\n")
+        writer.writeheader()
+        for what in [*(fault.what for fault in FAULTS.values()), *IN_THE_ENGINE, *IN_TIME]:
+            now = {name: found[what] for name, found in measured.items()}
+            writer.writerow({**rows.get(what, {}), WHAT: what, **now})
 
 
 if __name__ == "__main__":

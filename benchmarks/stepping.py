@@ -43,13 +43,12 @@ def motion() -> Trajectory:
     assert SCENE.robot is not None
     model = RobotModel(SCENE.robot)
     start = SCENE.robot.column("initial_position")[:7]
-    timed = straight_move(
-        start, start + np.array([0.8, -0.2, 0, 0, 0, 0, 0.5]), model.limits, speed=0.1
-    )
-    rows = len(timed.position)
-    position = np.hstack([timed.position, np.full((rows, 2), 0.035)])
-    velocity, acceleration = (
-        np.hstack([part, np.zeros((rows, 2))]) for part in (timed.velocity, timed.acceleration)
+    end = start + np.array([0.8, -0.2, 0, 0, 0, 0, 0.5])
+    timed = straight_move(start, end, model.limits, speed=0.1)
+    rows, arm = len(timed.position), (timed.position, timed.velocity, timed.acceleration)
+    position, velocity, acceleration = (
+        np.hstack([part, np.full((rows, 2), value)])
+        for part, value in zip(arm, (0.035, 0.0, 0.0), strict=True)
     )
     gravity = np.array(SCENE.gravity)
     effort = model.inverse_dynamics(gravity, position, velocity, acceleration)
@@ -119,8 +118,8 @@ def main() -> None:
             alone = bare(name, trajectory)
             stepping, whole, reading = worker(name, trajectory, watched=True)
             _, unwatched, _ = worker(name, trajectory, watched=False)
-            for values, seconds in zip(ratios.values(), (stepping, whole, unwatched), strict=True):
-                values.append(seconds / alone)
+            for values, cpu in zip(ratios.values(), (stepping, whole, unwatched), strict=True):
+                values.append(cpu / alone)
             readings.append(1000 * reading)
         for title, values in ratios.items():
             print(f"{name}: {title}, over the bare loop: {spread(values)}")
