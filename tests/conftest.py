@@ -31,7 +31,11 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile("simbench-tests", deadline=None)  # speed is measured in benchmarks/
+settings.register_profile("simbench-quick", deadline=None, max_examples=20)
 settings.load_profile("simbench-tests")
+
+QUICK = "not engine"
+"""What `-m` says for the quick tier."""
 
 ADAPTERS = {name: entry.value for name, entry in registered().items()}
 """Every registered adapter, as workers name it."""
@@ -81,8 +85,14 @@ collect_ignore = [path for engine, path in WITH_ENGINE.items() if find_spec(engi
 ENGINE_ROOMS = {"sims", "testing"}
 """Folders in which nearly every test asks an engine."""
 
-ENGINE_FIXTURES = {"case", "pytester", "machines"}
+ENGINE_FIXTURES = {"case", "machines", "pytester", "stepper"}
 """Of tests that run MuJoCo, pytest with simulators, or a cluster of them."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """The quick tier draws a fifth of Hypothesis' examples; the whole suite draws all of them."""
+    if config.getoption("markexpr") == QUICK:
+        settings.load_profile("simbench-quick")
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
