@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 from importlib.util import find_spec
 from pathlib import Path
@@ -85,6 +86,25 @@ collect_ignore = [path for engine, path in WITH_ENGINE.items() if find_spec(engi
 ENGINE_ROOMS = {"sims", "testing"}
 """Folders in which nearly every test asks an engine."""
 
+SLOW = {
+    "test_a_planted_loss_is_caught_and_no_change_is_not",
+    "test_equal_sides_are_told_apart_in_one_of_twenty_runs",
+    "test_error_rates",
+    "test_false_alarms_of_yes_and_no_stay_below_one_in_twenty",
+    "test_false_alarms_stay_below_one_in_twenty_even_without_a_margin",
+    "test_it_lands_elsewhere_if_asked_to",
+    "test_other_seeds_and_many_tests_do_not_hide_crashes",
+    "test_pictures_stay_in_their_folder",
+    "test_planted_changes_are_found_where_they_are",
+    "test_shrinks_to_the_smallest_amount",
+    "test_the_file_has_what_the_command_finds",
+    "test_the_jitter_moves_and_turns_every_cube_both_ways",
+    "test_the_order_of_the_cubes_is_by_seed",
+    "test_the_shares_are_of_all_places_also_of_those_never_filled",
+    "test_without_a_change_one_row_in_twenty_has_one_at_most",
+}
+"""They take more than a second of CPU time each, and no engine. The quick tier leaves them out."""
+
 ENGINE_FIXTURES = {"case", "machines", "pytester", "stepper"}
 """Of tests that run MuJoCo, pytest with simulators, or a cluster of them."""
 
@@ -93,6 +113,7 @@ def pytest_configure(config: pytest.Config) -> None:
     """The quick tier draws a fifth of Hypothesis' examples; the whole suite draws all of them."""
     if config.getoption("markexpr") == QUICK:
         settings.load_profile("simbench-quick")
+        os.environ.setdefault("SIMBENCH_FUZZ", "5")  # tests/plugin/test_fuzz.py
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
@@ -105,6 +126,14 @@ def pytest_itemcollected(item: pytest.Item) -> None:
     rooms = set(item.path.relative_to(Path(__file__).parent).parts)
     if rooms & ENGINE_ROOMS or item.path.name == "test_browser.py" or fixtures & ENGINE_FIXTURES:
         item.add_marker("engine")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """The quick tier leaves out what is slow, too."""
+    if config.getoption("markexpr") == QUICK:
+        slow = [item for item in items if getattr(item, "originalname", item.name) in SLOW]
+        config.hook.pytest_deselected(items=slow)
+        items[:] = [item for item in items if item not in slow]
 
 
 @pytest.fixture(autouse=True)

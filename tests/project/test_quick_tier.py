@@ -59,3 +59,17 @@ def test_ci_runs_it_on_each_python_and_pytest_with_no_simulator() -> None:
 def test_ci_still_runs_everything() -> None:
     commands = [step.get("run", "") for step in CI["jobs"]["engines"]["steps"]]
     assert [command for command in commands if "bash .ci/run" in command]
+
+
+def test_what_is_slow_is_left_out_and_its_names_are_those_of_tests() -> None:
+    sources = [path.read_text("utf-8") for path in (ROOT / "tests").glob("*/test_*.py")]
+    gone = [name for name in conftest.SLOW if not any(f"def {name}(" in s for s in sources)]
+    assert gone == []
+    left = [SimpleNamespace(name="test_fine", originalname="test_fine")]
+    slow = SimpleNamespace(name="test_error_rates[0.0]", originalname="test_error_rates")
+    items: Any = [*left, slow]
+    told: list[Any] = []
+    hook = SimpleNamespace(pytest_deselected=lambda items: told.extend(items))
+    config: Any = SimpleNamespace(getoption=lambda name: conftest.QUICK, hook=hook)
+    conftest.pytest_collection_modifyitems(config, items)
+    assert (items, told) == (left, [slow])
