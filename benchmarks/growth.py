@@ -1,141 +1,92 @@
-"""What a run of many records costs: reading, tables, gate and page, from 10 to 100,000 records.
+"""What a run of many records costs: reading, report and gate, from 10 to 100,000 records.
 
-    python benchmarks/growth.py [--most 100000] [--figure docs/pictures/growth.png]
+    python benchmarks/growth.py [--most 100000]
 
-Recorded repetitions are resampled into a folder: 8 simulators, each record a real one under another
-repetition and seed. Each size is measured in a process of its own.
+Bounds: no part grows faster than the records; `report.html` has at most 8 MB, and Chromium opens it
+in 2 s, from the address to the load event. CPU seconds, memory at its peak and the page's size;
+each number of records in a process of its own, on recorded repetitions that are resampled for 8
+simulators. Where Chromium is missing, nothing is opened.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
-import random
+import shutil
+import statistics
 import subprocess
 import sys
 import tempfile
 import time
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
-ROOT = Path(__file__).parent.parent
-sys.path.insert(0, str(ROOT))
+from common import arguments, write_run
 
-REAL = ROOT / "tests" / "measure" / "stacking_records.jsonl"
-SIMULATORS = 8
-PARTS = ("reading", "tables", "page", "gate")
+from pytest_simbench.measure.gate import run_gate
+from pytest_simbench.measure.limits import parse_limits
+from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.report.files import write_report
+from pytest_simbench.report.page import PAGE_NAME
 
-
-def resampled(folder: Path, number: int) -> None:
-    """Write so many records into a run folder."""
-    from pytest_simbench.records.folder import RunFolder
-    from pytest_simbench.tasks import Stacking
-
-    draw = random.Random(0)
-    real = [json.loads(line) for line in REAL.read_text().splitlines()]
-    real = [record for record in real if record["status"] == "ok"]
-    names = sorted({record["simulator"] for record in real})
-    with (folder / "records.jsonl").open("w") as file:
-        for k in range(number):
-            simulator = k % SIMULATORS
-            name = names[simulator % len(names)]
-            pool = [record for record in real if record["simulator"] == name]
-            new = f"{name}_{simulator}"
-            record = dict(draw.choice(pool))
-            record |= {
-                "simulator": new,
-                "test": record["test"].replace(f"[{name}-", f"[{new}-"),
-                "repetition": k // SIMULATORS + 1,
-                "seed": 1000 + k // SIMULATORS,
-                "settings": pool[0]["settings"],
-                "versions": pool[0]["versions"],
-            }
-            file.write(json.dumps(record) + "\n")
-    run = RunFolder(folder)
-    run.lock()
-    run.describe(Stacking())
-    run.close()
+LARGEST, LONGEST, OPENED = 8.0, 2.0, 5
+"""Of the page [MB], of the time to open it [s], and how often it is opened."""
 
 
 def measure(folder: Path) -> dict[str, float]:
-    """Seconds of each part, and the largest memory of this process [MB]."""
-    from pytest_simbench.measure.gate import run_gate
-    from pytest_simbench.measure.limits import parse_limits
-    from pytest_simbench.records.folder import RunFolder
-    from pytest_simbench.report.files import in_order, summaries_of
-    from pytest_simbench.report.page import page_of
-    from pytest_simbench.report.tables import render_run
-
-    found = {}
-    clock = time.process_time()
-
-    def part(name: str) -> None:
-        nonlocal clock
-        now = time.process_time()
-        found[name], clock = now - clock, now
-
+    """Seconds of each part, the largest memory of this process and the page's size [MB]."""
+    times = [time.process_time()]
     reading = RunFolder(folder).read()
-    part("reading")
-    summaries = summaries_of(reading)
-    render_run(summaries, 120)
-    part("tables")
-    (folder / "report.html").write_text(page_of(folder, summaries, in_order(reading.records)))
-    part("page")
+    times.append(time.process_time())
+    write_report(RunFolder(folder), reading)
+    times.append(time.process_time())
     metrics = [metric for task in reading.metrics.values() for metric in task]
     limits = parse_limits("placed:5%,ram:10%,rtf:20%", metrics)
     run_gate(reading.records, reading.records, limits, reading.metrics)
-    part("gate")
+    times.append(time.process_time())
+    parts = [end - begin for begin, end in pairwise(times)]
     status = Path("/proc/self/status").read_text()
-    found["memory"] = float(status.split("VmHWM:")[1].split()[0]) / 1e3
-    found["page MB"] = (folder / "report.html").stat().st_size / 1e6
-    return found
+    return {
+        **dict(zip(("reading", "report", "gate"), parts, strict=True)),
+        "memory": float(status.split("VmHWM:")[1].split()[0]) / 1e3,
+        "page": (folder / PAGE_NAME).stat().st_size / 1e6,
+    }
+
+
+def opening(path: Path, program: str) -> float:
+    """Median of the seconds to open a page, each time in a fresh context of the browser."""
+    from playwright.sync_api import sync_playwright
+
+    times = []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        for _ in range(OPENED):
+            page = browser.new_context(viewport={"width": 1400, "height": 900}).new_page()
+            start = time.perf_counter()
+            page.goto(path.as_uri(), wait_until="load")
+            page.evaluate("new Promise(done => requestAnimationFrame(() => setTimeout(done)))")
+            times.append(time.perf_counter() - start)
+        browser.close()
+    return statistics.median(times)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--most", type=int, default=100_000)
-    parser.add_argument("--figure", type=Path)
-    parser.add_argument("--measure", type=Path, help=argparse.SUPPRESS)
-    parser.add_argument("--profile", action="store_true", help=argparse.SUPPRESS)
-    given = parser.parse_args()
+    given = arguments(__doc__, {}, most=100_000, measure="")
     if given.measure:
-        if given.profile:
-            import cProfile
-
-            cProfile.run(f"measure(Path({str(given.measure)!r}))", sort="tottime")
-        print(json.dumps(measure(given.measure)))
+        print(json.dumps(measure(Path(given.measure))))
         return
-    results: dict[int, dict[str, Any]] = {}
-    size = 10
+    size, browser = 10, shutil.which("chromium")
     while size <= given.most:
         with tempfile.TemporaryDirectory() as name:
-            resampled(Path(name), size)
+            write_run(Path(name), size)
             command = [sys.executable, __file__, "--measure", name]
             out = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-        results[size] = json.loads(out.splitlines()[-1])
-        told = "  ".join(f"{part} {value:.2f}" for part, value in results[size].items())
+            found = json.loads(out.splitlines()[-1])
+            found["opened"] = opening(Path(name, PAGE_NAME), browser) if browser else 0.0
+        told = "  ".join(f"{part} {value:.2f}" for part, value in found.items())
         print(f"{size:7} records:  {told}", flush=True)
+        if found["page"] > LARGEST or found["opened"] > LONGEST:
+            raise SystemExit("larger or slower than it may be")
         size *= 10
-    if given.figure:
-        draw(results, given.figure)
-
-
-def draw(results: dict[int, dict[str, Any]], path: Path) -> None:
-    import matplotlib
-
-    matplotlib.use("agg")
-    from matplotlib import pyplot as plt
-
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.5), layout="constrained")
-    for part in PARTS:
-        left.loglog(list(results), [r[part] for r in results.values()], "o-", label=part)
-    left.set(xlabel="records", ylabel="CPU seconds")
-    left.legend()
-    right.loglog(list(results), [r["memory"] for r in results.values()], "o-")
-    right.set(xlabel="records", ylabel="memory at its peak [MB]")
-    for axes in (left, right):
-        axes.grid(alpha=0.3)
-    figure.savefig(path, dpi=110)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,4 @@
-"""The table of planted faults: what finds each, in each engine. Writes
-docs/data/planted_faults.csv, of which docs/parity.md has its table.
+"""The table of planted faults, docs/data/planted_faults.csv: what finds each, in each engine.
 
     python benchmarks/parity.py [SIMULATOR ...]
 
@@ -15,19 +14,18 @@ from __future__ import annotations
 import csv
 import sys
 from fnmatch import fnmatchcase
-from pathlib import Path
 
-from pytest_simbench.client.environments import missing
+from common import ROOT, arguments, present
+
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.parity import ParityResult
-from pytest_simbench.simulator.registry import adapter, registered
+from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.testing import CHECKS, Subject
 from pytest_simbench.testing.expected import read_expected_failures, reason_for
 from pytest_simbench.testing.faults import FAULTS, rounds
 from pytest_simbench.testing.parity import planted
 from pytest_simbench.testing.robot_faults import Fault
 
-ROOT = Path(__file__).parent.parent
 TABLE = ROOT / "docs" / "data" / "planted_faults.csv"
 EXPECTED = read_expected_failures(ROOT / "tests" / "sims" / "expected_failures.txt")
 
@@ -90,13 +88,17 @@ MEASURED = {
 }
 """The law of the kit that measures a quantity which an engine does not tell, first match."""
 
-
-NEEDING = {Capability.SELF_COLLIDE: "links_collide_when_asked"}
-"""The law that finds a fault of what only some engines can."""
-
-
 HAS_NONE = (" has no ", " have no ", "neither ")
 """In a deviation's reason: the engine lacks the thing, so it cannot be wrong there."""
+
+BY_ANOTHER = {
+    ("pybullet", "joint/*/friction"): "`limp_arm_falls`",  # told as loaded, whatever came later
+    ("pybullet", "body/*/damping"): "`cube_spins_on`",
+}
+"""What an engine changes by itself, found by another law than what the scene changes."""
+
+WHAT, UNCLAIMED = "planted fault", "not claimed"
+"""The first column; and of an adapter that does not claim a capability, so nobody asks it."""
 
 
 def by_law(subject: Subject, law: str) -> str:
@@ -114,33 +116,19 @@ def silent(subject: Subject, quantity: str) -> str:
     return by_law(subject, name)
 
 
-def cells(subject: Subject) -> dict[str, str]:
-    """What finds each of the faults, by its name."""
-    print(subject.name, file=sys.stderr, flush=True)
-    return {
-        name: cell(subject, fault, found)
-        for faults in rounds(subject.cls.info.capabilities)
-        for found in [planted(subject, faults.values())]
-        for name, fault in faults.items()
-    }
-
-
-def cell(subject: Subject, fault: Fault, found: ParityResult) -> str:
+def built(subject: Subject, fault: Fault, found: ParityResult) -> str:
+    """What finds a fault that the scene can have."""
     if fault.quantity in found.wrong:
         return "parity"
-    if fault.quantity in found.untold and fault.needs in NEEDING:
-        return by_law(subject, NEEDING[fault.needs])
-    return silent(subject, fault.quantity) if fault.quantity in found.untold else "**missed**"
-
-
-BY_ANOTHER = {
-    ("pybullet", "joint/*/friction"): "`limp_arm_falls`",  # told as loaded, whatever came later
-    ("pybullet", "body/*/damping"): "`cube_spins_on`",
-}
-"""What an engine changes by itself, found by another law than what the scene changes."""
+    if fault.quantity not in found.untold:
+        return "**missed**"
+    if fault.needs is Capability.SELF_COLLIDE:
+        return by_law(subject, "links_collide_when_asked")
+    return silent(subject, fault.quantity)
 
 
 def looked_up(subject: Subject, quantity: str) -> str:
+    """What finds a fault that only the engine's own functions can make."""
     if quantity.startswith("closure/") and not subject.can(Capability.LOOPS):
         return UNCLAIMED
     if (subject.name, quantity) in BY_ANOTHER:
@@ -151,40 +139,31 @@ def looked_up(subject: Subject, quantity: str) -> str:
     return silent(subject, example) if untold else "parity"
 
 
-UNCLAIMED = "not claimed"
-"""The adapter does not claim the capability, so nobody asks it."""
-
-NOT_MEASURED = "not measured"
-
-WHAT = "planted fault"
-"""The first column."""
-
-
-def in_time(subject: Subject, law: str, needs: Capability | None) -> str:
-    if needs is not None and not subject.can(needs):
-        return UNCLAIMED
-    return by_law(subject, law)
-
-
 def column(subject: Subject) -> dict[str, str]:
     """What finds each fault in one engine, by the fault in plain words."""
-    found = cells(subject)
-    return {
-        **{fault.what: found.get(name, UNCLAIMED) for name, fault in FAULTS.items()},
-        **{what: looked_up(subject, quantity) for what, quantity in IN_THE_ENGINE.items()},
-        **{what: in_time(subject, *law) for what, law in IN_TIME.items()},
-    }
+    print(subject.name, file=sys.stderr, flush=True)
+    column = {fault.what: UNCLAIMED for fault in FAULTS.values()}
+    for faults in rounds(subject.cls.info.capabilities):
+        found = planted(subject, faults.values())
+        column |= {fault.what: built(subject, fault, found) for fault in faults.values()}
+    column |= {what: looked_up(subject, quantity) for what, quantity in IN_THE_ENGINE.items()}
+    for what, (law, needs) in IN_TIME.items():
+        can = needs is None or subject.can(needs)
+        column[what] = by_law(subject, law) if can else UNCLAIMED
+    return column
 
 
 def main() -> None:
-    names = sys.argv[1:] or [name for name in registered() if not missing(adapter(name).info)]
-    with TABLE.open(newline="", encoding="utf-8") as file:
-        rows = {row[WHAT]: row for row in csv.DictReader(file)}
+    names = arguments(__doc__, {"simulators": []}).simulators or present()
     measured = {name: column(Subject(adapter(name))) for name in names}
+    rows: dict[str, dict[str, str]] = {}
+    if TABLE.exists():
+        with TABLE.open(newline="", encoding="utf-8") as file:
+            rows = {row[WHAT]: row for row in csv.DictReader(file)}
     known = {name for row in rows.values() for name in row} - {WHAT}
-    columns = [WHAT, *sorted(known | {*names})]
     with TABLE.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, columns, NOT_MEASURED, lineterminator="\n")
+        columns = [WHAT, *sorted(known | {*names})]
+        writer = csv.DictWriter(file, columns, "not measured", lineterminator="\n")
         writer.writeheader()
         for what in [*(fault.what for fault in FAULTS.values()), *IN_THE_ENGINE, *IN_TIME]:
             now = {name: found[what] for name, found in measured.items()}

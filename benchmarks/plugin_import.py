@@ -1,45 +1,36 @@
 """What the installed plugin costs a pytest run that has nothing to do with it.
 
-python benchmarks/plugin_import.py
+    python benchmarks/plugin_import.py [PAIRS]
+
+Bound: under 20 ms. Runs of one empty test, with the plugin and without it in turn.
 """
 
 from __future__ import annotations
 
-import os
-import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 
-RUNS = 15
-WITHOUT_OTHERS = [
-    part
-    for name in ("xdist", "xdist.looponfail", "benchmark", "hypothesispytest")
-    for part in ("-p", f"no:{name}")
-]
+from common import arguments, spread
+
+OTHERS = ("xdist", "xdist.looponfail", "benchmark", "hypothesispytest")
 
 
-def seconds(folder: Path, *arguments: str) -> float:
-    """Wall seconds of a run of one empty test."""
+def seconds(folder: Path, *more: str) -> float:
+    """Wall seconds of a run of one empty test, with no other plugin and none of `more`."""
+    off = [part for name in (*OTHERS, *more) for part in ("-p", f"no:{name}")]
     began = time.perf_counter()
-    command = [sys.executable, "-m", "pytest", "-q", *WITHOUT_OTHERS, *arguments, str(folder)]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=os.environ)
+    command = [sys.executable, "-m", "pytest", "-q", *off, str(folder)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     return time.perf_counter() - began
 
 
-def main() -> None:
-    folder = Path(tempfile.mkdtemp())
-    (folder / "test_empty.py").write_text("def test_empty():\n    pass\n")
-    pairs = [(seconds(folder), seconds(folder, "-p", "no:simbench")) for _ in range(RUNS)]
-    cost = [1000 * (with_it - without) for with_it, without in pairs]
-    print(
-        f"plugin: {statistics.median(cost):.1f} ms (min {min(cost):.1f}, max {max(cost):.1f}, "
-        f"{RUNS} pairs); a run without it takes "
-        f"{1000 * statistics.median(without for _, without in pairs):.0f} ms"
-    )
-
-
 if __name__ == "__main__":
-    main()
+    number = arguments(__doc__, {"pairs": 15}).pairs
+    with tempfile.TemporaryDirectory() as name:
+        Path(name, "test_empty.py").write_text("def test_empty():\n    pass\n")
+        pairs = [(seconds(Path(name)), seconds(Path(name), "simbench")) for _ in range(number)]
+    print("plugin, ms:", spread([1000 * (own - without) for own, without in pairs], ".1f"))
+    print("a run without it, ms:", spread([1000 * without for _, without in pairs], ".0f"))

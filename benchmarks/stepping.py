@@ -1,8 +1,8 @@
 """Stepping in the worker against a bare loop over the same engine, scene, steps and commands.
 
-    python benchmarks/stepping.py [SIMULATOR...]
+    python benchmarks/stepping.py [SIMULATOR...] [--pairs 7]
 
-Without names: every simulator of this environment.
+Bound: 1.05 times. Without names: every simulator of this environment.
 
 Each pair of runs is made in two fresh processes, in turn. `clock` is the worker's own clock of
 stepping, `all` the whole request: message, log check, bookkeeping, and watching whether the world
@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import json
 import os
-import statistics
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -21,11 +20,11 @@ from pathlib import Path
 
 import numpy as np
 import psutil
+from common import arguments, case, present, spread
 
 from pytest_simbench.client import bootstrap
-from pytest_simbench.client.environments import Environment, interpreter, missing
+from pytest_simbench.client.environments import Environment, interpreter
 from pytest_simbench.client.errors import Where
-from pytest_simbench.client.launch import Launch
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.robot.model import RobotModel
@@ -35,7 +34,6 @@ from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.tasks import Jitter, Stacking
 
 SCENE = Stacking().scene(1, Jitter())
-PAIRS = 7
 READINGS = 5
 """Of what an engine holds, after the motion."""
 
@@ -45,27 +43,21 @@ def motion() -> Trajectory:
     assert SCENE.robot is not None
     model = RobotModel(SCENE.robot)
     start = SCENE.robot.column("initial_position")[:7]
-    timed = straight_move(
-        start, start + np.array([0.8, -0.2, 0, 0, 0, 0, 0.5]), model.limits, speed=0.1
-    )
-    rows = len(timed.position)
-    position = np.hstack([timed.position, np.full((rows, 2), 0.035)])
-    velocity, acceleration = (
-        np.hstack([part, np.zeros((rows, 2))]) for part in (timed.velocity, timed.acceleration)
+    end = start + np.array([0.8, -0.2, 0, 0, 0, 0, 0.5])
+    timed = straight_move(start, end, model.limits, speed=0.1)
+    rows, arm = len(timed.position), (timed.position, timed.velocity, timed.acceleration)
+    position, velocity, acceleration = (
+        np.hstack([part, np.full((rows, 2), value)])
+        for part, value in zip(arm, (0.035, 0.0, 0.0), strict=True)
     )
     gravity = np.array(SCENE.gravity)
     effort = model.inverse_dynamics(gravity, position, velocity, acceleration)
     return Trajectory(0.004, position, velocity, effort)
 
 
-def bare(name: str) -> float:
+def bare(name: str, trajectory: Trajectory) -> float:
     """CPU seconds of a loop with nothing in it but command and step, in a process of its own."""
-    return loop(name)[-1]
-
-
-def loop(name: str, **more: int) -> list[float]:
-    """What `bare_loop.py` prints for a simulator."""
-    info, trajectory = adapter(name).info, motion()
+    info = adapter(name).info
     order = {
         "bootstrap": bootstrap.__file__,
         "packages": {
@@ -75,10 +67,7 @@ def loop(name: str, **more: int) -> list[float]:
         "adapter": registered()[name].value,
         "scene": SCENE.to_wire(),
         "tick": trajectory.tick,
-        "position": trajectory.position.tolist(),
-        "velocity": trajectory.velocity.tolist(),
-        "effort": trajectory.effort.tolist(),
-        **more,
+        **{part: getattr(trajectory, part).tolist() for part in ("position", "velocity", "effort")},
     }
     output = subprocess.run(
         [interpreter(info) or sys.executable, str(Path(__file__).with_name("bare_loop.py"))],
@@ -88,60 +77,54 @@ def loop(name: str, **more: int) -> list[float]:
         text=True,
         check=True,
     ).stdout
-    return [float(line) for line in output.splitlines()[-1 - 2 * len(more) :]]
+    return float(output.splitlines()[-1])
 
 
-def worker(name: str, *, watched: bool = True) -> tuple[float, float, float]:
+def worker(name: str, trajectory: Trajectory, *, watched: bool) -> tuple[float, float, float]:
     """CPU seconds of the same motion in a worker: its own clock, the whole request, and a reading.
 
     Watched, as every repetition is: at some steps the engine is asked again what it holds.
     """
-    path, info = registered()[name].value, adapter(name).info
-    launch = Launch(
-        path,
-        python=interpreter(info),
-        environment=Environment.of(info).variables(),
-        start_timeout=600.0,
-        stall_timeout=600.0,
-        compile_timeout=info.compile_timeout if info.costly_start else 0.0,
-    )
+    launch = case(name, Path(os.devnull), stall_timeout=600.0).launch("stepping")
     process = WorkerProcess(launch, Where(name, "headless"))
     process.construct()
     world = World(process, SCENE)
     if watched:
         world.watch(1)
-    trajectory = motion()
     assert process.pid is not None
     itself = psutil.Process(process.pid)
-    began = sum(itself.cpu_times()[:2])
+
+    def clock() -> float:
+        return sum(itself.cpu_times()[:2])
+
+    began = clock()
     world.follow(trajectory)
-    whole = sum(itself.cpu_times()[:2]) - began
-    clock = world.stats()["stepping"]["cpu"]
-    began = sum(itself.cpu_times()[:2])
+    whole, stepping = clock() - began, world.stats()["stepping"]["cpu"]
+    began = clock()
     for _ in range(READINGS):
         world.read_again()
-    reading = (sum(itself.cpu_times()[:2]) - began) / READINGS
+    reading = (clock() - began) / READINGS
     process.close()
-    return clock, whole, reading
+    return stepping, whole, reading
 
 
-def main(names: list[str]) -> None:
-    for name in names or [n for n in registered() if not missing(adapter(n).info)]:
-        clock, whole, unwatched, readings = [], [], [], []
-        for _ in range(PAIRS):
-            alone = bare(name)
-            mine, request, reading = worker(name)
+def main() -> None:
+    given = arguments(__doc__, {"simulators": []}, pairs=7)
+    trajectory = motion()
+    for name in given.simulators or present():
+        ratios: dict[str, list[float]] = {"clock": [], "all": [], "all, unwatched": []}
+        readings = []
+        for _ in range(given.pairs):
+            alone = bare(name, trajectory)
+            stepping, whole, reading = worker(name, trajectory, watched=True)
+            _, unwatched, _ = worker(name, trajectory, watched=False)
+            for values, cpu in zip(ratios.values(), (stepping, whole, unwatched), strict=True):
+                values.append(cpu / alone)
             readings.append(1000 * reading)
-            clock.append(mine / alone)
-            whole.append(request / alone)
-            unwatched.append(worker(name, watched=False)[1] / alone)
-        for title, ratios in (("clock", clock), ("all", whole), ("all, unwatched", unwatched)):
-            print(
-                f"{name}: {title} {statistics.median(ratios):.3f} x the bare loop "
-                f"(min {min(ratios):.3f}, max {max(ratios):.3f}, {PAIRS} pairs)"
-            )
-        print(f"{name}: reading what it holds {statistics.median(readings):.0f} ms of CPU")
+        for title, values in ratios.items():
+            print(f"{name}: {title}, over the bare loop: {spread(values)}")
+        print(f"{name}: reading what it holds, ms of CPU: {spread(readings, '.0f')}", flush=True)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

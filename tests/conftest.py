@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
+from importlib.util import find_spec
 from pathlib import Path
 
 # pytester takes out again what a test imports first; of matplotlib a part would then come twice.
@@ -30,7 +32,11 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile("simbench-tests", deadline=None)  # speed is measured in benchmarks/
+settings.register_profile("simbench-quick", deadline=None, max_examples=20)
 settings.load_profile("simbench-tests")
+
+QUICK = "not engine"
+"""What `-m` says for the quick tier."""
 
 ADAPTERS = {name: entry.value for name, entry in registered().items()}
 """Every registered adapter, as workers name it."""
@@ -70,6 +76,64 @@ def case_of(case: Case, name: str) -> Case:
 def workers() -> set[psutil.Process]:
     """Living processes that this one's workers are, or that these left behind."""
     return set(reaper.marked(reaper.new_mark().partition(".")[0]))
+
+
+WITH_ENGINE = {"mujoco": "testing/test_checks.py", "pybullet": "worker/test_watching.py"}
+"""Tests that cannot even be imported without this engine: their cheats derive from its adapter."""
+
+collect_ignore = [path for engine, path in WITH_ENGINE.items() if find_spec(engine) is None]
+
+ENGINE_ROOMS = {"sims", "testing"}
+"""Folders in which nearly every test asks an engine."""
+
+SLOW = {
+    "test_a_planted_loss_is_caught_and_no_change_is_not",
+    "test_equal_sides_are_told_apart_in_one_of_twenty_runs",
+    "test_error_rates",
+    "test_false_alarms_of_yes_and_no_stay_below_one_in_twenty",
+    "test_false_alarms_stay_below_one_in_twenty_even_without_a_margin",
+    "test_it_lands_elsewhere_if_asked_to",
+    "test_other_seeds_and_many_tests_do_not_hide_crashes",
+    "test_pictures_stay_in_their_folder",
+    "test_planted_changes_are_found_where_they_are",
+    "test_shrinks_to_the_smallest_amount",
+    "test_the_file_has_what_the_command_finds",
+    "test_the_jitter_moves_and_turns_every_cube_both_ways",
+    "test_the_order_of_the_cubes_is_by_seed",
+    "test_the_shares_are_of_all_places_also_of_those_never_filled",
+    "test_without_a_change_one_row_in_twenty_has_one_at_most",
+}
+"""They take more than a second of CPU time each, and no engine. The quick tier leaves them out."""
+
+ENGINE_FIXTURES = {"case", "machines", "pytester", "stepper"}
+"""Of tests that run MuJoCo, pytest with simulators, or a cluster of them."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """The quick tier draws a fifth of Hypothesis' examples; the whole suite draws all of them."""
+    if config.getoption("markexpr") == QUICK:
+        settings.load_profile("simbench-quick")
+        os.environ.setdefault("SIMBENCH_FUZZ", "5")  # tests/plugin/test_fuzz.py
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Mark what the quick tier leaves out, `pytest tests -m "not engine"`.
+
+    A test that needs an engine and is not known here has the mark in its file. One that has
+    neither fails in the quick tier, which runs without any engine.
+    """
+    fixtures = set(getattr(item, "fixturenames", ()))
+    rooms = set(item.path.relative_to(Path(__file__).parent).parts)
+    if rooms & ENGINE_ROOMS or item.path.name == "test_browser.py" or fixtures & ENGINE_FIXTURES:
+        item.add_marker("engine")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """The quick tier leaves out what is slow, too."""
+    if config.getoption("markexpr") == QUICK:
+        slow = [item for item in items if getattr(item, "originalname", item.name) in SLOW]
+        config.hook.pytest_deselected(items=slow)
+        items[:] = [item for item in items if item not in slow]
 
 
 @pytest.fixture(autouse=True)

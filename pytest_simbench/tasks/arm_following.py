@@ -68,7 +68,7 @@ REACHED: Mapping[str, tuple[Command, ...]] = {
         Command(13.9, (-0.6, -70.2, 26.8, 90.3, 0.0, 0.0)),
     ),
 }
-"""What `benchmarks/calibrate_push.py` found on the runs that are not held out: when the arm's
+"""What `tests/tasks/reached.py` finds on the runs that are not held out: when the arm's
 motions began after the first one [s], and the angles that the joints had at rest [degrees]. The
 first row is where the arm stood before. Joints 5 and 6 were not commanded."""
 

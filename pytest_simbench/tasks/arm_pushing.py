@@ -63,7 +63,7 @@ TICK = 0.01
 """Between samples [s]."""
 
 FINGER_ANGLE, FRICTION, MARKER_ASIDE = 0.2, 0.3, 0.009
-"""Calibrated by `benchmarks/calibrate_push.py`: see `ArmPushing`."""
+"""Calibrated, see `ArmPushing`; `benchmarks/README.md` says with which script."""
 
 BLUE = (0.20, 0.35, 0.75, 1.0)
 

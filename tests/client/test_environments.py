@@ -53,6 +53,7 @@ def half_made(info: SimulatorInfo) -> Environment:
     return environment
 
 
+@pytest.mark.engine
 def test_create(info: SimulatorInfo) -> None:
     environment = Environment.of(info)
     assert environment.problem is not None
@@ -124,6 +125,7 @@ def test_a_folder_that_takes_none_is_one_sentence(info: SimulatorInfo, tmp_path:
         Environment.of(info).create()
 
 
+@pytest.mark.engine
 def test_a_release_lives_in_its_own_even_where_the_engine_is_installed_here(
     info: SimulatorInfo,
 ) -> None:
@@ -139,6 +141,7 @@ def test_pips_configuration_is_uvs_too(monkeypatch: pytest.MonkeyPatch) -> None:
     assert environments._as_uv(told) == {"UV_DEFAULT_INDEX": "a", "UV_FIND_LINKS": "d,e"}
 
 
+@pytest.mark.engine
 def test_one_that_does_not_install_stays_half_made(info: SimulatorInfo) -> None:
     info = replace(info, requirements=("./no/such/package",))
     with pytest.raises(SimulatorError, match="only half installed"):

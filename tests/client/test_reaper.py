@@ -88,6 +88,7 @@ def started(folder: Path, adapter: str) -> tuple[subprocess.Popen[bytes], list[p
     return program, me.children(recursive=True)
 
 
+@pytest.mark.engine
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize(
     "adapter",
@@ -106,6 +107,7 @@ def test_a_killed_run_leaves_nothing(tmp_path: Path, adapter: str, number: int) 
         assert gone(pids)
 
 
+@pytest.mark.engine
 def test_a_run_that_ends_well_leaves_nothing(tmp_path: Path) -> None:
     script = SCRIPT.replace("1e6", "0.1")
     command = [
@@ -154,6 +156,7 @@ def test_a_reaper_that_was_stopped_ends_with_its_run() -> None:
     assert gone([int(output)], 5.0)
 
 
+@pytest.mark.engine
 @pytest.mark.parametrize("killed", [False, True])
 def test_temporary_files_of_workers_go_with_them(tmp_path: Path, killed: bool) -> None:
     """Whatever an engine leaves there, also when the run is killed."""

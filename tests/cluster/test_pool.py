@@ -25,6 +25,7 @@ def lab(name: str, *offers: str) -> Node:
     return node(name, PLUGIN, PYTHON, *offers)
 
 
+@pytest.mark.engine
 def test_a_machine_offers_what_is_ready_on_it() -> None:
     offers = here(3, ["mujoco"])
     assert set(offers.values()) == {3.0}
@@ -37,6 +38,7 @@ def test_a_machine_offers_what_is_ready_on_it() -> None:
     assert not found.stranger
 
 
+@pytest.mark.engine
 def test_a_release_with_an_environment_of_its_own_is_offered_by_its_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

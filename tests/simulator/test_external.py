@@ -112,6 +112,7 @@ def test_a_program_that_is_not_there(tmp_path: Path) -> None:
         Program("It", ["/nowhere/it"], tmp_path)
 
 
+@pytest.mark.engine
 def test_exactly_so_many_steps() -> None:
     """The program stands when nobody asks, and what it says is in the log from the start."""
     simulator = Outside(Outside.profiles["tuned"])
@@ -129,6 +130,7 @@ def test_exactly_so_many_steps() -> None:
     assert not simulator.folder.exists()
 
 
+@pytest.mark.engine
 @pytest.mark.parametrize(
     ("fault", "message"),
     [

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,9 +17,7 @@ from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.tasks import ArmFollowing, CorrectedArmFollowing
 from pytest_simbench.tasks.arm_following import CONTROL_PERIOD, REACHED, hands, reference, started
 from pytest_simbench.tasks.arm_pushing import arm
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
-import calibrate_push
+from tests.tasks.reached import reached
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +51,7 @@ def test_a_hand_that_follows_its_commands_began_when_they_came(runs: ArmRuns) ->
 
 
 def test_what_the_real_arm_made_of_its_commands_is_found_again(runs: ArmRuns) -> None:
-    for experiment, found in calibrate_push.reached(runs).items():
+    for experiment, found in reached(runs).items():
         times, angles = found.mean(axis=0)[:, 0], found.mean(axis=0)[:, 1:]
         assert times == pytest.approx([row.time for row in REACHED[experiment]], abs=0.01)
         assert angles == pytest.approx(np.array([r.angles for r in REACHED[experiment]]), abs=0.06)

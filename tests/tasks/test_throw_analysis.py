@@ -26,7 +26,6 @@ from pytest_simbench.tasks.throw_analysis import (
 from pytest_simbench.testing.drives import close_command
 from pytest_simbench.testing.scenes import grip, with_joint
 from pytest_simbench.testing.subject import Subject
-from tests.testing.cheats import HalfFlight
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])
 
@@ -91,8 +90,11 @@ class Held(Throwing):
         return self._throw(Manipulator(world, np.random.default_rng(0)))
 
 
+@pytest.mark.engine
 def test_half_gravity_in_flight_is_no_small_error() -> None:
     """What an engine makes of the flight shows, though the cheat begins with the flight."""
+    from tests.testing.cheats import HalfFlight  # imports MuJoCo
+
     task, found = Held(), {}
     for adapter in (MuJoCo, HalfFlight):
         with Subject(adapter).world(task.scene(1, Jitter())) as world:
