@@ -42,7 +42,7 @@ from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.summary import summarise
+from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task, cube
 

@@ -29,7 +29,7 @@ from pytest_simbench.experiment.experiment import Experiment  # noqa: E402
 from pytest_simbench.experiment.repeater import Repeater  # noqa: E402
 from pytest_simbench.records.folder import RunFolder  # noqa: E402
 from pytest_simbench.records.record import Record  # noqa: E402
-from pytest_simbench.report.progress import Progress  # noqa: E402
+from pytest_simbench.report.terminal.progress import Progress  # noqa: E402
 from pytest_simbench.robot.registry import find  # noqa: E402
 from pytest_simbench.tasks import Stacking  # noqa: E402
 from tests.cluster.machines import Machines  # noqa: E402

@@ -64,7 +64,7 @@ def measure(folder: Path) -> dict[str, float]:
     from pytest_simbench.records.folder import RunFolder
     from pytest_simbench.report.files import in_order, summaries_of
     from pytest_simbench.report.page import page_of
-    from pytest_simbench.report.tables import render_run
+    from pytest_simbench.report.terminal.run import render_run
 
     found = {}
     clock = time.process_time()

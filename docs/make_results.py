@@ -38,10 +38,11 @@ from published_runs import (
 )
 
 from pytest_simbench.measure.comparison import compare_by_seed, holm
-from pytest_simbench.report import cells, markdown
-from pytest_simbench.report.figures import write_figures
-from pytest_simbench.report.matrix import with_differences
-from pytest_simbench.report.summary import summarise
+from pytest_simbench.report.figures.task import write_figures
+from pytest_simbench.report.markdown import run as markdown
+from pytest_simbench.report.model import cells
+from pytest_simbench.report.model.matrix import with_differences
+from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.tasks import Throwing
 
 DOCS = Path(__file__).resolve().parent

@@ -28,9 +28,10 @@ from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.phenomena import PHENOMENA, PHENOMENON
 from pytest_simbench.records.readings import Reading
 from pytest_simbench.records.record import Failure, Record
-from pytest_simbench.report import markdown, sweep, truth
-from pytest_simbench.report.figures import drawing
-from pytest_simbench.report.summary import TaskSummary, summarise
+from pytest_simbench.report.figures.task import drawing
+from pytest_simbench.report.markdown import run as markdown
+from pytest_simbench.report.model import sweep, truth
+from pytest_simbench.report.model.summary import TaskSummary, summarise
 
 DOCS = Path(__file__).resolve().parent
 DATA, PAGE = DOCS / "data" / "truth.csv", DOCS / "truth.md"

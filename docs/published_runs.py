@@ -10,8 +10,8 @@ from typing import Any
 
 from pytest_simbench.records.metrics import COSTS, Metric
 from pytest_simbench.records.record import Failure, Record
-from pytest_simbench.report import cells
-from pytest_simbench.report.pooling import spread
+from pytest_simbench.report.model import cells
+from pytest_simbench.report.model.pooling import spread
 from pytest_simbench.tasks import Stacking, Throwing
 
 DATA = Path(__file__).resolve().parent / "data"

@@ -25,11 +25,6 @@ from pytest_simbench.records.folder import RECORDS, TASKS, Reading, RunFolder
 from pytest_simbench.records.merging import Merged, MergeError, merge, merge_tasks
 from pytest_simbench.records.paths import FolderError, new_name, opened, whole
 from pytest_simbench.records.record import Record, RecordError
-from pytest_simbench.report import history, repeatability, sweep
-from pytest_simbench.report.brief import render_brief
-from pytest_simbench.report.changes import render_terminal
-from pytest_simbench.report.claims import Claims, claims_of
-from pytest_simbench.report.claims import lines as lines_of
 from pytest_simbench.report.files import (
     Written,
     in_order,
@@ -40,10 +35,15 @@ from pytest_simbench.report.files import (
     write_outcome,
     write_report,
 )
-from pytest_simbench.report.outcome import Outcome
+from pytest_simbench.report.model import history, repeatability, sweep
+from pytest_simbench.report.model.changes import render_terminal
+from pytest_simbench.report.model.claims import Claims, claims_of
+from pytest_simbench.report.model.claims import lines as lines_of
+from pytest_simbench.report.model.outcome import Outcome
+from pytest_simbench.report.model.summary import TaskSummary
 from pytest_simbench.report.page import PAGE_NAME
-from pytest_simbench.report.summary import TaskSummary
-from pytest_simbench.report.tables import render_run
+from pytest_simbench.report.terminal.brief import render_brief
+from pytest_simbench.report.terminal.run import render_run
 
 
 @dataclass(frozen=True)

@@ -33,16 +33,17 @@ from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import NAME
-from pytest_simbench.report import markdown, sweep
-from pytest_simbench.report.brief import render_brief
-from pytest_simbench.report.claims import lines as lines_of
 from pytest_simbench.report.files import write_outcome, write_report
-from pytest_simbench.report.github import append_summary
-from pytest_simbench.report.history import lines
-from pytest_simbench.report.outcome import Outcome
+from pytest_simbench.report.markdown import run as markdown
+from pytest_simbench.report.markdown.github import append_summary
+from pytest_simbench.report.model import sweep
+from pytest_simbench.report.model.claims import lines as lines_of
+from pytest_simbench.report.model.history import lines
+from pytest_simbench.report.model.outcome import Outcome
 from pytest_simbench.report.page import PAGE_NAME
-from pytest_simbench.report.progress import Progress
-from pytest_simbench.report.tables import render_run
+from pytest_simbench.report.terminal.brief import render_brief
+from pytest_simbench.report.terminal.progress import Progress
+from pytest_simbench.report.terminal.run import render_run
 from pytest_simbench.tasks.base import Task
 
 RUNS = ".simbench"

@@ -16,21 +16,22 @@ from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.metrics import COSTS
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
-from pytest_simbench.report import history, markdown, sweep
-from pytest_simbench.report import outcome as outcome_of
-from pytest_simbench.report.badge import badge
-from pytest_simbench.report.claims import Claims, claims_of
-from pytest_simbench.report.figures import FiguresUnavailable, write_figures
-from pytest_simbench.report.history import AnyHistory
-from pytest_simbench.report.matrix import with_differences
-from pytest_simbench.report.outcome import Outcome
+from pytest_simbench.report.figures.sheet import sheet_name
+from pytest_simbench.report.figures.sheet import sheets as sheets_of
+from pytest_simbench.report.figures.task import FiguresUnavailable, write_figures
+from pytest_simbench.report.markdown import run as markdown
+from pytest_simbench.report.markdown.badge import badge
+from pytest_simbench.report.model import history, sweep
+from pytest_simbench.report.model import outcome as outcome_of
+from pytest_simbench.report.model.claims import Claims, claims_of
+from pytest_simbench.report.model.history import AnyHistory
+from pytest_simbench.report.model.matrix import with_differences
+from pytest_simbench.report.model.outcome import Outcome
+from pytest_simbench.report.model.summary import PHASES, TaskSummary, at_own_steps, summarise
+from pytest_simbench.report.model.truth import others
 from pytest_simbench.report.page import PAGE_NAME, Compared
 from pytest_simbench.report.replay import REPLAY_NAME
 from pytest_simbench.report.replay.groups import Group, groups
-from pytest_simbench.report.sheet import sheet_name
-from pytest_simbench.report.sheet import sheets as sheets_of
-from pytest_simbench.report.summary import PHASES, TaskSummary, at_own_steps, summarise
-from pytest_simbench.report.truth import others
 from pytest_simbench.worker.text import named
 
 MARKDOWN_NAME = "report.md"

@@ -34,16 +34,16 @@ from pytest_simbench.records.folder import RECORDS, TASKS, THRESHOLDS, Reading, 
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Failure, RecordError
 from pytest_simbench.repeatability.agreement import FOLDER as SAMPLES
-from pytest_simbench.report import history, sweep
-from pytest_simbench.report.brief import render_brief
-from pytest_simbench.report.changes import render_terminal
+from pytest_simbench.report.figures.sheet import albums
 from pytest_simbench.report.files import in_order, summaries_of, write_files
-from pytest_simbench.report.outcome import NAME as OUTCOME
-from pytest_simbench.report.outcome import Outcome
-from pytest_simbench.report.repeatability import render_terminal as render_repeatability
-from pytest_simbench.report.repeatability import write_tables
-from pytest_simbench.report.sheet import albums
-from pytest_simbench.report.tables import render_run
+from pytest_simbench.report.model import history, sweep
+from pytest_simbench.report.model.changes import render_terminal
+from pytest_simbench.report.model.outcome import NAME as OUTCOME
+from pytest_simbench.report.model.outcome import Outcome
+from pytest_simbench.report.model.repeatability import render_terminal as render_repeatability
+from pytest_simbench.report.model.repeatability import write_tables
+from pytest_simbench.report.terminal.brief import render_brief
+from pytest_simbench.report.terminal.run import render_run
 from tests.recordings.samples import motion, scene
 from tests.records.test_repeatability import LINE, REPLAY
 from tests.repeatability.test_agreement import TIMES, sample

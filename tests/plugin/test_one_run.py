@@ -220,7 +220,7 @@ def test_a_folder_deleted_while_running_loses_no_record(pytester: pytest.Pyteste
 def test_any_name_of_a_task_has_its_report(name: str, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
     from pytest_simbench.report.files import write_files
-    from pytest_simbench.report.summary import summarise
+    from pytest_simbench.report.model.summary import summarise
     from tests.report.samples import record
 
     folder = tmp_path / "run"

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from pytest_simbench.measure.differences import Difference, Verdict
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.report.answer import sentences, short_labels
-from pytest_simbench.report.matrix import with_differences
-from pytest_simbench.report.pooling import Spread
-from pytest_simbench.report.summary import Row, TaskSummary, summarise
+from pytest_simbench.report.model.answer import sentences, short_labels
+from pytest_simbench.report.model.matrix import with_differences
+from pytest_simbench.report.model.pooling import Spread
+from pytest_simbench.report.model.summary import Row, TaskSummary, summarise
 
 from .samples import METRICS, record, stacking_run, throwing_run, two_errors
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.badge import badge
 from pytest_simbench.report.files import write_badge
+from pytest_simbench.report.markdown.badge import badge
 from tests.hostile import HOSTILE, assert_harmless_terminal
 
 from .samples import failed, record

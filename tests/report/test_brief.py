@@ -8,9 +8,9 @@ import pytest
 
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.brief import MOST_LINES, render_brief
-from pytest_simbench.report.matrix import with_differences
-from pytest_simbench.report.summary import TaskSummary, summarise
+from pytest_simbench.report.model.matrix import with_differences
+from pytest_simbench.report.model.summary import TaskSummary, summarise
+from pytest_simbench.report.terminal.brief import MOST_LINES, render_brief
 
 from .samples import METRICS, failed, record, stacking_run, throwing_run
 from .test_tables import text

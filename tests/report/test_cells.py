@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.report import cells
-from pytest_simbench.report.cells import interval, metric_value, number
+from pytest_simbench.report.model import cells
+from pytest_simbench.report.model.cells import interval, metric_value, number
+from pytest_simbench.report.model.pooling import spread
 from pytest_simbench.report.page import cells as page_cells
-from pytest_simbench.report.pooling import spread
 
 LATE = Metric("late", "late", unit="s")
 CUBES = Metric("moved", "moved", unit="cubes")

@@ -10,7 +10,7 @@ from pytest_simbench.measure.gate import GateReport, run_gate
 from pytest_simbench.measure.limits import parse_limits
 from pytest_simbench.records.metrics import Better, Kind, Metric
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.changes import columns, render_markdown, render_terminal
+from pytest_simbench.report.model.changes import columns, render_markdown, render_terminal
 
 from .samples import METRICS, STACKING, THROWING, failed, record
 

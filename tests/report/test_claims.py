@@ -10,8 +10,8 @@ from pytest_simbench.measure.gate import GateReport
 from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.record import Failure
-from pytest_simbench.report.claims import claims_of, lines
-from pytest_simbench.report.markdown import render_claims
+from pytest_simbench.report.markdown.run import render_claims
+from pytest_simbench.report.model.claims import claims_of, lines
 from tests.report.samples import METRICS, record
 
 STACK = "suites/test_stacking.py::test_stacking"

@@ -12,11 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.report import files, markdown
-from pytest_simbench.report.figures import FiguresUnavailable, draw, drawing, write_figures
+from pytest_simbench.report import files
+from pytest_simbench.report.figures.task import FiguresUnavailable, draw, drawing, write_figures
 from pytest_simbench.report.files import Written, csv_of, write_files
-from pytest_simbench.report.matrix import with_differences
-from pytest_simbench.report.summary import summarise
+from pytest_simbench.report.markdown import run as markdown
+from pytest_simbench.report.model.matrix import with_differences
+from pytest_simbench.report.model.summary import summarise
 
 from .samples import METRICS, REFERENCES, failed, record, stacking_run, throwing_run, two_errors
 
@@ -155,7 +156,7 @@ def test_a_fault_of_the_drawing_costs_the_pictures_alone(
 
 def test_what_draws_and_writes_is_imported_only_then() -> None:
     code = (
-        "import sys, pytest_simbench.report.files, pytest_simbench.report.tables;"
+        "import sys, pytest_simbench.report.files, pytest_simbench.report.terminal.run;"
         "print('matplotlib' in sys.modules, 'jinja2' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

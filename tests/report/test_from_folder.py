@@ -19,9 +19,11 @@ from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.repeatability import Line, append
-from pytest_simbench.report import changes, markdown, tables
 from pytest_simbench.report.files import summaries_of, write_report
-from pytest_simbench.report.repeatability import write_tables
+from pytest_simbench.report.markdown import run as markdown
+from pytest_simbench.report.model import changes
+from pytest_simbench.report.model.repeatability import write_tables
+from pytest_simbench.report.terminal import run as tables
 from tests.hostile import assert_harmless_markdown, assert_harmless_terminal
 
 from .samples import METRICS, REFERENCES, record, stacking_run, throwing_run

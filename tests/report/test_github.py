@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.report.github import LARGEST, VARIABLE, append_summary
+from pytest_simbench.report.markdown.github import LARGEST, VARIABLE, append_summary
 
 
 def test_nothing_happens_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:

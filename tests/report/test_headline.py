@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.report.headline import headline
-from pytest_simbench.report.matrix import with_differences
-from pytest_simbench.report.summary import TaskSummary, summarise
+from pytest_simbench.report.model.headline import headline
+from pytest_simbench.report.model.matrix import with_differences
+from pytest_simbench.report.model.summary import TaskSummary, summarise
 
 from .samples import METRICS, record, stacking_run, throwing_run
 from .test_answer import SCORE, task

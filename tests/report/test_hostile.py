@@ -12,16 +12,18 @@ from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Failure, Record
 from pytest_simbench.records.repeatability import Line
-from pytest_simbench.report import changes, markdown, tables
-from pytest_simbench.report.brief import render_brief
-from pytest_simbench.report.capabilities import capability_markdown, capability_table
 from pytest_simbench.report.files import csv_of, write_files
-from pytest_simbench.report.github import VARIABLE, append_summary
-from pytest_simbench.report.matrix import with_differences
-from pytest_simbench.report.progress import Progress
-from pytest_simbench.report.repeatability import render_markdown, render_terminal
-from pytest_simbench.report.repeatability import tables as repeatability_tables
-from pytest_simbench.report.summary import summarise
+from pytest_simbench.report.markdown import run as markdown
+from pytest_simbench.report.markdown.github import VARIABLE, append_summary
+from pytest_simbench.report.model import changes
+from pytest_simbench.report.model.capabilities import capability_markdown, capability_table
+from pytest_simbench.report.model.matrix import with_differences
+from pytest_simbench.report.model.repeatability import render_markdown, render_terminal
+from pytest_simbench.report.model.repeatability import tables as repeatability_tables
+from pytest_simbench.report.model.summary import summarise
+from pytest_simbench.report.terminal import run as tables
+from pytest_simbench.report.terminal.brief import render_brief
+from pytest_simbench.report.terminal.progress import Progress
 from pytest_simbench.simulator.registry import adapter
 from tests.hostile import (
     HOSTILE,

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.records.folder import Reading
-from pytest_simbench.report import history
-from pytest_simbench.report.figures import drawing
+from pytest_simbench.report.figures.laws import FAILS, NOT_ASKED, draw_laws
+from pytest_simbench.report.figures.task import drawing
 from pytest_simbench.report.files import write_files
-from pytest_simbench.report.law_history import FAILS, NOT_ASKED, draw_laws
+from pytest_simbench.report.model import history
 from tests.measure.test_law_history import asked, row
 
 pytest.importorskip("matplotlib")

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from pytest_simbench.report import columns, markdown
-from pytest_simbench.report.matrix import with_differences
-from pytest_simbench.report.summary import TaskSummary, summarise
-from pytest_simbench.report.tables import render_run
+from pytest_simbench.report.markdown import run as markdown
+from pytest_simbench.report.model import tables as columns
+from pytest_simbench.report.model.matrix import with_differences
+from pytest_simbench.report.model.summary import TaskSummary, summarise
+from pytest_simbench.report.terminal.run import render_run
 
 from .samples import METRICS, record, stacking_run
 

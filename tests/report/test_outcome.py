@@ -13,8 +13,8 @@ import pytest
 
 from pytest_simbench.measure.gate import GateReport, run_gate
 from pytest_simbench.measure.limits import Limit
-from pytest_simbench.report.changes import columns
-from pytest_simbench.report.outcome import NAME, Outcome
+from pytest_simbench.report.model.changes import columns
+from pytest_simbench.report.model.outcome import NAME, Outcome
 
 from .samples import METRICS, record
 

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.report import columns
-from pytest_simbench.report.markdown import render_task
-from pytest_simbench.report.pooling import merged_order, pooled, pooled_by_phase
-from pytest_simbench.report.summary import summarise
-from pytest_simbench.report.tables import render_run
+from pytest_simbench.report.markdown.run import render_task
+from pytest_simbench.report.model import tables as columns
+from pytest_simbench.report.model.pooling import merged_order, pooled, pooled_by_phase
+from pytest_simbench.report.model.summary import summarise
+from pytest_simbench.report.terminal.run import render_run
 from tests.report.samples import METRICS, record
 
 

@@ -10,7 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.report.progress import HEARTBEAT_SECONDS, LOG_SECONDS, Progress, duration
+from pytest_simbench.report.terminal.progress import (
+    HEARTBEAT_SECONDS,
+    LOG_SECONDS,
+    Progress,
+    duration,
+)
 
 TEST = "test_stacking[mujoco-headless]"
 
@@ -284,7 +289,7 @@ def test_duration(seconds: float, text: str) -> None:
 
 def test_it_loads_no_heavy_library() -> None:
     code = (
-        "import sys, pytest_simbench.report.progress;"
+        "import sys, pytest_simbench.report.terminal.progress;"
         "print(sorted({'numpy', 'scipy', 'rich', 'matplotlib', 'psutil'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

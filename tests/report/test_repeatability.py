@@ -8,7 +8,7 @@ from pytest_simbench.records.repeatability import Line
 from pytest_simbench.repeatability.agreement import Agreement, Parting
 from pytest_simbench.repeatability.motions import Difference
 from pytest_simbench.repeatability.replay_result import Again
-from pytest_simbench.report.repeatability import render_markdown, render_terminal, tables
+from pytest_simbench.report.model.repeatability import render_markdown, render_terminal, tables
 
 AGAINS = (
     Again("after a reset"),

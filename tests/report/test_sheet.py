@@ -11,9 +11,9 @@ import pytest
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.recordings.album import Album
 from pytest_simbench.records.record import Record
+from pytest_simbench.report.figures.sheet import sheet_name, sheets
 from pytest_simbench.report.files import write_files
-from pytest_simbench.report.sheet import sheet_name, sheets
-from pytest_simbench.report.summary import summarise
+from pytest_simbench.report.model.summary import summarise
 from tests.hostile import HOSTILE
 
 from .samples import METRICS, record

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
-from pytest_simbench.report import columns
-from pytest_simbench.report.summary import summarise
+from pytest_simbench.report.model import tables as columns
+from pytest_simbench.report.model.summary import summarise
 
 from .samples import METRICS, REFERENCES, STACKING, failed, record, stacking_run, throwing_run
 

@@ -12,10 +12,11 @@ from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.phenomena import PHENOMENON
 from pytest_simbench.records.readings import Reading
 from pytest_simbench.records.record import Record
-from pytest_simbench.report import markdown, sweep
+from pytest_simbench.report.markdown import run as markdown
+from pytest_simbench.report.model import sweep
+from pytest_simbench.report.model.summary import at_own_steps, summarise
 from pytest_simbench.report.page.context import page
 from pytest_simbench.report.page.render import render
-from pytest_simbench.report.summary import at_own_steps, summarise
 
 from .samples import failed, record
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from pytest_simbench.report import columns
-from pytest_simbench.report.grid import Column, render
-from pytest_simbench.report.summary import TaskSummary, summarise
-from pytest_simbench.report.tables import render_run, render_task
+from pytest_simbench.report.model import tables as columns
+from pytest_simbench.report.model.summary import TaskSummary, summarise
+from pytest_simbench.report.terminal.grid import Column, render
+from pytest_simbench.report.terminal.run import render_run, render_task
 
 from .samples import METRICS, REFERENCES, failed, record, stacking_run, throwing_run, two_errors
 

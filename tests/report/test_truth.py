@@ -7,12 +7,13 @@ from pathlib import Path
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.phenomena import PHENOMENON
 from pytest_simbench.records.record import Record
-from pytest_simbench.report import markdown, truth
-from pytest_simbench.report.brief import render_brief
+from pytest_simbench.report.markdown import run as markdown
+from pytest_simbench.report.model import truth
+from pytest_simbench.report.model.summary import TaskSummary, summarise
 from pytest_simbench.report.page.context import page
 from pytest_simbench.report.page.render import render
-from pytest_simbench.report.summary import TaskSummary, summarise
-from pytest_simbench.report.tables import render_run
+from pytest_simbench.report.terminal.brief import render_brief
+from pytest_simbench.report.terminal.run import render_run
 
 from .samples import METRICS, failed, record, stacking_run
 

@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.report import cells
-from pytest_simbench.report.answer import short_labels, standing
-from pytest_simbench.report.grid import Column, capital
-from pytest_simbench.report.headline import cost_of
-from pytest_simbench.report.pooling import Sampled, Spread
-from pytest_simbench.report.summary import Row, TaskSummary
+from pytest_simbench.report.model import cells
+from pytest_simbench.report.model.answer import short_labels, standing
+from pytest_simbench.report.model.headline import cost_of
+from pytest_simbench.report.model.pooling import Sampled, Spread
+from pytest_simbench.report.model.summary import Row, TaskSummary
+from pytest_simbench.report.terminal.grid import Column, capital
 
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
 

@@ -11,21 +11,22 @@ from typing import TYPE_CHECKING, Any
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import series
-from pytest_simbench.report import columns, repeatability, sweep, truth
-from pytest_simbench.report.again import command
-from pytest_simbench.report.answer import sentences
-from pytest_simbench.report.changes import DIFFERENT
-from pytest_simbench.report.changes import columns as change_columns
-from pytest_simbench.report.claims import Claims
-from pytest_simbench.report.headline import headline
+from pytest_simbench.report.model import repeatability, sweep, truth
+from pytest_simbench.report.model import tables as columns
+from pytest_simbench.report.model.again import command
+from pytest_simbench.report.model.answer import sentences
+from pytest_simbench.report.model.changes import DIFFERENT
+from pytest_simbench.report.model.changes import columns as change_columns
+from pytest_simbench.report.model.claims import Claims
+from pytest_simbench.report.model.headline import headline
+from pytest_simbench.report.model.recorded import videos
+from pytest_simbench.report.model.summary import TaskSummary, at_own_steps
 from pytest_simbench.report.page import Compared as Reported
 from pytest_simbench.report.page import setup
 from pytest_simbench.report.page.cells import Of, Table, from_columns, labelled, of, study
 from pytest_simbench.report.page.pictures import Picture, of_sweeps, pictures
 from pytest_simbench.report.page.strips import Strip, strips
-from pytest_simbench.report.recorded import videos
 from pytest_simbench.report.replay.groups import Group, links
-from pytest_simbench.report.summary import TaskSummary, at_own_steps
 
 if TYPE_CHECKING:
     from pytest_simbench.measure.gate import GateReport

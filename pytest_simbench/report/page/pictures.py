@@ -11,9 +11,9 @@ from xml.etree import ElementTree
 
 from pytest_simbench.ground.names import digest
 from pytest_simbench.measure.sweep import Swept
-from pytest_simbench.report import sweep
-from pytest_simbench.report.figures import FiguresUnavailable, draw, drawing
-from pytest_simbench.report.summary import TaskSummary
+from pytest_simbench.report.figures.task import FiguresUnavailable, draw, drawing
+from pytest_simbench.report.model import sweep
+from pytest_simbench.report.model.summary import TaskSummary
 
 SVG = "http://www.w3.org/2000/svg"
 LINK = "http://www.w3.org/1999/xlink"

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pytest_simbench.records.configuration import TASK, text
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import series, told
-from pytest_simbench.report import columns
+from pytest_simbench.report.model import tables as columns
+from pytest_simbench.report.model.summary import TaskSummary
 from pytest_simbench.report.page.cells import Of
-from pytest_simbench.report.summary import TaskSummary
 
 
 @dataclass(frozen=True)

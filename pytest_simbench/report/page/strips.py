@@ -13,10 +13,10 @@ from typing import TypeVar
 from pytest_simbench.ground.text import for_figure
 from pytest_simbench.records.metrics import COSTS, Metric
 from pytest_simbench.records.record import Record
-from pytest_simbench.report import cells
-from pytest_simbench.report.answer import short_labels
+from pytest_simbench.report.model import cells
+from pytest_simbench.report.model.answer import short_labels
+from pytest_simbench.report.model.summary import TaskSummary
 from pytest_simbench.report.page.cells import Of, of
-from pytest_simbench.report.summary import TaskSummary
 
 HEIGHT = 36
 """Of a line [px]."""

@@ -11,10 +11,10 @@ import pytest
 from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.matrix import with_differences
+from pytest_simbench.report.model.matrix import with_differences
+from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.page import PAGE_NAME, context
 from pytest_simbench.report.page.render import render
-from pytest_simbench.report.summary import summarise
 from tests.hostile import HOSTILE
 from tests.report.browser import Opened, browser, opened
 from tests.report.page.test_hostile_page import MORE

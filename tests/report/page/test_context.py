@@ -9,12 +9,12 @@ import pytest
 
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.matrix import with_differences
+from pytest_simbench.report.model.matrix import with_differences
+from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.page import context
 from pytest_simbench.report.page.cells import Table, study
 from pytest_simbench.report.page.context import Page, command, page
 from pytest_simbench.report.page.setup import setup
-from pytest_simbench.report.summary import summarise
 from tests.report.samples import METRICS, failed, record, stacking_run, throwing_run
 
 

@@ -13,10 +13,10 @@ from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import Line, append
-from pytest_simbench.report.matrix import with_differences
+from pytest_simbench.report.model.matrix import with_differences
+from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.page import context
 from pytest_simbench.report.page.render import render
-from pytest_simbench.report.summary import summarise
 from tests.hostile import HOSTILE, assert_harmless_terminal
 from tests.report.samples import METRICS, failed, record, stacking_run, throwing_run
 from tests.report.test_hostile import ALL, declared, records

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import series
+from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.page.strips import HEIGHT, LEFT, LOST, MOST, RIGHT, Strip, strips
-from pytest_simbench.report.summary import summarise
 from tests.report.samples import METRICS, REFERENCES, record, stacking_run, throwing_run
 
 

@@ -15,9 +15,9 @@ from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.recordings.trace import Trace
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.files import write_files
+from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.replay.groups import groups
 from pytest_simbench.report.replay.render import replay_of
-from pytest_simbench.report.summary import summarise
 from pytest_simbench.scene import Pose
 from tests.hostile import HOSTILE
 from tests.recordings.samples import motion, scene

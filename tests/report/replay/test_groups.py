@@ -11,12 +11,12 @@ import pytest
 
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.records.record import Record
+from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.page import context
 from pytest_simbench.report.page.render import render as html
 from pytest_simbench.report.replay import render
 from pytest_simbench.report.replay.groups import groups, links
 from pytest_simbench.report.replay.render import ReplayUnavailable, replay_of
-from pytest_simbench.report.summary import summarise
 from tests.recordings.samples import trace
 from tests.report.samples import METRICS, record
 

@@ -18,7 +18,7 @@ from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.phenomena import PHENOMENON
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import grouped, series
-from pytest_simbench.report.pooling import (
+from pytest_simbench.report.model.pooling import (
     AMOUNT,
     Ends,
     Sampled,

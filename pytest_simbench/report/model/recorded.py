@@ -13,7 +13,7 @@ from pytest_simbench.recordings.bag import write_bag
 from pytest_simbench.recordings.trace import Trace, TraceError
 from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.progress import Progress
+from pytest_simbench.report.terminal.progress import Progress
 
 FOLDER = "recordings"
 """In the run folder."""

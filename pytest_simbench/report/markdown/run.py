@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 
 from pytest_simbench.ground.text import for_markdown, in_one_line
 from pytest_simbench.measure.sweep import Swept
-from pytest_simbench.report import columns, sweep, truth
-from pytest_simbench.report.answer import sentences
-from pytest_simbench.report.claims import Claims
-from pytest_simbench.report.grid import Column, capital
-from pytest_simbench.report.summary import TaskSummary
+from pytest_simbench.report.model import sweep, truth
+from pytest_simbench.report.model import tables as columns
+from pytest_simbench.report.model.answer import sentences
+from pytest_simbench.report.model.claims import Claims
+from pytest_simbench.report.model.summary import TaskSummary
+from pytest_simbench.report.terminal.grid import Column, capital
 
 
 def render_run(

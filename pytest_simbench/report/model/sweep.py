@@ -14,9 +14,9 @@ from pytest_simbench.measure.sweep import REFERENCE, Choice, Line, Point, Swept,
 from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.phenomena import ordered
 from pytest_simbench.records.series import step_text
-from pytest_simbench.report import cells
-from pytest_simbench.report.figures import drawing, line_style, save
-from pytest_simbench.report.grid import Column, fill, render
+from pytest_simbench.report.figures.task import drawing, line_style, save
+from pytest_simbench.report.model import cells
+from pytest_simbench.report.terminal.grid import Column, fill, render
 
 TITLE = "the same laws over time steps"
 

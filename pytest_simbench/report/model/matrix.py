@@ -9,7 +9,7 @@ from pytest_simbench.measure.differences import differences
 from pytest_simbench.measure.modes import compare_modes
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import Series, comparable, series
-from pytest_simbench.report.summary import TaskSummary
+from pytest_simbench.report.model.summary import TaskSummary
 
 
 def with_differences(

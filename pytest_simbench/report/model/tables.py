@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pytest_simbench.report import cells
-from pytest_simbench.report.answer import short_labels
-from pytest_simbench.report.grid import Column
-from pytest_simbench.report.pooling import merged_order
-from pytest_simbench.report.summary import PHASES, Row, TaskSummary
+from pytest_simbench.report.model import cells
+from pytest_simbench.report.model.answer import short_labels
+from pytest_simbench.report.model.pooling import merged_order
+from pytest_simbench.report.model.summary import PHASES, Row, TaskSummary
+from pytest_simbench.report.terminal.grid import Column
 
 LEGEND = (
     "min / mean / max over the finished repetitions, [95 % interval of the mean]; none for fewer "

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pytest_simbench.measure.comparison import MARGIN
 from pytest_simbench.measure.differences import Difference
 from pytest_simbench.records.metrics import Metric, significant
-from pytest_simbench.report import cells
-from pytest_simbench.report.summary import Row, TaskSummary
+from pytest_simbench.report.model import cells
+from pytest_simbench.report.model.summary import Row, TaskSummary
 
 NAMED = 3
 """How many simulators a sentence names; the table below has them all."""

@@ -14,8 +14,8 @@ from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.metrics import COSTS, Metric, significant
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import grouped
-from pytest_simbench.report.again import command
-from pytest_simbench.report.grid import Column, fill, render
+from pytest_simbench.report.model.again import command
+from pytest_simbench.report.terminal.grid import Column, fill, render
 
 MOST = 12
 """Claims that fail, or are not decided, which the first screen tells in full."""

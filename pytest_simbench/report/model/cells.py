@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pytest_simbench.measure.intervals import proportion
 from pytest_simbench.records.metrics import Metric, significant
-from pytest_simbench.report.pooling import Sampled, Spread
-from pytest_simbench.report.summary import Row
+from pytest_simbench.report.model.pooling import Sampled, Spread
+from pytest_simbench.report.model.summary import Row
 
 MISSING = "-"
 

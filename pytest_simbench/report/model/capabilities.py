@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pytest_simbench.ground.text import for_markdown
-from pytest_simbench.report.grid import Column, render
+from pytest_simbench.report.terminal.grid import Column, render
 from pytest_simbench.simulator.info import Capability, SimulatorInfo
 
 MARKS: tuple[tuple[str, Capability], ...] = (

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 from pytest_simbench.ground.text import LONGEST_LABEL, in_one_line
 from pytest_simbench.records.metrics import COSTS, Metric
-from pytest_simbench.report import cells
-from pytest_simbench.report.answer import NAMED, short_labels, standing
-from pytest_simbench.report.pooling import Spread
-from pytest_simbench.report.summary import Row, TaskSummary
+from pytest_simbench.report.model import cells
+from pytest_simbench.report.model.answer import NAMED, short_labels, standing
+from pytest_simbench.report.model.pooling import Spread
+from pytest_simbench.report.model.summary import Row, TaskSummary
 
 OUTCOMES = 2
 """Metrics that the second sentence names of a task of which the study has none with a good

@@ -8,8 +8,8 @@ from pytest_simbench.ground.text import for_markdown, for_terminal
 from pytest_simbench.measure.gate import Change, GateReport
 from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.records.series import short
-from pytest_simbench.report import markdown
-from pytest_simbench.report.grid import Column, fill, render
+from pytest_simbench.report.markdown import run as markdown
+from pytest_simbench.report.terminal.grid import Column, fill, render
 
 ALWAYS = ("rtf", "cpu_cost", "ram")
 """Costs that are shown although they may not have changed, as the study's metrics are."""

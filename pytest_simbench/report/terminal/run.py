@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pytest_simbench.ground.text import for_terminal, in_one_line
-from pytest_simbench.report import columns, truth
-from pytest_simbench.report.answer import sentences
-from pytest_simbench.report.grid import fill, render
-from pytest_simbench.report.headline import headline
-from pytest_simbench.report.summary import TaskSummary
+from pytest_simbench.report.model import tables as columns
+from pytest_simbench.report.model import truth
+from pytest_simbench.report.model.answer import sentences
+from pytest_simbench.report.model.headline import headline
+from pytest_simbench.report.model.summary import TaskSummary
+from pytest_simbench.report.terminal.grid import fill, render
 
 NARROWEST = 40
 """Tables are laid out for at least so many columns; in fewer, lines run over."""

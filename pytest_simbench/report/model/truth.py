@@ -10,10 +10,10 @@ from statistics import fmean
 from pytest_simbench.measure.phenomena import KEPT, Ratios, Verdict, verdict, worst
 from pytest_simbench.records.metrics import significant
 from pytest_simbench.records.phenomena import ordered
-from pytest_simbench.report import cells
-from pytest_simbench.report.answer import NAMED, short_labels
-from pytest_simbench.report.grid import Column, fill, render
-from pytest_simbench.report.summary import Row, TaskSummary
+from pytest_simbench.report.model import cells
+from pytest_simbench.report.model.answer import NAMED, short_labels
+from pytest_simbench.report.model.summary import Row, TaskSummary
+from pytest_simbench.report.terminal.grid import Column, fill, render
 
 TITLE = "which simulator is right about what"
 

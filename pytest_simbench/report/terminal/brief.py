@@ -8,12 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pytest_simbench.ground.text import for_terminal, in_one_line
-from pytest_simbench.report import cells, columns, truth
-from pytest_simbench.report.answer import short_labels
-from pytest_simbench.report.grid import GAP, Column, fill, render
-from pytest_simbench.report.headline import cost_of, headline
-from pytest_simbench.report.summary import TaskSummary
-from pytest_simbench.report.tables import NARROWEST
+from pytest_simbench.report.model import cells, truth
+from pytest_simbench.report.model import tables as columns
+from pytest_simbench.report.model.answer import short_labels
+from pytest_simbench.report.model.headline import cost_of, headline
+from pytest_simbench.report.model.summary import TaskSummary
+from pytest_simbench.report.terminal.grid import GAP, Column, fill, render
+from pytest_simbench.report.terminal.run import NARROWEST
 
 MOST_LINES = 38
 """For the whole result; two further ones tell its title and where the report is. Rows are never

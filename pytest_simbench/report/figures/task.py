@@ -17,10 +17,10 @@ from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.text import for_figure
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.paths import write_whole
-from pytest_simbench.report.answer import short_labels
-from pytest_simbench.report.cells import unit
-from pytest_simbench.report.pooling import merged_order
-from pytest_simbench.report.summary import Row, TaskSummary
+from pytest_simbench.report.model.answer import short_labels
+from pytest_simbench.report.model.cells import unit
+from pytest_simbench.report.model.pooling import merged_order
+from pytest_simbench.report.model.summary import Row, TaskSummary
 
 DPI = 120
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")

@@ -12,8 +12,8 @@ from pytest_simbench.records.repeatability import Line, read
 from pytest_simbench.repeatability.agreement import LIMITS, Agreement, agreements
 from pytest_simbench.repeatability.motions import GROWTH_TIMES
 from pytest_simbench.repeatability.replay_result import Again
-from pytest_simbench.report.grid import Column, fill, render
-from pytest_simbench.report.markdown import table
+from pytest_simbench.report.markdown.run import table
+from pytest_simbench.report.terminal.grid import Column, fill, render
 
 Table = tuple[str, str, list[Column]]
 """Title, how to read it, columns."""

@@ -13,8 +13,8 @@ from pytest_simbench.measure.history import Course, History, histories
 from pytest_simbench.measure.intervals import interval
 from pytest_simbench.measure.law_history import LawHistory, law_histories
 from pytest_simbench.records.folder import Reading
-from pytest_simbench.report.figures import COLOURS, drawing, heading, save
-from pytest_simbench.report.law_history import draw_laws
+from pytest_simbench.report.figures.laws import draw_laws
+from pytest_simbench.report.figures.task import COLOURS, drawing, heading, save
 
 AnyHistory = History | LawHistory
 
