@@ -38,10 +38,10 @@ from published_runs import (
 )
 
 from pytest_simbench.measure.comparison import compare_by_seed, holm
-from pytest_simbench.report.figures.task import write_figures
+from pytest_simbench.report.figures.drawing import write
+from pytest_simbench.report.figures.task import pictures
 from pytest_simbench.report.markdown import run as markdown
 from pytest_simbench.report.model import cells
-from pytest_simbench.report.model.matrix import with_differences
 from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.tasks import Throwing
 
@@ -329,9 +329,7 @@ def raw(runs: Runs) -> None:
                 continue
             records = [record for _, run in found for record in run.records()]
             whole = TASKS[task].study() if rules == "study" else TASKS[task]
-            summary = with_differences(
-                summarise(records, {task: whole.metrics}, {task: whole.references}), records
-            )
+            summary = summarise(records, {task: whole.metrics}, {task: whole.references})
             name = f"{rules}_{profile}_{task}"
             text = markdown.render_task(summary[0], 1).split("\n", 1)[1].strip()
             title = f"# {task.capitalize()}, {WORDS[rules]}, `{profile}` settings"
@@ -345,7 +343,7 @@ def raw(runs: Runs) -> None:
             (DATA / f"{name}.md").write_text(f"{title}\n\n{head}\n\n{text}\n", "utf-8")
             if rules == "ours":
                 with TemporaryDirectory() as folder:
-                    write_figures(Path(folder), summary)
+                    write(Path(folder), pictures(summary))
                     picture = Path(folder, f"{task}_metrics.png").read_bytes()
                 (DOCS / "pictures" / f"{profile}_{task}.png").write_bytes(picture)
 

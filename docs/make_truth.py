@@ -28,7 +28,8 @@ from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.phenomena import PHENOMENA, PHENOMENON
 from pytest_simbench.records.readings import Reading
 from pytest_simbench.records.record import Failure, Record
-from pytest_simbench.report.figures.task import drawing
+from pytest_simbench.report.figures import sweep as figures
+from pytest_simbench.report.figures.drawing import drawing
 from pytest_simbench.report.markdown import run as markdown
 from pytest_simbench.report.model import sweep, truth
 from pytest_simbench.report.model.summary import TaskSummary, summarise
@@ -115,9 +116,9 @@ def draw() -> None:
     """The pictures of the page."""
     found = found_sweeps()
     with drawing():
-        for over in sweep.OVER:
+        for over in figures.OVER:
             path = PICTURES / f"sweep_{DRAWN.replace(' ', '_')}_{over}.png"
-            sweep.draw(found, DRAWN, over).savefig(path, dpi=90)
+            figures.draw(found, DRAWN, over).savefig(path, dpi=90)
 
 
 def summaries(profile: str) -> list[TaskSummary]:
@@ -159,7 +160,7 @@ def part(name: str, profile: str) -> str:
         return "\n".join(f"- {text}" for text in truth.sentences(found))
     if name == "phenomena":
         return markdown.table(truth.table(found))
-    texts = [f"{title}:\n\n{markdown.table(table)}" for title, table in truth.details(found)]
+    texts = [f"{each.title}:\n\n{markdown.table(each.columns)}" for each in truth.details(found)]
     return "\n\n".join(text[0].upper() + text[1:] for text in texts)
 
 
@@ -168,7 +169,7 @@ def _sweep(name: str) -> str:
     found = found_sweeps()
     if name == "steps":
         return markdown.table(sweep.table(found))
-    tables = dict(sweep.details(found))
+    tables = {each.title: each.columns for each in sweep.details(found)}
     if name == "failures":
         failed = [table for title, table in tables.items() if title.startswith("what failed")]
         return "\n".join(map(markdown.table, failed)) or "Nothing failed."

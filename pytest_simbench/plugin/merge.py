@@ -34,16 +34,21 @@ from pytest_simbench.report.files import (
     write_files,
     write_outcome,
     write_report,
+    write_tables,
 )
-from pytest_simbench.report.model import history, repeatability, sweep
-from pytest_simbench.report.model.changes import render_terminal
+from pytest_simbench.report.model import history, sweep
 from pytest_simbench.report.model.claims import Claims, claims_of
-from pytest_simbench.report.model.claims import lines as lines_of
 from pytest_simbench.report.model.outcome import Outcome
 from pytest_simbench.report.model.summary import TaskSummary
 from pytest_simbench.report.page import PAGE_NAME
-from pytest_simbench.report.terminal.brief import render_brief
-from pytest_simbench.report.terminal.run import render_run
+from pytest_simbench.report.terminal.parts import (
+    claim_lines,
+    history_lines,
+    render_changes,
+    render_tables,
+    sweep_lines,
+)
+from pytest_simbench.report.terminal.run import render_brief, render_run
 
 
 @dataclass(frozen=True)
@@ -168,7 +173,7 @@ def report_runs(config: pytest.Config) -> int:
     looks = max(outcome.looks for outcome in outcomes)
     summaries, written = summaries_of(whole, looks), Written()
     histories, sweeps = history.of_run(whole), sweep.of_run(whole)
-    tables, problems = ([], []) if others else repeatability.write_tables(folder.path, target)
+    tables, problems = ([], []) if others else write_tables(folder.path, target)
     if not (whole.records or tables or problems):
         raise pytest.UsageError(f"--sim-report {first}: it holds no repetition")
     compared = None if others else outcomes[0].compared
@@ -193,14 +198,14 @@ def report_runs(config: pytest.Config) -> int:
         recorded.append("no recordings: join the runs with --sim-merge first")
     _print(config, summaries, sweeps, [*runs.problems, *written.problems, *recorded], claims)
     width = shutil.get_terminal_size().columns
-    for line in history.lines(histories, width):
+    for line in history_lines(histories, width):
         print(for_terminal(line))
     if not others and outcomes[0].compared is not None:
         name, report = outcomes[0].compared
-        text = render_terminal(report, width, bool(report.changes))
+        text = render_changes(report, width, bool(report.changes))
         print(for_terminal(f"\nbaseline: {name}\n{text}"))
     if tables or problems:
-        print(f"\n{repeatability.render_terminal(tables, width)}")
+        print(f"\n{render_tables(tables, width)}")
         for problem in problems:
             print(for_terminal(problem))
     if target is not None and written.complete:
@@ -234,10 +239,10 @@ def _print(
 ) -> None:
     verbose, width = config.get_verbosity() > 0, shutil.get_terminal_size().columns
     if claims:
-        print(lines_of(claims, width) + "\n")
+        print(claim_lines(claims, width) + "\n")
     print((render_run if verbose else render_brief)(summaries, width))
     if sweeps:
-        told = (sweep.whole if verbose else sweep.brief)(sweeps, width)
+        told = sweep_lines(sweeps, width, verbose)
         print("\n".join([f"\n{sweep.TITLE}", *map(for_terminal, told)]))
     for problem in filter(None, problems):
         print(for_terminal(problem))

@@ -6,7 +6,8 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -16,26 +17,23 @@ from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.metrics import COSTS
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.figures.sheet import sheet_name
-from pytest_simbench.report.figures.sheet import sheets as sheets_of
-from pytest_simbench.report.figures.task import FiguresUnavailable, write_figures
-from pytest_simbench.report.markdown import run as markdown
 from pytest_simbench.report.markdown.badge import badge
-from pytest_simbench.report.model import history, sweep
-from pytest_simbench.report.model import outcome as outcome_of
+from pytest_simbench.report.markdown.run import render_run, render_tables
+from pytest_simbench.report.model import history, sweep, truth
 from pytest_simbench.report.model.claims import Claims, claims_of
+from pytest_simbench.report.model.document import Table
 from pytest_simbench.report.model.history import AnyHistory
-from pytest_simbench.report.model.matrix import with_differences
-from pytest_simbench.report.model.outcome import Outcome
+from pytest_simbench.report.model.outcome import NAME as OUTCOME
+from pytest_simbench.report.model.outcome import Compared, Outcome
 from pytest_simbench.report.model.summary import PHASES, TaskSummary, at_own_steps, summarise
-from pytest_simbench.report.model.truth import others
-from pytest_simbench.report.page import PAGE_NAME, Compared
+from pytest_simbench.report.page import PAGE_NAME
 from pytest_simbench.report.replay import REPLAY_NAME
 from pytest_simbench.report.replay.groups import Group, groups
 from pytest_simbench.worker.text import named
 
 MARKDOWN_NAME = "report.md"
 CSV_NAME = "report.csv"
+TABLES_NAME = "repeatability.md"
 
 IDENTITY = (
     "test", "task", "simulator", "mode", "profile", "protocol", "repetition", "seed", "jitter",
@@ -82,29 +80,22 @@ def write_report(
         RecordError: its records cannot be read.
     """
     reading = reading or folder.read()
+    found: dict[str, Any] = {
+        "histories": tuple(history.of_run(reading)),
+        "sweeps": tuple(sweep.of_run(reading)),
+        "claims": claims_of(reading, comparison[1] if comparison else None),
+    }
+    summaries = tuple(summaries_of(reading, looks))
     records = in_order(reading.records)
-    summaries = summaries_of(reading, looks)
-    histories, sweeps = tuple(history.of_run(reading)), tuple(sweep.of_run(reading))
-    claims = claims_of(reading, comparison[1] if comparison else None)
-    written = write_files(
-        folder.path,
-        summaries,
-        records,
-        comparison=comparison,
-        histories=histories,
-        sweeps=sweeps,
-        claims=claims,
-    )
-    return replace(
-        written, summaries=tuple(summaries), histories=histories, sweeps=sweeps, claims=claims
-    )
+    written = write_files(folder.path, summaries, records, comparison=comparison, **found)
+    return replace(written, summaries=summaries, **found)
 
 
 def summaries_of(reading: Reading, looks: int = 1) -> list[TaskSummary]:
     """What a run that was judged so often tells of each task."""
     records = at_own_steps(in_order(reading.records))
     found = summarise(records, reading.metrics, reading.references)
-    return with_differences([replace(summary, looks=looks) for summary in found], records)
+    return [replace(summary, looks=looks) for summary in found]
 
 
 def in_order(records: Sequence[Record]) -> list[Record]:
@@ -139,48 +130,71 @@ def write_files(
     from pytest_simbench.report.page.context import page
     from pytest_simbench.report.page.render import render  # Jinja2
 
-    problems: list[str] = []
-    failed: list[str] = []
-    pictures: list[Path] = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         return Written((f"no report: {_unwritable(folder, error)}",), False)
-    sheets: Mapping[str, bytes] = {}
+    drawn = _Drawn()
     if figures:
-        try:
-            sheets, told = sheets_of(run or folder, records)
-            problems += told
-            pictures = [
-                *write_figures(folder, others(summaries)),
-                *history.write_pictures(folder, histories),
-                *sweep.write_pictures(folder, sweeps),
-            ]
-        except FiguresUnavailable as error:
-            problems.append(str(error))
-        except OSError as error:
-            failed.append(f"pictures: {_unwritable(folder, error)}")
-        except Exception as error:  # a fault of ours, which costs the pictures and no table
-            failed.append(f"the pictures could not be drawn: {named(error)}")
-    told_of = {found.title: found.sentences() for found in histories}
-    names = [picture.name for picture in pictures]
-    text = markdown.render_run(summaries, names, told_of, sweeps, claims)
-    shown, replay, told = _replay(run or folder, records)
-    problems += told
-    told_page = page(run or folder, summaries, records, comparison, shown, sheets, sweeps, claims)
-    contents = {PAGE_NAME: render(told_page)}
+        drawn = _draw(folder, run or folder, summaries, records, histories, sweeps)
+    told = history.sections(histories)
+    text = render_run(summaries, drawn.pictures, told, sweeps, claims)
+    shown, replay, unshown = _replay(run or folder, records)
+    found = page(run or folder, summaries, comparison, shown, drawn.sheets, sweeps, claims)
+    contents = {PAGE_NAME: render(found)}
     if replay:
         contents[REPLAY_NAME] = replay
     if records:  # else the run has results on repeatability alone
         contents |= {MARKDOWN_NAME: text, CSV_NAME: csv_of(records)}
-    encoded = {name: text.encode("utf-8", "replace") for name, text in contents.items()}
-    encoded |= {sheet_name(task): sheet for task, sheet in sheets.items()}
-    for name, content in encoded.items():
-        try:
-            write_whole(folder, name, content)
-        except OSError as error:
-            failed.append(_unwritable(folder / name, error))
-    return Written((*problems, *failed), not failed)
+    unwritten = [_written(folder, name, text) for name, text in contents.items()]
+    unwritten += [_written(folder, name, sheet) for name, sheet in drawn.files.items()]
+    failed = [*drawn.failed, *filter(None, unwritten)]
+    return Written((*drawn.problems, *unshown, *failed), not failed)
+
+
+@dataclass
+class _Drawn:
+    """Pictures of a run.
+
+    Attributes:
+        pictures: names of the files written.
+        sheets: contact sheets (PNG), by the name of their task; `files`: by that of their file.
+        problems, failed: what could not be shown, and what went wrong, as sentences.
+    """
+
+    pictures: list[str] = field(default_factory=list)
+    sheets: Mapping[str, bytes] = field(default_factory=dict)
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    problems: list[str] = field(default_factory=list)
+    failed: list[str] = field(default_factory=list)
+
+
+def _draw(
+    folder: Path,
+    run: Path,
+    summaries: Sequence[TaskSummary],
+    records: Sequence[Record],
+    histories: Sequence[AnyHistory],
+    sweeps: Sequence[Swept],
+) -> _Drawn:
+    """Draw all pictures, and write those that are no contact sheet."""
+    from pytest_simbench.report.figures import history, sheet, sweep, task
+    from pytest_simbench.report.figures.drawing import FiguresUnavailable, write
+
+    found = _Drawn()
+    try:
+        found.sheets, found.problems = sheet.sheets(run, records)
+        found.files = {sheet.sheet_name(task): drawn for task, drawn in found.sheets.items()}
+        every = task.pictures(truth.others(summaries)), history.pictures(histories)
+        paths = write(folder, chain(*every, sweep.pictures(sweeps)))
+        found.pictures = [path.name for path in paths]
+    except FiguresUnavailable as error:
+        found.problems.append(str(error))
+    except OSError as error:
+        found.failed.append(f"pictures: {_unwritable(folder, error)}")
+    except Exception as error:  # a fault of ours, which costs the pictures and no table
+        found.failed.append(f"the pictures could not be drawn: {named(error)}")
+    return found
 
 
 def _replay(run: Path, records: Sequence[Record]) -> tuple[list[Group], str, list[str]]:
@@ -212,16 +226,41 @@ def write_outcome(folder: Path, outcome: Outcome) -> str:
     try:
         outcome.write(folder)
     except OSError as error:
-        return _unwritable(folder / outcome_of.NAME, error)
+        return _unwritable(folder / OUTCOME, error)
     return ""
 
 
 def write_badge(path: Path, records: Sequence[Record], passed: bool | None) -> str:
     """Write the badge of a run; a sentence when it could not be written."""
+    failed = _written(path.parent, path.name, badge(records, passed))
+    return f"no badge: {failed}" if failed else ""
+
+
+def write_tables(folder: Path, to: Path | None = None) -> tuple[list[Table], list[str]]:
+    """The tables of what a run folder holds on repeatability, also as a file of Markdown.
+
+    Args:
+        folder: of the run.
+        to: the folder for the file; None: there is none.
+
+    Returns:
+        The tables, and one sentence for each thing that is wrong.
+    """
+    from pytest_simbench.report.model.repeatability import found_in
+
+    found, problems = found_in(folder)
+    if found and to is not None:
+        problems.append(_written(to, TABLES_NAME, render_tables("Repeatability", found)))
+    return found, [*filter(None, problems)]
+
+
+def _written(folder: Path, name: str, content: str | bytes) -> str:
+    """Write a file; a sentence when it could not be written."""
+    encoded = content.encode("utf-8", "replace") if isinstance(content, str) else content
     try:
-        write_whole(path.parent, path.name, badge(records, passed).encode("ascii"))
+        write_whole(folder, name, encoded)
     except OSError as error:
-        return f"no badge: {_unwritable(path, error)}"
+        return _unwritable(folder / name, error)
     return ""
 
 

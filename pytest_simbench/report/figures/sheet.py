@@ -17,7 +17,7 @@ from pytest_simbench.ground.text import for_figure
 from pytest_simbench.recordings.album import FOLDER, Album
 from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.figures.task import drawing
+from pytest_simbench.report.figures.drawing import drawing
 
 CELL = (2.0, 1.5)
 """Width and height of a picture on the sheet [inches]."""

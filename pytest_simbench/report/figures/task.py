@@ -1,96 +1,24 @@
-"""Pictures of a run: metrics with intervals, start and end times, CPU and memory.
-
-matplotlib is an optional extra and is imported only when a picture is drawn.
-"""
+"""Pictures of a task: metrics with intervals, start and end times, CPU and memory."""
 
 from __future__ import annotations
 
-import io
 import math
-import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.text import for_figure
-from pytest_simbench.records.metrics import Metric
-from pytest_simbench.records.paths import write_whole
-from pytest_simbench.report.model.answer import short_labels
-from pytest_simbench.report.model.cells import unit
+from pytest_simbench.report.figures.drawing import COLOURS, Named, heading, line_style, panelled
 from pytest_simbench.report.model.pooling import merged_order
-from pytest_simbench.report.model.summary import Row, TaskSummary
-
-DPI = 120
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-"""Okabe and Ito's palette: told apart by colour-blind readers too (jfly.uni-koeln.de/color)."""
-
-MARKERS = "osD^vP*X"
-"""With the colours, so that lines are told apart without them."""
-
-PLAIN_TEXT: Any = {
-    "text.usetex": False,
-    "text.parse_math": False,
-    "axes.formatter.use_mathtext": False,
-}
-"""No label is a formula or LaTeX, whatever `matplotlibrc` says."""
+from pytest_simbench.report.model.summary import Row, TaskSummary, short_labels
 
 
-class FiguresUnavailable(RuntimeError):
-    """Pictures cannot be drawn here; the message says what to install."""
-
-
-def write_figures(folder: Path, summaries: Sequence[TaskSummary]) -> list[Path]:
-    """Draw all pictures of a run as PNG files in `folder` and return their paths.
-
-    Raises:
-        FiguresUnavailable: matplotlib is not installed.
-        OSError: the folder cannot be written to.
-    """
-    paths: list[Path] = []
-    with drawing():
-        for summary in summaries:
-            for name in PICTURES:
-                figure = draw(summary, name)
-                if figure is not None:
-                    paths.append(save(figure, folder, f"{file_name(summary.task)}_{name}"))
-    return paths
-
-
-def save(figure: Any, folder: Path, name: str) -> Path:
-    """Write a picture as PNG, whole or not at all, and return its path; within `drawing`.
-
-    Raises:
-        OSError: the folder cannot be written to.
-    """
-    picture = io.BytesIO()
-    figure.savefig(picture, format="png", dpi=DPI)
-    write_whole(folder, f"{name}.png", picture.getvalue())
-    return folder / f"{name}.png"
-
-
-@contextmanager
-def drawing(**settings: Any) -> Iterator[None]:
-    """While pictures are drawn and saved: no text means anything, no warning is shown.
-
-    Args:
-        settings: more of matplotlib's, `svg_fonttype` for `svg.fonttype`.
-
-    Raises:
-        FiguresUnavailable: matplotlib is not installed.
-    """
-    try:
-        from matplotlib import rc_context
-    except ImportError as error:
-        raise FiguresUnavailable(
-            "no pictures: matplotlib is missing; pip install 'pytest-simbench[figures]'"
-        ) from error
-    more = {name.replace("_", "."): value for name, value in settings.items()}
-    with rc_context(PLAIN_TEXT | more), warnings.catch_warnings():
-        # Characters that the font lacks are drawn as boxes, long labels leave less room.
-        warnings.simplefilter("ignore", UserWarning)
-        yield
+def pictures(summaries: Sequence[TaskSummary]) -> Named:
+    """All pictures of a run, `TASK_NAME`."""
+    for summary in summaries:
+        for name in PICTURES:
+            if (figure := draw(summary, name)) is not None:
+                yield f"{file_name(summary.task)}_{name}", figure
 
 
 def draw(summary: TaskSummary, name: str, *, titled: bool = True) -> Any:
@@ -163,10 +91,9 @@ def _metrics(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -> 
             if found.low is not None and found.high is not None:
                 axis.plot([scale * found.low, scale * found.high], [y, y], color=COLOURS[0], lw=2)
             axis.plot(scale * found.mean, y, "o", color=COLOURS[0])
-        axis.set_xlabel(heading(metric))
+        panelled(axis, heading(metric))
         if metric.bounded:
             axis.set_xlim(-3, 103)
-        axis.grid(axis="x", alpha=0.4)
         if metric.name in summary.references:
             axis.axvline(summary.references[metric.name], color="0.4", ls="--", lw=1)
 
@@ -175,34 +102,31 @@ def _times(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -> No
     """A bar from the start of the task to its end, with the deviation of both."""
     (axis,) = axes
     for y, row in enumerate(rows):
-        if row.start is None or row.end is None:
+        start, end = row.costs.get("start"), row.costs.get("end")
+        if start is None or end is None:
             continue
-        axis.barh(
-            y, row.end.mean - row.start.mean, left=row.start.mean, height=0.5, color=COLOURS[5]
-        )
-        for found, colour in ((row.start, COLOURS[2]), (row.end, COLOURS[1])):
+        axis.barh(y, end.mean - start.mean, left=start.mean, height=0.5, color=COLOURS[5])
+        for found, colour in ((start, COLOURS[2]), (end, COLOURS[1])):
             axis.errorbar(found.mean, y, xerr=found.std, fmt="o", color=colour, capsize=3, ms=4)
     axis.set_xlim(left=0)
-    axis.set_xlabel("seconds from launch")
-    axis.grid(axis="x", alpha=0.4)
+    panelled(axis, "seconds from launch")
 
 
 def _resources(axes: Sequence[Any], summary: TaskSummary, rows: Sequence[Row]) -> None:
     """Bars of CPU and resident memory; a tick marks the peak of the memory."""
     for axis, name, label in (
-        (axes[0], "cpu_percent", "CPU, % of a core"),
-        (axes[1], "rss_mb", "RAM, MB (| is the peak)"),
+        (axes[0], "cpu", "CPU, % of a core"),
+        (axes[1], "ram", "RAM, MB (| is the peak)"),
     ):
         for y, row in enumerate(rows):
-            found = getattr(row, name)
+            found = row.costs.get(name)
             if found is None or not math.isfinite(found.mean):
                 continue
             axis.barh(y, found.mean, xerr=found.std, height=0.5, color=COLOURS[5], capsize=3)
             if found.peak is not None:
                 axis.plot(found.peak, y, "|", color=COLOURS[1], ms=16, mew=2)
         axis.set_xlim(left=0)
-        axis.set_xlabel(label)
-        axis.grid(axis="x", alpha=0.4)
+        panelled(axis, label)
 
 
 Fill = Callable[[Sequence[Any], TaskSummary, Sequence[Row]], None]
@@ -227,22 +151,6 @@ def _phases(figure: Any, rows: Sequence[Row]) -> None:
             axis.plot(x, y, ms=5, label=for_figure(name), **line_style(place))
         axis.set_xticks(range(len(order)), map(for_figure, order), rotation=40, ha="right")
         axis.set_ylim(bottom=0)
-        axis.set_ylabel(label)
-        axis.grid(axis="y", alpha=0.4)
+        panelled(axis, label, "y")
     handles, names = panels[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside lower center", ncols=4, frameon=False)
-
-
-def line_style(place: int) -> dict[str, Any]:
-    """Of the line of a row, by its place: other rows have other ones."""
-    return {
-        "marker": MARKERS[place % len(MARKERS)],
-        "ls": ("-", "--")[place // len(COLOURS) % 2],
-        "color": COLOURS[place % len(COLOURS)],
-        "lw": 1.2,
-    }
-
-
-def heading(metric: Metric, between: str = ", ") -> str:
-    """Title and unit for an axis."""
-    return for_figure(between.join(filter(None, [metric.title, unit(metric)])))

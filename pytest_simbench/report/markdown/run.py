@@ -1,23 +1,22 @@
-"""The same report as GitHub Markdown: for the run folder, docs and the summary page of a CI job."""
+"""The report as GitHub Markdown: for the run folder, docs and the summary page of a CI job."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 from pytest_simbench.ground.text import for_markdown, in_one_line
+from pytest_simbench.measure.gate import GateReport
 from pytest_simbench.measure.sweep import Swept
-from pytest_simbench.report.model import sweep, truth
-from pytest_simbench.report.model import tables as columns
-from pytest_simbench.report.model.answer import sentences
+from pytest_simbench.report.model import changes, sweep, tables, truth
 from pytest_simbench.report.model.claims import Claims
+from pytest_simbench.report.model.document import Column, Section, Table, capital
 from pytest_simbench.report.model.summary import TaskSummary
-from pytest_simbench.report.terminal.grid import Column, capital
 
 
 def render_run(
     summaries: Sequence[TaskSummary],
     pictures: Sequence[str] = (),
-    histories: Mapping[str, Sequence[str]] | None = None,
+    histories: Sequence[Section] = (),
     sweeps: Sequence[Swept] = (),
     claims: Claims | None = None,
 ) -> str:
@@ -26,24 +25,20 @@ def render_run(
     Args:
         summaries: from `summary.summarise`.
         pictures: addresses of pictures to show at the end, relative to the report.
-        histories: what changed over a simulator's releases, in sentences, by title.
+        histories: what changed over a simulator's releases.
         sweeps: laws over time steps.
         claims: what the tests claimed, which comes first.
     """
     if not (summaries or sweeps):
         return "No repetition was recorded.\n"
     parts = [render_claims(claims)] if claims else []
-    parts += [_truth(summaries)] if truth.laws(summaries) else []
-    parts += [_sweep(sweeps)] if sweeps else []
-    parts += [render_task(summary) for summary in truth.others(summaries)]
-    for title, found in (histories or {}).items():
-        items = "\n".join(f"- {for_markdown(text)}" for text in found)
-        parts.append(f"## {for_markdown(f'History: {title}')}\n\n{items}")
-    parts.append(f"How to read it: {for_markdown(columns.LEGEND)}")
-    deviations = columns.deviations(summaries)
-    if deviations:
-        lines = [f"- {for_markdown(f'{name}: {text}')}" for name, text in deviations]
-        parts.append("\n".join(["## Declared deviations from the scene", "", *lines]))
+    first = filter(None, [truth.section(summaries), sweep.section(sweeps)])
+    tasks = map(tables.section, truth.others(summaries))
+    parts += [render_section(found) for found in (*first, *tasks, *histories)]
+    parts.append(f"How to read it: {for_markdown(tables.LEGEND)}")
+    if deviations := tables.deviations(summaries):
+        lines = _bullets(f"{name}: {text}" for name, text in deviations)
+        parts.append(f"## Declared deviations from the scene\n\n{lines}")
     if pictures:
         parts.append("\n".join(["## Pictures", "", *(f"![{name}]({name})" for name in pictures)]))
     return "\n\n".join(parts) + "\n"
@@ -51,7 +46,7 @@ def render_run(
 
 def render_claims(found: Claims) -> str:
     """Pass or fail, and why."""
-    parts = [f"**{for_markdown(found.sentence)}**", table(found.table) if found.table else ""]
+    parts = [f"**{for_markdown(found.sentence)}**", table(found.table.columns)]
     for trouble in found.troubles:
         told = [f"- {for_markdown(trouble.what)}"]
         told += [f"  worst: {for_markdown(trouble.worst)}"] if trouble.worst else []
@@ -63,51 +58,60 @@ def render_claims(found: Claims) -> str:
     return "\n\n".join(filter(None, parts))
 
 
-def _truth(summaries: Sequence[TaskSummary]) -> str:
-    """What simulators make of laws."""
-    parts = [f"## {capital(truth.TITLE)}"]
-    if told := truth.sentences(summaries):
-        parts.append("\n".join(f"- {for_markdown(text)}" for text in told))
-    parts += [table(truth.table(summaries)), for_markdown(truth.LEGEND)]
-    for name, found in truth.details(summaries):
-        parts.append(f"### {for_markdown(capital(name))}\n\n{table(found)}")
-    return "\n\n".join(parts)
-
-
-def _sweep(found: Sequence[Swept]) -> str:
-    """Laws over time steps."""
-    parts = [f"## {capital(sweep.TITLE)}", table(sweep.table(found)), for_markdown(sweep.LEGEND)]
-    parts.append(for_markdown(sweep.READING))
-    for name, columns_ in sweep.details(found):
-        parts.append(f"### {for_markdown(capital(name))}\n\n{table(columns_)}")
-    return "\n\n".join(parts)
-
-
 def render_task(summary: TaskSummary, level: int = 2) -> str:
     """One task under a heading of that level."""
-    title = f"{'#' * level} {for_markdown(columns.title(summary))}"
-    parts = [title, "\n".join(f"- {for_markdown(text)}" for text in sentences(summary))]
-    parts.append(table(columns.study(summary)))
-    tables = [*columns.details(summary), (columns.BY_PHASE, columns.by_phase(summary))]
-    for name, found in tables:
-        if found:
-            heading = for_markdown(capital(name))
-            parts.append(f"{'#' * (level + 1)} {heading}\n\n{table(found)}")
-    notes = columns.notes(summary)
-    if notes:
-        parts.append("\n".join(f"- {for_markdown(f'note: {text}')}" for text in notes))
-    return "\n\n".join(part for part in parts if part)
+    return render_section(tables.section(summary), level)
+
+
+def render_section(found: Section, level: int = 2) -> str:
+    """A section under a heading of that level: sentences, tables, notes."""
+    parts = [f"{'#' * level} {for_markdown(found.title)}", _bullets(found.sentences)]
+    for place, each in enumerate(found.tables):
+        parts += _titled(each, level + 1 if place else 0)
+    parts.append(_bullets(f"note: {text}" for text in found.notes))
+    return "\n\n".join(filter(None, parts))
+
+
+def render_changes(report: GateReport, baseline: str, limited: bool) -> str:
+    """The comparison with a baseline, for the page of a CI job; ends with a newline."""
+    passed = changes.passed(report) if limited else ""
+    parts = [
+        f"## {for_markdown(f'Compared with {baseline}')}",
+        _bullets(changes.warned(report)),
+        _bullets(changes.failed(report)),
+        f"Passed: {passed}." if passed else "",
+        table(changes.columns(report)),
+        _bullets(f"not compared: {sentence}" for sentence in report.notes),
+    ]
+    return "\n\n".join(filter(None, parts)) + "\n"
+
+
+def render_tables(title: str, found: Sequence[Table]) -> str:
+    """Tables of their own under one title; ends with a newline."""
+    parts = [f"# {title}", *(part for each in found for part in _titled(each, 2))]
+    return "\n\n".join(parts) + "\n"
 
 
 def table(found: Sequence[Column]) -> str:
-    """One table with a line for each row."""
-    single = [column.joined() for column in found]
+    """One table with a line for each row; nothing without columns."""
+    if not found:
+        return ""
     lines = [
-        [for_markdown(column.heading, cell=True) for column in single],
-        [":--" if column.left else "--:" for column in single],
+        [for_markdown(column.heading, cell=True) for column in found],
+        [":--" if column.left else "--:" for column in found],
         *(
-            [for_markdown(" ".join(cell), cell=True) for cell in row]
-            for row in zip(*(column.cells for column in single), strict=True)
+            [for_markdown(cell.text, cell=True) for cell in row]
+            for row in zip(*(column.cells for column in found), strict=True)
         ),
     ]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _titled(found: Table, level: int) -> list[str]:
+    """A table, under a heading where there is a level, and how to read it."""
+    heading = [f"{'#' * level} {for_markdown(capital(found.title))}"] if level else []
+    return [*heading, table(found.columns), *filter(None, [for_markdown(found.note)])]
+
+
+def _bullets(items: Iterable[str]) -> str:
+    return "\n".join(f"- {for_markdown(item)}" for item in items)

@@ -1,35 +1,28 @@
-"""The result of a task in plain words, which claims no more than the tests between rows support."""
+"""The result in plain words, which claim no more than the tests between rows support."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from pytest_simbench.ground.text import LONGEST_LABEL, in_one_line
 from pytest_simbench.measure.comparison import MARGIN
 from pytest_simbench.measure.differences import Difference
 from pytest_simbench.records.metrics import Metric, significant
 from pytest_simbench.report.model import cells
+from pytest_simbench.report.model.document import listed
+from pytest_simbench.report.model.pooling import COST, Spread
 from pytest_simbench.report.model.summary import Row, TaskSummary
 
 NAMED = 3
 """How many simulators a sentence names; the table below has them all."""
 
+OUTCOMES = 2
+"""Metrics that the headline names of a task of which the study has none with a good direction."""
 
-def sentences(summary: TaskSummary) -> list[str]:
-    """One sentence for each of the study's metrics, and the failures."""
-    names = short_labels(summary.rows)
-    found = [_compare(metric, summary, names) for metric in summary.study]
-    failed = [
-        f"{name} {row.failed} of {row.attempts}"
-        for name, row in zip(names, summary.rows, strict=True)
-        if row.failed
-    ]
-    attempts = sum(row.attempts for row in summary.rows)
-    if failed:
-        found.append(f"crashes: {', '.join(failed)}.")
-    elif attempts:
-        found.append(f"crashes: none in {attempts} repetitions.")
-    return [sentence for sentence in [*found, *summary.modes] if sentence]
+TOLD_COSTS = ("cpu_cost", "ram")
+"""Of the costs those that the headline names; they belong to the simulator alone."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +30,7 @@ class Standing:
     """What the differences at one metric make of the rows, by their places.
 
     Attributes:
-        ahead: who beats another and is beaten by nobody.
+        ahead: who beats another and is beaten by nobody; a mean alone puts nobody anywhere.
         behind: who is beaten.
         apart: who differs from another at a metric of which no direction is right.
         same: who is equivalent to all others.
@@ -68,8 +61,7 @@ def standing(name: str, summary: TaskSummary) -> Standing:
     behind = {d.loser for d in found} - {None}
     ahead = {d.winner for d in found} - {None} - behind
     apart = {place for d in found if d.verdict == "different" for place in (d.a, d.b)}
-    unlike = {place for d in found if d.verdict != "equivalent" for place in (d.a, d.b)}
-    same = rows - unlike
+    same = rows - {place for d in found if d.verdict != "equivalent" for place in (d.a, d.b)}
     left = rows - ahead - behind - apart - same
     untold = ""
     if not (ahead or behind or apart):
@@ -86,56 +78,62 @@ def _untold(found: Sequence[Difference]) -> str:
     return f"a difference needs at least {needs} pairs that differ; so far {differ or 'none'}"
 
 
-def short_labels(rows: Sequence[Row]) -> list[str]:
-    """Names that tell the rows apart: mode, profile and test only where they differ."""
-    modes = len({row.mode for row in rows}) > 1
-    profiles = len({row.profile for row in rows}) > 1
-    labels = []
-    for row in rows:
-        parts = [row.mode] * modes + [row.profile] * profiles + [row.test] * bool(row.test)
-        labels.append(f"{row.simulator} ({', '.join(parts)})" if parts else row.simulator)
-    return labels
+def sentences(summary: TaskSummary) -> list[str]:
+    """One sentence for each of the study's metrics, and the failures."""
+    found = [_compare(metric, summary) for metric in summary.study]
+    failed = [
+        f"{name} {row.failed} of {row.attempts}"
+        for name, row in zip(summary.names, summary.rows, strict=True)
+        if row.failed
+    ]
+    attempts = sum(row.attempts for row in summary.rows)
+    if failed:
+        found.append(f"crashes: {', '.join(failed)}.")
+    elif attempts:
+        found.append(f"crashes: none in {attempts} repetitions.")
+    return [sentence for sentence in [*found, *summary.modes] if sentence]
 
 
-def _compare(metric: Metric, summary: TaskSummary, names: Sequence[str]) -> str:
-    """Who is ahead at one metric: only what the tests between the rows support.
-
-    Ahead is who beats another and is beaten by nobody, behind who is beaten; a mean alone puts
-    nobody anywhere.
-    """
-    sign = 1 if metric.better == "lower" else -1
-    values = {
-        place: value
-        for place, row in enumerate(summary.rows)
-        if (value := row.metrics.get(metric.name)) is not None
-    }
-    texts = {
-        place: f"{names[place]} {cells.mean_in_words(value, metric)}"
-        + _finished(value.count, summary.rows[place])
-        for place, value in sorted(values.items(), key=lambda item: sign * item[1].mean)
-    }
+def _compare(metric: Metric, summary: TaskSummary) -> str:
+    """Who is ahead at one metric: only what the tests between the rows support."""
+    texts = _values(metric, summary)
     if len(texts) < 2:
         return "".join(f"{metric.title}: {text}." for text in texts.values())
-    found = standing(metric.name, summary)
+    found, every = standing(metric.name, summary), listed([*texts.values()], NAMED)
     if found.untold:
-        return f"{metric.title}: {_list([*texts.values()])}; {found.untold}."
+        return f"{metric.title}: {every}; {found.untold}."
+    told = [d for d in summary.differences if d.metric.name == metric.name]
     if found.apart:
-        told = [d for d in summary.differences if d.metric.name == metric.name]
         count = sum(d.verdict == "different" for d in told)
         many = f"{count} of {len(told)} pairs differ" if len(told) > 1 else "they differ"
-        return f"{metric.title}: {_list([*texts.values()])}; {many}, and no value is the right one."
+        return f"{metric.title}: {every}; {many}, and no value is the right one."
     ahead = [text for place, text in texts.items() if place in found.ahead]
     behind = [text for place, text in texts.items() if place in found.behind]
     others = [text for place, text in texts.items() if place not in {*found.ahead, *found.behind}]
     verb = "is" if len(ahead) == 1 else "are"
     # "of" only where it is true of each: one row that beats every one that is behind.
-    won = [d for d in summary.differences if d.metric.name == metric.name and d.winner is not None]
+    won = [d for d in told if d.winner is not None]
     beaten = {d.loser for d in won if d.winner in found.ahead}
     of_each = len(ahead) == 1 and beaten == set(found.behind)
-    over = f" of {_list(behind)}" if of_each else f"; behind: {_list(behind)}"
+    over = f" of {listed(behind, NAMED)}" if of_each else f"; behind: {listed(behind, NAMED)}"
     by = f", by {_amount(won[0])}" if len(won) == 1 else ""
-    rest = f"; not told apart: {_list(others)}" if others else ""
-    return f"{metric.title}: {_list(ahead)} {verb} ahead{over}{by}{rest}."
+    rest = f"; not told apart: {listed(others, NAMED)}" if others else ""
+    return f"{metric.title}: {listed(ahead, NAMED)} {verb} ahead{over}{by}{rest}."
+
+
+def _values(metric: Metric, summary: TaskSummary) -> Mapping[int, str]:
+    """Name and value of each row that has one, by its place; the better ones first."""
+    sign = 1 if metric.better == "lower" else -1
+    known = [
+        (place, value, summary.rows[place])
+        for place, row in enumerate(summary.rows)
+        if (value := row.metrics.get(metric.name)) is not None
+    ]
+    return {
+        place: f"{summary.names[place]} {cells.mean_in_words(value, metric)}"
+        + _finished(value.count, row)
+        for place, value, row in sorted(known, key=lambda item: sign * item[1].mean)
+    }
 
 
 def _finished(count: int, row: Row) -> str:
@@ -152,8 +150,82 @@ def _amount(found: Difference) -> str:
     return f"{text} [{', '.join(map(significant, sorted(told)))}]" if told else text
 
 
-def _list(texts: Sequence[str]) -> str:
-    shown = list(texts) if len(texts) <= NAMED + 1 else list(texts[:NAMED])
-    if len(texts) > len(shown):
-        return ", ".join(shown) + f" and {len(texts) - len(shown)} more"
-    return " and ".join([", ".join(shown[:-1]), shown[-1]]) if len(shown) > 1 else shown[0]
+def headline(summaries: Sequence[TaskSummary]) -> list[str]:
+    """A whole run in at most three sentences: what ran, what came of it, what it cost; they rank
+    only what the corrected tests rank."""
+    return [text for text in (_ran(summaries), _outcome(summaries), _cost(summaries)) if text]
+
+
+def _ran(summaries: Sequence[TaskSummary]) -> str:
+    rows = [row for summary in summaries for row in summary.rows]
+    if not rows:
+        return ""
+    who = list(dict.fromkeys(row.simulator for row in rows))
+    tasks = _and([summary.task for summary in summaries])
+    attempts, failed = (sum(getattr(row, k) for row in rows) for k in ("attempts", "failed"))
+    text = f"{_and(who) if len(who) == 1 else f'{len(who)} simulators'} did {tasks}: "
+    text += f"{attempts} repetition{'s' * (attempts != 1)}, "
+    if failed:
+        counts = Counter[str]()
+        for row in rows:
+            counts[row.simulator] += row.failed
+        told = _and([f"{_and([n])} {k}" for n, k in counts.items() if k])
+        text += f"{failed} crashed ({told})"
+    else:
+        text += "none crashed"
+    cut = sum(row.interrupted for row in rows)
+    return text + (f", {cut} cut short" if cut else "") + "."
+
+
+def _outcome(summaries: Sequence[TaskSummary]) -> str:
+    clauses = []
+    for summary in summaries:
+        found: dict[str, list[str]] = {}
+        ranked = [m for m in summary.metrics if m.better]
+        shown = [m for m in ranked if m.study] or ranked[:OUTCOMES]
+        for metric in [*shown, *(m for m in summary.metrics if m.study and not m.better)]:
+            values = [row.metrics.get(metric.name) for row in summary.rows]
+            if text := _who(metric, values, summary):
+                found.setdefault(text, []).append(metric.title)
+        task = _and([summary.task])
+        clauses += [f"{task}, {_and(titles)}: {text}" for text, titles in found.items()]
+    return f"Outcome: {'; '.join(clauses)}." if clauses else ""
+
+
+def _cost(summaries: Sequence[TaskSummary]) -> str:
+    found: dict[tuple[str, str], list[str]] = {}
+    for metric in (COST[name] for name in TOLD_COSTS):
+        for summary in summaries:
+            values = [row.costs.get(metric.name) for row in summary.rows]
+            if text := _who(metric, values, summary):
+                found.setdefault((metric.title, text), []).append(summary.task)
+    several = len(summaries) > 1
+    clauses = [
+        f"{title}{f', {_and(tasks)}' * several}: {text}" for (title, text), tasks in found.items()
+    ]
+    return f"Cost: {'; '.join(clauses)}." if clauses else ""
+
+
+def _who(metric: Metric, values: Sequence[Spread | None], summary: TaskSummary) -> str:
+    """Who is ahead and who behind; of a single row its value."""
+    there = [value for value in values if value is not None]
+    if len(there) < 2:
+        return "".join(cells.mean_in_words(value, metric) for value in there)
+    found = standing(metric.name, summary)
+    ahead, behind, apart = (
+        _some([summary.names[k] for k in who]) for who in (found.ahead, found.behind, found.apart)
+    )
+    if found.untold:
+        return found.untold
+    if apart:
+        return f"{apart} differ, and no value is the right one"
+    return f"{ahead} ahead (behind: {behind})" if ahead else f"behind: {behind}"
+
+
+def _some(names: Sequence[str]) -> str:
+    """The names, or how many where they are more than a sentence holds."""
+    return _and(names) if len(names) <= NAMED else f"{len(names)} others"
+
+
+def _and(texts: Sequence[str]) -> str:
+    return listed([in_one_line(text, LONGEST_LABEL) for text in texts])

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
-from pytest_simbench.ground.text import for_markdown
-from pytest_simbench.report.terminal.grid import Column, render
+from pytest_simbench.report.model.document import Column
 from pytest_simbench.simulator.info import Capability, SimulatorInfo
 
 MARKS: tuple[tuple[str, Capability], ...] = (
@@ -19,53 +18,28 @@ MARKS: tuple[tuple[str, Capability], ...] = (
 """Capabilities that get a column; every simulator runs headless."""
 
 
-def rows(infos: Sequence[SimulatorInfo]) -> dict[str, list[str]]:
-    """Cells by heading, one for each simulator."""
-    table = {
-        "simulator": [info.name for info in infos],
-        "engine": [info.engine for info in infos],
-        "licence": [info.licence for info in infos],
-        "written in": [info.language for info in infos],
-        "headless": ["yes" for _ in infos],
-    }
-    for heading, capability in MARKS:
-        table[heading] = ["yes" if capability in info.capabilities else "-" for info in infos]
-    table["own environment"] = [_environment(info) for info in infos]
-    table["compiles first"] = ["yes" if info.costly_start else "-" for info in infos]
-    table["on disk MB"] = [str(info.install_size_mb or "?") for info in infos]
-    table["tested versions"] = [info.tested_range for info in infos]
-    return table
+def columns(infos: Sequence[SimulatorInfo]) -> list[Column]:
+    """A row for each simulator."""
+
+    def marks(found: Iterable[object]) -> list[str]:
+        return ["yes" if each else "-" for each in found]
+
+    return [
+        Column("simulator", [info.name for info in infos], left=True),
+        Column("engine", [info.engine for info in infos], left=True),
+        Column("licence", [info.licence for info in infos], left=True),
+        Column("written in", [info.language for info in infos], left=True),
+        Column("headless", marks(infos)),
+        *(
+            Column(heading, marks(capability in info.capabilities for info in infos))
+            for heading, capability in MARKS
+        ),
+        Column("own environment", map(_environment, infos)),
+        Column("compiles first", marks(info.costly_start for info in infos)),
+        Column("on disk MB", [str(info.install_size_mb or "?") for info in infos]),
+        Column("tested versions", [info.tested_range for info in infos]),
+    ]
 
 
 def _environment(info: SimulatorInfo) -> str:
     return "yes" if info.requirements else "system's Python" if info.system_packages else "-"
-
-
-def capability_table(infos: Sequence[SimulatorInfo], width: int) -> str:
-    """The table for a terminal of `width` columns."""
-    texts = ("simulator", "engine", "licence", "written in")
-    columns = [
-        Column(heading, [[cell] for cell in cells], left=heading in texts)
-        for heading, cells in rows(infos).items()
-    ]
-    return render(columns, width)
-
-
-def capability_markdown(infos: Sequence[SimulatorInfo]) -> str:
-    """The table for a page of documentation."""
-    table = rows(infos)
-    texts = [list(table), *map(list, zip(*table.values(), strict=True))]
-    lines = [[for_markdown(cell, cell=True) for cell in line] for line in texts]
-    lines.insert(1, ["---"] * len(table))
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def main() -> None:
-    """Print the Markdown table of all registered simulators, for docs/simulators.md."""
-    from pytest_simbench.simulator.registry import adapter, registered
-
-    print(capability_markdown([adapter(name).info for name in registered()]))
-
-
-if __name__ == "__main__":
-    main()

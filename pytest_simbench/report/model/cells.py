@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pytest_simbench.measure.intervals import proportion
 from pytest_simbench.records.metrics import Metric, significant
-from pytest_simbench.report.model.pooling import Sampled, Spread
+from pytest_simbench.report.model.document import Cell
+from pytest_simbench.report.model.pooling import Spread
 from pytest_simbench.report.model.summary import Row
 
 MISSING = "-"
@@ -40,61 +41,67 @@ def interval(found: Spread, metric: Metric) -> str:
     return f"[{', '.join(metric_value(end, metric) for end in ends)}]"
 
 
-def spread(found: Spread | None, metric: Metric) -> list[str]:
+def spread(found: Spread | None, metric: Metric) -> Cell:
     """Two lines: min / mean / max (for yes-or-no: how many of how many), and the interval."""
     if found is None:
-        return [MISSING]
+        return Cell([MISSING])
     if metric.kind == "yes_no":
-        yes = round(found.mean * found.count)
-        return [
-            f"{yes} of {found.count}",
-            f"{metric_value(found.mean, metric)} {interval(found, metric)}".rstrip(),
-        ]
+        yes, share = round(found.mean * found.count), metric_value(found.mean, metric)
+        lines = [f"{yes} of {found.count}", f"{share} {interval(found, metric)}".rstrip()]
+        return Cell(lines, found.mean)
     parts = (found.min, found.mean, found.max)
-    return [" / ".join(metric_value(part, metric) for part in parts), interval(found, metric)]
+    shown = " / ".join(metric_value(part, metric) for part in parts)
+    return Cell([shown, interval(found, metric)], found.mean)
 
 
-def mean_interval(found: Spread | None, metric: Metric) -> list[str]:
+def mean_first(found: Spread | None, metric: Metric) -> Cell:
+    """Three lines, for the page: mean, interval, smallest and largest; yes-or-no as above."""
+    if found is None or metric.kind == "yes_no":
+        return spread(found, metric)
+    mean, *ends = (metric_value(v, metric) for v in (found.mean, found.min, found.max))
+    shown = " to ".join(dict.fromkeys(ends))
+    lines = [mean, interval(found, metric), shown if shown != mean else ""]
+    return Cell([line for line in lines if line], found.mean)
+
+
+def mean_interval(found: Spread | None, metric: Metric) -> Cell:
     """Two lines: the mean, and the interval."""
     if found is None:
-        return [MISSING]
-    return [metric_value(found.mean, metric), interval(found, metric)]
+        return Cell([MISSING])
+    return Cell([metric_value(found.mean, metric), interval(found, metric)], found.mean)
 
 
-def cost(found: Spread | None, digits: int = 2) -> list[str]:
+def cost(found: Spread | None, digits: int = 2) -> Cell:
     """Two lines: the mean, and the interval."""
     if found is None:
-        return [MISSING]
-    return [number(found.mean, digits), _ends(found, digits)]
+        return Cell([MISSING])
+    ends = [] if found.low is None or found.high is None else [found.low, found.high]
+    shown = [f"[{', '.join(number(end, digits) for end in ends)}]"] if ends else [""]
+    return Cell([number(found.mean, digits), *shown], found.mean)
 
 
-def _ends(found: Spread | Sampled, digits: int) -> str:
-    if found.low is None or found.high is None:
-        return ""
-    return f"[{number(found.low, digits)}, {number(found.high, digits)}]"
-
-
-def sampled(found: Sampled | None) -> list[str]:
+def sampled(found: Spread | None) -> Cell:
     """Mean +- deviation over all samples, the interval of the mean, the peak where there is one."""
     if found is None:
-        return [MISSING]
+        return Cell([MISSING])
     lines = [f"{found.mean:.0f} +- {found.std:.0f}"]
     if found.low is not None and found.high is not None:
         lines.append(f"[{found.low:.0f}, {found.high:.0f}]")
     if found.peak is not None:
         lines.append(f"(peak {found.peak:.0f})")
-    return lines
+    return Cell(lines, found.mean)
 
 
-def failures(row: Row) -> list[str]:
+def failures(row: Row) -> Cell:
     """Failed repetitions of those that count, the interval of their share, the interrupted ones."""
-    lines = [f"{row.failed} of {row.attempts}"]
+    lines, share = [f"{row.failed} of {row.attempts}"], None
     if row.attempts:
         found = proportion(row.failed, row.attempts)
+        share = found.mean
         lines.append(f"[{100 * found.low:.0f}, {100 * found.high:.0f}] %")
     if row.interrupted:
         lines.append(f"{row.interrupted} cut")
-    return lines
+    return Cell(lines, share)
 
 
 def unit(metric: Metric) -> str:

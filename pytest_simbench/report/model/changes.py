@@ -1,15 +1,11 @@
-"""What changed since a baseline: for the terminal, and as Markdown for the page of a CI job."""
+"""What changed since a baseline."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
-from pytest_simbench.ground.text import for_markdown, for_terminal
 from pytest_simbench.measure.gate import Change, GateReport
 from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.records.series import short
-from pytest_simbench.report.markdown import run as markdown
-from pytest_simbench.report.terminal.grid import Column, fill, render
+from pytest_simbench.report.model.document import Column
 
 ALWAYS = ("rtf", "cpu_cost", "ram")
 """Costs that are shown although they may not have changed, as the study's metrics are."""
@@ -23,14 +19,15 @@ def columns(report: GateReport) -> list[Column]:
     rows = _rows(report)
     if not rows:
         return []
+    found = [change for change, _ in rows]
     return [
-        Column("test", [[short(change.test)] for change, _ in rows], left=True),
-        Column("metric", [[_name(change)] for change, _ in rows], left=True),
-        Column("baseline", [[change.metric.format(change.comparison.first)] for change, _ in rows]),
-        Column("now", [[change.metric.format(change.comparison.second)] for change, _ in rows]),
-        Column("change", [[_amount(change)] for change, _ in rows]),
-        Column("p", [[f"{change.p_value:.2g}"] for change, _ in rows]),
-        Column("verdict", [[verdict] for _, verdict in rows], left=True),
+        Column("test", [short(change.test) for change in found], left=True, above=True),
+        Column("metric", map(_name, found), left=True),
+        Column("baseline", [_value(change, change.comparison.first) for change in found]),
+        Column("now", [_value(change, change.comparison.second) for change in found]),
+        Column("change", map(_amount, found)),
+        Column("p", [f"{change.p_value:.2g}" for change in found]),
+        Column("verdict", [verdict for _, verdict in rows], left=True, wrap=True),
     ]
 
 
@@ -69,6 +66,11 @@ def _name(change: Change) -> str:
     return f"{change.metric.name} (speed out)" if change.normalised else change.metric.name
 
 
+def _value(change: Change, value: float) -> str:
+    """CPU is told in % alone: that it is of one core would make the table too wide."""
+    return change.metric.format(value).replace(" of a core", "")
+
+
 def _amount(change: Change) -> str:
     """The change of the number itself, with its sign: `-20 points`, `+3.2 %`."""
     rising = change.comparison.second > change.comparison.first
@@ -79,50 +81,18 @@ def _amount(change: Change) -> str:
 DIFFERENT = "different in the baseline (a change may come from this)"
 
 
-def render_terminal(report: GateReport, width: int, limited: bool) -> str:
-    """The comparison as plain lines: differences first, then the table, then the verdicts.
-
-    Args:
-        report: from `run_gate`.
-        width: of the terminal.
-        limited: whether limits were given, so that passing is worth a sentence.
-    """
-    table = columns(report)
-    parts = [
-        _listed(DIFFERENT, report.differences, width),
-        render(table, width) if table else "",
-        _listed("not compared", report.notes, width),
-        "\n".join(fill(f"FAILED {sentence}", width, "  ") for sentence in report.failures),
-        _passed(report) if limited else "",
-    ]
-    return for_terminal("\n\n".join(part for part in parts if part))
+def warned(report: GateReport) -> list[str]:
+    """What is not the same in both runs."""
+    return [f"{DIFFERENT}: {sentence}" for sentence in report.differences]
 
 
-def _passed(report: GateReport) -> str:
-    """What is said when nothing fails."""
+def failed(report: GateReport) -> list[str]:
+    """Why the comparison fails."""
+    return [f"FAILED {sentence}" for sentence in report.failures]
+
+
+def passed(report: GateReport) -> str:
+    """What is said when nothing fails; empty where something does."""
     if report.failures:
         return ""
     return PASSED if report.compared else NO_LIMIT
-
-
-def _listed(title: str, items: Iterable[str], width: int) -> str:
-    lines = [f"  {fill(item, width, '    ')}" for item in items]
-    return "\n".join([f"{title}:", *lines]) if lines else ""
-
-
-def render_markdown(report: GateReport, baseline: str, limited: bool) -> str:
-    """The same for the page of a CI job; ends with a newline."""
-    table = columns(report)
-    parts = [
-        f"## {for_markdown(f'Compared with {baseline}')}",
-        _bullets(f"{DIFFERENT}: {sentence}" for sentence in report.differences),
-        _bullets(f"FAILED {sentence}" for sentence in report.failures),
-        f"Passed: {passed}." if limited and (passed := _passed(report)) else "",
-        markdown.table(table) if table else "",
-        _bullets(f"not compared: {sentence}" for sentence in report.notes),
-    ]
-    return "\n\n".join(part for part in parts if part) + "\n"
-
-
-def _bullets(items: Iterable[str]) -> str:
-    return "\n".join(f"- {for_markdown(item)}" for item in items)

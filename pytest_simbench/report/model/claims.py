@@ -15,7 +15,7 @@ from pytest_simbench.records.metrics import COSTS, Metric, significant
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import grouped
 from pytest_simbench.report.model.again import command
-from pytest_simbench.report.terminal.grid import Column, fill, render
+from pytest_simbench.report.model.document import Column, Table, names
 
 MOST = 12
 """Claims that fail, or are not decided, which the first screen tells in full."""
@@ -56,7 +56,7 @@ class Claims:
 
     state: str
     sentence: str
-    table: Sequence[Column]
+    table: Table
     troubles: Sequence[Trouble]
     more: int = 0
 
@@ -82,19 +82,6 @@ def claims_of(reading: Reading, comparison: GateReport | None = None) -> Claims:
     troubles, more = troubles[:MOST], len(troubles) - MOST
     told = _sentence(state, count, reading.records)
     return Claims(state, told, _table(claims, reading.metrics), troubles, max(0, more))
-
-
-def lines(found: Claims, width: int) -> str:
-    """For the terminal, of at most `width` columns."""
-    parts = [fill(found.sentence, width), render(found.table, width) if found.table else ""]
-    for trouble in found.troubles:
-        told = [fill(trouble.what, width, "  ")]
-        told += [fill(f"  worst: {trouble.worst}", width, "  ")] if trouble.worst else []
-        told += [f"  again: {trouble.again}"] if trouble.again else []
-        parts.append("\n".join(told))
-    if found.more:
-        parts.append(f"{found.more} more of them in the report")
-    return "\n\n".join(filter(None, parts))
 
 
 def _that_count(found: Sequence[Claim]) -> list[Claim]:
@@ -126,35 +113,22 @@ def _sentence(state: str, count: Counter[str], records: Sequence[Record]) -> str
     return f"{state}   {', '.join(parts)}; {repetitions}"
 
 
-def _table(claims: Sequence[Claim], metrics: Mapping[str, Sequence[Metric]]) -> list[Column]:
+def _table(claims: Sequence[Claim], metrics: Mapping[str, Sequence[Metric]]) -> Table:
     """A row for each function, task and claim; several tests in one cell are counted."""
     if not claims:
-        return []
-    who = _labels(claims)
-    subjects = list(dict.fromkeys(who.values()))
+        return Table("Claims", [])
+    places = list(dict.fromkeys(map(_place, claims)))
+    who = dict(zip(places, names(places, "{} {}", " "), strict=True))
     rows = grouped(claims, lambda c: (_subject(c, claims), _claimed(c, metrics)))
-    labels = [[f"{subject}: {text}"] for subject, text in rows]
-    found = [Column("claim", labels, left=True)]
-    for name in subjects:
-        cells = [
-            [_cell([c for c in row if who[_place(c)] == name], metrics)] for row in rows.values()
-        ]
-        found.append(Column(name, cells, left=True))
-    return found
+    found = [Column("claim", [f"{subject}: {text}" for subject, text in rows], left=True)]
+    for name in dict.fromkeys(who.values()):
+        of = ([c for c in row if who[_place(c)] == name] for row in rows.values())
+        found.append(Column(name, [_cell(row, metrics) for row in of], left=True))
+    return Table("Claims", found)
 
 
 def _place(claim: Claim) -> tuple[str, str, str]:
     return claim.simulator, claim.mode, claim.profile
-
-
-def _labels(claims: Sequence[Claim]) -> dict[tuple[str, str, str], str]:
-    """Names of simulators, with mode and profile where they differ."""
-    places = list(dict.fromkeys(map(_place, claims)))
-    several = [len({place[k] for place in places}) > 1 for k in (1, 2)]
-    return {
-        place: " ".join([place[0], *(place[k + 1] for k in range(2) if several[k])])
-        for place in places
-    }
 
 
 def _subject(claim: Claim, claims: Sequence[Claim]) -> str:

@@ -17,6 +17,9 @@ from pytest_simbench.simulator.files import FileError, read_file, read_json
 
 NAME = "outcome.json"
 
+Compared = tuple[str, GateReport]
+"""Name of a baseline, and what differs from it."""
+
 SCHEMA = 1
 
 LARGEST = 64 * 2**20
@@ -40,8 +43,8 @@ class Outcome:
     looks: int = 1
 
     @property
-    def compared(self) -> tuple[str, GateReport] | None:
-        """Name of the baseline and what differs from it, as the page takes them."""
+    def compared(self) -> Compared | None:
+        """The comparison, if there is one."""
         return None if self.comparison is None else (self.baseline, self.comparison)
 
     def write(self, folder: Path) -> None:

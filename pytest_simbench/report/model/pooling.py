@@ -1,21 +1,20 @@
-"""Many repetitions' values as one: smallest, mean and largest; and what was sampled."""
+"""Many repetitions' values as one: mean, deviation and interval; and what was sampled."""
 
 from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pytest_simbench.measure.intervals import interval
-from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.metrics import COSTS, Metric
 
-Ends = Callable[[Sequence[float], Metric], tuple[float, float]]
-"""Gives the lower and upper end of the interval of a metric's mean; infinite where not known."""
+COST = {cost.name: cost for cost in COSTS}
 
-AMOUNT = Metric("amount", "any cost", least=0.0)
-"""For the intervals of what is not a share."""
+SAMPLED = {"cpu": "cpu_percent", "ram": "rss_mb"}
+"""Costs that are sampled, and how records call them among their resources."""
 
 
 @dataclass(frozen=True)
@@ -24,8 +23,9 @@ class Spread:
 
     Attributes:
         count: repetitions that have it.
-        std: deviation between repetitions; 0 for a single one.
+        std: deviation between repetitions, and within them where it was sampled; 0 for one value.
         low, high: the 95 % interval of the mean, or None where too few repetitions tell one.
+        peak: the largest value that was sampled.
     """
 
     count: int
@@ -35,35 +35,12 @@ class Spread:
     std: float = 0.0
     low: float | None = None
     high: float | None = None
-
-
-@dataclass(frozen=True)
-class Sampled:
-    """A resource over all repetitions of a row.
-
-    Attributes:
-        mean, std: of what was sampled, each repetition counting the same.
-        peak: the largest value.
-        low, high: the 95 % interval of the mean over the repetitions, None for too few.
-    """
-
-    mean: float
-    std: float
     peak: float | None = None
-    low: float | None = None
-    high: float | None = None
 
 
-def interval_ends(values: Sequence[float], metric: Metric) -> tuple[float, float]:
-    """Ends of the 95 % interval that the assertions use, see `measure.intervals`."""
-    found = interval(values, metric)
-    return found.low, found.high
-
-
-def spread(
-    values: Iterable[float | None], metric: Metric | None = None, ends: Ends = interval_ends
-) -> Spread | None:
-    """Smallest, mean and largest of the values that are there, with the interval of the mean.
+def spread(values: Iterable[float | None], metric: Metric | None = None) -> Spread | None:
+    """Smallest, mean and largest of the values that are there, with the interval of the mean, which
+    is the one that the assertions use (`measure.intervals`).
 
     Without a metric no interval is computed, nor where a share lies outside 0..1 or a value below
     its least: a report shows a wrong record rather than fail on it.
@@ -74,9 +51,9 @@ def spread(
     low: float | None = None
     high: float | None = None
     if metric is not None and _possible(found, metric):
-        low, high = ends(found, metric)
-        if not (math.isfinite(low) and math.isfinite(high)):
-            low = high = None
+        told = interval(found, metric)
+        if math.isfinite(told.low) and math.isfinite(told.high):
+            low, high = told.low, told.high
     std = statistics.stdev(found) if len(found) > 1 else 0.0
     return Spread(len(found), min(found), statistics.fmean(found), max(found), std, low, high)
 
@@ -87,9 +64,7 @@ def _possible(values: Sequence[float], metric: Metric) -> bool:
     return metric.least is None or min(values) >= metric.least
 
 
-def pooled(
-    resources: Iterable[Mapping[str, Any]], name: str, ends: Ends = interval_ends
-) -> Sampled | None:
+def pooled(resources: Iterable[Mapping[str, Any]], cost: str) -> Spread | None:
     """Mean and deviation of what was sampled, each repetition counting the same.
 
     So the mean is that of the repetitions' means, whose interval is shown, however many samples a
@@ -98,35 +73,30 @@ def pooled(
 
     Args:
         resources: of each repetition, as records hold them.
-        name: `cpu_percent` or `rss_mb`.
-        ends: the interval to show.
+        cost: `cpu` or `ram`.
     """
-    parts = []
-    peaks = []
+    parts, peaks = [], []
     for use in resources:
-        found = use.get(name) or {}
+        found = use.get(SAMPLED[cost]) or {}
         mean, count = found.get("mean"), use.get("samples") or 0
         if mean is not None and count > 0:
             parts.append((mean, found.get("std") or 0.0))
         if found.get("peak") is not None:
             peaks.append(float(found["peak"]))
-    over = spread([mean for mean, _ in parts], AMOUNT, ends)
+    over = spread([mean for mean, _ in parts], COST[cost])
     if over is None:
         return None
     variance = statistics.fmean(std**2 + (mean - over.mean) ** 2 for mean, std in parts)
-    peak = max(peaks, default=None)
-    return Sampled(over.mean, math.sqrt(variance), peak, over.low, over.high)
+    return replace(over, std=math.sqrt(variance), peak=max(peaks, default=None))
 
 
-def pooled_by_phase(
-    resources: Sequence[Mapping[str, Any]],
-) -> dict[str, tuple[Sampled, Sampled]]:
+def pooled_by_phase(resources: Sequence[Mapping[str, Any]]) -> dict[str, tuple[Spread, Spread]]:
     """CPU [% of a core] and RAM [MB] in each phase that was sampled, in order of appearance."""
     phases = [use.get("phases") or {} for use in resources]
     found = {}
     for name in merged_order(phases):
         parts = [use[name] for use in phases if name in use]
-        cpu, memory = (pooled(parts, kind) for kind in ("cpu_percent", "rss_mb"))
+        cpu, memory = (pooled(parts, cost) for cost in SAMPLED)
         if cpu is not None and memory is not None:
             found[name] = (cpu, memory)
     return found

@@ -1,8 +1,8 @@
-"""From records to the rows of a table: one row per test and configuration of a task.
+"""From records to the rows of a table, and what differs between them, computed once for all media.
 
-Every renderer (terminal, Markdown, pictures) reads these rows, so that all of them tell the same
-numbers. A crashed repetition counts with the worst value where a metric has one (`Record.value`);
-of everything else crashed and interrupted ones are left out.
+A row is one test and configuration of a task. A crashed repetition counts with the worst value
+where a metric has one (`Record.value`); of everything else crashed and interrupted ones are left
+out.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from pytest_simbench.measure.differences import Difference
+from pytest_simbench.measure.differences import Difference, differences
+from pytest_simbench.measure.modes import compare_modes
 from pytest_simbench.records.choices import published_again
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.phenomena import PHENOMENON
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import grouped, series
+from pytest_simbench.records.series import comparable, grouped, series
+from pytest_simbench.report.model.document import Of, names
 from pytest_simbench.report.model.pooling import (
-    AMOUNT,
-    Ends,
-    Sampled,
+    COST,
+    SAMPLED,
     Spread,
-    interval_ends,
     pooled,
     pooled_by_phase,
     spread,
@@ -31,6 +31,9 @@ from pytest_simbench.report.model.pooling import (
 
 PHASES = ("launch", "compile", "load", "plan", "step", "other")
 """Where the wall time of a repetition goes, in order."""
+
+SHOWN_COSTS = ("cpu", "ram", "rtf", "cpu_cost", "start", "end")
+"""Costs that tables have, in their order."""
 
 
 @dataclass(frozen=True)
@@ -61,12 +64,13 @@ class Row:
             `timestep=0.004` or the test's function name; else empty.
         finished, failed, interrupted: counts of repetitions.
         metrics: by metric name; None where no repetition has the value.
-        start, end: seconds from launch to the start and the end of the task.
+        costs: by the names of `metrics.COSTS`: those of `SHOWN_COSTS`.
         by_phase: CPU in % of a core and RAM in MB by the task's phase, in order.
         seconds: mean wall seconds by phase (`PHASES`, `total`).
         notes: what a reader must know of these numbers (parallel repetitions, reused worker).
         reasons: why scores are no better, in the task's words, and how often; the most frequent
             first. Those that differ in numbers alone are counted together.
+        records: all of its repetitions.
     """
 
     task: str
@@ -78,18 +82,18 @@ class Row:
     failed: int = 0
     interrupted: int = 0
     metrics: Mapping[str, Spread | None] = field(default_factory=dict)
-    cpu_percent: Sampled | None = None
-    rss_mb: Sampled | None = None
-    by_phase: Mapping[str, tuple[Sampled, Sampled]] = field(default_factory=dict)
-    real_time_factor: Spread | None = None
-    cpu_cost: Spread | None = None
-    start: Spread | None = None
-    end: Spread | None = None
+    costs: Mapping[str, Spread | None] = field(default_factory=dict)
+    by_phase: Mapping[str, tuple[Spread, Spread]] = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
     causes: tuple[Cause, ...] = ()
     deviations: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     reasons: tuple[tuple[str, int], ...] = ()
+    records: Sequence[Record] = ()
+
+    @property
+    def of(self) -> Of:
+        return Of(self.simulator, self.mode, self.profile)
 
     @property
     def attempts(self) -> int:
@@ -114,8 +118,9 @@ class TaskSummary:
         metrics: what the task declares; those with `study` make its first table, else all.
         references: the value a perfect run would give, by metric name.
         protocol: the protocol of its records; several are joined by commas.
-        differences: between rows, by their places; from `matrix.with_differences`.
-        modes: whether headless and GUI agree, in sentences; from there too.
+        differences: between rows of one mode and profile, by their places. Of laws there are none:
+            they are no sample of anything, see `measure.phenomena`.
+        modes: whether headless and GUI agree, in sentences.
         described: whether the run says what the metrics mean; else they are plain numbers.
         phenomenon: that the task is a law of; empty of one that is none.
         looks: how often the run was judged, see `outcome.Outcome`.
@@ -142,6 +147,16 @@ class TaskSummary:
         """The others."""
         return tuple(metric for metric in self.metrics if metric not in self.study)
 
+    @property
+    def names(self) -> list[str]:
+        """What tells the rows apart: mode, profile and test only where they differ."""
+        return short_labels(self.rows)
+
+
+def short_labels(rows: Sequence[Row]) -> list[str]:
+    """Names that tell the rows apart."""
+    return names([(*row.of, row.test) for row in rows])
+
 
 def at_own_steps(records: Iterable[Record]) -> list[Record]:
     """The records without those of laws at other time steps than their profile's own, which have
@@ -153,7 +168,6 @@ def summarise(
     records: Iterable[Record],
     metrics: Mapping[str, Sequence[Metric]],
     references: Mapping[str, Mapping[str, float]] | None = None,
-    ends: Ends = interval_ends,
 ) -> list[TaskSummary]:
     """The records as one summary per task, tasks in order of appearance.
 
@@ -162,26 +176,40 @@ def summarise(
         metrics: what each task declares, by its name; of a task that is missing here, the record's
             metrics are shown as plain values.
         references: by task, then by metric.
-        ends: the intervals to show.
     """
-    summaries = []
-    for task, found in grouped(records, lambda r: r.task).items():
-        declared = tuple(metrics[task] if task in metrics else _undeclared(found))
-        rows = tuple(_row(r.records, declared, r.label, ends) for r in series(found))
-        protocols = ", ".join(sorted({record.protocol for record in found}))
-        known = dict((references or {}).get(task, {}))
-        summaries.append(
-            TaskSummary(
-                task,
-                declared,
-                rows,
-                known,
-                protocols,
-                described=task in metrics,
-                phenomenon=str(found[0].settings.get(PHENOMENON) or ""),
-            )
-        )
-    return summaries
+    return [
+        _summary(task, found, metrics.get(task), dict((references or {}).get(task, {})))
+        for task, found in grouped(records, lambda r: r.task).items()
+    ]
+
+
+def _summary(
+    task: str,
+    records: Sequence[Record],
+    declared: Sequence[Metric] | None,
+    references: Mapping[str, float],
+) -> TaskSummary:
+    metrics = tuple(_undeclared(records) if declared is None else declared)
+    found = series(records)
+    phenomenon = str(records[0].settings.get(PHENOMENON) or "")
+    apart: list[Difference] = []
+    modes: list[str] = []
+    if not phenomenon:
+        sides = {place: row.records for place, row in enumerate(found)}
+        apart = differences(sides, metrics, lambda a, b: comparable(found[a], found[b]), references)
+        ordered = [record for row in found for record in row.records]
+        modes = [compared.sentence for compared in compare_modes(ordered, metrics)]
+    return TaskSummary(
+        task,
+        metrics,
+        tuple(_row(row.records, metrics, row.label) for row in found),
+        references,
+        ", ".join(sorted({record.protocol for record in records})),
+        tuple(apart),
+        tuple(modes),
+        described=declared is not None,
+        phenomenon=phenomenon,
+    )
 
 
 def _undeclared(records: Sequence[Record]) -> list[Metric]:
@@ -189,7 +217,7 @@ def _undeclared(records: Sequence[Record]) -> list[Metric]:
     return [Metric(name, name, better=None, study=True) for name in names]
 
 
-def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str, ends: Ends) -> Row:
+def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str) -> Row:
     first = records[0]
     done = [record for record in records if record.status == "ok"]
     notes = list(dict.fromkeys(r.notes.untested for r in records if r.notes.untested))
@@ -210,22 +238,20 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str, ends: 
         finished=len(done),
         failed=sum(record.status == "failed" for record in records),
         interrupted=sum(record.status == "interrupted" for record in records),
-        metrics={
-            metric.name: spread([r.value(metric) for r in records], metric, ends)
-            for metric in metrics
+        metrics={m.name: spread([r.value(m) for r in records], m) for m in metrics},
+        costs={
+            name: pooled([r.resources for r in done], name)
+            if name in SAMPLED
+            else spread([r.cost(name) for r in done], COST[name])
+            for name in SHOWN_COSTS
         },
-        cpu_percent=pooled([r.resources for r in done], "cpu_percent", ends),
-        rss_mb=pooled([r.resources for r in done], "rss_mb", ends),
         by_phase=pooled_by_phase([r.resources for r in done]),
-        real_time_factor=spread([r.cost("rtf") for r in done], AMOUNT, ends),
-        cpu_cost=spread([r.cost("cpu_cost") for r in done], AMOUNT, ends),
-        start=spread([r.cost("start") for r in done], AMOUNT, ends),
-        end=spread([r.cost("end") for r in done], AMOUNT, ends),
         seconds=_seconds(done),
         causes=_causes(records),
         deviations=tuple(dict.fromkeys(text for r in records for text in r.deviations)),
         notes=tuple(notes),
         reasons=_reasons(done),
+        records=records,
     )
 
 

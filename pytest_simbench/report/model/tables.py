@@ -1,14 +1,17 @@
-"""The columns of every table, for the terminal and Markdown alike."""
+"""The tables of a task, the same in every medium."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 
+from pytest_simbench.measure.limits import CRASHED
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.report.model import cells
-from pytest_simbench.report.model.answer import short_labels
-from pytest_simbench.report.model.pooling import merged_order
-from pytest_simbench.report.model.summary import PHASES, Row, TaskSummary
-from pytest_simbench.report.terminal.grid import Column
+from pytest_simbench.report.model.answer import sentences, standing
+from pytest_simbench.report.model.document import Cell, Column, Content, Section, Table
+from pytest_simbench.report.model.pooling import Spread, merged_order
+from pytest_simbench.report.model.summary import PHASES, SHOWN_COSTS, Row, TaskSummary
 
 LEGEND = (
     "min / mean / max over the finished repetitions, [95 % interval of the mean]; none for fewer "
@@ -20,6 +23,8 @@ LEGEND = (
 )
 """How to read the tables, in one paragraph."""
 
+CRASHES = "crashes"
+"""Title of the table of failures, which the page tells in its own way."""
 
 MATRIX = "the row beats the column at (in brackets: differs from it)"
 """Title of the matrix."""
@@ -27,28 +32,85 @@ MATRIX = "the row beats the column at (in brackets: differs from it)"
 BY_PHASE = "CPU and RAM by phase: means over all samples taken in it"
 """Title of the table that only the written report has, for its width."""
 
+COST_HEADINGS = {
+    "cpu": ("CPU %", "of one core: mean and deviation of worker and children"),
+    "ram": ("RAM MB", "resident memory of worker and children: mean, deviation, peak"),
+    "rtf": ("x real time", "simulated over wall seconds of stepping"),
+    "cpu_cost": ("CPU s/sim s", "CPU seconds per simulated second of stepping"),
+    "start": ("start s", "from launch to the start of the task"),
+    "end": ("end s", "from launch to the end of the task"),
+}
+"""Heading and note."""
 
-def study(summary: TaskSummary) -> list[Column]:
+UNDESCRIBED = (
+    "the run does not say what its metrics mean (an older pytest-simbench wrote it, or its tasks."
+    "jsonl is lost), so they are shown as plain numbers: no unit, and neither better nor worse"
+)
+
+Shown = Callable[[Spread | None, Metric], Cell]
+"""How the cell of a metric is written."""
+
+
+def section(summary: TaskSummary, shown: Shown = cells.spread) -> Section:
+    """All that is told of a task, but for `LEGEND`."""
+    found = [
+        Table(study_title(summary), study(summary, shown)),
+        Table(CRASHES, failures(summary)),
+        Table("why the task fell short", reasons(summary)),
+        Table("further metrics: mean [95 % interval]", stricter(summary)),
+        Table(MATRIX, matrix(summary)),
+        Table("where the time went: mean wall seconds and share", time_spent(summary)),
+        Table(BY_PHASE, by_phase(summary)),
+    ]
+    tables = [table for table in found if table.columns]
+    return Section(title(summary), sentences(summary), tables, notes(summary), summary.task)
+
+
+def study_title(summary: TaskSummary) -> str:
+    return "The study's table" if summary.protocol == "paper" else "Outcomes and costs"
+
+
+def study(summary: TaskSummary, shown: Shown = cells.spread) -> list[Column]:
     """The first table: crashes, the task's own metrics, then costs."""
     rows = summary.rows
-    return [
-        labels(rows),
-        Column("crashed", [cells.failures(row) for row in rows], "outcome"),
-        *(
-            Column(
-                cells.heading(metric),
-                [cells.spread(row.metrics.get(metric.name), metric) for row in rows],
-                "outcome",
-            )
-            for metric in summary.study
-        ),
-        Column("CPU %", [cells.sampled(row.cpu_percent) for row in rows], "cost"),
-        Column("RAM MB", [cells.sampled(row.rss_mb) for row in rows], "cost"),
-        Column("x real time", [cells.cost(row.real_time_factor) for row in rows], "cost"),
-        Column("CPU s/sim s", [cells.cost(row.cpu_cost) for row in rows], "cost"),
-        Column("start s", [cells.cost(row.start) for row in rows], "cost"),
-        Column("end s", [cells.cost(row.end) for row in rows], "cost"),
+
+    def judged(name: str, found: Iterable[Cell]) -> list[Cell]:
+        """The cells with what their rows are at the metric of that name."""
+        who = standing(name, summary).by_place
+        return [replace(cell, verdict=who.get(place, "")) for place, cell in enumerate(found)]
+
+    failed = judged(CRASHED.name, map(cells.failures, rows))
+    columns = [labels(rows), Column("crashed", failed, "outcome", note=CRASHED.doc)]
+    for metric in summary.study:
+        values = judged(metric.name, (shown(row.metrics.get(metric.name), metric) for row in rows))
+        columns.append(Column(cells.heading(metric), values, "outcome", note=metric.doc))
+    for name in SHOWN_COSTS:
+        write = cells.sampled if name in ("cpu", "ram") else cells.cost
+        heading, note = COST_HEADINGS[name]
+        values = judged(name, (write(row.costs.get(name)) for row in rows))
+        columns.append(Column(heading, values, "cost", note=note))
+    return columns
+
+
+def brief(summary: TaskSummary) -> list[Column]:
+    """The same in one line for each row, with the costs that are compared."""
+    rows = summary.rows
+    found = [
+        Column("simulator", summary.names, left=True),
+        Column("crashed", [f"{row.failed} of {row.attempts}" for row in rows]),
     ]
+    for metric in summary.study:
+        values = [cells.mean_interval(row.metrics.get(metric.name), metric) for row in rows]
+        found.append(Column(cells.heading(metric), values).joined())
+    for name in ("cpu_cost", "ram", "rtf"):
+        costs = [row.costs.get(name) for row in rows]
+        texts = [
+            cells.MISSING if c is None
+            else f"{c.mean:.0f}" if name == "ram" else cells.number(c.mean, 2)
+            for c in costs
+        ]  # fmt: skip
+        found.append(Column(COST_HEADINGS[name][0], texts))
+    return found
 
 
 def stricter(summary: TaskSummary) -> list[Column]:
@@ -60,11 +122,11 @@ def stricter(summary: TaskSummary) -> list[Column]:
     known = any(metric.name in summary.references for metric in shown)
     columns = [labels(rows, first="reference" if known else "")]
     for metric in shown:
-        values = [cells.mean_interval(row.metrics.get(metric.name), metric) for row in rows]
+        values: list[Content] = []
         if known:
-            reference = summary.references.get(metric.name)
-            text = "" if reference is None else cells.metric_value(reference, metric)
-            values.insert(0, [text])
+            right = summary.references.get(metric.name)
+            values.append("" if right is None else cells.metric_value(right, metric))
+        values += [cells.mean_interval(row.metrics.get(metric.name), metric) for row in rows]
         columns.append(Column(cells.heading(metric), values, "stricter"))
     return columns
 
@@ -74,38 +136,34 @@ def time_spent(summary: TaskSummary) -> list[Column]:
     rows = [row for row in summary.rows if row.seconds.get("total")]
     if not rows:
         return []
+
+    def spent(row: Row, phase: str) -> list[str]:
+        seconds = row.seconds.get(phase)
+        if seconds is None:
+            return [cells.MISSING]
+        return [cells.number(seconds, 2), f"({100 * seconds / row.seconds['total']:.0f} %)"]
+
     columns = [labels(rows)]
     for phase in PHASES:
-        if phase == "compile" and not any(row.seconds.get(phase) for row in rows):
-            continue
-        texts = []
-        for row in rows:
-            seconds = row.seconds.get(phase)
-            share = 0.0 if seconds is None else 100 * seconds / row.seconds["total"]
-            texts.append(
-                [cells.MISSING]
-                if seconds is None
-                else [cells.number(seconds, 2), f"({share:.0f} %)"]
-            )
-        columns.append(Column(f"{phase} s", texts, "time"))
-    totals = [[cells.number(row.seconds["total"], 3)] for row in rows]
+        if phase != "compile" or any(row.seconds.get(phase) for row in rows):
+            columns.append(Column(f"{phase} s", [spent(row, phase) for row in rows], "time"))
+    totals = [cells.number(row.seconds["total"], 3) for row in rows]
     return [*columns, Column("total s", totals, "time")]
 
 
 def by_phase(summary: TaskSummary) -> list[Column]:
     """CPU and RAM in each phase of the task: means over all samples taken in it."""
     rows = [row for row in summary.rows if row.by_phase]
+
+    def used(row: Row, phase: str) -> list[str]:
+        if phase not in row.by_phase:
+            return [cells.MISSING]
+        cpu, memory = row.by_phase[phase]
+        return [f"{cpu.mean:.0f} %", f"{memory.mean:.0f} MB"]
+
+    phases = merged_order(row.by_phase for row in rows)
     columns = [labels(rows)] if rows else []
-    for phase in merged_order(row.by_phase for row in rows):
-        texts = []
-        for row in rows:
-            if phase in row.by_phase:
-                cpu, memory = row.by_phase[phase]
-                texts.append([f"{cpu.mean:.0f} %", f"{memory.mean:.0f} MB"])
-            else:
-                texts.append([cells.MISSING])
-        columns.append(Column(phase, texts, "resources"))
-    return columns
+    return columns + [Column(p, [used(row, p) for row in rows], "resources") for p in phases]
 
 
 def failures(summary: TaskSummary) -> list[Column]:
@@ -123,12 +181,12 @@ def failures(summary: TaskSummary) -> list[Column]:
         for cause in causes
     ]
     return [
-        Column("simulator", [[row.label] for row, _ in found], left=True, wrap=True),
-        Column("count", [[str(len(cause.repetitions))] for cause in causes]),
-        Column("failure", [[cause.type] for cause in causes], left=True),
-        Column("phase", [[cause.phase or cells.MISSING] for cause in causes], left=True),
-        Column("repetitions", [[numbers(cause.repetitions)] for cause in causes], left=True),
-        Column("message", [[text] for text in shown], left=True, wrap=True),
+        Column("simulator", [row.label for row, _ in found], left=True, wrap=True),
+        Column("count", [str(len(cause.repetitions)) for cause in causes]),
+        Column("failure", [cause.type for cause in causes], left=True),
+        Column("phase", [cause.phase or cells.MISSING for cause in causes], left=True),
+        Column("repetitions", [numbers(cause.repetitions) for cause in causes], left=True),
+        Column("message", shown, left=True, wrap=True),
     ]
 
 
@@ -138,9 +196,9 @@ def reasons(summary: TaskSummary) -> list[Column]:
     if not found:
         return []
     return [
-        Column("simulator", [[row.label] for row, *_ in found], left=True, wrap=True),
-        Column("count", [[str(count)] for *_, count in found]),
-        Column("reason", [[text] for _, text, _ in found], left=True, wrap=True),
+        Column("simulator", [row.label for row, *_ in found], left=True, wrap=True),
+        Column("count", [str(count) for *_, count in found]),
+        Column("reason", [text for _, text, _ in found], left=True, wrap=True),
     ]
 
 
@@ -156,30 +214,22 @@ def matrix(summary: TaskSummary) -> list[Column]:
     places = sorted({place for pair in found for place in pair})
     if not places:
         return []
-    names = short_labels(summary.rows)
-    columns = [Column("simulator", [[names[place]] for place in places], left=True)]
-    for loser in places:
-        cells_ = [_beaten(found.get((place, loser), []), place == loser) for place in places]
-        columns.append(Column(names[loser], cells_, names[loser], left=True))
-    return columns
 
+    def beaten(place: int, loser: int) -> list[str]:
+        metrics = found.get((place, loser), [])
+        if not metrics:
+            return ["" if place == loser else cells.MISSING]
+        return [f"{name}," for name in metrics[:-1]] + metrics[-1:]
 
-def _beaten(metrics: list[str], same: bool) -> list[str]:
-    if not metrics:
-        return ["" if same else cells.MISSING]
-    return [f"{name}," for name in metrics[:-1]] + metrics[-1:]
-
-
-def details(summary: TaskSummary) -> list[tuple[str, list[Column]]]:
-    """The tables below the first, each with its title; a table without columns is left out."""
-    found = [
-        ("crashes", failures(summary)),
-        ("why the task fell short", reasons(summary)),
-        ("further metrics: mean [95 % interval]", stricter(summary)),
-        (MATRIX, matrix(summary)),
-        ("where the time went: mean wall seconds and share", time_spent(summary)),
+    names, of = summary.names, [summary.rows[place].of for place in places]
+    rows = [Cell([names[place]], of=who) for place, who in zip(places, of, strict=True)]
+    return [
+        Column("simulator", rows, left=True),
+        *(
+            Column(names[k], [beaten(place, k) for place in places], names[k], left=True)
+            for k in places
+        ),
     ]
-    return [(name, columns) for name, columns in found if columns]
 
 
 def title(summary: TaskSummary) -> str:
@@ -189,12 +239,6 @@ def title(summary: TaskSummary) -> str:
     plural = "" if counts[-1] == 1 else "s"
     each = " each" if len(summary.rows) > 1 else ""
     return f"{summary.task}: {many} repetition{plural}{each}, protocol {summary.protocol}"
-
-
-UNDESCRIBED = (
-    "the run does not say what its metrics mean (an older pytest-simbench wrote it, or its tasks."
-    "jsonl is lost), so they are shown as plain numbers: no unit, and neither better nor worse"
-)
 
 
 def notes(summary: TaskSummary) -> list[str]:
@@ -214,21 +258,14 @@ def of_run(summary: TaskSummary) -> list[str]:
 
 def deviations(summaries: Sequence[TaskSummary]) -> list[tuple[str, str]]:
     """What each simulator cannot express of the scene, as its adapter declares it."""
-    found = {
-        (row.simulator, text)
-        for summary in summaries
-        for row in summary.rows
-        for text in row.deviations
-    }
-    return sorted(found)
+    rows = [row for summary in summaries for row in summary.rows]
+    return sorted({(row.simulator, text) for row in rows for text in row.deviations})
 
 
 def labels(rows: Sequence[Row], first: str = "") -> Column:
     """The column that names the rows."""
-    texts = [[row.simulator, row.variant] for row in rows]
-    if first:
-        texts.insert(0, [first])
-    return Column("simulator", texts, left=True)
+    cells = [Cell([row.simulator, row.variant], of=row.of) for row in rows]
+    return Column("simulator", [*[Cell([first])] * bool(first), *cells], left=True)
 
 
 def numbers(values: Sequence[int], most: int = 4) -> str:

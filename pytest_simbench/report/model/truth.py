@@ -4,16 +4,16 @@ error."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from statistics import fmean
 
 from pytest_simbench.measure.phenomena import KEPT, Ratios, Verdict, verdict, worst
 from pytest_simbench.records.metrics import significant
 from pytest_simbench.records.phenomena import ordered
 from pytest_simbench.report.model import cells
-from pytest_simbench.report.model.answer import NAMED, short_labels
-from pytest_simbench.report.model.summary import Row, TaskSummary
-from pytest_simbench.report.terminal.grid import Column, fill, render
+from pytest_simbench.report.model.answer import NAMED
+from pytest_simbench.report.model.document import Column, Section, Table, capital, listed
+from pytest_simbench.report.model.summary import Row, TaskSummary, short_labels
 
 TITLE = "which simulator is right about what"
 
@@ -41,6 +41,14 @@ def others(summaries: Sequence[TaskSummary]) -> list[TaskSummary]:
     return [summary for summary in summaries if not summary.phenomenon]
 
 
+def section(summaries: Sequence[TaskSummary]) -> Section | None:
+    """All that is told of laws; None without any."""
+    if not laws(summaries):
+        return None
+    first = Table(TITLE, table(summaries), LEGEND)
+    return Section(capital(TITLE), sentences(summaries), [first, *details(summaries)])
+
+
 def sentences(summaries: Sequence[TaskSummary]) -> list[str]:
     """A verdict on each phenomenon and settings profile, in words; none of a single simulator."""
     profiles = list(dict.fromkeys(row.profile for row in _rows(summaries).values()))
@@ -60,16 +68,16 @@ def sentences(summaries: Sequence[TaskSummary]) -> list[str]:
 def table(summaries: Sequence[TaskSummary]) -> list[Column]:
     """Simulators by phenomena, and what a simulated second costs."""
     rows = _rows(summaries)
-    columns = [Column("simulator", [[name] for name in rows], left=True)]
+    columns = [Column("simulator", rows, left=True)]
     for phenomenon in _phenomena(summaries):
         found = [_ratios(summaries, phenomenon, row) for row in rows.values()]
-        columns.append(Column(phenomenon, [[_cell(ratios)] for ratios in found]))
+        columns.append(Column(phenomenon, map(_cell, found)))
     costs = [_cost(summaries, row) for row in rows.values()]
-    shown = [[cells.MISSING if cost is None else cells.number(cost, 2)] for cost in costs]
+    shown = [cells.MISSING if cost is None else cells.number(cost, 2) for cost in costs]
     return [*columns, Column("CPU s/sim s", shown)]
 
 
-def details(summaries: Sequence[TaskSummary]) -> list[tuple[str, list[Column]]]:
+def details(summaries: Sequence[TaskSummary]) -> list[Table]:
     """For each phenomenon its laws by simulators: the error in the law's unit, with its ratio to
     the tolerance where the law is not kept."""
     rows = _rows(summaries)
@@ -77,28 +85,13 @@ def details(summaries: Sequence[TaskSummary]) -> list[tuple[str, list[Column]]]:
     for phenomenon in _phenomena(summaries):
         asked = [summary for summary in laws(summaries) if summary.phenomenon == phenomenon]
         columns = [
-            Column("law", [[summary.task] for summary in asked], left=True),
-            Column("error in", [[_unit(summary)] for summary in asked], left=True),
+            Column("law", [summary.task for summary in asked], left=True),
+            Column("error in", map(_unit, asked), left=True),
         ]
         for name, of in rows.items():
-            columns.append(Column(name, [[_error(summary, of)] for summary in asked]))
-        found.append((f"laws of {phenomenon}", columns))
+            columns.append(Column(name, [_error(summary, of) for summary in asked]))
+        found.append(Table(f"laws of {phenomenon}", columns))
     return found
-
-
-def brief(summaries: Sequence[TaskSummary], width: int) -> str:
-    """Sentences and table, as plain lines; empty without laws."""
-    if not laws(summaries):
-        return ""
-    told = [fill(text, width, "  ") for text in sentences(summaries)]
-    parts = ["\n".join(told), render(table(summaries), width), fill(LEGEND, width)]
-    return "\n\n".join(part for part in parts if part)
-
-
-def whole(summaries: Sequence[TaskSummary], width: int) -> str:
-    """The same, and every law."""
-    parts = [f"{name}\n{render(found, width)}" for name, found in details(summaries)]
-    return "\n\n".join([brief(summaries, width), *parts])
 
 
 def _rows(summaries: Sequence[TaskSummary], profile: str | None = None) -> dict[str, Row]:
@@ -142,11 +135,11 @@ def _cost(
 ) -> float | None:
     """CPU seconds for a simulated second, the mean of the laws."""
     found = [
-        row.cpu_cost.mean
+        cost.mean
         for summary in laws(summaries)
         if phenomenon in (None, summary.phenomenon)
         and (row := _row(summary, like)) is not None
-        and row.cpu_cost is not None
+        and (cost := row.costs.get("cpu_cost")) is not None
     ]
     return fmean(found) if found else None
 
@@ -186,9 +179,9 @@ def _told(found: Verdict, costs: dict[str, float | None]) -> str:
         more = len(found.unbeaten) - len(some)
         some += [f"{more} more"] * (more > 0)
         text = f"no clear best; laws kept of {found.laws} by those that nobody beats: "
-        text += _listed(some) if some else "nobody"
+        text += listed(some) or "nobody"
         text += _cheapest({who: costs[who] for who in found.unbeaten})
-    left = f"; not compared: {_listed(list(found.incomplete))}" if found.incomplete else ""
+    left = f"; not compared: {listed(found.incomplete)}" if found.incomplete else ""
     return f"{text}{left}."
 
 
@@ -197,8 +190,3 @@ def _cheapest(costs: dict[str, float | None]) -> str:
     if len(known) < 2 or known[0][0] > CHEAPER * known[1][0]:
         return ""
     return f"; the cheapest of them: {known[0][1]}"
-
-
-def _listed(texts: list[str]) -> str:
-    join: Callable[[list[str]], str] = ", ".join
-    return " and ".join([join(texts[:-1]), texts[-1]]) if len(texts) > 1 else texts[0]

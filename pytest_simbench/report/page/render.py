@@ -14,6 +14,8 @@ from markupsafe import Markup
 
 from pytest_simbench import __version__
 from pytest_simbench.ground.text import for_terminal
+from pytest_simbench.report.model import changes
+from pytest_simbench.report.model.document import Cell, Table, capital
 from pytest_simbench.report.page.context import Page
 
 _LOG = re.compile(r"logs/[A-Za-z0-9_=-][A-Za-z0-9_.=-]*\.log")
@@ -37,10 +39,21 @@ def render(page: Page) -> str:
         policy=f"default-src 'none'; script-src 'sha256-{_digest(script)}'; "
         "style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'",
         symbols=SYMBOLS,
+        capital=capital,
+        rows=_rows,
+        failed=changes.failed,
+        warned=changes.warned,
         svg=lambda picture: Markup(picture.svg),
         log_link=lambda log: log if _LOG.fullmatch(log) else "",
         version=__version__,
     )
+
+
+def _rows(found: Table) -> list[tuple[Cell, ...]]:
+    """The rows of a table; texts stand in one line."""
+    first, *others = found.columns
+    shown = [first, *(column.joined() if column.left else column for column in others)]
+    return list(zip(*(column.cells for column in shown), strict=True))
 
 
 @cache

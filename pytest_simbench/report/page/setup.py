@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from pytest_simbench.records.configuration import TASK, text
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import series, told
-from pytest_simbench.report.model import tables as columns
+from pytest_simbench.records.series import told
+from pytest_simbench.report.model import tables
+from pytest_simbench.report.model.document import Of
 from pytest_simbench.report.model.summary import TaskSummary
-from pytest_simbench.report.page.cells import Of
 
 
 @dataclass(frozen=True)
@@ -38,39 +38,30 @@ class Setup:
     simulators: Sequence[Configured]
 
 
-def setup(summaries: Sequence[TaskSummary], records: Sequence[Record]) -> Setup:
+def setup(summaries: Sequence[TaskSummary]) -> Setup:
     """The setup of a run."""
     deviations: dict[str, list[str]] = {}
-    for name, deviation in columns.deviations(summaries):
+    for name, deviation in tables.deviations(summaries):
         deviations.setdefault(name, []).append(deviation)
     tasks: dict[str, dict[str, list[str]]] = {}
     found: dict[tuple[str, ...], Configured] = {}
     for summary in summaries:
-        for row in series(r for r in records if r.task == summary.task):
+        for row in summary.rows:
             known = {key: _shown(value) for key, value in told(row.records).items()}
-            parameters = tasks.setdefault(summary.task, {})
             for name, value in _part(known, f"settings.{TASK}").items():
-                parameters.setdefault(name, []).append(value)
-            settings = {
-                key: value
-                for key, value in _part(known, "settings.").items()
-                if not key.startswith(TASK)
-            }
-            versions = _part(known, "versions.")
-            subject = Of(*row.key[:3])
-            same = (*subject, text(settings), text(versions))
-            label = f"{subject.simulator} {subject.mode} {subject.profile}"
+                tasks.setdefault(summary.task, {}).setdefault(name, []).append(value)
+            settings = _part(known, "settings.")
+            settings = {k: v for k, v in settings.items() if not k.startswith(TASK)}
+            versions, of = _part(known, "versions."), row.of
             found.setdefault(
-                same,
-                Configured(
-                    label, subject, settings, versions, deviations.get(subject.simulator, [])
-                ),
+                (*of, text(settings), text(versions)),
+                Configured(" ".join(of), of, settings, versions, deviations.get(of.simulator, [])),
             )
     shared = {
         task: {name: _joined(values) for name, values in parameters.items()}
         for task, parameters in tasks.items()
-        if parameters
     }
+    records = [record for summary in summaries for row in summary.rows for record in row.records]
     return Setup(_run(records), shared, list(found.values()))
 
 

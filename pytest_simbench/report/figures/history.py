@@ -1,13 +1,22 @@
-"""The picture of a simulator's laws over its releases: one cell for each law and release."""
+"""Pictures of a simulator's releases: each metric over them, or each law."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
+from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.text import for_figure
+from pytest_simbench.measure.history import Course, History
+from pytest_simbench.measure.intervals import interval
 from pytest_simbench.measure.law_history import LawHistory, Reached, times
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
+from pytest_simbench.report.figures.drawing import COLOURS, Named, heading, panelled
+from pytest_simbench.report.model.history import AnyHistory
+
+SHOWN = 6
+"""Panels of a picture at most: those that changed come first."""
 
 STEPS = (
     (KEPT, "#d9e6f2", "kept"),
@@ -22,6 +31,55 @@ FAILS, NOT_ASKED = "#000000", "#ffffff"
 
 ROW = 0.17
 """Height of a law [in]."""
+
+
+def pictures(found: Sequence[AnyHistory]) -> Named:
+    """Each history, `SIMULATOR_TASK_history`."""
+    for history in found:
+        name = file_name(f"{history.simulator}_{history.task}_history", *history.identity)
+        yield name, draw_laws(history) if isinstance(history, LawHistory) else draw(history)
+
+
+def draw(history: History) -> Any:
+    """Each metric over the releases as a `matplotlib.figure.Figure`, within `figures.drawing`.
+
+    A dot is a mean, the line through it its 95 % interval, a dashed line a supported change point.
+    """
+    from matplotlib.figure import Figure
+
+    # Those that changed, then what the study shows and the costs.
+    shown = sorted(history.courses, key=lambda c: (not c.changes, not c.metric.study))[:SHOWN]
+    figure: Any = Figure(
+        figsize=(max(6.0, 2 + 0.45 * len(history.releases)), 0.9 + 1.5 * len(shown)),
+        layout="constrained",
+    )
+    panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, course in zip(panels, shown, strict=True):
+        _panel(axis, course)
+    panels[-1].set_xticks(range(len(history.releases)), history.releases, rotation=45, ha="right")
+    figure.suptitle(for_figure(history.title), fontsize="medium")
+    return figure
+
+
+def _panel(axis: Any, course: Course) -> None:
+    metric = course.metric
+    scale = 100 if metric.bounded else 1
+    present = [place for place, values in enumerate(course.values) if values]
+    for place in present:
+        found = interval([*course.values[place].values()], metric)
+        low, high = (min(max(x, -1e300), 1e300) for x in (found.low, found.high))
+        if abs(low) < 1e299 and abs(high) < 1e299 and found.n > 1:
+            axis.plot([place, place], [scale * low, scale * high], color=COLOURS[0], lw=2)
+        axis.plot(place, scale * found.mean, "o", color=COLOURS[0], ms=4)
+    for change in course.changes:
+        axis.axvline(present[change.place] - 0.5, color=COLOURS[1], ls="--", lw=1)
+    panelled(axis, heading(metric, between="\n"), "y")
+    axis.yaxis.label.set_fontsize(8)
+    axis.margins(y=0.15)
+    low, high = axis.get_ylim()
+    least = 4 * scale * metric.smallest_difference  # a deterministic engine's rounding is no course
+    if high - low < least:
+        axis.set_ylim((low + high - least) / 2, (low + high + least) / 2)
 
 
 def draw_laws(history: LawHistory) -> Any:
