@@ -113,7 +113,7 @@ def record(
     if not options.value(config, RECORD):
         return []
     from pytest_simbench.report.files import shown
-    from pytest_simbench.report.model.recorded import FOLDER, write_bags
+    from pytest_simbench.report.replay.recorded import FOLDER, write_bags
 
     count, problems = write_bags(run, target, records, progress or _printed())
     if not count:

@@ -300,9 +300,7 @@ class Run:
         problems += [*written.problems, cluster.lost(self.reading.records)]
         if written.summaries or written.sweeps:
             changes = comparison.markdown() if comparison else ""
-            page = markdown.render_run(
-                written.summaries, sweeps=written.sweeps, claims=written.claims
-            )
+            page = markdown.render_run(written)
             problems.append(append_summary("\n".join([changes, page])))
             reporter.write_sep("=", "simulator comparison")
             if written.claims:

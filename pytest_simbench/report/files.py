@@ -5,27 +5,24 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any, TextIO
 
 from pytest_simbench.ground.text import for_csv, for_terminal
-from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.metrics import COSTS
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.markdown.badge import badge
 from pytest_simbench.report.markdown.run import render_run, render_tables
-from pytest_simbench.report.model import history, sweep, truth
-from pytest_simbench.report.model.claims import Claims, claims_of
 from pytest_simbench.report.model.document import Table
-from pytest_simbench.report.model.history import AnyHistory
 from pytest_simbench.report.model.outcome import NAME as OUTCOME
 from pytest_simbench.report.model.outcome import Compared, Outcome
-from pytest_simbench.report.model.summary import PHASES, TaskSummary, at_own_steps, summarise
+from pytest_simbench.report.model.report import Report
+from pytest_simbench.report.model.summary import PHASES
 from pytest_simbench.report.page import PAGE_NAME
 from pytest_simbench.report.replay import REPLAY_NAME
 from pytest_simbench.report.replay.groups import Group, groups
@@ -42,24 +39,16 @@ IDENTITY = (
 
 
 @dataclass(frozen=True)
-class Written:
-    """What became of the report.
+class Written(Report):
+    """A report, and what became of its files.
 
     Attributes:
         problems: one sentence each.
         complete: whether every file was written; pictures that need matplotlib are not missed.
-        summaries: what the report tells of each task.
-        histories: of simulators of which there are several releases.
-        sweeps: laws over time steps.
-        claims: what the tests claimed, and what came of it.
     """
 
-    problems: tuple[str, ...] = ()
+    problems: Sequence[str] = ()
     complete: bool = True
-    summaries: tuple[TaskSummary, ...] = ()
-    histories: tuple[AnyHistory, ...] = ()
-    sweeps: tuple[Swept, ...] = ()
-    claims: Claims | None = None
 
 
 def write_report(
@@ -79,136 +68,88 @@ def write_report(
     Raises:
         RecordError: its records cannot be read.
     """
-    reading = reading or folder.read()
-    found: dict[str, Any] = {
-        "histories": tuple(history.of_run(reading)),
-        "sweeps": tuple(sweep.of_run(reading)),
-        "claims": claims_of(reading, comparison[1] if comparison else None),
-    }
-    summaries = tuple(summaries_of(reading, looks))
-    records = in_order(reading.records)
-    written = write_files(folder.path, summaries, records, comparison=comparison, **found)
-    return replace(written, summaries=summaries, **found)
-
-
-def summaries_of(reading: Reading, looks: int = 1) -> list[TaskSummary]:
-    """What a run that was judged so often tells of each task."""
-    records = at_own_steps(in_order(reading.records))
-    found = summarise(records, reading.metrics, reading.references)
-    return [replace(summary, looks=looks) for summary in found]
-
-
-def in_order(records: Sequence[Record]) -> list[Record]:
-    """By test and repetition, however many processes wrote them."""
-    return sorted(records, key=lambda r: (r.test, r.repetition))
+    return write_files(folder.path, Report.of(reading or folder.read(), comparison, looks))
 
 
 def write_files(
-    folder: Path,
-    summaries: Sequence[TaskSummary],
-    records: Sequence[Record],
-    figures: bool = True,
-    comparison: Compared | None = None,
-    run: Path | None = None,
-    histories: Sequence[AnyHistory] = (),
-    sweeps: Sequence[Swept] = (),
-    claims: Claims | None = None,
+    folder: Path, report: Report, run: Path | None = None, figures: bool = True
 ) -> Written:
     """Write all files; what cannot be written is told, and the rest is written all the same.
 
     Args:
         folder: where.
-        summaries: of each task.
-        records: that they were made of.
+        report: what is told.
+        run: the run folder, where it is another: traces, pictures and results on repeatability are
+            read from it.
         figures: whether pictures are drawn too.
-        comparison: with a baseline, where there is one.
-        run: the run folder, where it is another: its results on repeatability are on the page.
-        histories: of simulators, drawn too.
-        sweeps: laws over time steps, drawn too.
-        claims: what the tests claimed, which comes first.
     """
     from pytest_simbench.report.page.context import page
     from pytest_simbench.report.page.render import render  # Jinja2
 
+    run, told, failed = run or folder, [], []
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        return Written((f"no report: {_unwritable(folder, error)}",), False)
-    drawn = _Drawn()
-    if figures:
-        drawn = _draw(folder, run or folder, summaries, records, histories, sweeps)
-    told = history.sections(histories)
-    text = render_run(summaries, drawn.pictures, told, sweeps, claims)
-    shown, replay, unshown = _replay(run or folder, records)
-    found = page(run or folder, summaries, comparison, shown, drawn.sheets, sweeps, claims)
-    contents = {PAGE_NAME: render(found)}
+        told.append(f"no report: {_unwritable(folder, error)}")
+        return Written(**vars(report), problems=told, complete=False)
+    drawn, sheets = _draw(folder, run, report, told, failed) if figures else ([], {})
+    shown, replay = _replay(run, report.records, told)
+    contents: dict[str, str | bytes] = {PAGE_NAME: render(page(run, report, shown, sheets))}
     if replay:
         contents[REPLAY_NAME] = replay
-    if records:  # else the run has results on repeatability alone
-        contents |= {MARKDOWN_NAME: text, CSV_NAME: csv_of(records)}
-    unwritten = [_written(folder, name, text) for name, text in contents.items()]
-    unwritten += [_written(folder, name, sheet) for name, sheet in drawn.files.items()]
-    failed = [*drawn.failed, *filter(None, unwritten)]
-    return Written((*drawn.problems, *unshown, *failed), not failed)
-
-
-@dataclass
-class _Drawn:
-    """Pictures of a run.
-
-    Attributes:
-        pictures: names of the files written.
-        sheets: contact sheets (PNG), by the name of their task; `files`: by that of their file.
-        problems, failed: what could not be shown, and what went wrong, as sentences.
-    """
-
-    pictures: list[str] = field(default_factory=list)
-    sheets: Mapping[str, bytes] = field(default_factory=dict)
-    files: Mapping[str, bytes] = field(default_factory=dict)
-    problems: list[str] = field(default_factory=list)
-    failed: list[str] = field(default_factory=list)
+    if report.records:  # else the run has results on repeatability alone
+        contents[MARKDOWN_NAME] = render_run(report, drawn)
+        contents[CSV_NAME] = csv_of(report.records)
+    failed += filter(None, (_written(folder, name, text) for name, text in contents.items()))
+    return Written(**vars(report), problems=[*told, *failed], complete=not failed)
 
 
 def _draw(
-    folder: Path,
-    run: Path,
-    summaries: Sequence[TaskSummary],
-    records: Sequence[Record],
-    histories: Sequence[AnyHistory],
-    sweeps: Sequence[Swept],
-) -> _Drawn:
-    """Draw all pictures, and write those that are no contact sheet."""
+    folder: Path, run: Path, report: Report, told: list[str], failed: list[str]
+) -> tuple[list[str], dict[str, bytes]]:
+    """Draw and write all pictures.
+
+    Args:
+        folder: where.
+        run: folder with the pictures that simulators made.
+        report: what is told.
+        told, failed: take what could not be shown, and what went wrong, as sentences.
+
+    Returns:
+        Names of the files but contact sheets; and these (PNG), by the name of their task.
+    """
     from pytest_simbench.report.figures import history, sheet, sweep, task
     from pytest_simbench.report.figures.drawing import FiguresUnavailable, write
 
-    found = _Drawn()
+    sheets: dict[str, bytes] = {}
     try:
-        found.sheets, found.problems = sheet.sheets(run, records)
-        found.files = {sheet.sheet_name(task): drawn for task, drawn in found.sheets.items()}
-        every = task.pictures(truth.others(summaries)), history.pictures(histories)
-        paths = write(folder, chain(*every, sweep.pictures(sweeps)))
-        found.pictures = [path.name for path in paths]
+        sheets, unread = sheet.sheets(run, report.records)
+        told += unread
+        for name, drawn in sheets.items():
+            failed += filter(None, [_written(folder, sheet.sheet_name(name), drawn)])
+        every = task.pictures(report.tasks), history.pictures(report.histories)
+        paths = write(folder, chain(*every, sweep.pictures(report.sweeps)))
+        return [path.name for path in paths], sheets
     except FiguresUnavailable as error:
-        found.problems.append(str(error))
+        told.append(str(error))
     except OSError as error:
-        found.failed.append(f"pictures: {_unwritable(folder, error)}")
+        failed.append(f"pictures: {_unwritable(folder, error)}")
     except Exception as error:  # a fault of ours, which costs the pictures and no table
-        found.failed.append(f"the pictures could not be drawn: {named(error)}")
-    return found
+        failed.append(f"the pictures could not be drawn: {named(error)}")
+    return [], sheets
 
 
-def _replay(run: Path, records: Sequence[Record]) -> tuple[list[Group], str, list[str]]:
-    """What the replay shows, the page itself, and what could not be shown."""
+def _replay(run: Path, records: Sequence[Record], told: list[str]) -> tuple[list[Group], str]:
+    """What the replay shows, and the page itself; `told` takes what could not be shown."""
     from pytest_simbench.report.replay.render import ReplayUnavailable, replay_of
 
     found = groups(run, records)
-    if not found:
-        return [], "", []
     try:
-        page, count, problems = replay_of(found)
+        page, count, problems = replay_of(found) if found else ("", 0, [])
     except ReplayUnavailable as error:
-        return [], "", [str(error)]
-    return found[:count], page, problems
+        page, count, problems = "", 0, [str(error)]
+    told += problems
+    return found[:count], page
 
 
 def where(page: Path, base: Path) -> str:

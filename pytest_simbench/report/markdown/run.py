@@ -6,37 +6,26 @@ from collections.abc import Iterable, Sequence
 
 from pytest_simbench.ground.text import for_markdown, in_one_line
 from pytest_simbench.measure.gate import GateReport
-from pytest_simbench.measure.sweep import Swept
-from pytest_simbench.report.model import changes, sweep, tables, truth
+from pytest_simbench.report.model import changes, tables
 from pytest_simbench.report.model.claims import Claims
 from pytest_simbench.report.model.document import Column, Section, Table, capital
+from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import TaskSummary
 
 
-def render_run(
-    summaries: Sequence[TaskSummary],
-    pictures: Sequence[str] = (),
-    histories: Sequence[Section] = (),
-    sweeps: Sequence[Swept] = (),
-    claims: Claims | None = None,
-) -> str:
+def render_run(report: Report, pictures: Sequence[str] = ()) -> str:
     """The whole report; ends with a newline.
 
     Args:
-        summaries: from `summary.summarise`.
+        report: of the run.
         pictures: addresses of pictures to show at the end, relative to the report.
-        histories: what changed over a simulator's releases.
-        sweeps: laws over time steps.
-        claims: what the tests claimed, which comes first.
     """
-    if not (summaries or sweeps):
+    if not (report.summaries or report.sweeps):
         return "No repetition was recorded.\n"
-    parts = [render_claims(claims)] if claims else []
-    first = filter(None, [truth.section(summaries), sweep.section(sweeps)])
-    tasks = map(tables.section, truth.others(summaries))
-    parts += [render_section(found) for found in (*first, *tasks, *histories)]
+    parts = [render_claims(report.claims)] if report.claims else []
+    parts += map(render_section, report.sections)
     parts.append(f"How to read it: {for_markdown(tables.LEGEND)}")
-    if deviations := tables.deviations(summaries):
+    if deviations := tables.deviations(report.summaries):
         lines = _bullets(f"{name}: {text}" for name, text in deviations)
         parts.append(f"## Declared deviations from the scene\n\n{lines}")
     if pictures:

@@ -14,9 +14,9 @@ PASSED = "no metric got worse beyond its limit"
 NO_LIMIT = "not significantly more repetitions crashed; no other limit was tested"
 
 
-def columns(report: GateReport) -> list[Column]:
+def columns(report: GateReport | None) -> list[Column]:
     """One line for each metric with a limit, each of the study's, and each that clearly changed."""
-    rows = _rows(report)
+    rows = _rows(report) if report else []
     if not rows:
         return []
     found = [change for change, _ in rows]

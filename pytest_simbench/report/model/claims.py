@@ -22,6 +22,9 @@ MOST = 12
 
 ORDER = ("FAIL", "UNDECIDED", "PASS")
 
+Metrics = Mapping[str, Sequence[Metric]]
+"""What each task declares."""
+
 NO_CLAIM = "no claim was made"
 
 
@@ -113,7 +116,7 @@ def _sentence(state: str, count: Counter[str], records: Sequence[Record]) -> str
     return f"{state}   {', '.join(parts)}; {repetitions}"
 
 
-def _table(claims: Sequence[Claim], metrics: Mapping[str, Sequence[Metric]]) -> Table:
+def _table(claims: Sequence[Claim], metrics: Metrics) -> Table:
     """A row for each function, task and claim; several tests in one cell are counted."""
     if not claims:
         return Table("Claims", [])
@@ -138,7 +141,7 @@ def _subject(claim: Claim, claims: Sequence[Claim]) -> str:
     return f"{name} {claim.variant}".rstrip() if len(variants) <= MOST // 3 else name
 
 
-def _claimed(claim: Claim, metrics: Mapping[str, Sequence[Metric]]) -> str:
+def _claimed(claim: Claim, metrics: Metrics) -> str:
     """The claim in words: `placed >= 90 %`."""
     if not claim.metric or claim.threshold is None:
         return "the test passes"
@@ -148,12 +151,12 @@ def _claimed(claim: Claim, metrics: Mapping[str, Sequence[Metric]]) -> str:
     return f"{claim.metric} {sign} {shown}"
 
 
-def _metric(claim: Claim, metrics: Mapping[str, Sequence[Metric]]) -> Metric | None:
+def _metric(claim: Claim, metrics: Metrics) -> Metric | None:
     known = (*metrics.get(claim.task, ()), *COSTS, CRASHED)
     return next((metric for metric in known if metric.name == claim.metric), None)
 
 
-def _cell(claims: Sequence[Claim], metrics: Mapping[str, Sequence[Metric]]) -> str:
+def _cell(claims: Sequence[Claim], metrics: Metrics) -> str:
     """Verdict and value; of several claims how many have each verdict."""
     if len(claims) != 1:
         count = Counter[str](claim.verdict for claim in claims)
@@ -161,7 +164,7 @@ def _cell(claims: Sequence[Claim], metrics: Mapping[str, Sequence[Metric]]) -> s
     return f"{claims[0].verdict} {_value(claims[0], metrics)}".rstrip()
 
 
-def _value(claim: Claim, metrics: Mapping[str, Sequence[Metric]]) -> str:
+def _value(claim: Claim, metrics: Metrics) -> str:
     """What was measured, with its bounds: `71 [60, 80]`, `4 of 5`."""
     metric = _metric(claim, metrics)
     if metric is None or claim.mean is None:
@@ -178,9 +181,7 @@ def _value(claim: Claim, metrics: Mapping[str, Sequence[Metric]]) -> str:
     return f"{significant(scale * claim.mean)}{bounds}"
 
 
-def _trouble(
-    claim: Claim, records: Sequence[Record], metrics: Mapping[str, Sequence[Metric]]
-) -> Trouble:
+def _trouble(claim: Claim, records: Sequence[Record], metrics: Metrics) -> Trouble:
     crashed = f", {claim.crashed} crashed" if claim.crashed else ""
     name = claim.function.rpartition("::")[2]
     test = f"{claim.simulator}, {f'{name} {claim.variant}'.rstrip()}"
@@ -201,9 +202,7 @@ def _trouble(
     )
 
 
-def _undecided(
-    subject: str, claimed: str, claims: Sequence[Claim], metrics: Mapping[str, Sequence[Metric]]
-) -> Trouble:
+def _undecided(subject: str, claimed: str, claims: Sequence[Claim], metrics: Metrics) -> Trouble:
     """One claim of several simulators that are not decided."""
     found = [f"{claim.simulator} {_value(claim, metrics)} ({claim.advice})" for claim in claims]
     return Trouble(f"UNDECIDED {subject}: {claimed}: {'; '.join(found)}")
@@ -218,9 +217,7 @@ def _again(record: Record | None) -> str:
     return command(record) if record else ""
 
 
-def _worst(
-    claim: Claim, records: Sequence[Record], metrics: Mapping[str, Sequence[Metric]]
-) -> Record | None:
+def _worst(claim: Claim, records: Sequence[Record], metrics: Metrics) -> Record | None:
     """The repetition that speaks most against a claim; a crashed one first."""
     metric = _metric(claim, metrics)
     crashed = [record for record in records if record.status == "failed"]

@@ -4,12 +4,14 @@ error."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from statistics import fmean
 
 from pytest_simbench.measure.phenomena import KEPT, Ratios, Verdict, verdict, worst
 from pytest_simbench.records.metrics import significant
 from pytest_simbench.records.phenomena import ordered
+from pytest_simbench.records.series import grouped
 from pytest_simbench.report.model import cells
 from pytest_simbench.report.model.answer import NAMED
 from pytest_simbench.report.model.document import Column, Section, Table, capital, listed
@@ -51,15 +53,14 @@ def section(summaries: Sequence[TaskSummary]) -> Section | None:
 
 def sentences(summaries: Sequence[TaskSummary]) -> list[str]:
     """A verdict on each phenomenon and settings profile, in words; none of a single simulator."""
-    profiles = list(dict.fromkeys(row.profile for row in _rows(summaries).values()))
-    found = []
-    for phenomenon in _phenomena(summaries):
+    every, found = contenders(summaries), []
+    profiles = list(dict.fromkeys(one.profile for one in every))
+    for phenomenon, of in _by_phenomenon(summaries).items():
         for profile in profiles:
-            rows = _rows(summaries, profile)
-            ratios = {name: _ratios(summaries, phenomenon, row) for name, row in rows.items()}
-            ratios = {name: known for name, known in ratios.items() if known}
-            if len(ratios) > 1:
-                costs = {name: _cost(summaries, rows[name], phenomenon) for name in ratios}
+            compared = {one.name: one for one in contenders(summaries, profile) if one.ratios(of)}
+            if len(compared) > 1:
+                ratios = {name: one.ratios(of) for name, one in compared.items()}
+                costs = {name: one.cost(of) for name, one in compared.items()}
                 where = f" ({profile})" if len(profiles) > 1 else ""
                 found.append(f"for {phenomenon}{where}: {_told(verdict(ratios), costs)}")
     return found
@@ -67,50 +68,71 @@ def sentences(summaries: Sequence[TaskSummary]) -> list[str]:
 
 def table(summaries: Sequence[TaskSummary]) -> list[Column]:
     """Simulators by phenomena, and what a simulated second costs."""
-    rows = _rows(summaries)
-    columns = [Column("simulator", rows, left=True)]
-    for phenomenon in _phenomena(summaries):
-        found = [_ratios(summaries, phenomenon, row) for row in rows.values()]
-        columns.append(Column(phenomenon, map(_cell, found)))
-    costs = [_cost(summaries, row) for row in rows.values()]
-    shown = [cells.MISSING if cost is None else cells.number(cost, 2) for cost in costs]
-    return [*columns, Column("CPU s/sim s", shown)]
+    every = contenders(summaries)
+    costs = [one.cost(laws(summaries)) for one in every]
+    return [
+        Column("simulator", [one.name for one in every], left=True),
+        *(
+            Column(phenomenon, [_cell(one.ratios(of)) for one in every])
+            for phenomenon, of in _by_phenomenon(summaries).items()
+        ),
+        Column("CPU s/sim s", [cells.MISSING if c is None else cells.number(c, 2) for c in costs]),
+    ]
 
 
 def details(summaries: Sequence[TaskSummary]) -> list[Table]:
     """For each phenomenon its laws by simulators: the error in the law's unit, with its ratio to
     the tolerance where the law is not kept."""
-    rows = _rows(summaries)
     found = []
-    for phenomenon in _phenomena(summaries):
-        asked = [summary for summary in laws(summaries) if summary.phenomenon == phenomenon]
+    for phenomenon, of in _by_phenomenon(summaries).items():
         columns = [
-            Column("law", [summary.task for summary in asked], left=True),
-            Column("error in", map(_unit, asked), left=True),
+            Column("law", [law.task for law in of], left=True),
+            Column("error in", map(_unit, of), left=True),
         ]
-        for name, of in rows.items():
-            columns.append(Column(name, [_error(summary, of) for summary in asked]))
+        for one in contenders(summaries):
+            columns.append(Column(one.name, [_error(one.rows.get(law.task)) for law in of]))
         found.append(Table(f"laws of {phenomenon}", columns))
     return found
 
 
-def _rows(summaries: Sequence[TaskSummary], profile: str | None = None) -> dict[str, Row]:
-    """One row of each contender, of one settings profile or of all, by its short name."""
-    found: dict[str, Row] = {}
-    for summary in laws(summaries):
-        for row in summary.rows:
+@dataclass(frozen=True)
+class Contender:
+    """A simulator in one mode and settings profile, with its row of each law."""
+
+    name: str
+    profile: str
+    rows: Mapping[str, Row]
+
+    def ratios(self, of: Sequence[TaskSummary]) -> Ratios:
+        """Of these laws those that it was asked."""
+        found = {law.task: _ratio(self.rows[law.task]) for law in of if law.task in self.rows}
+        return {law: ratio for law, ratio in found.items() if ratio is not None}
+
+    def cost(self, of: Sequence[TaskSummary]) -> float | None:
+        """CPU seconds for a simulated second, the mean of these laws."""
+        rows = [self.rows[law.task] for law in of if law.task in self.rows]
+        known = [cost.mean for row in rows if (cost := row.costs.get("cpu_cost")) is not None]
+        return fmean(known) if known else None
+
+
+def contenders(summaries: Sequence[TaskSummary], profile: str | None = None) -> list[Contender]:
+    """Those of one settings profile, or of all, with short names."""
+    found: dict[str, dict[str, Row]] = {}
+    for law in laws(summaries):
+        for row in law.rows:
             if profile in (None, row.profile):
-                found.setdefault(row.label, row)
-    rows = sorted(found.values(), key=lambda row: row.profile)
-    return dict(zip(short_labels(rows), rows, strict=True))
+                found.setdefault(row.label, {}).setdefault(law.task, row)
+    rows = sorted(found.values(), key=lambda of: next(iter(of.values())).profile)
+    firsts = [next(iter(of.values())) for of in rows]
+    return [
+        Contender(name, first.profile, of)
+        for name, first, of in zip(short_labels(firsts), firsts, rows, strict=True)
+    ]
 
 
-def _row(summary: TaskSummary, like: Row) -> Row | None:
-    return next((row for row in summary.rows if row.label == like.label), None)
-
-
-def _phenomena(summaries: Sequence[TaskSummary]) -> list[str]:
-    return ordered(summary.phenomenon for summary in laws(summaries))
+def _by_phenomenon(summaries: Sequence[TaskSummary]) -> dict[str, list[TaskSummary]]:
+    found = grouped(laws(summaries), lambda law: law.phenomenon)
+    return {phenomenon: found[phenomenon] for phenomenon in ordered(found)}
 
 
 def _ratio(row: Row) -> float | None:
@@ -118,30 +140,6 @@ def _ratio(row: Row) -> float | None:
         return math.inf
     found = row.metrics.get("ratio")
     return None if found is None else found.max
-
-
-def _ratios(summaries: Sequence[TaskSummary], phenomenon: str, like: Row) -> Ratios:
-    found = {}
-    for summary in laws(summaries):
-        row = _row(summary, like)
-        ratio = _ratio(row) if row else None
-        if summary.phenomenon == phenomenon and ratio is not None:
-            found[summary.task] = ratio
-    return found
-
-
-def _cost(
-    summaries: Sequence[TaskSummary], like: Row, phenomenon: str | None = None
-) -> float | None:
-    """CPU seconds for a simulated second, the mean of the laws."""
-    found = [
-        cost.mean
-        for summary in laws(summaries)
-        if phenomenon in (None, summary.phenomenon)
-        and (row := _row(summary, like)) is not None
-        and (cost := row.costs.get("cpu_cost")) is not None
-    ]
-    return fmean(found) if found else None
 
 
 def _cell(ratios: Ratios) -> str:
@@ -157,9 +155,9 @@ def _times(ratio: float) -> str:
     return "fails" if math.isinf(ratio) else f"{significant(ratio, 2)}x"
 
 
-def _error(summary: TaskSummary, like: Row) -> str:
-    row = _row(summary, like)
-    if row is None or (ratio := _ratio(row)) is None:
+def _error(row: Row | None) -> str:
+    ratio = _ratio(row) if row else None
+    if row is None or ratio is None:
         return cells.MISSING
     error = row.metrics.get("error")
     if math.isinf(ratio) or error is None:
@@ -171,7 +169,7 @@ def _unit(summary: TaskSummary) -> str:
     return next((metric.unit for metric in summary.metrics if metric.name == "error"), "")
 
 
-def _told(found: Verdict, costs: dict[str, float | None]) -> str:
+def _told(found: Verdict, costs: Mapping[str, float | None]) -> str:
     if found.best is not None:
         text = f"{found.best}, which keeps {found.kept[found.best]} of {found.laws} laws"
     else:
@@ -180,13 +178,8 @@ def _told(found: Verdict, costs: dict[str, float | None]) -> str:
         some += [f"{more} more"] * (more > 0)
         text = f"no clear best; laws kept of {found.laws} by those that nobody beats: "
         text += listed(some) or "nobody"
-        text += _cheapest({who: costs[who] for who in found.unbeaten})
+        known = sorted((c, who) for who in found.unbeaten if (c := costs[who]) is not None)
+        if len(known) > 1 and known[0][0] <= CHEAPER * known[1][0]:
+            text += f"; the cheapest of them: {known[0][1]}"
     left = f"; not compared: {listed(found.incomplete)}" if found.incomplete else ""
     return f"{text}{left}."
-
-
-def _cheapest(costs: dict[str, float | None]) -> str:
-    known = sorted((cost, who) for who, cost in costs.items() if cost is not None)
-    if len(known) < 2 or known[0][0] > CHEAPER * known[1][0]:
-        return ""
-    return f"; the cheapest of them: {known[0][1]}"

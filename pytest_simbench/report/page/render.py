@@ -16,7 +16,7 @@ from pytest_simbench import __version__
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.report.model import changes
 from pytest_simbench.report.model.document import Cell, Table, capital
-from pytest_simbench.report.page.context import Page
+from pytest_simbench.report.page.context import Shown
 
 _LOG = re.compile(r"logs/[A-Za-z0-9_=-][A-Za-z0-9_.=-]*\.log")
 """A log in the run folder, as this package names them: it becomes a link, anything else a text."""
@@ -28,7 +28,7 @@ SYMBOLS = {"ahead": ("\u25b2", "ahead"), "behind": ("\u25bc", "behind"),
 """Of the verdicts: what is seen without colours, and what is read aloud."""
 
 
-def render(page: Page) -> str:
+def render(page: Shown) -> str:
     """The page as one HTML document, without a line that depends on when it was made."""
     style, script = _part("page.css"), _part("page.js")
     return _template().render(
