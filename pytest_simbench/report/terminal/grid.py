@@ -19,6 +19,9 @@ from pytest_simbench.report.model.document import Column, Content
 GAP = 2
 """Blank columns between two columns of a table."""
 
+NARROWEST = 16
+"""Columns that text which may be wrapped must have beside the others."""
+
 PLAIN = Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
 """One rule of hyphens under the heading and nothing else, so that logs stay readable."""
 
@@ -33,7 +36,7 @@ def render(columns: Sequence[Column], width: int) -> str:
     single = [column.joined() for column in columns]
     if fits(single, width):
         return _draw(single, width)
-    if columns[0].above:
+    if columns[0].above and fits([c for c in single[1:] if not c.wrap], width - NARROWEST):
         return _below(single, width)
     if any(column.wrap for column in columns):
         return _draw(single, width)

@@ -11,7 +11,7 @@ import pytest
 from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.model.matrix import with_differences
+from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.page import PAGE_NAME, context
 from pytest_simbench.report.page.render import render
@@ -32,12 +32,10 @@ __all__ = ["browser", "opened"]  # fixtures
 
 def write(folder: Path, found: list[Record], baseline: list[Record] | None = None) -> Path:
     metrics = METRICS | declared(STRANGE)
-    summaries = with_differences(summarise(found, metrics, REFERENCES), found)
-    comparison = None
-    if baseline:
-        comparison = ("runs/before", run_gate(baseline, found, (), metrics))
+    compared = ("runs/before", run_gate(baseline, found, (), metrics)) if baseline else None
+    report = Report(summarise(found, metrics, REFERENCES), found, comparison=compared)
     path = folder / PAGE_NAME
-    path.write_text(render(context.page(folder, summaries, found, comparison)), encoding="utf-8")
+    path.write_text(render(context.page(folder, report)), encoding="utf-8")
     return path
 
 

@@ -15,6 +15,7 @@ from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.recordings.trace import Trace
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.files import write_files
+from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.replay.groups import groups
 from pytest_simbench.report.replay.render import replay_of
@@ -208,7 +209,7 @@ def test_a_dot_of_the_report_leads_to_its_replay(tmp_path: Path, opened: Opened)
     Trace.of(scene(), longer(0.5), [(0.0, "task")]).write(
         tmp_path, f"traces/{file_stem_of(kept[1])}.npz"
     )
-    assert write_files(tmp_path, summarise(kept, METRICS, {}), kept, figures=False).complete
+    assert write_files(tmp_path, Report(summarise(kept, METRICS), kept), figures=False).complete
     page = opened(tmp_path / "report.html")
     dots = page.locator(".strip").first.locator(".dot")
     dots.nth(0).click()

@@ -11,7 +11,8 @@ from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.record import Failure
 from pytest_simbench.report.markdown.run import render_claims
-from pytest_simbench.report.model.claims import claims_of, lines
+from pytest_simbench.report.model.claims import claims_of
+from pytest_simbench.report.terminal.parts import claim_lines
 from tests.report.samples import METRICS, record
 
 STACK = "suites/test_stacking.py::test_stacking"
@@ -75,7 +76,7 @@ def test_a_limit_against_the_baseline_that_is_exceeded_is_a_claim_that_fails() -
 
 
 def test_the_table_has_a_column_for_each_simulator_and_a_row_for_each_claim() -> None:
-    shown = lines(claims_of(reading(claim(low=0.83, high=1.0), FAILED)), 80)
+    shown = claim_lines(claims_of(reading(claim(low=0.83, high=1.0), FAILED)), 80)
     row = next(line for line in shown.splitlines() if line.startswith("test_stacking"))
     assert row.split("  ") == ["test_stacking: placed >= 90 %", "PASS 100 [83, 100]",
                                "FAIL 50 [30, 70]"]  # fmt: skip
@@ -113,14 +114,14 @@ def test_a_test_that_failed_as_a_whole_is_told_unless_a_claim_of_it_says_why() -
 def test_many_variants_of_a_test_are_counted_in_one_cell() -> None:
     laws = [claim(test=f"{STACK}[{k}]", variant=f"law{k}") for k in range(9)]
     laws.append(claim(test=f"{STACK}[x]", variant="x", verdict="FAIL"))
-    shown = lines(claims_of(reading(*laws)), 80)
+    shown = claim_lines(claims_of(reading(*laws)), 80)
     assert "FAIL 1, PASS 9" in shown
 
 
 @pytest.mark.parametrize("width", [80, 200])
 def test_no_line_of_the_table_is_wider_than_the_terminal(width: int) -> None:
     many = [claim(f"simulator{k}", low=0.83, high=1.0) for k in range(10)]
-    shown = lines(claims_of(reading(*many)), width)
+    shown = claim_lines(claims_of(reading(*many)), width)
     assert all(len(line) <= width for line in shown.splitlines())
 
 

@@ -8,7 +8,9 @@ from pytest_simbench.records.repeatability import Line
 from pytest_simbench.repeatability.agreement import Agreement, Parting
 from pytest_simbench.repeatability.motions import Difference
 from pytest_simbench.repeatability.replay_result import Again
-from pytest_simbench.report.model.repeatability import render_markdown, render_terminal, tables
+from pytest_simbench.report.markdown.run import render_tables as render_markdown
+from pytest_simbench.report.model.repeatability import tables
+from pytest_simbench.report.terminal.parts import render_tables as render_terminal
 
 AGAINS = (
     Again("after a reset"),
@@ -72,11 +74,11 @@ def test_the_row_says_it_all() -> None:
 
 def test_no_table_without_content() -> None:
     assert tables([], []) == []
-    assert [title for title, _, _ in tables(LINES[:1], [])] == ["Replay: throwing, seed 7"]
+    assert [table.title for table in tables(LINES[:1], [])] == ["Replay: throwing, seed 7"]
 
 
 def test_markdown() -> None:
-    text = render_markdown(tables(LINES, AGREEMENTS))
+    text = render_markdown("Repeatability", tables(LINES, AGREEMENTS))
     assert text.startswith("# Repeatability\n\n## Replay: throwing, seed 7\n")
     assert "| mujoco headless tuned | yes | same |" in text
     assert "| wobbly headless tuned | 0.50 s / never | - |" in text

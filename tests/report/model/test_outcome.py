@@ -15,8 +15,7 @@ from pytest_simbench.measure.gate import GateReport, run_gate
 from pytest_simbench.measure.limits import Limit
 from pytest_simbench.report.model.changes import columns
 from pytest_simbench.report.model.outcome import NAME, Outcome
-
-from .samples import METRICS, record
+from tests.report.samples import METRICS, record
 
 
 def compared() -> GateReport:

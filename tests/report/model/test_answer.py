@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from itertools import combinations
 
 import pytest
@@ -11,12 +12,11 @@ from hypothesis import strategies as st
 
 from pytest_simbench.measure.differences import Difference, Verdict
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.report.model.answer import sentences, short_labels
-from pytest_simbench.report.model.matrix import with_differences
+from pytest_simbench.report.model import tables
+from pytest_simbench.report.model.answer import headline, sentences
 from pytest_simbench.report.model.pooling import Spread
 from pytest_simbench.report.model.summary import Row, TaskSummary, summarise
-
-from .samples import METRICS, record, stacking_run, throwing_run, two_errors
+from tests.report.samples import METRICS, record, stacking_run, texts, throwing_run
 
 SCORE = Metric("score", "score", "", "higher", "share", 10, study=True)
 
@@ -62,24 +62,54 @@ def told(
 
 
 def test_sample_runs() -> None:
-    (stacking,) = with_differences(
-        summarise(stacking_run(), METRICS, ends=two_errors), stacking_run()
-    )
+    records = [*stacking_run(), *throwing_run()]
+    stacking, throwing = summarise(records, METRICS)
     assert sentences(stacking) == [
-        "placed: mujoco 99 % [97, 100] is ahead of pybullet 65 % [52, 78], by 33.3 points "
+        "placed: mujoco 99 % [79, 100] is ahead of pybullet 65 % [40, 78], by 33.3 points "
         "[16.7, 50].",
-        "at the end: mujoco 97 % [94, 99] is ahead of pybullet 77 % [62, 92], by 20 points "
+        "at the end: mujoco 97 % [77, 99] is ahead of pybullet 77 % [46, 91], by 20 points "
         "[1.53, 38.5].",
         "crashes: pybullet 3 of 20.",
     ]
-    (throwing,) = with_differences(
-        summarise(throwing_run(), METRICS, ends=two_errors), throwing_run()
-    )
     assert sentences(throwing) == [
-        "moved: mujoco 42 % [38, 45] and pybullet 39 % [34, 45]; a difference needs at least 6 "
+        "moved: mujoco 42 % [33, 54] and pybullet 39 % [27, 52]; a difference needs at least 6 "
         "pairs that differ; so far 1.",
         "crashes: none in 40 repetitions.",
     ]
+    assert headline([stacking, throwing]) == [
+        "2 simulators did stacking and throwing: 80 repetitions, 3 crashed (pybullet 3).",
+        "Outcome: stacking, placed and at the end: mujoco ahead (behind: pybullet); "
+        "throwing, moved: a difference needs at least 6 pairs that differ; so far 1.",
+        "Cost: CPU s per simulated s, stacking and throwing: not compared; RAM, stacking and "
+        "throwing: a difference needs at least 6 pairs that differ; so far none.",
+    ]
+    assert headline([]) == []
+
+
+def test_the_matrix_says_who_beats_whom_at_what() -> None:
+    (found,) = summarise(stacking_run(), METRICS)
+    assert texts(tables.matrix(found)) == {
+        "simulator": ["mujoco", "pybullet"],
+        "mujoco": ["", "-"],
+        "pybullet": ["placed, at_end, untouched_moved", ""],
+    }
+    same = [record(name, k, metrics={"placed": 1.0}) for name in ("a", "b") for k in range(20)]
+    assert tables.matrix(summarise(same, METRICS)[0]) == []
+
+
+def test_modes_are_not_set_against_each_other() -> None:
+    good = [record("mujoco", k, metrics={"placed": 1.0}) for k in range(20)]
+    poor = [record("mujoco", k, mode="gui", metrics={"placed": 0.2}) for k in range(20)]
+    assert summarise([*good, *poor], METRICS)[0].differences == ()
+
+
+def test_who_is_ahead_colours_the_cells() -> None:
+    (found,) = summarise(stacking_run(), METRICS)
+    verdicts = {c.heading: [cell.verdict for cell in c.cells] for c in tables.study(found)}
+    assert verdicts["placed %"] == verdicts["at the end %"] == ["ahead", "behind"]
+    assert verdicts["crashed"] == verdicts["RAM MB"] == ["open", "open"]
+    for heading in ("x real time", "CPU s/sim s", "CPU %", "start s", "simulator"):
+        assert verdicts[heading] == ["", ""]  # no control was recorded
 
 
 @pytest.mark.parametrize(
@@ -123,10 +153,10 @@ def test_nobody_leads_with_nothing() -> None:
         for name, moved in (("genesis", 0.0), ("newton", 0.0), ("drake", 0.5), ("dart", 0.5))
         for k in range(20)
     ]
-    (found,) = with_differences(summarise(records, METRICS), records)
+    (found,) = summarise(records, METRICS)
     assert sentences(found)[0].startswith("moved: dart 50 % [")
     assert "are ahead; behind: genesis 0 % [0, " in sentences(found)[0]
-    (nothing,) = with_differences(summarise(records[:40], METRICS), records[:40])
+    (nothing,) = summarise(records[:40], METRICS)
     assert sentences(nothing)[0].endswith(
         "; a difference needs at least 6 pairs that differ; so far none."
     )
@@ -139,7 +169,7 @@ def test_few_repetitions_are_not_compared(count: int) -> None:
         for name, placed in (("good", 1.0), ("poor", 0.0))
         for k in range(count)
     ]
-    (found,) = with_differences(summarise(records, METRICS), records)
+    (found,) = summarise(records, METRICS)
     assert {d.verdict for d in found.differences} == {"undecided"}
     assert sentences(found)[0].endswith(
         f"; a difference needs at least 6 pairs that differ; so far {count}."
@@ -176,14 +206,28 @@ def test_a_single_simulator_is_told_without_a_rank() -> None:
     assert sentences(task({"a": 0.5}))[0] == "score: a 50 % [40, 60]."
 
 
-def test_names_say_no_more_than_they_must() -> None:
-    records = stacking_run() + stacking_run("gui")
-    assert short_labels(summarise(records, METRICS)[0].rows) == [
-        "mujoco (headless)",
-        "mujoco (gui)",
-        "pybullet (headless)",
-        "pybullet (gui)",
-    ]
+def test_the_headline_counts_many_and_tells_a_single_one() -> None:
+    means = dict.fromkeys("abcdefg", 0.1) | {"x": 0.9}
+    found = headline([task(means, tuple(f"x>{name}" for name in "abcdefg"))])
+    assert found[1] == "Outcome: t, score: x ahead (behind: 7 others)."
+    found = headline([task({"a": 0.1, "b": 0.5, "c": 0.9}, ("c>b", "b>a", "c>a"))])
+    assert found[1] == "Outcome: t, score: c ahead (behind: a and b)."
+    alone = [record(repetition=k, metrics={"placed": 1.0, "at_end": 0.8}) for k in range(10)]
+    ran, outcome, cost = headline(
+        summarise([*alone, record(repetition=11, status="interrupted")], METRICS)
+    )
+    assert ran == "mujoco did stacking: 10 repetitions, none crashed, 1 cut short."
+    assert outcome.startswith("Outcome: stacking, placed: 100 % [")
+    assert cost == "Cost: CPU s per simulated s: 0.048; RAM: 150 MB."
+
+
+def test_a_task_without_metrics_of_the_study_is_told_by_its_first_two() -> None:
+    metrics = tuple(Metric(name, name, "m", "lower") for name in ("one", "two", "three"))
+    found = task({"a": 0.1, "b": 0.9})
+    spread = found.rows[0].metrics[SCORE.name]
+    rows = tuple(replace(row, metrics=dict.fromkeys(("one", "two"), spread)) for row in found.rows)
+    told = headline([TaskSummary("t", metrics, rows)])[1]
+    assert told == "Outcome: t, one and two: not compared."
 
 
 PAIRS = st.sets(st.sampled_from([f"{a}>{b}" for a in "abcd" for b in "abcd" if a < b]))
