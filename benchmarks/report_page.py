@@ -17,8 +17,9 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from pytest_simbench.records.record import Record
 from pytest_simbench.report.model.matrix import with_differences
+
+from pytest_simbench.records.record import Record
 from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.page import PAGE_NAME, page_of
 from pytest_simbench.tasks import Stacking, Throwing

@@ -86,7 +86,9 @@ def write_files(
     from pytest_simbench.report.page.context import page
     from pytest_simbench.report.page.render import render  # Jinja2
 
-    run, told, failed = run or folder, [], []
+    told: list[str] = []
+    failed: list[str] = []
+    run = run or folder
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

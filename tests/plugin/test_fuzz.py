@@ -49,8 +49,8 @@ from pytest_simbench.report.terminal.run import render_brief, render_run
 from tests.recordings.samples import motion, scene
 from tests.records.test_repeatability import LINE, REPLAY
 from tests.repeatability.test_agreement import TIMES, sample
-from tests.report.samples import METRICS, record
 from tests.report.model.test_outcome import compared
+from tests.report.samples import METRICS, record
 
 EXAMPLES = int(os.environ.get("SIMBENCH_FUZZ", "25"))
 

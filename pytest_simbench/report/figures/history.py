@@ -13,7 +13,7 @@ from pytest_simbench.measure.intervals import interval
 from pytest_simbench.measure.law_history import LawHistory, Reached, times
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
 from pytest_simbench.report.figures.drawing import COLOURS, Named, heading, panelled
-from pytest_simbench.report.model.history import AnyHistory
+from pytest_simbench.report.model.report import AnyHistory
 
 SHOWN = 6
 """Panels of a picture at most: those that changed come first."""

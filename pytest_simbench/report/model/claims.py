@@ -64,27 +64,74 @@ class Claims:
     more: int = 0
 
 
+@dataclass(frozen=True)
+class _Told:
+    """A claim with the metric that it is about, None where that is not known, and its subject: the
+    test's function and its variant; of many variants (laws) the function alone."""
+
+    claim: Claim
+    metric: Metric | None
+    subject: str
+
+    @property
+    def claimed(self) -> str:
+        """The claim in words: `placed >= 90 %`."""
+        claim, metric = self.claim, self.metric
+        if not claim.metric or claim.threshold is None:
+            return "the test passes"
+        sign = ">=" if claim.relation == "at least" else "<="
+        shown = metric.format(claim.threshold) if metric else significant(claim.threshold)
+        return f"{claim.metric} {sign} {shown}"
+
+    @property
+    def value(self) -> str:
+        """What was measured, with its bounds: `71 [60, 80]`, `4 of 5`."""
+        claim, metric = self.claim, self.metric
+        if metric is None or claim.mean is None:
+            return ""
+        if metric.kind == "yes_no":
+            return f"{round(claim.mean * claim.n)} of {claim.n}"
+        scale = 100 if metric.bounded else 1
+        known = [end for end in (claim.low, claim.high) if end is not None and isfinite(end)]
+        ends = [significant(scale * end) for end in known]
+        bounds = f" [{', '.join(ends)}]" if len(ends) == 2 and ends[0] != ends[1] else ""
+        return f"{significant(scale * claim.mean)}{bounds}"
+
+
 def claims_of(reading: Reading, comparison: GateReport | None = None) -> Claims:
     """Of a run, with the limits against its baseline."""
     claims = _that_count(reading.claims)
+    told = [_told(claim, claims, reading.metrics) for claim in claims]
     failures = comparison.failures if comparison else ()
     count = Counter[str](claim.verdict for claim in claims)
     count["FAIL"] += len(failures)
     state = next((verdict for verdict in ORDER if count[verdict]), "")
-    troubles = [Trouble(text) for text in failures]
-    bad = sorted(
-        (claim for claim in claims if claim.verdict != "PASS"), key=lambda c: ORDER.index(c.verdict)
-    )
     of_test = grouped(reading.records, lambda r: r.test)
-    fails = [claim for claim in bad if claim.verdict == "FAIL"]
-    open_ = grouped(
-        bad[len(fails) :], lambda c: (_subject(c, claims), _claimed(c, reading.metrics))
-    )
-    troubles += [_trouble(c, of_test.get(c.test, []), reading.metrics) for c in fails]
-    troubles += [_undecided(*of, group, reading.metrics) for of, group in open_.items()]
-    troubles, more = troubles[:MOST], len(troubles) - MOST
-    told = _sentence(state, count, reading.records)
-    return Claims(state, told, _table(claims, reading.metrics), troubles, max(0, more))
+    fails = [one for one in told if one.claim.verdict == "FAIL"]
+    undecided = [one for one in told if one.claim.verdict == "UNDECIDED"]
+    troubles = [Trouble(text) for text in failures]
+    troubles += [_trouble(one, of_test.get(one.claim.test, [])) for one in fails]
+    for (subject, claimed), same in grouped(undecided, lambda t: (t.subject, t.claimed)).items():
+        found = [f"{one.claim.simulator} {one.value} ({one.claim.advice})" for one in same]
+        troubles.append(Trouble(f"UNDECIDED {subject}: {claimed}: {'; '.join(found)}"))
+    more = max(0, len(troubles) - MOST)
+    sentence = _sentence(state, count, reading.records)
+    return Claims(state, sentence, _table(told), troubles[:MOST], more)
+
+
+def _told(claim: Claim, claims: Sequence[Claim], metrics: Metrics) -> _Told:
+    known = (*metrics.get(claim.task, ()), *COSTS, CRASHED)
+    metric = next((metric for metric in known if metric.name == claim.metric), None)
+    variants = {c.variant for c in claims if c.function == claim.function}
+    return _Told(claim, metric, _name(claim) if len(variants) <= MOST // 3 else _function(claim))
+
+
+def _function(claim: Claim) -> str:
+    return claim.function.rpartition("::")[2]
+
+
+def _name(claim: Claim) -> str:
+    return f"{_function(claim)} {claim.variant}".rstrip()
 
 
 def _that_count(found: Sequence[Claim]) -> list[Claim]:
@@ -116,115 +163,49 @@ def _sentence(state: str, count: Counter[str], records: Sequence[Record]) -> str
     return f"{state}   {', '.join(parts)}; {repetitions}"
 
 
-def _table(claims: Sequence[Claim], metrics: Metrics) -> Table:
-    """A row for each function, task and claim; several tests in one cell are counted."""
-    if not claims:
+def _table(told: Sequence[_Told]) -> Table:
+    """A row for each subject and claim, a column for each simulator; several tests in one cell are
+    counted."""
+    if not told:
         return Table("Claims", [])
-    places = list(dict.fromkeys(map(_place, claims)))
+    of = [(one.claim.simulator, one.claim.mode, one.claim.profile) for one in told]
+    places = list(dict.fromkeys(of))
     who = dict(zip(places, names(places, "{} {}", " "), strict=True))
-    rows = grouped(claims, lambda c: (_subject(c, claims), _claimed(c, metrics)))
+    rows = grouped(zip(of, told, strict=True), lambda pair: (pair[1].subject, pair[1].claimed))
     found = [Column("claim", [f"{subject}: {text}" for subject, text in rows], left=True)]
-    for name in dict.fromkeys(who.values()):
-        of = ([c for c in row if who[_place(c)] == name] for row in rows.values())
-        found.append(Column(name, [_cell(row, metrics) for row in of], left=True))
+    for place, name in who.items():
+        cells = [_cell([one for at, one in row if at == place]) for row in rows.values()]
+        found.append(Column(name, cells, left=True))
     return Table("Claims", found)
 
 
-def _place(claim: Claim) -> tuple[str, str, str]:
-    return claim.simulator, claim.mode, claim.profile
-
-
-def _subject(claim: Claim, claims: Sequence[Claim]) -> str:
-    """The test's function and its variant; of many variants (laws) the function alone."""
-    name = claim.function.rpartition("::")[2]
-    variants = {c.variant for c in claims if c.function == claim.function}
-    return f"{name} {claim.variant}".rstrip() if len(variants) <= MOST // 3 else name
-
-
-def _claimed(claim: Claim, metrics: Metrics) -> str:
-    """The claim in words: `placed >= 90 %`."""
-    if not claim.metric or claim.threshold is None:
-        return "the test passes"
-    sign = ">=" if claim.relation == "at least" else "<="
-    metric = _metric(claim, metrics)
-    shown = metric.format(claim.threshold) if metric else significant(claim.threshold)
-    return f"{claim.metric} {sign} {shown}"
-
-
-def _metric(claim: Claim, metrics: Metrics) -> Metric | None:
-    known = (*metrics.get(claim.task, ()), *COSTS, CRASHED)
-    return next((metric for metric in known if metric.name == claim.metric), None)
-
-
-def _cell(claims: Sequence[Claim], metrics: Metrics) -> str:
+def _cell(told: Sequence[_Told]) -> str:
     """Verdict and value; of several claims how many have each verdict."""
-    if len(claims) != 1:
-        count = Counter[str](claim.verdict for claim in claims)
-        return ", ".join(f"{verdict} {count[verdict]}" for verdict in ORDER if count[verdict])
-    return f"{claims[0].verdict} {_value(claims[0], metrics)}".rstrip()
+    if len(told) == 1:
+        return f"{told[0].claim.verdict} {told[0].value}".rstrip()
+    count = Counter[str](one.claim.verdict for one in told)
+    return ", ".join(f"{verdict} {count[verdict]}" for verdict in ORDER if count[verdict])
 
 
-def _value(claim: Claim, metrics: Metrics) -> str:
-    """What was measured, with its bounds: `71 [60, 80]`, `4 of 5`."""
-    metric = _metric(claim, metrics)
-    if metric is None or claim.mean is None:
-        return ""
-    if metric.kind == "yes_no":
-        return f"{round(claim.mean * claim.n)} of {claim.n}"
-    scale = 100 if metric.bounded else 1
-    ends = [
-        significant(scale * end)
-        for end in (claim.low, claim.high)
-        if end is not None and isfinite(end)
-    ]
-    bounds = f" [{', '.join(ends)}]" if len(ends) == 2 and ends[0] != ends[1] else ""
-    return f"{significant(scale * claim.mean)}{bounds}"
-
-
-def _trouble(claim: Claim, records: Sequence[Record], metrics: Metrics) -> Trouble:
-    crashed = f", {claim.crashed} crashed" if claim.crashed else ""
-    name = claim.function.rpartition("::")[2]
-    test = f"{claim.simulator}, {f'{name} {claim.variant}'.rstrip()}"
+def _trouble(told: _Told, records: Sequence[Record]) -> Trouble:
+    """A claim that failed, with the repetition that speaks most against it; a crashed one first."""
+    claim, metric = told.claim, told.metric
+    test = f"FAIL {claim.simulator}, {_name(claim)}"
+    crashed = [record for record in records if record.status == "failed"]
     if not claim.metric:
-        record = next((r for r in records if r.status == "failed"), None) or next(
-            iter(records), None
-        )
-        return Trouble(f"{claim.verdict} {test}: {claim.advice}", "", _again(record), record)
-    worst = _worst(claim, [r for r in records if r.task == claim.task], metrics)
-    value = f"{_value(claim, metrics)} over {claim.n} repetitions{crashed}"
-    what = f"{claim.verdict} {test}: {_claimed(claim, metrics)} is {value}"
+        worst = next(iter([*crashed, *records]), None)
+        return Trouble(f"{test}: {claim.advice}", "", command(worst) if worst else "", worst)
+    many = f", {claim.crashed} crashed" if claim.crashed else ""
+    what = f"{test}: {told.claimed} is {told.value} over {claim.n} repetitions{many}"
+    own = [record for record in records if record.task == claim.task]
+    worst = next((record for record in crashed if record in own), None)
+    why = f"crashed: {worst.error.cause}" if worst and worst.error else ""
+    known = [] if metric is None else [(v, r) for r in own if (v := r.value(metric)) is not None]
+    if worst is None and metric is not None and known:
+        pick = min if claim.relation == "at least" else max
+        value, worst = pick(known, key=lambda pair: pair[0])
+        why = f"has {metric.format(value)}"
     if worst is None:
         return Trouble(what)
-    error = worst.error
-    why = f"crashed: {error.cause}" if error else _told(worst, _metric(claim, metrics))
-    return Trouble(
-        what, f"seed {worst.seed}, repetition {worst.repetition} {why}", _again(worst), worst
-    )
-
-
-def _undecided(subject: str, claimed: str, claims: Sequence[Claim], metrics: Metrics) -> Trouble:
-    """One claim of several simulators that are not decided."""
-    found = [f"{claim.simulator} {_value(claim, metrics)} ({claim.advice})" for claim in claims]
-    return Trouble(f"UNDECIDED {subject}: {claimed}: {'; '.join(found)}")
-
-
-def _told(record: Record, metric: Metric | None) -> str:
-    value = record.value(metric) if metric else None
-    return "" if metric is None or value is None else f"has {metric.format(value)}"
-
-
-def _again(record: Record | None) -> str:
-    return command(record) if record else ""
-
-
-def _worst(claim: Claim, records: Sequence[Record], metrics: Metrics) -> Record | None:
-    """The repetition that speaks most against a claim; a crashed one first."""
-    metric = _metric(claim, metrics)
-    crashed = [record for record in records if record.status == "failed"]
-    if crashed or metric is None:
-        return next(iter(crashed), None)
-    known = [(value, r) for r in records if (value := r.value(metric)) is not None]
-    if not known:
-        return None
-    pick = min if claim.relation == "at least" else max
-    return pick(known, key=lambda pair: pair[0])[1]
+    told_of = f"seed {worst.seed}, repetition {worst.repetition} {why}"
+    return Trouble(what, told_of, command(worst), worst)

@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from pytest_simbench.measure.history import History, histories
+from pytest_simbench.measure.law_history import LawHistory, law_histories
 from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.model import history, sweep, tables, truth
+from pytest_simbench.report.model import sweep, tables, truth
 from pytest_simbench.report.model.claims import Claims, claims_of
 from pytest_simbench.report.model.document import Section
-from pytest_simbench.report.model.history import AnyHistory
 from pytest_simbench.report.model.outcome import Compared
 from pytest_simbench.report.model.summary import TaskSummary, at_own_steps, summarise
+
+AnyHistory = History | LawHistory
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,7 @@ class Report:
         return cls(
             summaries_of(reading, looks),
             in_order(reading.records),
-            history.of_run(reading),
+            histories_of(reading),
             sweep.of_run(reading),
             claims_of(reading, comparison[1] if comparison else None),
             comparison,
@@ -57,7 +60,13 @@ class Report:
     def sections(self) -> list[Section]:
         """Laws, time steps, tasks, and releases."""
         laws = filter(None, [truth.section(self.summaries), sweep.section(self.sweeps)])
-        return [*laws, *map(tables.section, self.tasks), *history.sections(self.histories)]
+        told = [Section(f"History: {one.title}", one.sentences()) for one in self.histories]
+        return [*laws, *map(tables.section, self.tasks), *told]
+
+
+def histories_of(reading: Reading) -> list[AnyHistory]:
+    """The releases of simulators: of each test, and of all laws."""
+    return [*histories(reading.records, reading.metrics), *law_histories(reading.records)]
 
 
 def summaries_of(reading: Reading, looks: int = 1) -> list[TaskSummary]:

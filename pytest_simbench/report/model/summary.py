@@ -38,21 +38,32 @@ SHOWN_COSTS = ("cpu", "ram", "rtf", "cpu_cost", "start", "end")
 
 @dataclass(frozen=True)
 class Cause:
-    """Failures that share type and phase.
-
-    Attributes:
-        message: that of the first of them, in one line.
-        last_line: the last line of that one's log.
-        repetitions: their numbers, with `seeds` in the same order.
-    """
+    """Failures of one row that share type and phase."""
 
     type: str
     phase: str
-    message: str
-    last_line: str
-    repetitions: tuple[int, ...]
-    seeds: tuple[int, ...]
-    log: str = ""
+    records: Sequence[Record]
+
+    @property
+    def repetitions(self) -> list[int]:
+        """Their numbers."""
+        return [record.repetition for record in self.records]
+
+    @property
+    def message(self) -> str:
+        """That of the first of them, in one line."""
+        error = self.records[0].error
+        return " ".join(error.message.split()) if error else "the record names no cause"
+
+    @property
+    def tail(self) -> list[str]:
+        """The last lines of that one's log, which is at `log`."""
+        error = self.records[0].error
+        return error.log_tail.strip().splitlines() if error else []
+
+    @property
+    def log(self) -> str:
+        return self.records[0].notes.log
 
 
 @dataclass(frozen=True)
@@ -277,23 +288,10 @@ def _seconds(records: Sequence[Record]) -> dict[str, float]:
 
 
 def _causes(records: Sequence[Record]) -> tuple[Cause, ...]:
-    failed = (record for record in records if record.status == "failed")
+    """The most frequent first."""
     groups = grouped(
-        failed, lambda r: (r.error.type, r.error.phase) if r.error else ("unknown", "")
+        (record for record in records if record.status == "failed"),
+        lambda r: (r.error.type, r.error.phase) if r.error else ("unknown", ""),
     )
-    causes = []
-    for (kind, phase), group in sorted(groups.items(), key=lambda item: -len(item[1])):
-        error = group[0].error
-        tail = error.log_tail.strip().splitlines() if error else []
-        causes.append(
-            Cause(
-                kind,
-                phase,
-                " ".join(error.message.split()) if error else "the record names no cause",
-                tail[-1].strip() if tail else "",
-                tuple(record.repetition for record in group),
-                tuple(record.seed for record in group),
-                group[0].notes.log,
-            )
-        )
-    return tuple(causes)
+    ordered = sorted(groups.items(), key=lambda item: -len(item[1]))
+    return tuple(Cause(kind, phase, group) for (kind, phase), group in ordered)

@@ -175,7 +175,7 @@ def failures(summary: TaskSummary) -> list[Column]:
     shown = [
         "; ".join(
             [cause.message or cause.type]
-            + ([f"last line of its log: {cause.last_line}"] if cause.last_line else [])
+            + [f"last line of its log: {line.strip()}" for line in cause.tail[-1:]]
             + ([f"log: {cause.log}"] if cause.log else [])
         )
         for cause in causes

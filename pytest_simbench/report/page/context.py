@@ -124,8 +124,6 @@ def _task(summary: TaskSummary, repetitions: _Repetitions, replays: Sequence[Gro
 
 def _cause(row: Row, cause: Cause, repetitions: _Repetitions) -> Shown:
     """Failures of a row that share type and phase, with the end of the first one's log."""
-    first = next(r for r in row.records if r.repetition == cause.repetitions[0])
-    tail = first.error.log_tail.strip().splitlines() if first.error else []
     where = f" in {cause.phase}" if cause.phase else ""
     return {
         "title": f"{row.label}: {len(cause.repetitions)} x {cause.type}{where}",
@@ -133,8 +131,8 @@ def _cause(row: Row, cause: Cause, repetitions: _Repetitions) -> Shown:
         "message": cause.message,
         "repetitions": tables.numbers(cause.repetitions, 10),
         "log": cause.log,
-        "tail": for_terminal("\n".join(tail[-TAIL:])),
-        **repetitions.recorded(first),
+        "tail": for_terminal("\n".join(cause.tail[-TAIL:])),
+        **repetitions.recorded(cause.records[0]),
     }
 
 

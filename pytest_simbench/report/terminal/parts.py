@@ -11,7 +11,7 @@ from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.report.model import capabilities, changes, sweep
 from pytest_simbench.report.model.claims import Claims
 from pytest_simbench.report.model.document import Table
-from pytest_simbench.report.model.history import AnyHistory
+from pytest_simbench.report.model.report import AnyHistory
 from pytest_simbench.report.terminal.grid import fill, render
 from pytest_simbench.simulator.info import SimulatorInfo
 
