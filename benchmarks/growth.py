@@ -62,8 +62,9 @@ def measure(folder: Path) -> dict[str, float]:
     from pytest_simbench.measure.gate import run_gate
     from pytest_simbench.measure.limits import parse_limits
     from pytest_simbench.records.folder import RunFolder
-    from pytest_simbench.report.files import in_order, summaries_of
-    from pytest_simbench.report.page import page_of
+    from pytest_simbench.report.model.report import Report
+    from pytest_simbench.report.page.context import page
+    from pytest_simbench.report.page.render import render
     from pytest_simbench.report.terminal.run import render_run
 
     found = {}
@@ -76,10 +77,10 @@ def measure(folder: Path) -> dict[str, float]:
 
     reading = RunFolder(folder).read()
     part("reading")
-    summaries = summaries_of(reading)
-    render_run(summaries, 120)
+    report = Report.of(reading)
+    render_run(report.summaries, 120)
     part("tables")
-    (folder / "report.html").write_text(page_of(folder, summaries, in_order(reading.records)))
+    (folder / "report.html").write_text(render(page(folder, report)))
     part("page")
     metrics = [metric for task in reading.metrics.values() for metric in task]
     limits = parse_limits("placed:5%,ram:10%,rtf:20%", metrics)

@@ -17,11 +17,12 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from pytest_simbench.report.model.matrix import with_differences
-
 from pytest_simbench.records.record import Record
+from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import summarise
-from pytest_simbench.report.page import PAGE_NAME, page_of
+from pytest_simbench.report.page import PAGE_NAME
+from pytest_simbench.report.page.context import page as page_of
+from pytest_simbench.report.page.render import render
 from pytest_simbench.tasks import Stacking, Throwing
 
 SIMULATORS, REPETITIONS, OPENED = 8, 20, 5
@@ -83,18 +84,15 @@ def main() -> None:
     lines = [line for run in given.run for line in (run / "records.jsonl").open()]
     records = resampled([Record.from_json(line) for line in lines])
     tasks = (Stacking(), Throwing())
-    summaries = with_differences(
-        summarise(
-            records,
-            {task.name: task.metrics for task in tasks},
-            {task.name: task.references for task in tasks},
-        ),
+    summaries = summarise(
         records,
+        {task.name: task.metrics for task in tasks},
+        {task.name: task.references for task in tasks},
     )
     folder = given.keep or Path(tempfile.mkdtemp())
     folder.mkdir(parents=True, exist_ok=True)
     start = time.perf_counter()
-    page = page_of(folder, summaries, records)
+    page = render(page_of(folder, Report(summaries, records)))
     written = time.perf_counter() - start
     path = folder / PAGE_NAME
     path.write_text(page, encoding="utf-8")

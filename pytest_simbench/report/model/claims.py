@@ -35,14 +35,12 @@ class Trouble:
     Attributes:
         what: simulator, test, and what came of the claim.
         worst: which repetition to look at, in words; empty where none stands out.
-        again: the command that runs it again, or more of them; may be empty.
-        record: that repetition.
+        again: the command that runs it again; may be empty.
     """
 
     what: str
     worst: str = ""
     again: str = ""
-    record: Record | None = None
 
 
 @dataclass(frozen=True)
@@ -194,7 +192,7 @@ def _trouble(told: _Told, records: Sequence[Record]) -> Trouble:
     crashed = [record for record in records if record.status == "failed"]
     if not claim.metric:
         worst = next(iter([*crashed, *records]), None)
-        return Trouble(f"{test}: {claim.advice}", "", command(worst) if worst else "", worst)
+        return Trouble(f"{test}: {claim.advice}", "", command(worst) if worst else "")
     many = f", {claim.crashed} crashed" if claim.crashed else ""
     what = f"{test}: {told.claimed} is {told.value} over {claim.n} repetitions{many}"
     own = [record for record in records if record.task == claim.task]
@@ -207,5 +205,5 @@ def _trouble(told: _Told, records: Sequence[Record]) -> Trouble:
         why = f"has {metric.format(value)}"
     if worst is None:
         return Trouble(what)
-    told_of = f"seed {worst.seed}, repetition {worst.repetition} {why}"
-    return Trouble(what, told_of, command(worst), worst)
+    where = f"seed {worst.seed}, repetition {worst.repetition}"
+    return Trouble(what, f"{where} {why}", command(worst))

@@ -53,8 +53,9 @@ Shown = Callable[[Spread | None, Metric], Cell]
 
 def section(summary: TaskSummary, shown: Shown = cells.spread) -> Section:
     """All that is told of a task, but for `LEGEND`."""
+    paper = summary.protocol == "paper"
     found = [
-        Table(study_title(summary), study(summary, shown)),
+        Table("The study's table" if paper else "Outcomes and costs", study(summary, shown)),
         Table(CRASHES, failures(summary)),
         Table("why the task fell short", reasons(summary)),
         Table("further metrics: mean [95 % interval]", stricter(summary)),
@@ -64,10 +65,6 @@ def section(summary: TaskSummary, shown: Shown = cells.spread) -> Section:
     ]
     tables = [table for table in found if table.columns]
     return Section(title(summary), sentences(summary), tables, notes(summary), summary.task)
-
-
-def study_title(summary: TaskSummary) -> str:
-    return "The study's table" if summary.protocol == "paper" else "Outcomes and costs"
 
 
 def study(summary: TaskSummary, shown: Shown = cells.spread) -> list[Column]:
@@ -93,24 +90,19 @@ def study(summary: TaskSummary, shown: Shown = cells.spread) -> list[Column]:
 
 
 def brief(summary: TaskSummary) -> list[Column]:
-    """The same in one line for each row, with the costs that are compared."""
-    rows = summary.rows
-    found = [
+    """The same in one line for each row, without bounds of costs; the least important come last."""
+    _, crashed, *others = study(summary, cells.mean_interval)
+    metrics, costs = others[: -len(SHOWN_COSTS)], others[-len(SHOWN_COSTS) :]
+    by_name = dict(zip(SHOWN_COSTS, costs, strict=True))
+    return [
         Column("simulator", summary.names, left=True),
-        Column("crashed", [f"{row.failed} of {row.attempts}" for row in rows]),
+        replace(crashed, content=[cell.lines[0] for cell in crashed.cells]),
+        *(column.joined() for column in metrics),
+        *(
+            Column(cost.heading, [cell.lines[0].partition(" ")[0] for cell in cost.cells])
+            for cost in (by_name[name] for name in ("cpu_cost", "ram", "rtf"))
+        ),
     ]
-    for metric in summary.study:
-        values = [cells.mean_interval(row.metrics.get(metric.name), metric) for row in rows]
-        found.append(Column(cells.heading(metric), values).joined())
-    for name in ("cpu_cost", "ram", "rtf"):
-        costs = [row.costs.get(name) for row in rows]
-        texts = [
-            cells.MISSING if c is None
-            else f"{c.mean:.0f}" if name == "ram" else cells.number(c.mean, 2)
-            for c in costs
-        ]  # fmt: skip
-        found.append(Column(COST_HEADINGS[name][0], texts))
-    return found
 
 
 def stricter(summary: TaskSummary) -> list[Column]:

@@ -132,7 +132,7 @@ def _strip(metric: Metric, summary: TaskSummary, number: Callable[[Record], int]
     elif reference is not None and math.isfinite(reference):
         low, high = min(low, reference), max(high, reference)
     log = cost and low > 0 and high / low > LOGARITHMIC
-    scale = _Scale(low, high, log)
+    scale = _scale(low, high, log)
 
     def line(row: Row, label: str, found: Sequence[tuple[Record, float | None]]) -> StripLine:
         there = [(r, v) for r, v in found if v is not None]
@@ -158,7 +158,7 @@ def _strip(metric: Metric, summary: TaskSummary, number: Callable[[Record], int]
         for_figure(cells.heading(metric)),
         metric.doc,
         [line(*each) for each in zip(summary.rows, summary.names, known, strict=True)],
-        [(scale(v), cells.metric_value(v, metric)) for v in scale.ticks()],
+        [(scale(v), cells.metric_value(v, metric)) for v in _ticks(low, high, log)],
         None if reference is None or not math.isfinite(reference) else scale(reference),
         metric.study and not cost,
         log,
@@ -178,29 +178,24 @@ def _some(found: Sequence[T], by: Callable[[T], float] = lambda item: 0.0) -> Se
     return [found[k] for k in sorted(places)]
 
 
-class _Scale:
-    """From values to shares of the width."""
+def _scale(low: float, high: float, log: bool) -> Callable[[float], float]:
+    """From values to shares of the width [%]."""
+    of = math.log10 if log else float
 
-    def __init__(self, low: float, high: float, log: bool) -> None:
-        self._log = log
-        self.low, self.high = low, high
-
-    def __call__(self, value: float) -> float:
-        low, high = self._of(self.low), self._of(self.high)
-        share = (self._of(max(value, self.low) if self._log else value) - low) / (high - low or 1)
-        share = share if high > low else 0.5
+    def place(value: float) -> float:
+        share = 0.5
+        if high > low:
+            share = (of(max(value, low) if log else value) - of(low)) / (of(high) - of(low))
         return round(LEFT + (RIGHT - LEFT) * min(1.0, max(0.0, share)), 2)
 
-    def _of(self, value: float) -> float:
-        return math.log10(value) if self._log else value
+    return place
 
-    def ticks(self) -> list[float]:
-        """Both ends and what lies between them."""
-        if self.low == self.high:
-            return [self.low]
-        if self._log:
-            return [self.low, math.sqrt(self.low * self.high), self.high]
-        return [self.low + (self.high - self.low) * k / 4 for k in range(5)]
+
+def _ticks(low: float, high: float, log: bool) -> list[float]:
+    """Both ends and what lies between them."""
+    if log and low < high:
+        return [low, math.sqrt(low * high), high]
+    return [low + (high - low) * k / 4 for k in range(5)] if low < high else [low]
 
 
 def _swarm(found: Sequence[tuple[int, float, str]]) -> list[Dot]:
