@@ -176,7 +176,8 @@ def test_few_repetitions_are_not_compared(count: int) -> None:
     )
 
 
-def test_lower_is_better_where_the_metric_says_so() -> None:
+def test_lower_is_better_where_the_metric_says_so_and_a_single_one_has_no_rank() -> None:
+    assert sentences(task({"a": 0.5}))[0] == "score: a 50 % [40, 60]."
     metric = Metric("score", "error", "m", "lower", study=True)
     found = sentences(task({"a": 0.2, "b": 0.11}, ("b>a",), metric))
     assert (
@@ -200,10 +201,6 @@ def test_a_metric_without_a_good_direction_is_not_ranked() -> None:
     ]
     two = sentences(task({"a": 1.1, "b": 2.1}, ("a!b",), metric))[0]
     assert two.endswith("; they differ, and no value is the right one.")
-
-
-def test_a_single_simulator_is_told_without_a_rank() -> None:
-    assert sentences(task({"a": 0.5}))[0] == "score: a 50 % [40, 60]."
 
 
 def test_the_headline_counts_many_and_tells_a_single_one() -> None:

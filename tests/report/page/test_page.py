@@ -75,9 +75,11 @@ def test_a_failure_is_told_with_the_end_of_its_log(tmp_path: Path) -> None:
     assert hung["tail"] == "step 3\ndied"
 
 
-def test_unreadable_results_on_repeatability_are_told(tmp_path: Path) -> None:
+def test_only_failures_make_a_page_that_tells_unreadable_results_too(tmp_path: Path) -> None:
     (tmp_path / "repeatability.jsonl").write_text("nonsense\n")
-    found = made(stacking_run(), tmp_path)
+    found = made([failed("WorkerDied", "load", "gone")], tmp_path)
+    (task,) = found["tasks"]
+    assert (task["strips"], len(task["causes"])) == ([], 1)
     (problem,) = found["problems"]
     assert "repeatability.jsonl" in problem
     assert found["repeatability"] == []
@@ -128,13 +130,6 @@ def test_the_command_runs_one_of_several_profiles_and_time_steps_alone() -> None
 )  # fmt: skip
 def test_an_id_that_is_no_plain_test_gives_no_command(test: str) -> None:
     assert command(record(test=test)) == ""
-
-
-def test_only_failures_still_make_a_page(tmp_path: Path) -> None:
-    found = made([failed("WorkerDied", "load", "gone")], tmp_path)
-    (task,) = found["tasks"]
-    assert task["strips"] == []
-    assert len(task["causes"]) == 1
 
 
 def plots(records: list[Record]) -> dict[str, Strip]:

@@ -139,24 +139,18 @@ def test_it_ends_by_itself_and_begins_anew(replay: Path, opened: Opened) -> None
     until(page, "Number(document.getElementById('time').value) < 1.9")
 
 
-def test_the_slider_goes_there_and_back(replay: Path, opened: Opened) -> None:
+def test_what_is_drawn_follows_the_slider_and_the_ghost(replay: Path, opened: Opened) -> None:
     page = show(opened, replay)
     start = frame(page)
-    go(page, 1.5)
+    go(page, 1.0)
     later = frame(page)
     assert later != start
+    page.locator("#ghost").select_option("drake")
+    assert frame(page) != later  # it is seen in the other tile
+    page.locator("#ghost").select_option("none")
+    assert frame(page) == later
     go(page, 0.0)
     assert frame(page) == start
-
-
-def test_a_ghost_is_seen_in_the_other_tiles(replay: Path, opened: Opened) -> None:
-    page = show(opened, replay)
-    go(page, 1.0)
-    plain = frame(page)
-    page.locator("#ghost").select_option("drake")
-    assert frame(page) != plain
-    page.locator("#ghost").select_option("none")
-    assert frame(page) == plain
 
 
 def test_an_address_leads_to_a_seed(replay: Path, opened: Opened) -> None:
