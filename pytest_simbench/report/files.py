@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from pytest_simbench.ground.text import for_csv, for_terminal
 from pytest_simbench.records.folder import Reading, RunFolder
@@ -25,8 +25,10 @@ from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import PHASES
 from pytest_simbench.report.page import PAGE_NAME
 from pytest_simbench.report.replay import REPLAY_NAME
-from pytest_simbench.report.replay.groups import Group, groups
 from pytest_simbench.worker.text import named
+
+if TYPE_CHECKING:
+    from pytest_simbench.report.replay.groups import Group
 
 MARKDOWN_NAME = "report.md"
 CSV_NAME = "report.csv"
@@ -143,6 +145,7 @@ def _draw(
 
 def _replay(run: Path, records: Sequence[Record], told: list[str]) -> tuple[list[Group], str]:
     """What the replay shows, and the page itself; `told` takes what could not be shown."""
+    from pytest_simbench.report.replay.groups import groups
     from pytest_simbench.report.replay.render import ReplayUnavailable, replay_of
 
     found = groups(run, records)

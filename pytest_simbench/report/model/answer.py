@@ -27,47 +27,45 @@ TOLD_COSTS = ("cpu_cost", "ram")
 
 @dataclass(frozen=True)
 class Standing:
-    """What the differences at one metric make of the rows, by their places.
+    """What the differences at one metric make of the rows.
 
     Attributes:
-        ahead: who beats another and is beaten by nobody; a mean alone puts nobody anywhere.
-        behind: who is beaten.
-        apart: who differs from another at a metric of which no direction is right.
-        same: who is equivalent to all others.
-        open: who was compared, and is none of these.
+        verdicts: of rows that were compared, by place. `ahead`: it beats another and is beaten by
+            none; a mean alone puts nobody anywhere. `behind`: it is beaten. `apart`: it differs
+            from another, and no direction is right. `same`: it is equivalent to all others.
+            `open`: none of these.
         untold: why nobody is told apart, in words; empty where somebody is.
     """
 
-    ahead: tuple[int, ...] = ()
-    behind: tuple[int, ...] = ()
-    apart: tuple[int, ...] = ()
-    same: tuple[int, ...] = ()
-    open: tuple[int, ...] = ()
-    untold: str = "not compared"
+    verdicts: Mapping[int, str]
+    untold: str
 
-    @property
-    def by_place(self) -> dict[int, str]:
-        """What each row is."""
-        kinds = ("ahead", "behind", "apart", "same", "open")
-        return {place: kind for kind in kinds for place in getattr(self, kind)}
+    def who(self, verdict: str) -> list[int]:
+        """The places of those that are this."""
+        return [place for place, found in self.verdicts.items() if found == verdict]
 
 
 def standing(name: str, summary: TaskSummary) -> Standing:
     """Who is ahead at the metric of that name, and whether anything can be told yet."""
     found = [d for d in summary.differences if d.metric.name == name]
     if not found:
-        return Standing()
-    rows = {place for d in found for place in (d.a, d.b)}
-    behind = {d.loser for d in found} - {None}
-    ahead = {d.winner for d in found} - {None} - behind
-    apart = {place for d in found if d.verdict == "different" for place in (d.a, d.b)}
-    same = rows - {place for d in found if d.verdict != "equivalent" for place in (d.a, d.b)}
-    left = rows - ahead - behind - apart - same
+        return Standing({}, "not compared")
+    behind, ahead = ({getattr(d, side) for d in found} for side in ("loser", "winner"))
+    verdicts = {}
+    for place in sorted({place for d in found for place in (d.a, d.b)}):
+        own = {d.verdict for d in found if place in (d.a, d.b)}
+        verdicts[place] = (
+            "behind" if place in behind
+            else "ahead" if place in ahead
+            else "apart" if "different" in own
+            else "same" if own == {"equivalent"}
+            else "open"
+        )  # fmt: skip
     untold = ""
-    if not (ahead or behind or apart):
-        untold = _untold(found) if left else f"the same within {100 * MARGIN:g} points"
-    groups = [tuple(sorted(group)) for group in (ahead, behind, apart, same, left)]
-    return Standing(groups[0], groups[1], groups[2], groups[3], groups[4], untold)
+    if not {"ahead", "behind", "apart"} & {*verdicts.values()}:
+        same = f"the same within {100 * MARGIN:g} points"
+        untold = _untold(found) if "open" in verdicts.values() else same
+    return Standing(verdicts, untold)
 
 
 def _untold(found: Sequence[Difference]) -> str:
@@ -103,18 +101,20 @@ def _compare(metric: Metric, summary: TaskSummary) -> str:
     if found.untold:
         return f"{metric.title}: {every}; {found.untold}."
     told = [d for d in summary.differences if d.metric.name == metric.name]
-    if found.apart:
+    if found.who("apart"):
         count = sum(d.verdict == "different" for d in told)
         many = f"{count} of {len(told)} pairs differ" if len(told) > 1 else "they differ"
         return f"{metric.title}: {every}; {many}, and no value is the right one."
-    ahead = [text for place, text in texts.items() if place in found.ahead]
-    behind = [text for place, text in texts.items() if place in found.behind]
-    others = [text for place, text in texts.items() if place not in {*found.ahead, *found.behind}]
+
+    def those(*verdicts: str | None) -> list[str]:
+        return [text for k, text in texts.items() if found.verdicts.get(k) in verdicts]
+
+    ahead, behind, others = those("ahead"), those("behind"), those("same", "open", None)
     verb = "is" if len(ahead) == 1 else "are"
     # "of" only where it is true of each: one row that beats every one that is behind.
     won = [d for d in told if d.winner is not None]
-    beaten = {d.loser for d in won if d.winner in found.ahead}
-    of_each = len(ahead) == 1 and beaten == set(found.behind)
+    beaten = {d.loser for d in won if d.winner in found.who("ahead")}
+    of_each = len(ahead) == 1 and beaten == set(found.who("behind"))
     over = f" of {listed(behind, NAMED)}" if of_each else f"; behind: {listed(behind, NAMED)}"
     by = f", by {_amount(won[0])}" if len(won) == 1 else ""
     rest = f"; not told apart: {listed(others, NAMED)}" if others else ""
@@ -213,7 +213,8 @@ def _who(metric: Metric, values: Sequence[Spread | None], summary: TaskSummary) 
         return "".join(cells.mean_in_words(value, metric) for value in there)
     found = standing(metric.name, summary)
     ahead, behind, apart = (
-        _some([summary.names[k] for k in who]) for who in (found.ahead, found.behind, found.apart)
+        _some([summary.names[place] for place in found.who(verdict)])
+        for verdict in ("ahead", "behind", "apart")
     )
     if found.untold:
         return found.untold

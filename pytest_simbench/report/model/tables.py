@@ -73,7 +73,7 @@ def study(summary: TaskSummary, shown: Shown = cells.spread) -> list[Column]:
 
     def judged(name: str, found: Iterable[Cell]) -> list[Cell]:
         """The cells with what their rows are at the metric of that name."""
-        who = standing(name, summary).by_place
+        who = standing(name, summary).verdicts
         return [replace(cell, verdict=who.get(place, "")) for place, cell in enumerate(found)]
 
     failed = judged(CRASHED.name, map(cells.failures, rows))

@@ -9,7 +9,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from jinja2 import BaseLoader, Environment, StrictUndefined, Template
+from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from pytest_simbench import __version__
@@ -59,7 +59,7 @@ def _rows(found: Table) -> list[tuple[Cell, ...]]:
 @cache
 def _template() -> Template:
     return Environment(
-        loader=_Parts(),
+        loader=FunctionLoader(_part),
         autoescape=True,
         finalize=_text,
         undefined=StrictUndefined,
@@ -68,14 +68,8 @@ def _template() -> Template:
     ).get_template("page.html")
 
 
-class _Parts(BaseLoader):
-    """Templates from the package, also from a zip file."""
-
-    def get_source(self, environment: Environment, template: str) -> tuple[str, None, Any]:
-        return _part(template), None, None
-
-
 def _part(name: str) -> str:
+    """A template, also from a zip file."""
     return (files(__package__) / "templates" / name).read_text(encoding="utf-8")
 
 
