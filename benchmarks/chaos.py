@@ -41,7 +41,7 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.files import summaries_of
+from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.tasks.base import Count, Outcome
 from tests import tiny
 
@@ -182,7 +182,11 @@ def check_tables(folder: Path) -> None:
     reading, found = RunFolder(folder).read(), Counter[tuple[str, str, str]]()
     check(not reading.problems, f"records: {reading.problems}")
     check(len(reading.records) == TRUTH.total(), f"{len(reading.records)} records")
-    for row in (row for summary in summaries_of(reading) for row in summary.rows):
+    for row in (
+        row
+        for summary in summarise(reading.records, reading.metrics, reading.references)
+        for row in summary.rows
+    ):
         counts = {"ok": row.finished, "failed": row.failed, "interrupted": row.interrupted}
         for status, count in counts.items():  # each fault has a row, as it has an adapter
             found[row.simulator, row.mode, status] += count

@@ -13,10 +13,11 @@ from published_runs import load as load_runs
 from tables import DOCS, SIMULATORS, table
 
 from pytest_simbench.measure.comparison import compare_by_seed, holm
-from pytest_simbench.report import cells, markdown
-from pytest_simbench.report.figures import write_figures
-from pytest_simbench.report.matrix import with_differences
-from pytest_simbench.report.summary import TaskSummary, summarise
+from pytest_simbench.report.figures.drawing import write
+from pytest_simbench.report.figures.task import pictures
+from pytest_simbench.report.markdown import run as markdown
+from pytest_simbench.report.model import cells
+from pytest_simbench.report.model.summary import TaskSummary, summarise
 from pytest_simbench.tasks import Throwing
 
 PLURALS = {"stacking": "stackings", "throwing": "throws"}
@@ -266,8 +267,7 @@ load = cache(load_runs)
 def _summary(rules: str, profile: str, task: str) -> TaskSummary:
     records = [r for _, run in _of(load(), rules, profile, task) for r in run.records()]
     whole = TASKS[task].study() if rules == "study" else TASKS[task]
-    found = summarise(records, {task: whole.metrics}, {task: whole.references})
-    return with_differences(found, records)[0]
+    return summarise(records, {task: whole.metrics}, {task: whole.references})[0]
 
 
 def raw(rules: str, profile: str, task: str) -> str:
@@ -298,6 +298,6 @@ def draw() -> None:
     for name in PICTURES:
         profile, task = name.split("_")
         with TemporaryDirectory() as folder:
-            write_figures(Path(folder), [_summary("ours", profile, task)])
+            write(Path(folder), pictures([_summary("ours", profile, task)]))
             picture = Path(folder, f"{task}_metrics.png").read_bytes()
         (DOCS / "pictures" / f"{name}.png").write_bytes(picture)

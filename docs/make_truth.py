@@ -15,9 +15,11 @@ from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.phenomena import PHENOMENA, PHENOMENON
 from pytest_simbench.records.readings import Reading
 from pytest_simbench.records.record import Failure, Record
-from pytest_simbench.report import markdown, sweep, truth
-from pytest_simbench.report.figures import drawing
-from pytest_simbench.report.summary import TaskSummary, summarise
+from pytest_simbench.report.figures import sweep as figures
+from pytest_simbench.report.figures.drawing import drawing
+from pytest_simbench.report.markdown import run as markdown
+from pytest_simbench.report.model import sweep, truth
+from pytest_simbench.report.model.summary import TaskSummary, summarise
 
 DRAWN = "free motion"
 """Whose pictures are on the page."""
@@ -82,9 +84,9 @@ def draw() -> None:
     """The pictures of the page."""
     found = found_sweeps()
     with drawing():
-        for over in sweep.OVER:
+        for over in figures.OVER:
             path = DOCS / "pictures" / f"sweep_{DRAWN.replace(' ', '_')}_{over}.png"
-            sweep.draw(found, DRAWN, over).savefig(path, dpi=90)
+            figures.draw(found, DRAWN, over).savefig(path, dpi=90)
 
 
 def summaries(profile: str) -> list[TaskSummary]:
@@ -125,7 +127,7 @@ def over_steps(part: str) -> str:
     found = found_sweeps()
     if part == "steps":
         return markdown.table(sweep.table(found))
-    tables = dict(sweep.details(found))
+    tables = {each.title: each.columns for each in sweep.details(found)}
     if part == "broken":
         return markdown.table(tables[sweep.BROKEN])
     failed = [table for title, table in tables.items() if title.startswith("what failed")]
@@ -152,8 +154,10 @@ def every_error() -> str:
     ]
     for profile in ("tuned", "default"):
         parts += [f"## Settings: {profile}", unbeaten(profile)]
-        for title, columns in truth.details(summaries(profile)):
-            parts.append(f"### {title.capitalize()}, {profile}\n\n{markdown.table(columns)}")
+        for each in truth.details(summaries(profile)):
+            parts.append(
+                f"### {each.title.capitalize()}, {profile}\n\n{markdown.table(each.columns)}"
+            )
     return "\n\n".join(parts) + "\n"
 
 
@@ -164,7 +168,8 @@ def every_step() -> str:
         "--protocol=smoke\n\nTuned settings, six time steps each. What it says: [which step to "
         "take](../truth.md#which-step-to-take).\nEvery number: [sweep.csv](sweep.csv)."
     ]
-    for title, columns in sweep.details(found_sweeps()):
-        if title.partition(":")[0] in PHENOMENA:
-            parts.append(f"{title[0].upper()}{title[1:]}:\n\n{markdown.table(columns)}")
+    for each in sweep.details(found_sweeps()):
+        if each.title.partition(":")[0] in PHENOMENA:
+            title = each.title[0].upper() + each.title[1:]
+            parts.append(f"{title}:\n\n{markdown.table(each.columns)}")
     return "\n\n".join(parts) + "\n"

@@ -11,8 +11,8 @@ from tables import SIMULATORS, Kept, Line
 
 from pytest_simbench.records.metrics import COSTS, Metric
 from pytest_simbench.records.record import Failure, Record
-from pytest_simbench.report import cells
-from pytest_simbench.report.pooling import spread
+from pytest_simbench.report.model import cells
+from pytest_simbench.report.model.pooling import spread
 from pytest_simbench.tasks import Stacking, Throwing
 
 TASKS = {"stacking": Stacking(), "throwing": Throwing()}

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.stats import t as student
 
 from pytest_simbench.measure.intervals import CONFIDENCE
 
@@ -120,6 +119,8 @@ def _slope(h: np.ndarray, e: np.ndarray, k: int) -> float:
 
 def _fitted(x: np.ndarray, y: np.ndarray) -> Convergence:
     """The slope of a straight line, and its interval."""
+    from scipy.special import stdtrit
+
     dx = x - x.mean()
     spread = float(dx @ dx)
     slope = float(dx @ (y - y.mean())) / spread
@@ -128,5 +129,5 @@ def _fitted(x: np.ndarray, y: np.ndarray) -> Convergence:
         return Convergence("order", slope, -math.inf, math.inf, len(x))
     off = y - y.mean() - slope * dx
     error = math.sqrt(float(off @ off) / left / spread)
-    half = float(student.ppf((1 + CONFIDENCE) / 2, left)) * error
+    half = float(stdtrit(left, (1 + CONFIDENCE) / 2)) * error
     return Convergence("order", slope, slope - half, slope + half, len(x))

@@ -311,7 +311,7 @@ def _interval(test: _Test, reach: float, *, decided: bool) -> tuple[float | None
     """
     n, mean = len(test.gaps), float(test.gaps.mean())
     spread = float(((test.gaps - mean) ** 2).sum())
-    if test.one_value or n <= reach**2 + 1e-9 or spread <= 1e-18 * max(1.0, mean**2):
+    if test.one_value or n <= reach**2 + 1e-9 or spread <= 1e-18 * max(1.0, mean * mean):
         return None, None
     half = reach * math.sqrt(spread / (n * (n - reach**2)))
     low, high = mean - half, mean + half

@@ -111,7 +111,7 @@ def _size(info: SimulatorInfo) -> str:
 def _simulators(selection: Selection) -> Iterator[str]:
     """Lines: the table of capabilities, then a paragraph for each registered simulator, also for
     those whose adapter is broken."""
-    from pytest_simbench.report.capabilities import capability_table
+    from pytest_simbench.report.terminal.parts import capability_table
 
     width = shutil.get_terminal_size((160, 24)).columns
     yield capability_table([adapter(name).info for name in registered()], width)

@@ -23,7 +23,8 @@ from pytest_simbench.records.baseline import (
 from pytest_simbench.records.configuration import other_meanings
 from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.metrics import Metric, UnknownMetric
-from pytest_simbench.report.changes import render_markdown, render_terminal
+from pytest_simbench.report.markdown.run import render_changes as render_markdown
+from pytest_simbench.report.terminal.parts import render_changes as render_terminal
 
 Beside = tuple[str, Sequence[str]]
 """A simulator, and others that are compared with it."""

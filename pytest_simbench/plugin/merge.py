@@ -19,31 +19,32 @@ import pytest
 
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.ground.text import for_terminal
-from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.plugin import options, recording
 from pytest_simbench.records.folder import RECORDS, TASKS, Reading, RunFolder
 from pytest_simbench.records.merging import Merged, MergeError, merge, merge_tasks
 from pytest_simbench.records.paths import FolderError, new_name, opened, whole
 from pytest_simbench.records.record import Record, RecordError
-from pytest_simbench.report import history, repeatability, sweep
-from pytest_simbench.report.brief import render_brief
-from pytest_simbench.report.changes import render_terminal
-from pytest_simbench.report.claims import Claims, claims_of
-from pytest_simbench.report.claims import lines as lines_of
 from pytest_simbench.report.files import (
     Written,
-    in_order,
-    summaries_of,
     where,
     write_badge,
     write_files,
     write_outcome,
     write_report,
+    write_tables,
 )
-from pytest_simbench.report.outcome import Outcome
+from pytest_simbench.report.model import sweep
+from pytest_simbench.report.model.outcome import Outcome
+from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.page import PAGE_NAME
-from pytest_simbench.report.summary import TaskSummary
-from pytest_simbench.report.tables import render_run
+from pytest_simbench.report.terminal.parts import (
+    claim_lines,
+    history_lines,
+    render_changes,
+    render_tables,
+    sweep_lines,
+)
+from pytest_simbench.report.terminal.run import render_brief, render_run
 
 
 @dataclass(frozen=True)
@@ -143,7 +144,7 @@ def merge_runs(config: pytest.Config) -> int:
         passed = together([outcome.passed for outcome in outcomes])
         problems += [*wrong, write_outcome(folder.path, Outcome(passed, looks=looks))]
         problems.append(publish(config, kept, passed))
-        _print(config, written.summaries, written.sweeps, problems, written.claims)
+        _print(config, written, problems)
         if written.complete and not unsaved:
             print(where(folder.path / PAGE_NAME, config.invocation_params.dir))
     finally:
@@ -166,41 +167,29 @@ def report_runs(config: pytest.Config) -> int:
     whole = runs.merged("--sim-report")[1] if others else runs.readings[first]
     outcomes, wrong = runs.outcomes()
     looks = max(outcome.looks for outcome in outcomes)
-    summaries, written = summaries_of(whole, looks), Written()
-    histories, sweeps = history.of_run(whole), sweep.of_run(whole)
-    tables, problems = ([], []) if others else repeatability.write_tables(folder.path, target)
+    compared = None if others else outcomes[0].compared
+    report = Report.of(whole, compared, looks)
+    tables, problems = ([], []) if others else write_tables(folder.path, target)
     if not (whole.records or tables or problems):
         raise pytest.UsageError(f"--sim-report {first}: it holds no repetition")
-    compared = None if others else outcomes[0].compared
-    claims = claims_of(whole, compared[1] if compared else None)
+    written = Written()
     if target is not None:
-        run = None if others else folder.path
-        written = write_files(
-            target,
-            summaries,
-            in_order(whole.records),
-            True,
-            compared,
-            run,
-            histories,
-            sweeps,
-            claims,
-        )
+        written = write_files(target, report, None if others else folder.path)
     recorded = [*wrong, publish(config, whole.records, together([o.passed for o in outcomes]))]
     if target is not None and not others:
         recorded += recording.record(config, folder.path, target, whole.records)
     elif options.value(config, recording.RECORD):
         recorded.append("no recordings: join the runs with --sim-merge first")
-    _print(config, summaries, sweeps, [*runs.problems, *written.problems, *recorded], claims)
+    _print(config, report, [*runs.problems, *written.problems, *recorded])
     width = shutil.get_terminal_size().columns
-    for line in history.lines(histories, width):
+    for line in history_lines(report.histories, width):
         print(for_terminal(line))
-    if not others and outcomes[0].compared is not None:
-        name, report = outcomes[0].compared
-        text = render_terminal(report, width, bool(report.changes))
+    if compared is not None:
+        name, gate = compared
+        text = render_changes(gate, width, bool(gate.changes))
         print(for_terminal(f"\nbaseline: {name}\n{text}"))
     if tables or problems:
-        print(f"\n{repeatability.render_terminal(tables, width)}")
+        print(f"\n{render_tables(tables, width)}")
         for problem in problems:
             print(for_terminal(problem))
     if target is not None and written.complete:
@@ -225,19 +214,13 @@ def _target(config: pytest.Config, folders: list[RunFolder]) -> Path | None:
     return target
 
 
-def _print(
-    config: pytest.Config,
-    summaries: Sequence[TaskSummary],
-    sweeps: Sequence[Swept],
-    problems: list[str],
-    claims: Claims | None,
-) -> None:
+def _print(config: pytest.Config, report: Report, problems: list[str]) -> None:
     verbose, width = config.get_verbosity() > 0, shutil.get_terminal_size().columns
-    if claims:
-        print(lines_of(claims, width) + "\n")
-    print((render_run if verbose else render_brief)(summaries, width))
-    if sweeps:
-        told = (sweep.whole if verbose else sweep.brief)(sweeps, width)
+    if report.claims:
+        print(claim_lines(report.claims, width) + "\n")
+    print((render_run if verbose else render_brief)(report.summaries, width))
+    if report.sweeps:
+        told = sweep_lines(report.sweeps, width, verbose)
         print("\n".join([f"\n{sweep.TITLE}", *map(for_terminal, told)]))
     for problem in filter(None, problems):
         print(for_terminal(problem))

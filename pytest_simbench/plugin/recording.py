@@ -18,7 +18,7 @@ from pytest_simbench.plugin import options
 if TYPE_CHECKING:
     from pytest_simbench.experiment.experiment import Experiment
     from pytest_simbench.records.record import Record
-    from pytest_simbench.report.progress import Progress
+    from pytest_simbench.report.terminal.progress import Progress
 
 RECORD, TRACE, PICTURES, VIDEO = "sim_record", "sim_trace", "sim_pictures", "sim_video"
 
@@ -113,7 +113,7 @@ def record(
     if not options.value(config, RECORD):
         return []
     from pytest_simbench.report.files import shown
-    from pytest_simbench.report.recorded import FOLDER, write_bags
+    from pytest_simbench.report.replay.recorded import FOLDER, write_bags
 
     count, problems = write_bags(run, target, records, progress or _printed())
     if not count:
@@ -124,7 +124,7 @@ def record(
 
 def _printed() -> Progress:
     """For a command, which has no terminal of pytest's."""
-    from pytest_simbench.report.progress import Progress
+    from pytest_simbench.report.terminal.progress import Progress
 
     def write(text: str) -> None:
         print(text, end="", flush=True)

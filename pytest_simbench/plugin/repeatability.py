@@ -27,7 +27,8 @@ from pytest_simbench.repeatability.replay import replay
 from pytest_simbench.repeatability.replay_result import Replay
 from pytest_simbench.repeatability.search import Finding
 from pytest_simbench.repeatability.stability import Sensitivity, Stability
-from pytest_simbench.report.repeatability import render_terminal, write_tables
+from pytest_simbench.report.files import write_tables
+from pytest_simbench.report.terminal.parts import render_tables as render_terminal
 from pytest_simbench.simulator.info import Capability
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks.base import Task

@@ -31,16 +31,17 @@ from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import NAME
-from pytest_simbench.report import markdown, sweep
-from pytest_simbench.report.brief import render_brief
-from pytest_simbench.report.claims import lines as lines_of
 from pytest_simbench.report.files import write_outcome, write_report
-from pytest_simbench.report.github import append_summary
-from pytest_simbench.report.history import lines
-from pytest_simbench.report.outcome import Outcome
+from pytest_simbench.report.markdown import run as markdown
+from pytest_simbench.report.markdown.github import append_summary
+from pytest_simbench.report.model import sweep
+from pytest_simbench.report.model.outcome import Outcome
 from pytest_simbench.report.page import PAGE_NAME
-from pytest_simbench.report.progress import Progress
-from pytest_simbench.report.tables import render_run
+from pytest_simbench.report.terminal.parts import claim_lines as lines_of
+from pytest_simbench.report.terminal.parts import history_lines as lines
+from pytest_simbench.report.terminal.parts import sweep_lines
+from pytest_simbench.report.terminal.progress import Progress
+from pytest_simbench.report.terminal.run import render_brief, render_run
 from pytest_simbench.tasks.base import Task
 
 RUNS = ".simbench"
@@ -294,9 +295,7 @@ class Run:
         problems += [*written.problems, cluster.lost(self.reading.records)]
         if written.summaries or written.sweeps:
             changes = comparison.markdown() if comparison else ""
-            page = markdown.render_run(
-                written.summaries, sweeps=written.sweeps, claims=written.claims
-            )
+            page = markdown.render_run(written)
             problems.append(append_summary("\n".join([changes, page])))
             reporter.write_sep("=", "simulator comparison")
             if written.claims:
@@ -306,8 +305,7 @@ class Run:
             reporter.write_line(show(written.summaries, reporter._tw.fullwidth))
         if written.sweeps:
             reporter.write_sep("=", sweep.TITLE)
-            tell = sweep.whole if verbose else sweep.brief
-            for line in tell(written.sweeps, reporter._tw.fullwidth):
+            for line in sweep_lines(written.sweeps, reporter._tw.fullwidth, verbose):
                 reporter.write_line(for_terminal(line))
         if written.histories:
             reporter.write_sep("=", "history")

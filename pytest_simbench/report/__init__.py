@@ -1,5 +1,7 @@
-"""What the run found, for people: live progress, terminal tables, Markdown, pictures.
+"""What a run found, for people. `model` computes it once; the other rooms only draw it.
 
-Modules: `progress` (standard library only, used while tests run), `summary` (records to rows),
-`cells` (numbers to text), `tables` (terminal), `markdown` and `figures` (run folder and docs).
+- `model`: rows, differences, sentences, tables and claims of a run.
+- `terminal`, `markdown`, `page` (`report.html`), `figures` and `replay` (`replay.html`): each
+  draws it in one medium.
+- `files`: writes all files of a run folder.
 """

@@ -5,36 +5,34 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from pytest_simbench.ground.text import for_csv, for_terminal
-from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.metrics import COSTS
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
-from pytest_simbench.report import history, markdown, sweep
-from pytest_simbench.report import outcome as outcome_of
-from pytest_simbench.report.badge import badge
-from pytest_simbench.report.claims import Claims, claims_of
-from pytest_simbench.report.figures import FiguresUnavailable, write_figures
-from pytest_simbench.report.history import AnyHistory
-from pytest_simbench.report.matrix import with_differences
-from pytest_simbench.report.outcome import Outcome
-from pytest_simbench.report.page import PAGE_NAME, Compared
+from pytest_simbench.report.markdown.badge import badge
+from pytest_simbench.report.markdown.run import render_run, render_tables
+from pytest_simbench.report.model.document import Table
+from pytest_simbench.report.model.outcome import NAME as OUTCOME
+from pytest_simbench.report.model.outcome import Compared, Outcome
+from pytest_simbench.report.model.report import Report
+from pytest_simbench.report.model.summary import PHASES
+from pytest_simbench.report.page import PAGE_NAME
 from pytest_simbench.report.replay import REPLAY_NAME
-from pytest_simbench.report.replay.groups import Group, groups
-from pytest_simbench.report.sheet import sheet_name
-from pytest_simbench.report.sheet import sheets as sheets_of
-from pytest_simbench.report.summary import PHASES, TaskSummary, at_own_steps, summarise
-from pytest_simbench.report.truth import others
 from pytest_simbench.worker.text import named
+
+if TYPE_CHECKING:
+    from pytest_simbench.report.replay.groups import Group
 
 MARKDOWN_NAME = "report.md"
 CSV_NAME = "report.csv"
+TABLES_NAME = "repeatability.md"
 
 IDENTITY = (
     "test", "task", "simulator", "mode", "profile", "protocol", "repetition", "seed", "jitter",
@@ -43,24 +41,16 @@ IDENTITY = (
 
 
 @dataclass(frozen=True)
-class Written:
-    """What became of the report.
+class Written(Report):
+    """A report, and what became of its files.
 
     Attributes:
         problems: one sentence each.
         complete: whether every file was written; pictures that need matplotlib are not missed.
-        summaries: what the report tells of each task.
-        histories: of simulators of which there are several releases.
-        sweeps: laws over time steps.
-        claims: what the tests claimed, and what came of it.
     """
 
-    problems: tuple[str, ...] = ()
+    problems: Sequence[str] = ()
     complete: bool = True
-    summaries: tuple[TaskSummary, ...] = ()
-    histories: tuple[AnyHistory, ...] = ()
-    sweeps: tuple[Swept, ...] = ()
-    claims: Claims | None = None
 
 
 def write_report(
@@ -80,120 +70,91 @@ def write_report(
     Raises:
         RecordError: its records cannot be read.
     """
-    reading = reading or folder.read()
-    records = in_order(reading.records)
-    summaries = summaries_of(reading, looks)
-    histories, sweeps = tuple(history.of_run(reading)), tuple(sweep.of_run(reading))
-    claims = claims_of(reading, comparison[1] if comparison else None)
-    written = write_files(
-        folder.path,
-        summaries,
-        records,
-        comparison=comparison,
-        histories=histories,
-        sweeps=sweeps,
-        claims=claims,
-    )
-    return replace(
-        written, summaries=tuple(summaries), histories=histories, sweeps=sweeps, claims=claims
-    )
-
-
-def summaries_of(reading: Reading, looks: int = 1) -> list[TaskSummary]:
-    """What a run that was judged so often tells of each task."""
-    records = at_own_steps(in_order(reading.records))
-    found = summarise(records, reading.metrics, reading.references)
-    return with_differences([replace(summary, looks=looks) for summary in found], records)
-
-
-def in_order(records: Sequence[Record]) -> list[Record]:
-    """By test and repetition, however many processes wrote them."""
-    return sorted(records, key=lambda r: (r.test, r.repetition))
+    return write_files(folder.path, Report.of(reading or folder.read(), comparison, looks))
 
 
 def write_files(
-    folder: Path,
-    summaries: Sequence[TaskSummary],
-    records: Sequence[Record],
-    figures: bool = True,
-    comparison: Compared | None = None,
-    run: Path | None = None,
-    histories: Sequence[AnyHistory] = (),
-    sweeps: Sequence[Swept] = (),
-    claims: Claims | None = None,
+    folder: Path, report: Report, run: Path | None = None, figures: bool = True
 ) -> Written:
     """Write all files; what cannot be written is told, and the rest is written all the same.
 
     Args:
         folder: where.
-        summaries: of each task.
-        records: that they were made of.
+        report: what is told.
+        run: the run folder, where it is another: traces, pictures and results on repeatability are
+            read from it.
         figures: whether pictures are drawn too.
-        comparison: with a baseline, where there is one.
-        run: the run folder, where it is another: its results on repeatability are on the page.
-        histories: of simulators, drawn too.
-        sweeps: laws over time steps, drawn too.
-        claims: what the tests claimed, which comes first.
     """
     from pytest_simbench.report.page.context import page
     from pytest_simbench.report.page.render import render  # Jinja2
 
-    problems: list[str] = []
+    told: list[str] = []
     failed: list[str] = []
-    pictures: list[Path] = []
+    run = run or folder
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        return Written((f"no report: {_unwritable(folder, error)}",), False)
-    sheets: Mapping[str, bytes] = {}
-    if figures:
-        try:
-            sheets, told = sheets_of(run or folder, records)
-            problems += told
-            pictures = [
-                *write_figures(folder, others(summaries)),
-                *history.write_pictures(folder, histories),
-                *sweep.write_pictures(folder, sweeps),
-            ]
-        except FiguresUnavailable as error:
-            problems.append(str(error))
-        except OSError as error:
-            failed.append(f"pictures: {_unwritable(folder, error)}")
-        except Exception as error:  # a fault of ours, which costs the pictures and no table
-            failed.append(f"the pictures could not be drawn: {named(error)}")
-    told_of = {found.title: found.sentences() for found in histories}
-    names = [picture.name for picture in pictures]
-    text = markdown.render_run(summaries, names, told_of, sweeps, claims)
-    shown, replay, told = _replay(run or folder, records)
-    problems += told
-    told_page = page(run or folder, summaries, records, comparison, shown, sheets, sweeps, claims)
-    contents = {PAGE_NAME: render(told_page)}
+        told.append(f"no report: {_unwritable(folder, error)}")
+        return Written(**vars(report), problems=told, complete=False)
+    drawn, sheets = _draw(folder, run, report, told, failed) if figures else ([], {})
+    shown, replay = _replay(run, report.records, told)
+    contents: dict[str, str | bytes] = {PAGE_NAME: render(page(run, report, shown, sheets))}
     if replay:
         contents[REPLAY_NAME] = replay
-    if records:  # else the run has results on repeatability alone
-        contents |= {MARKDOWN_NAME: text, CSV_NAME: csv_of(records)}
-    encoded = {name: text.encode("utf-8", "replace") for name, text in contents.items()}
-    encoded |= {sheet_name(task): sheet for task, sheet in sheets.items()}
-    for name, content in encoded.items():
-        try:
-            write_whole(folder, name, content)
-        except OSError as error:
-            failed.append(_unwritable(folder / name, error))
-    return Written((*problems, *failed), not failed)
+    if report.records:  # else the run has results on repeatability alone
+        contents[MARKDOWN_NAME] = render_run(report, drawn)
+        contents[CSV_NAME] = csv_of(report.records)
+    failed += filter(None, (_written(folder, name, text) for name, text in contents.items()))
+    return Written(**vars(report), problems=[*told, *failed], complete=not failed)
 
 
-def _replay(run: Path, records: Sequence[Record]) -> tuple[list[Group], str, list[str]]:
-    """What the replay shows, the page itself, and what could not be shown."""
+def _draw(
+    folder: Path, run: Path, report: Report, told: list[str], failed: list[str]
+) -> tuple[list[str], dict[str, bytes]]:
+    """Draw and write all pictures.
+
+    Args:
+        folder: where.
+        run: folder with the pictures that simulators made.
+        report: what is told.
+        told, failed: take what could not be shown, and what went wrong, as sentences.
+
+    Returns:
+        Names of the files but contact sheets; and these (PNG), by the name of their task.
+    """
+    from pytest_simbench.report.figures import history, sheet, sweep, task
+    from pytest_simbench.report.figures.drawing import FiguresUnavailable, write
+
+    sheets: dict[str, bytes] = {}
+    try:
+        sheets, unread = sheet.sheets(run, report.records)
+        told += unread
+        for name, drawn in sheets.items():
+            failed += filter(None, [_written(folder, sheet.sheet_name(name), drawn)])
+        every = task.pictures(report.tasks), history.pictures(report.histories)
+        paths = write(folder, chain(*every, sweep.pictures(report.sweeps)))
+        return [path.name for path in paths], sheets
+    except FiguresUnavailable as error:
+        told.append(str(error))
+    except OSError as error:
+        failed.append(f"pictures: {_unwritable(folder, error)}")
+    except Exception as error:  # a fault of ours, which costs the pictures and no table
+        failed.append(f"the pictures could not be drawn: {named(error)}")
+    return [], sheets
+
+
+def _replay(run: Path, records: Sequence[Record], told: list[str]) -> tuple[list[Group], str]:
+    """What the replay shows, and the page itself; `told` takes what could not be shown."""
+    from pytest_simbench.report.replay.groups import groups
     from pytest_simbench.report.replay.render import ReplayUnavailable, replay_of
 
     found = groups(run, records)
-    if not found:
-        return [], "", []
     try:
-        page, count, problems = replay_of(found)
+        page, count, problems = replay_of(found) if found else ("", 0, [])
     except ReplayUnavailable as error:
-        return [], "", [str(error)]
-    return found[:count], page, problems
+        page, count, problems = "", 0, [str(error)]
+    told += problems
+    return found[:count], page
 
 
 def where(page: Path, base: Path) -> str:
@@ -211,16 +172,41 @@ def write_outcome(folder: Path, outcome: Outcome) -> str:
     try:
         outcome.write(folder)
     except OSError as error:
-        return _unwritable(folder / outcome_of.NAME, error)
+        return _unwritable(folder / OUTCOME, error)
     return ""
 
 
 def write_badge(path: Path, records: Sequence[Record], passed: bool | None) -> str:
     """Write the badge of a run; a sentence when it could not be written."""
+    failed = _written(path.parent, path.name, badge(records, passed))
+    return f"no badge: {failed}" if failed else ""
+
+
+def write_tables(folder: Path, to: Path | None = None) -> tuple[list[Table], list[str]]:
+    """The tables of what a run folder holds on repeatability, also as a file of Markdown.
+
+    Args:
+        folder: of the run.
+        to: the folder for the file; None: there is none.
+
+    Returns:
+        The tables, and one sentence for each thing that is wrong.
+    """
+    from pytest_simbench.report.model.repeatability import found_in
+
+    found, problems = found_in(folder)
+    if found and to is not None:
+        problems.append(_written(to, TABLES_NAME, render_tables("Repeatability", found)))
+    return found, [*filter(None, problems)]
+
+
+def _written(folder: Path, name: str, content: str | bytes) -> str:
+    """Write a file; a sentence when it could not be written."""
+    encoded = content.encode("utf-8", "replace") if isinstance(content, str) else content
     try:
-        write_whole(path.parent, path.name, badge(records, passed).encode("ascii"))
+        write_whole(folder, name, encoded)
     except OSError as error:
-        return f"no badge: {_unwritable(path, error)}"
+        return _unwritable(folder / name, error)
     return ""
 
 

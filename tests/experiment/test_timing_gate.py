@@ -13,7 +13,7 @@ from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.measure.gate import GateReport, run_gate
 from pytest_simbench.measure.limits import parse_limits
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.progress import Progress
+from pytest_simbench.report.terminal.progress import Progress
 from tests.tiny import Falling
 from tests.worker.test_control import busy_machine
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.report.capabilities import capability_markdown
+from pytest_simbench.report.markdown.capabilities import capability_markdown
 from pytest_simbench.simulator.registry import adapter, registered
 
 

@@ -36,23 +36,24 @@ from pytest_simbench.records.folder import CLAIMS, RECORDS, TASKS, THRESHOLDS, R
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Failure, RecordError
 from pytest_simbench.repeatability.agreement import FOLDER as SAMPLES
-from pytest_simbench.report import history, markdown, sweep
-from pytest_simbench.report.brief import render_brief
-from pytest_simbench.report.changes import render_terminal
-from pytest_simbench.report.claims import claims_of
-from pytest_simbench.report.claims import lines as lines_of_claims
-from pytest_simbench.report.files import in_order, summaries_of, write_files
-from pytest_simbench.report.outcome import NAME as OUTCOME
-from pytest_simbench.report.outcome import Outcome
-from pytest_simbench.report.repeatability import render_terminal as render_repeatability
-from pytest_simbench.report.repeatability import write_tables
-from pytest_simbench.report.sheet import albums
-from pytest_simbench.report.tables import render_run
+from pytest_simbench.report.figures.sheet import albums
+from pytest_simbench.report.files import write_files, write_tables
+from pytest_simbench.report.model.outcome import NAME as OUTCOME
+from pytest_simbench.report.model.outcome import Outcome
+from pytest_simbench.report.model.report import Report
+from pytest_simbench.report.terminal.parts import (
+    claim_lines,
+    history_lines,
+    render_changes,
+    render_tables,
+    sweep_lines,
+)
+from pytest_simbench.report.terminal.run import render_brief, render_run
 from tests.recordings.samples import motion, scene
 from tests.records.test_repeatability import LINE, REPLAY
 from tests.repeatability.test_agreement import TIMES, sample
+from tests.report.model.test_outcome import compared
 from tests.report.samples import METRICS, record
-from tests.report.test_outcome import compared
 
 EXAMPLES = int(os.environ.get("SIMBENCH_FUZZ", "25"))
 
@@ -125,26 +126,21 @@ def report(run: Path) -> None:
     """What `--sim-report` and a comparison do, but for drawing."""
     reading = _read(run)
     outcome, wrong = Outcome.read(run)
-    summaries, sweeps = summaries_of(reading), sweep.of_run(reading)
-    histories = history.of_run(reading)
-    claims = claims_of(reading, outcome.compared and outcome.compared[1])
-    found = in_order(reading.records)
-    written = write_files(
-        run, summaries, found, False, outcome.compared, None, histories, sweeps, claims
-    )
+    told_of = Report.of(reading, outcome.compared)
+    found = told_of.records
+    written = write_files(run, told_of, figures=False)
     tables, problems = write_tables(run, run)
     _, told = albums(run, found)
     for text in (*reading.problems, *written.problems, *filter(None, [wrong]), *problems, *told):
         one_sentence(text)
-    render_repeatability(tables, 100)
-    render_brief(summaries, 40)
-    lines_of_claims(claims, 40)
-    markdown.render_run(summaries, sweeps=sweeps, claims=claims)
-    render_run(summaries, 100)
-    history.lines(histories, 40)
-    sweep.whole(sweeps, 40)
+    render_tables(tables, 100)
+    claim_lines(told_of.claims, 40)
+    render_brief(told_of.summaries, 40)
+    render_run(told_of.summaries, 100)
+    history_lines(told_of.histories, 40)
+    sweep_lines(told_of.sweeps, 40, True)
     if outcome.compared is not None:
-        render_terminal(outcome.compared[1], 100, False)
+        render_changes(outcome.compared[1], 100, False)
     for path in (run, run / BENCHMARKS):
         try:
             before = read_baseline(path)

@@ -34,7 +34,7 @@ def test_file(pytester: pytest.Pytester) -> None:
     [
         ("run.write_report", (), "Exit: interrupted while the report was made; the records are "
          "kept in */o, and pytest --sim-report */o makes the report"),
-        ("merge.summaries_of", ("--sim-report=o",), "--sim-report: interrupted; nothing that it "
+        ("merge.Report.of", ("--sim-report=o",), "--sim-report: interrupted; nothing that it "
          "read was changed"),
     ],
 )  # fmt: skip

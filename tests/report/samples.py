@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
-import statistics
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Failure, Record
+from pytest_simbench.report.model.document import Column
 from tests.records.build import made
 
 STACKING = (
@@ -35,12 +35,14 @@ METRICS = {"stacking": STACKING, "throwing": THROWING}
 REFERENCES = {"throwing": {"landing_x": 1.352, "release_speed": 2.753}}
 
 
-def two_errors(values: Sequence[float], metric: Metric) -> tuple[float, float]:
-    """Mean -+ two standard errors: ends that tests of texts can rely on, whatever the method."""
-    mean = statistics.fmean(values)
-    half = 2 * statistics.pstdev(values) / math.sqrt(max(1, len(values) - 1))
-    low, high = mean - half, mean + half
-    return (max(0.0, low), min(1.0, high)) if metric.bounded else (low, high)
+def texts(columns: Iterable[Column]) -> dict[str, list[str]]:
+    """A table by its headings, each cell in one line."""
+    return {column.heading: [cell.text for cell in column.cells] for column in columns}
+
+
+def text(block: str) -> str:
+    """What a terminal shows, as it stands in a test."""
+    return textwrap.dedent(block).strip("\n")
 
 
 def record(

@@ -12,16 +12,18 @@ from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Failure, Record
 from pytest_simbench.records.repeatability import Line
-from pytest_simbench.report import changes, markdown, tables
-from pytest_simbench.report.brief import render_brief
-from pytest_simbench.report.capabilities import capability_markdown, capability_table
 from pytest_simbench.report.files import csv_of, write_files
-from pytest_simbench.report.github import VARIABLE, append_summary
-from pytest_simbench.report.matrix import with_differences
-from pytest_simbench.report.progress import Progress
-from pytest_simbench.report.repeatability import render_markdown, render_terminal
-from pytest_simbench.report.repeatability import tables as repeatability_tables
-from pytest_simbench.report.summary import summarise
+from pytest_simbench.report.markdown.capabilities import capability_markdown
+from pytest_simbench.report.markdown.github import VARIABLE, append_summary
+from pytest_simbench.report.markdown.run import render_changes as changes_in_markdown
+from pytest_simbench.report.markdown.run import render_run as markdown
+from pytest_simbench.report.markdown.run import render_tables as tables_in_markdown
+from pytest_simbench.report.model import repeatability
+from pytest_simbench.report.model.report import Report
+from pytest_simbench.report.model.summary import TaskSummary, summarise
+from pytest_simbench.report.terminal.parts import capability_table, render_changes, render_tables
+from pytest_simbench.report.terminal.progress import Progress
+from pytest_simbench.report.terminal.run import render_brief, render_run
 from pytest_simbench.simulator.registry import adapter
 from tests.hostile import (
     HOSTILE,
@@ -69,26 +71,19 @@ def declared(text: str) -> dict[str, list[Metric]]:
     return {text: [Metric(text, text, text, study=True, doc=text)]}
 
 
+def told(text: str) -> list[TaskSummary]:
+    return summarise(records(text), declared(text), {text: {text: 0.5}})
+
+
 @texts
-def test_the_terminal(text: str) -> None:
-    found = with_differences(
-        summarise(records(text), declared(text), {text: {text: 0.5}}), records(text)
-    )
+def test_the_terminal_the_report_in_markdown_and_the_csv(text: str) -> None:
+    found = told(text)
     for width in (60, 200):
-        for shown in (tables.render_run(found, width), render_brief(found, width)):
+        for shown in (render_run(found, width), render_brief(found, width)):
             assert_harmless_terminal(shown)
             assert len(shown) < 100_000
-
-
-@texts
-def test_the_report_in_markdown(text: str) -> None:
-    found = with_differences(summarise(records(text), declared(text)), records(text))
-    assert_harmless_markdown(markdown.render_run(found))
-    assert_harmless_terminal(markdown.render_run(found))
-
-
-@texts
-def test_the_csv(text: str) -> None:
+    assert_harmless_markdown(markdown(Report(found)))
+    assert_harmless_terminal(markdown(Report(found)))
     content = csv_of(records(text))
     assert_harmless_csv(content)
     assert_harmless_terminal(content.replace("\r\n", "\n"))
@@ -103,7 +98,7 @@ def test_pictures_stay_in_their_folder(text: str, tmp_path: Path) -> None:
     folder.mkdir(parents=True)
     all_ = [*records(text), *(replace(r, task=f"{text} ") for r in records(text))]
     with mpl.rc_context({"text.parse_math": True}):
-        write_files(folder, summarise(all_, declared(text)), all_)
+        write_files(folder, Report(summarise(all_, declared(text)), all_))
     files = {path for path in tmp_path.rglob("*") if path.is_file()}
     assert {path.parent for path in files} == {folder}
     assert sum(path.suffix == ".png" for path in files) == 6
@@ -115,17 +110,16 @@ def test_a_formula_in_a_label_is_no_formula(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
     (tmp_path / "run").mkdir()
     found = records(r"$\nonsense{$")
-    written = write_files(tmp_path / "run", summarise(found, declared(r"$\nonsense{$")), found)
-    assert written.problems == ()
+    report = Report(summarise(found, declared(r"$\nonsense{$")), found)
+    assert write_files(tmp_path / "run", report).problems == []
 
 
 @texts
 def test_the_comparison_with_a_baseline(text: str) -> None:
     now = [replace(r, versions={text: "2"}, settings={text: 1}) for r in records(text)]
     report = run_gate(records(text), now, (), declared(text))
-    assert_harmless_terminal(changes.render_terminal(report, 100, True))
-    shown = changes.render_markdown(report, text, True)
-    assert_harmless_markdown(shown)
+    assert_harmless_terminal(render_changes(report, 100, True))
+    assert_harmless_markdown(changes_in_markdown(report, text, True))
 
 
 @texts
@@ -139,9 +133,9 @@ def test_the_tables_of_repeatability(text: str) -> None:
         Line("replay", text, text, text, text, text, 1, {}, {}, {"claims": True, "again": [again]}),
         Line("search", text, text, text, text, text, 1, {}, {}, {"sentence": text}),
     ]
-    found = repeatability_tables(lines, [])
-    assert_harmless_terminal(render_terminal(found, 100))
-    assert_harmless_markdown(render_markdown(found))
+    found = repeatability.tables(lines, [])
+    assert_harmless_terminal(render_tables(found, 100))
+    assert_harmless_markdown(tables_in_markdown("Repeatability", found))
 
 
 @texts
@@ -169,6 +163,5 @@ def test_the_progress_line(text: str, is_tty: bool) -> None:
 
 def test_the_page_of_a_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, str(tmp_path / "summary"))
-    found = summarise(records(ALL), declared(ALL))
-    assert append_summary(markdown.render_run(found)) == ""
+    assert append_summary(markdown(Report(told(ALL)))) == ""
     assert_harmless_markdown((tmp_path / "summary").read_text(encoding="utf-8"))

@@ -5,23 +5,33 @@ from __future__ import annotations
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.report.progress import HEARTBEAT_SECONDS, LOG_SECONDS, Progress, duration
+from pytest_simbench.report.terminal.progress import (
+    HEARTBEAT_SECONDS,
+    LOG_SECONDS,
+    Progress,
+    duration,
+)
 
 TEST = "test_stacking[mujoco-headless]"
 
 
 class Desk:
-    """A clock to turn, a screen that keeps what is written."""
+    """A clock to turn, a screen that keeps what is written; a test of so many repetitions runs."""
 
-    def __init__(self, is_tty: bool, width: int = 120) -> None:
+    def __init__(
+        self, repetitions: int, is_tty: bool = True, width: int = 120, last: int | None = None
+    ) -> None:
         self.now = 0.0
         self.written: list[str] = []
         self.progress = Progress(self.written.append, is_tty, width, clock=lambda: self.now)
+        if repetitions:
+            self.progress.start_test(TEST, repetitions, last)
 
     @property
     def text(self) -> str:
@@ -38,80 +48,68 @@ class Desk:
                 continue
             cells[column : column + 1] = [char]
             column += 1
-        return "".join(cells).rstrip()
+        return "".join(cells).rstrip().removeprefix(f"{TEST}  ")
 
     def repeat(self, number: int, seconds: float, status: str = "ok") -> None:
         self.progress.repetition(number, seed=1000 + number)
         self.now += seconds
         self.progress.end_repetition(status, seconds)
 
+    def under_way(self, number: int, phase: str, count: str = "", node: str = "") -> None:
+        """A repetition that has been in a phase for a second, and has done `9/15 cubes`."""
+        self.progress.repetition(number, seed=7, node=node)
+        self.now += 0.5
+        self.progress.phase(phase)
+        self.now += 0.5
+        if count:
+            numbers, _, noun = count.partition(" ")
+            done, total = map(int, numbers.split("/"))
+            self.progress.count(done, total, noun)
+
 
 def test_a_terminal_line_tells_where_the_run_is_and_how_long_it_takes() -> None:
-    desk = Desk(is_tty=True)
-    desk.progress.start_test(TEST, 16)
-    assert desk.screen == f"{TEST}  0 of 16 repetitions done"
+    desk = Desk(16)
+    assert desk.screen == "0 of 16 repetitions done"
     desk.repeat(1, 10.0)
     desk.repeat(2, 10.0)
-    desk.progress.repetition(3, seed=7)
-    desk.progress.phase("place")
-    desk.now += 2.0
-    desk.progress.count(9, 15, "cubes placed")
-    assert desk.screen == (
-        f"{TEST}  repetition 3 of 16  place  9/15 cubes placed  about 2 min 20 s left"
-    )
+    desk.under_way(3, "place", "9/15 cubes placed")
+    assert desk.screen == "repetition 3 of 16  place  9/15 cubes placed  about 2 min 20 s left"
 
 
-@pytest.mark.parametrize("width", [120, 50])
-def test_more_repetitions_of_a_test_are_counted_on(width: int) -> None:
+@pytest.mark.parametrize(
+    ("width", "before", "now"),
+    [(120, "10 of 12 repetitions", "repetition 11 of 12"), (50, "10/12", "11/12")],
+)
+def test_more_repetitions_of_a_test_are_counted_on(width: int, before: str, now: str) -> None:
     """`--reps auto` runs some more, and a resumed run what is missing: never `11 of 2`."""
-    desk = Desk(is_tty=True, width=width)
-    desk.progress.start_test(TEST, 2, last=12)
-    of, before = ("repetition 11 of 12", "  10 of 12") if width > 50 else ("  11/12", "  10/12")
-    assert before in desk.screen
-    desk.progress.repetition(11, seed=7)
-    desk.now += 1.0
-    desk.progress.phase("place")
-    assert of in desk.screen
+    desk = Desk(2, width=width, last=12)
+    assert desk.screen.startswith(before)
+    desk.under_way(11, "place")
+    assert desk.screen.startswith(now)
     desk.progress.end_repetition("ok", 10.0)
     desk.repeat(12, 10.0)
-    assert before.replace("10", "12") in desk.screen
-    log = Desk(is_tty=False)
-    log.progress.start_test(TEST, 2, last=12)
+    assert desk.screen.startswith(before.replace("10", "12"))
+    log = Desk(2, is_tty=False, last=12)
     log.repeat(11, 10.0)
     assert "repetition 11 of 12  ok after 10.0 s  about 10 s left" in log.text
 
 
-def test_a_narrow_terminal_gets_the_short_form_and_then_a_cut_one() -> None:
-    lines = {}
-    for width in (80, 50):
-        desk = Desk(is_tty=True, width=width)
-        desk.progress.start_test(TEST, 16)
-        desk.repeat(1, 10.0)
-        desk.progress.repetition(2, seed=7)
-        desk.progress.phase("place")
-        desk.now += 1.0
-        desk.progress.count(9, 15, "cubes")
-        lines[width] = desk.screen
-    assert lines == {
-        80: f"{TEST}  2/16  place 9/15 cubes  2m30s left",
-        50: f"{TEST}  2/16  place 9/...",
-    }
+@pytest.mark.parametrize(
+    ("width", "screen"), [(80, "2/16  place 9/15 cubes  2m30s left"), (50, "2/16  place 9/...")]
+)
+def test_a_narrow_terminal_gets_the_short_form_and_then_a_cut_one(width: int, screen: str) -> None:
+    desk = Desk(16, width=width)
+    desk.repeat(1, 10.0)
+    desk.under_way(2, "place", "9/15 cubes")
+    assert desk.screen == screen
 
 
-def test_a_shorter_line_leaves_nothing_of_the_longer_one() -> None:
-    desk = Desk(is_tty=True)
-    desk.progress.start_test(TEST, 2)
-    desk.progress.repetition(1, seed=7)
-    desk.now += 1
-    desk.progress.phase("a very long name of a phase")
+def test_a_shorter_line_leaves_nothing_of_the_longer_one_and_clear_leaves_none() -> None:
+    desk = Desk(2)
+    desk.under_way(1, "a very long name of a phase")
     desk.now += 1
     desk.progress.phase("x")
-    assert desk.screen == f"{TEST}  repetition 1 of 2  x"
-
-
-def test_clear_leaves_an_empty_line_once() -> None:
-    desk = Desk(is_tty=True)
-    desk.progress.start_test(TEST, 2)
+    assert desk.screen == "repetition 1 of 2  x"
     desk.progress.clear()
     assert desk.screen == ""
     assert desk.text.endswith("\r")
@@ -121,8 +119,7 @@ def test_clear_leaves_an_empty_line_once() -> None:
 
 
 def test_a_terminal_is_redrawn_ten_times_a_second_at_most() -> None:
-    desk = Desk(is_tty=True)
-    desk.progress.start_test(TEST, 1)
+    desk = Desk(1)
     desk.progress.repetition(1, seed=7)
     for step in range(1000):  # 1 ms apart
         desk.now = step / 1000
@@ -131,8 +128,7 @@ def test_a_terminal_is_redrawn_ten_times_a_second_at_most() -> None:
 
 
 def test_a_log_has_a_line_every_ten_seconds_and_one_at_the_end() -> None:
-    desk = Desk(is_tty=False)
-    desk.progress.start_test(TEST, 3)
+    desk = Desk(3, is_tty=False)
     desk.progress.repetition(1, seed=7)
     desk.progress.count(15, 15, "cubes")
     desk.now += 10.5
@@ -152,25 +148,19 @@ def test_a_log_has_a_line_every_ten_seconds_and_one_at_the_end() -> None:
 
 
 def test_what_runs_on_a_cluster_says_where() -> None:
-    desk, log = Desk(is_tty=True), Desk(is_tty=False)
-    for one in (desk, log):
-        one.progress.start_test(TEST, 2)
-        one.progress.repetition(1, seed=7, node="lab1")
-        one.now += 1.0
-        one.progress.phase("place")
-    assert desk.screen == f"{TEST}  repetition 1 of 2  on lab1  place"
-    desk.progress.repetition(1, seed=7, node="lab2")
-    desk.now += 1.0
-    desk.progress.phase("launch")
-    assert desk.screen == f"{TEST}  repetition 1 of 2  on lab2  launch"
+    desk = Desk(2)
+    for node in ("lab1", "lab2"):
+        desk.under_way(1, "place", node=node)
+        assert desk.screen == f"repetition 1 of 2  on {node}  place"
+    log = Desk(2, is_tty=False)
+    log.under_way(1, "place", node="lab1")
     log.now += 9.5
     log.progress.end_repetition("ok", 10.5)
     assert log.text == f"{TEST}  repetition 1 of 2  on lab1  ok after 10.5 s  about 10 s left\n"
 
 
 def test_a_log_of_a_long_repetition_shows_that_it_lives() -> None:
-    desk = Desk(is_tty=False)
-    desk.progress.start_test(TEST, 1)
+    desk = Desk(1, is_tty=False)
     desk.progress.repetition(1, seed=7)
     desk.progress.phase("pick")
     for second in range(100):
@@ -181,67 +171,57 @@ def test_a_log_of_a_long_repetition_shows_that_it_lives() -> None:
 
 
 def test_failures_stay_in_sight() -> None:
-    desk = Desk(is_tty=True)
-    desk.progress.start_test(TEST, 4)
+    desk = Desk(4)
     desk.repeat(1, 10.0, "failed")
     desk.now += 1
     desk.progress.repetition(2, seed=7)
-    assert desk.screen == f"{TEST}  repetition 2 of 4  1 crashed  about 30 s left"
+    assert desk.screen == "repetition 2 of 4  1 crashed  about 30 s left"
+
+
+def at_once(count: int, work: Callable[[int], None]) -> None:
+    threads = [threading.Thread(target=work, args=(number,)) for number in range(1, count + 1)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
 
 
 def test_parallel_repetitions_report_each_for_itself() -> None:
-    desk = Desk(is_tty=True, width=140)
-    desk.progress.start_test(TEST, 20)
-    both = threading.Barrier(2)
+    desk, both = Desk(20, width=140), threading.Barrier(2)
 
-    def repetition(number: int) -> None:
+    def work(number: int) -> None:
         desk.progress.repetition(number, seed=number)
         both.wait(10)
         desk.progress.phase(f"phase{number}")
         desk.progress.count(number, 15, "cubes")
         both.wait(10)
 
-    threads = [threading.Thread(target=repetition, args=(number,)) for number in (3, 4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    line = desk.progress.line()
-    assert line == f"{TEST}  repetitions 3, 4 of 20  phase3  3/15 cubes | phase4  4/15 cubes"
+    at_once(2, work)
+    told = "repetitions 1, 2 of 20  phase1  1/15 cubes | phase2  2/15 cubes"
+    assert desk.progress.line() == f"{TEST}  {told}"
 
 
-def test_two_jobs_halve_the_time_left() -> None:
-    lines = {}
-    for jobs in (1, 2):
-        desk = Desk(is_tty=True)
-        desk.progress.start_test(TEST, 20)
-        barrier = threading.Barrier(jobs)
+@pytest.mark.parametrize(
+    ("jobs", "left"), [(1, "about 3 min 10 s left"), (2, "about 1 min 30 s left")]
+)
+def test_two_jobs_halve_the_time_left(jobs: int, left: str) -> None:
+    desk, barrier = Desk(20), threading.Barrier(jobs)
 
-        def repetition(
-            number: int, desk: Desk = desk, barrier: threading.Barrier = barrier
-        ) -> None:
-            desk.progress.repetition(number, seed=number)
-            barrier.wait(10)
-            desk.progress.end_repetition("ok", 10.0)
+    def work(number: int) -> None:
+        desk.progress.repetition(number, seed=number)
+        barrier.wait(10)
+        desk.progress.end_repetition("ok", 10.0)
 
-        threads = [threading.Thread(target=repetition, args=(k,)) for k in range(jobs)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-        lines[jobs] = desk.progress.line().split("  ")[-1]
-    assert lines == {1: "about 3 min 10 s left", 2: "about 1 min 30 s left"}
+    at_once(jobs, work)
+    assert desk.progress.line().endswith(left)
 
 
 def test_reports_outside_a_test_are_ignored() -> None:
-    desk = Desk(is_tty=True)
-    desk.progress.phase("launch")
-    desk.progress.count(1, 2)
-    desk.progress.repetition(1, seed=7)
+    desk = Desk(0)
+    desk.under_way(1, "launch", "1/2")
     desk.progress.end_repetition("ok", 1.0)
     desk.progress.end_test()
-    assert desk.text == ""
-    assert desk.progress.line() == ""
+    assert desk.text == desk.progress.line() == ""
 
 
 @given(
@@ -252,13 +232,10 @@ def test_reports_outside_a_test_are_ignored() -> None:
 def test_no_line_is_wider_than_the_terminal(
     width: int, name: str, events: list[tuple[str, int]]
 ) -> None:
-    desk = Desk(is_tty=True, width=width)
+    desk = Desk(0, width=width)
     desk.progress.start_test(name, 20)
     for number, (phase, done) in enumerate(events, start=1):
-        desk.progress.repetition(number, seed=0)
-        desk.progress.phase(phase)
-        desk.now += 0.2
-        desk.progress.count(done, 10**6, "things")
+        desk.under_way(number, phase, f"{done}/1000000 things")
         assert len(desk.progress.line()) < width
         desk.progress.end_repetition("ok", float(done))
         desk.now += 0.2
@@ -267,24 +244,16 @@ def test_no_line_is_wider_than_the_terminal(
 
 @pytest.mark.parametrize(
     ("seconds", "text"),
-    [
-        (0.0, "1 s"),
-        (45.4, "45 s"),
-        (59.7, "1 min"),
-        (60.0, "1 min"),
-        (128.0, "2 min 10 s"),
-        (3569.0, "59 min 30 s"),
-        (3570.0, "1 h"),
-        (4800.0, "1 h 20 min"),
-    ],
-)
+    [(0.0, "1 s"), (45.4, "45 s"), (59.7, "1 min"), (60.0, "1 min"), (128.0, "2 min 10 s"),
+     (3569.0, "59 min 30 s"), (3570.0, "1 h"), (4800.0, "1 h 20 min")],
+)  # fmt: skip
 def test_duration(seconds: float, text: str) -> None:
     assert duration(seconds) == text
 
 
 def test_it_loads_no_heavy_library() -> None:
     code = (
-        "import sys, pytest_simbench.report.progress;"
+        "import sys, pytest_simbench.report.terminal.progress;"
         "print(sorted({'numpy', 'scipy', 'rich', 'matplotlib', 'psutil'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

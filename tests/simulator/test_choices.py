@@ -13,9 +13,9 @@ from pytest_simbench.plugin.options import MOST_REPETITIONS, option
 from pytest_simbench.records.choices import FIRST_SEED, Seen, published_again
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.markdown import render_task as written
-from pytest_simbench.report.summary import summarise
-from pytest_simbench.report.tables import render_task
+from pytest_simbench.report.markdown.run import render_task as written
+from pytest_simbench.report.model.summary import summarise
+from pytest_simbench.report.terminal.run import render_task
 from pytest_simbench.simulator.registry import adapter, registered, seeds_seen
 from tests.report.samples import METRICS, record
 from tests.tiny import Falling

@@ -11,9 +11,11 @@ from xml.etree import ElementTree
 
 from pytest_simbench.ground.names import digest
 from pytest_simbench.measure.sweep import Swept
-from pytest_simbench.report import sweep
-from pytest_simbench.report.figures import FiguresUnavailable, draw, drawing
-from pytest_simbench.report.summary import TaskSummary
+from pytest_simbench.report.figures import sweep
+from pytest_simbench.report.figures.drawing import FiguresUnavailable, drawing
+from pytest_simbench.report.figures.task import draw
+from pytest_simbench.report.model.summary import TaskSummary
+from pytest_simbench.report.model.sweep import phenomena
 
 SVG = "http://www.w3.org/2000/svg"
 LINK = "http://www.w3.org/1999/xlink"
@@ -47,7 +49,7 @@ def of_sweeps(found: Sequence[Swept]) -> tuple[list[Picture], str]:
     """The pictures of laws over time steps; and a sentence where there are none and why."""
     return _drawn(
         (sweep.caption(of, over), ("sweep", of, over), partial(sweep.draw, found, of, over))
-        for of in sweep.phenomena(found)
+        for of in phenomena(found)
         for over in sweep.OVER
     )
 

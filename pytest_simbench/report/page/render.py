@@ -9,12 +9,14 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from jinja2 import BaseLoader, Environment, StrictUndefined, Template
+from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from pytest_simbench import __version__
 from pytest_simbench.ground.text import for_terminal
-from pytest_simbench.report.page.context import Page
+from pytest_simbench.report.model import changes
+from pytest_simbench.report.model.document import Cell, Table, capital
+from pytest_simbench.report.page.context import Shown
 
 _LOG = re.compile(r"logs/[A-Za-z0-9_=-][A-Za-z0-9_.=-]*\.log")
 """A log in the run folder, as this package names them: it becomes a link, anything else a text."""
@@ -26,7 +28,7 @@ SYMBOLS = {"ahead": ("\u25b2", "ahead"), "behind": ("\u25bc", "behind"),
 """Of the verdicts: what is seen without colours, and what is read aloud."""
 
 
-def render(page: Page) -> str:
+def render(page: Shown) -> str:
     """The page as one HTML document, without a line that depends on when it was made."""
     style, script = _part("page.css"), _part("page.js")
     return _template().render(
@@ -37,16 +39,27 @@ def render(page: Page) -> str:
         policy=f"default-src 'none'; script-src 'sha256-{_digest(script)}'; "
         "style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'",
         symbols=SYMBOLS,
+        capital=capital,
+        rows=_rows,
+        failed=changes.failed,
+        warned=changes.warned,
         svg=lambda picture: Markup(picture.svg),
         log_link=lambda log: log if _LOG.fullmatch(log) else "",
         version=__version__,
     )
 
 
+def _rows(found: Table) -> list[tuple[Cell, ...]]:
+    """The rows of a table; texts stand in one line."""
+    first, *others = found.columns
+    shown = [first, *(column.joined() if column.left else column for column in others)]
+    return list(zip(*(column.cells for column in shown), strict=True))
+
+
 @cache
 def _template() -> Template:
     return Environment(
-        loader=_Parts(),
+        loader=FunctionLoader(_part),
         autoescape=True,
         finalize=_text,
         undefined=StrictUndefined,
@@ -55,14 +68,8 @@ def _template() -> Template:
     ).get_template("page.html")
 
 
-class _Parts(BaseLoader):
-    """Templates from the package, also from a zip file."""
-
-    def get_source(self, environment: Environment, template: str) -> tuple[str, None, Any]:
-        return _part(template), None, None
-
-
 def _part(name: str) -> str:
+    """A template, also from a zip file."""
     return (files(__package__) / "templates" / name).read_text(encoding="utf-8")
 
 

@@ -2,101 +2,70 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from pytest_simbench.records.configuration import TASK, text
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import series, told
-from pytest_simbench.report import columns
-from pytest_simbench.report.page.cells import Of
-from pytest_simbench.report.summary import TaskSummary
+from pytest_simbench.records.series import told
+from pytest_simbench.report.model import tables
+from pytest_simbench.report.model.summary import TaskSummary
 
 
-@dataclass(frozen=True)
-class Configured:
-    """One row's simulator: settings and versions, by name."""
-
-    label: str
-    of: Of
-    settings: Mapping[str, str]
-    versions: Mapping[str, str]
-    deviations: Sequence[str]
-
-
-@dataclass(frozen=True)
-class Setup:
-    """What holds for the whole run, each with all its values, and what for single simulators.
-
-    Attributes:
-        run: protocol, jitter, seeds, limits, machines.
-        tasks: parameters of each task, by its name.
-    """
-
-    run: Mapping[str, str]
-    tasks: Mapping[str, Mapping[str, str]]
-    simulators: Sequence[Configured]
-
-
-def setup(summaries: Sequence[TaskSummary], records: Sequence[Record]) -> Setup:
-    """The setup of a run."""
-    deviations: dict[str, list[str]] = {}
-    for name, deviation in columns.deviations(summaries):
-        deviations.setdefault(name, []).append(deviation)
+def setup(summaries: Sequence[TaskSummary]) -> dict[str, Any]:
+    """What holds for the whole `run`, each with all its values (protocol, jitter, seeds, limits,
+    machines), the parameters of each of the `tasks`, and for each of the `simulators` settings,
+    versions and deviations."""
+    deviations = tables.deviations(summaries)
     tasks: dict[str, dict[str, list[str]]] = {}
-    found: dict[tuple[str, ...], Configured] = {}
+    simulators: dict[tuple[str, ...], dict[str, Any]] = {}
     for summary in summaries:
-        for row in series(r for r in records if r.task == summary.task):
+        for row in summary.rows:
             known = {key: _shown(value) for key, value in told(row.records).items()}
-            parameters = tasks.setdefault(summary.task, {})
             for name, value in _part(known, f"settings.{TASK}").items():
-                parameters.setdefault(name, []).append(value)
-            settings = {
-                key: value
-                for key, value in _part(known, "settings.").items()
-                if not key.startswith(TASK)
+                tasks.setdefault(summary.task, {}).setdefault(name, []).append(value)
+            settings, versions = _part(known, "settings."), _part(known, "versions.")
+            settings = {k: v for k, v in settings.items() if not k.startswith(TASK)}
+            found = {
+                "label": " ".join(row.of),
+                "of": row.of,
+                "settings": settings,
+                "versions": versions,
+                "deviations": [what for who, what in deviations if who == row.simulator],
             }
-            versions = _part(known, "versions.")
-            subject = Of(*row.key[:3])
-            same = (*subject, text(settings), text(versions))
-            label = f"{subject.simulator} {subject.mode} {subject.profile}"
-            found.setdefault(
-                same,
-                Configured(
-                    label, subject, settings, versions, deviations.get(subject.simulator, [])
-                ),
-            )
+            simulators.setdefault((*row.of, text(settings), text(versions)), found)
     shared = {
         task: {name: _joined(values) for name, values in parameters.items()}
         for task, parameters in tasks.items()
-        if parameters
     }
-    return Setup(_run(records), shared, list(found.values()))
+    records = [record for summary in summaries for row in summary.rows for record in row.records]
+    return {"run": _run(records), "tasks": shared, "simulators": list(simulators.values())}
 
 
 def _run(records: Sequence[Record]) -> dict[str, str]:
     seeds = sorted({record.seed for record in records})
     named = {
-        "protocol": [record.protocol for record in records],
-        "jitter": [f"{record.jitter:g}" for record in records],
-        "limits": [
+        "protocol": _joined(record.protocol for record in records),
+        "jitter": _joined(f"{record.jitter:g}" for record in records),
+        "limits": _joined(
             ", ".join(f"{k} {_shown(v)}" for k, v in r.limits.items() if v is not None)
             for r in records
-        ],
-        "machine": [", ".join(f"{k}: {_shown(v)}" for k, v in r.host.items()) for r in records],
+        ),
+        "machine": _joined(
+            ", ".join(f"{k}: {_shown(v)}" for k, v in r.host.items()) for r in records
+        ),
     }
-    found = {name: _joined(values) for name, values in named.items()}
     if seeds:
         many = f"{seeds[0]} to {seeds[-1]} ({len(seeds)})"
-        found["seeds"] = many if len(seeds) > 1 else str(seeds[0])
-    return {name: value for name, value in found.items() if value}
+        named["seeds"] = many if len(seeds) > 1 else str(seeds[0])
+    return {name: value for name, value in named.items() if value}
 
 
 def _part(known: Mapping[str, str], start: str) -> dict[str, str]:
     return {k.removeprefix(start): value for k, value in known.items() if k.startswith(start)}
 
 
-def _joined(values: Sequence[str]) -> str:
+def _joined(values: Iterable[str]) -> str:
     """Each different value once."""
     return "; ".join(dict.fromkeys(filter(None, values)))
 

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from pytest_simbench.ground.text import for_figure
-from pytest_simbench.records.metrics import COSTS, Metric
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
-from pytest_simbench.report import cells
-from pytest_simbench.report.answer import short_labels
-from pytest_simbench.report.page.cells import Of, of
-from pytest_simbench.report.summary import TaskSummary
+from pytest_simbench.report.model import cells
+from pytest_simbench.report.model.document import Of
+from pytest_simbench.report.model.pooling import COST
+from pytest_simbench.report.model.summary import Row, TaskSummary
 
 HEIGHT = 36
 """Of a line [px]."""
@@ -102,38 +102,27 @@ class Strip:
         return any(line.lost for line in self.lines)
 
 
-def strips(
-    summary: TaskSummary, rows: Sequence[Sequence[Record]], number: Callable[[Record], int]
-) -> list[Strip]:
+def strips(summary: TaskSummary, number: Callable[[Record], int]) -> list[Strip]:
     """A plot for each metric and cost that any repetition has.
 
     Args:
         summary: of the task.
-        rows: the records of each of its rows.
         number: of a record on the page.
     """
     own = {metric.name for metric in summary.metrics}
-    costs = [cost for name in SHOWN_COSTS for cost in COSTS if cost.name == name not in own]
-    plots = [
-        _strip(metric, summary, rows, number, lambda r, n=metric.name: r.metrics.get(n))  # type: ignore[misc]
-        for metric in summary.metrics
-    ]
-    plots += [
-        _strip(cost, summary, rows, number, lambda r, n=cost.name: r.cost(n), cost=True)  # type: ignore[misc]
-        for cost in costs
-    ]
+    costs = [COST[name] for name in SHOWN_COSTS if name not in own]
+    plots = [_strip(metric, summary, number) for metric in (*summary.metrics, *costs)]
     return [plot for plot in plots if plot is not None]
 
 
-def _strip(
-    metric: Metric,
-    summary: TaskSummary,
-    rows: Sequence[Sequence[Record]],
-    number: Callable[[Record], int],
-    value: Callable[[Record], float | None],
-    cost: bool = False,
-) -> Strip | None:
-    every = [v for records in rows for r in records if (v := _finite(r, value)) is not None]
+def _strip(metric: Metric, summary: TaskSummary, number: Callable[[Record], int]) -> Strip | None:
+    cost = metric not in summary.metrics
+    known = [
+        [(r, _finite(r, r.cost(metric.name) if cost else r.metrics.get(metric.name)))
+         for r in row.records]
+        for row in summary.rows
+    ]  # fmt: skip
+    every = [v for row in known for _, v in row if v is not None]
     reference = None if cost else summary.references.get(metric.name)
     if not every:
         return None
@@ -143,38 +132,33 @@ def _strip(
     elif reference is not None and math.isfinite(reference):
         low, high = min(low, reference), max(high, reference)
     log = cost and low > 0 and high / low > LOGARITHMIC
-    scale = _Scale(low, high, log)
-    lines = []
-    for row, records, label in zip(summary.rows, rows, short_labels(summary.rows), strict=True):
-        found = [(r, v) for r in records if (v := _finite(r, value)) is not None]
-        drawn = _some(found, by=lambda item: item[1])
-        lost = _some([r for r in records if _finite(r, value) is None])
-        dots = [(number(r), scale(v), _text(v, metric)) for r, v in drawn]
+    scale = _scale(low, high, log)
+
+    def line(row: Row, label: str, found: Sequence[tuple[Record, float | None]]) -> StripLine:
+        there = [(r, v) for r, v in found if v is not None]
+        drawn = _some(there, by=lambda item: item[1])
+        lost = _some([r for r, v in found if v is None])
+        mean = sum(v for _, v in there) / len(there) if there else None
         pooled = None if cost else row.metrics.get(metric.name)
-        there = [v for _, v in found]
-        count = len(drawn) + len(lost)
-        mean = sum(there) / len(there) if there else None
         ends = (mean, pooled.low, pooled.high) if pooled else (mean, None, None)
-        bar, low_end, high_end = (None if v is None else scale(v) for v in ends)
-        lines.append(
-            StripLine(
-                for_figure(label),
-                of(row),
-                _swarm(dots),
-                _swarm([(number(r), LOST, "") for r in lost]),
-                bar,
-                low_end,
-                high_end,
-                left_out=(
-                    f"{count} of {len(records)} repetitions drawn" if count < len(records) else ""
-                ),
-            )
+        bar, low_end, high_end = (None if end is None else scale(end) for end in ends)
+        count = len(drawn) + len(lost)
+        return StripLine(
+            for_figure(label),
+            row.of,
+            _swarm([(number(r), scale(v), _text(v, metric)) for r, v in drawn]),
+            _swarm([(number(r), LOST, "") for r in lost]),
+            bar,
+            low_end,
+            high_end,
+            f"{count} of {len(found)} repetitions drawn" if count < len(found) else "",
         )
+
     return Strip(
         for_figure(cells.heading(metric)),
         metric.doc,
-        lines,
-        [(scale(v), cells.metric_value(v, metric)) for v in scale.ticks()],
+        [line(*each) for each in zip(summary.rows, summary.names, known, strict=True)],
+        [(scale(v), cells.metric_value(v, metric)) for v in _ticks(low, high, log)],
         None if reference is None or not math.isfinite(reference) else scale(reference),
         metric.study and not cost,
         log,
@@ -194,29 +178,24 @@ def _some(found: Sequence[T], by: Callable[[T], float] = lambda item: 0.0) -> Se
     return [found[k] for k in sorted(places)]
 
 
-class _Scale:
-    """From values to shares of the width."""
+def _scale(low: float, high: float, log: bool) -> Callable[[float], float]:
+    """From values to shares of the width [%]."""
+    of = math.log10 if log else float
 
-    def __init__(self, low: float, high: float, log: bool) -> None:
-        self._log = log
-        self.low, self.high = low, high
-
-    def __call__(self, value: float) -> float:
-        low, high = self._of(self.low), self._of(self.high)
-        share = (self._of(max(value, self.low) if self._log else value) - low) / (high - low or 1)
-        share = share if high > low else 0.5
+    def place(value: float) -> float:
+        share = 0.5
+        if high > low:
+            share = (of(max(value, low) if log else value) - of(low)) / (of(high) - of(low))
         return round(LEFT + (RIGHT - LEFT) * min(1.0, max(0.0, share)), 2)
 
-    def _of(self, value: float) -> float:
-        return math.log10(value) if self._log else value
+    return place
 
-    def ticks(self) -> list[float]:
-        """Both ends and what lies between them."""
-        if self.low == self.high:
-            return [self.low]
-        if self._log:
-            return [self.low, math.sqrt(self.low * self.high), self.high]
-        return [self.low + (self.high - self.low) * k / 4 for k in range(5)]
+
+def _ticks(low: float, high: float, log: bool) -> list[float]:
+    """Both ends and what lies between them."""
+    if log and low < high:
+        return [low, math.sqrt(low * high), high]
+    return [low + (high - low) * k / 4 for k in range(5)] if low < high else [low]
 
 
 def _swarm(found: Sequence[tuple[int, float, str]]) -> list[Dot]:
@@ -244,7 +223,6 @@ def _text(value: float, metric: Metric) -> str:
     return f"{cells.metric_value(value, metric)} {cells.unit(metric)}".rstrip()
 
 
-def _finite(record: Record, value: Callable[[Record], float | None]) -> float | None:
+def _finite(record: Record, value: float | None) -> float | None:
     """The value of a repetition that was finished; none of one that failed, as in the tables."""
-    found = value(record) if record.ok else None
-    return float(found) if found is not None and math.isfinite(found) else None
+    return float(value) if record.ok and value is not None and math.isfinite(value) else None

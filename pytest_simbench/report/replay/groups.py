@@ -9,8 +9,8 @@ from pathlib import Path
 from pytest_simbench.records.configuration import task_parameters
 from pytest_simbench.records.paths import FolderError
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.recorded import trace_of
 from pytest_simbench.report.replay import REPLAY_NAME
+from pytest_simbench.report.replay.recorded import trace_of
 
 
 @dataclass

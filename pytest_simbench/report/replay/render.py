@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import zlib
 from base64 import b64encode
 from collections.abc import Sequence
 from importlib.resources import files
@@ -21,13 +22,18 @@ from pytest_simbench.recordings.bag import METAL
 from pytest_simbench.recordings.figure import Figure, Mesh
 from pytest_simbench.recordings.trace import Trace, TraceError
 from pytest_simbench.report.replay.groups import Group
-from pytest_simbench.report.replay.motion import SCALE, packed
 from pytest_simbench.scene import Body, Box, Pose, Solid
 
 INSTALL = "no replay in 3-D: pip install 'pytest-simbench[replay]'"
 
 LARGEST = 12_000_000
 """Of all motions in a page [bytes]; further seeds are left out."""
+
+SCALE = 10_000
+"""Steps of a motion per unit: 0.1 mm, 0.1 mrad, 0.1 ms."""
+
+FARTHEST = 1e4
+"""Nothing is drawn farther away [m]."""
 
 
 class ReplayUnavailable(ImportError):
@@ -84,6 +90,17 @@ def replay_of(shown: Sequence[Group]) -> tuple[str, int, list[str]]:
         return "", 0, problems
     data = {"groups": told, "scale": SCALE, "metal": METAL}
     return _page(meshes.viewer(), data), len(told), list(dict.fromkeys(problems))
+
+
+def packed(trace: Trace) -> str:
+    """A motion as packed text (zlib, base64): time, then each joint's position, then seven columns
+    a free body, (columns, n) whole numbers in `SCALE`, each as the difference to the one before.
+    What stands still is zeros then, and packs to nothing."""
+    bodies = trace.bodies[:, :, :7].reshape(len(trace.time), -1)
+    table = np.column_stack([trace.time, trace.joints[:, 0], bodies])
+    columns = np.rint(np.clip(table, -FARTHEST, FARTHEST) * SCALE).T.astype("<i4")
+    steps = np.diff(columns, axis=1, prepend=0).astype("<i4")
+    return b64encode(zlib.compress(steps.tobytes(), 9)).decode("ascii")
 
 
 class _Meshes:

@@ -11,10 +11,10 @@ import pytest
 from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.matrix import with_differences
+from pytest_simbench.report.model.report import Report
+from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.page import PAGE_NAME, context
 from pytest_simbench.report.page.render import render
-from pytest_simbench.report.summary import summarise
 from tests.hostile import HOSTILE
 from tests.report.browser import Opened, browser, opened
 from tests.report.page.test_hostile_page import MORE
@@ -32,12 +32,10 @@ __all__ = ["browser", "opened"]  # fixtures
 
 def write(folder: Path, found: list[Record], baseline: list[Record] | None = None) -> Path:
     metrics = METRICS | declared(STRANGE)
-    summaries = with_differences(summarise(found, metrics, REFERENCES), found)
-    comparison = None
-    if baseline:
-        comparison = ("runs/before", run_gate(baseline, found, (), metrics))
+    compared = ("runs/before", run_gate(baseline, found, (), metrics)) if baseline else None
+    report = Report(summarise(found, metrics, REFERENCES), found, comparison=compared)
     path = folder / PAGE_NAME
-    path.write_text(render(context.page(folder, summaries, found, comparison)), encoding="utf-8")
+    path.write_text(render(context.page(folder, report)), encoding="utf-8")
     return path
 
 
@@ -71,6 +69,9 @@ def test_it_opens_and_fits(
     page = opened(report, width, height, color_scheme=scheme)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert "3 simulators did stacking and throwing" in page.locator(".answer").first.inner_text()
+    compared = page.locator("#baseline").inner_text()
+    assert "Compared with runs/before" in compared
+    assert "is not in the baseline and is not compared" in compared
     light = page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
     assert light == (scheme == "light")
     for part in page.locator("details").all():
@@ -99,12 +100,8 @@ def test_tables_sort_by_number_and_by_name(
     assert heading.get_attribute("aria-sort") == "descending"
     page.get_by_role("button", name="simulator").first.click()
     assert rows(page) == sorted(before)
-
-
-def test_rows_without_a_value_come_last_either_way(report: Path, opened: Opened) -> None:
-    page = opened(report)
     button = page.get_by_role("button", name="at the end %").first
-    for _ in range(2):
+    for _ in range(2):  # rows without a value come last either way
         button.click()
         assert rows(page)[-1] == "drake headless tuned"
 
@@ -145,13 +142,8 @@ def test_a_dot_tells_its_repetition(report: Path, opened: Opened, width: int, he
     assert detail.locator("a").get_attribute("href") == "logs/test_stacking-1.log"
     page.keyboard.press("Escape")
     assert not detail.is_visible()
-
-
-def test_a_failed_repetition_is_a_cross_that_tells_its_cause(report: Path, opened: Opened) -> None:
-    page = opened(report)
-    cross = page.locator("figure.strip").first.locator("svg.dot").first
-    cross.focus()
-    text = page.locator("#detail").inner_text()
+    page.locator("figure.strip").first.locator("svg.dot").first.focus()  # a cross: it failed
+    text = detail.inner_text()
     assert "WorkerDied in pick: the worker was killed by SIGSEGV" in text
     assert "placed %: no value" in text
 
@@ -172,13 +164,6 @@ def test_dots_are_reached_by_keyboard(report: Path, opened: Opened) -> None:
     assert "mujoco headless" in seen[3]
     assert seen[4] != seen[5]
     assert plot.locator('.dot[tabindex="0"]').count() == 5
-
-
-def test_the_comparison_stands_on_it(report: Path, opened: Opened) -> None:
-    page = opened(report)
-    text = page.locator("#baseline").inner_text()
-    assert "Compared with runs/before" in text
-    assert "is not in the baseline and is not compared" in text
 
 
 def test_on_paper_all_is_open_and_nothing_is_a_control(report: Path, opened: Opened) -> None:

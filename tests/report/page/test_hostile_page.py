@@ -13,10 +13,10 @@ from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import Line, append
-from pytest_simbench.report.matrix import with_differences
+from pytest_simbench.report.model.report import Report
+from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.page import context
 from pytest_simbench.report.page.render import render
-from pytest_simbench.report.summary import summarise
 from tests.hostile import HOSTILE, assert_harmless_terminal
 from tests.report.samples import METRICS, failed, record, stacking_run, throwing_run
 from tests.report.test_hostile import ALL, declared, records
@@ -62,8 +62,8 @@ class Parsed(HTMLParser):
 
 
 def made(found: list[Record], folder: Path, metrics: object = METRICS) -> str:
-    summaries = with_differences(summarise(found, metrics), found)  # type: ignore[arg-type]
-    return render(context.page(folder, summaries, found))
+    summaries = summarise(found, metrics)  # type: ignore[arg-type]
+    return render(context.page(folder, Report(summaries, found)))
 
 
 def kinds(page: str) -> set[tuple[str, str]]:

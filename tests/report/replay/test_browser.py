@@ -15,9 +15,10 @@ from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.recordings.trace import Trace
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.files import write_files
+from pytest_simbench.report.model.report import Report
+from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.replay.groups import groups
 from pytest_simbench.report.replay.render import replay_of
-from pytest_simbench.report.summary import summarise
 from pytest_simbench.scene import Pose
 from tests.hostile import HOSTILE
 from tests.recordings.samples import motion, scene
@@ -138,24 +139,18 @@ def test_it_ends_by_itself_and_begins_anew(replay: Path, opened: Opened) -> None
     until(page, "Number(document.getElementById('time').value) < 1.9")
 
 
-def test_the_slider_goes_there_and_back(replay: Path, opened: Opened) -> None:
+def test_what_is_drawn_follows_the_slider_and_the_ghost(replay: Path, opened: Opened) -> None:
     page = show(opened, replay)
     start = frame(page)
-    go(page, 1.5)
+    go(page, 1.0)
     later = frame(page)
     assert later != start
+    page.locator("#ghost").select_option("drake")
+    assert frame(page) != later  # it is seen in the other tile
+    page.locator("#ghost").select_option("none")
+    assert frame(page) == later
     go(page, 0.0)
     assert frame(page) == start
-
-
-def test_a_ghost_is_seen_in_the_other_tiles(replay: Path, opened: Opened) -> None:
-    page = show(opened, replay)
-    go(page, 1.0)
-    plain = frame(page)
-    page.locator("#ghost").select_option("drake")
-    assert frame(page) != plain
-    page.locator("#ghost").select_option("none")
-    assert frame(page) == plain
 
 
 def test_an_address_leads_to_a_seed(replay: Path, opened: Opened) -> None:
@@ -208,7 +203,7 @@ def test_a_dot_of_the_report_leads_to_its_replay(tmp_path: Path, opened: Opened)
     Trace.of(scene(), longer(0.5), [(0.0, "task")]).write(
         tmp_path, f"traces/{file_stem_of(kept[1])}.npz"
     )
-    assert write_files(tmp_path, summarise(kept, METRICS, {}), kept, figures=False).complete
+    assert write_files(tmp_path, Report(summarise(kept, METRICS), kept), figures=False).complete
     page = opened(tmp_path / "report.html")
     dots = page.locator(".strip").first.locator(".dot")
     dots.nth(0).click()

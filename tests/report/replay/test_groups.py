@@ -11,12 +11,13 @@ import pytest
 
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.records.record import Record
+from pytest_simbench.report.model.report import Report
+from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.page import context
 from pytest_simbench.report.page.render import render as html
 from pytest_simbench.report.replay import render
 from pytest_simbench.report.replay.groups import groups, links
 from pytest_simbench.report.replay.render import ReplayUnavailable, replay_of
-from pytest_simbench.report.summary import summarise
 from tests.recordings.samples import trace
 from tests.report.samples import METRICS, record
 
@@ -52,11 +53,11 @@ def test_the_first_seed_of_each_task_comes_first(tmp_path: Path) -> None:
 
 def test_the_report_leads_to_the_replay(tmp_path: Path) -> None:
     kept = keep(tmp_path, record("drake", 1), record("mujoco", 1))
-    summaries = summarise(kept, METRICS, {})
-    page = html(context.page(tmp_path, summaries, kept, None, groups(tmp_path, kept)))
+    report = Report(summarise(kept, METRICS), kept)
+    page = html(context.page(tmp_path, report, groups(tmp_path, kept)))
     assert page.count('"replay": "replay.html#0"') == 2
     assert '<a class="replay" href="replay.html#0">seed 1001, 2 side by side</a>' in page
-    assert 'href="replay.html' not in html(context.page(tmp_path, summaries, kept))
+    assert 'href="replay.html' not in html(context.page(tmp_path, report))
 
 
 def test_a_trace_that_is_none_is_told_and_the_rest_shown(tmp_path: Path) -> None:

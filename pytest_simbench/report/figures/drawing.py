@@ -1,0 +1,102 @@
+"""How pictures are drawn and saved, whatever they show.
+
+matplotlib is an optional extra and is imported only when a picture is drawn.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from pytest_simbench.ground.text import for_figure
+from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.paths import write_whole
+from pytest_simbench.report.model.cells import unit
+
+DPI = 120
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+"""Okabe and Ito's palette: told apart by colour-blind readers too (jfly.uni-koeln.de/color)."""
+
+MARKERS = "osD^vP*X"
+"""With the colours, so that lines are told apart without them."""
+
+PLAIN_TEXT: Any = {
+    "text.usetex": False,
+    "text.parse_math": False,
+    "axes.formatter.use_mathtext": False,
+}
+"""No label is a formula or LaTeX, whatever `matplotlibrc` says."""
+
+
+class FiguresUnavailable(RuntimeError):
+    """Pictures cannot be drawn here; the message says what to install."""
+
+
+Named = Iterator[tuple[str, Any]]
+"""Pictures as a `matplotlib.figure.Figure` each, with the names of their files without ending."""
+
+
+def write(folder: Path, pictures: Iterable[tuple[str, Any]]) -> list[Path]:
+    """Draw pictures, which may wait for that, as PNG files in `folder`, each whole or not at all,
+    and return their paths.
+
+    Raises:
+        FiguresUnavailable: matplotlib is not installed.
+        OSError: the folder cannot be written to.
+    """
+    paths = []
+    with drawing():
+        for name, figure in pictures:
+            picture = io.BytesIO()
+            figure.savefig(picture, format="png", dpi=DPI)
+            write_whole(folder, f"{name}.png", picture.getvalue())
+            paths.append(folder / f"{name}.png")
+    return paths
+
+
+@contextmanager
+def drawing(**settings: Any) -> Iterator[None]:
+    """While pictures are drawn and saved: no text means anything, no warning is shown.
+
+    Args:
+        settings: more of matplotlib's, `svg_fonttype` for `svg.fonttype`.
+
+    Raises:
+        FiguresUnavailable: matplotlib is not installed.
+    """
+    try:
+        from matplotlib import rc_context
+    except ImportError as error:
+        raise FiguresUnavailable(
+            "no pictures: matplotlib is missing; pip install 'pytest-simbench[figures]'"
+        ) from error
+    more = {name.replace("_", "."): value for name, value in settings.items()}
+    with rc_context(PLAIN_TEXT | more), warnings.catch_warnings():
+        # Characters that the font lacks are drawn as boxes, long labels leave less room.
+        warnings.simplefilter("ignore", UserWarning)
+        yield
+
+
+def line_style(place: int) -> dict[str, Any]:
+    """Of the line of a row, by its place: other rows have other ones."""
+    return {
+        "marker": MARKERS[place % len(MARKERS)],
+        "ls": ("-", "--")[place // len(COLOURS) % 2],
+        "color": COLOURS[place % len(COLOURS)],
+        "lw": 1.2,
+    }
+
+
+def heading(metric: Metric, between: str = ", ") -> str:
+    """Title and unit for an axis."""
+    return for_figure(between.join(filter(None, [metric.title, unit(metric)])))
+
+
+def panelled(axis: Any, label: str, along: str = "x") -> None:
+    """What panels have in common: a label and a grid along one of their axes."""
+    getattr(axis, f"set_{along}label")(label)
+    axis.grid(axis=along, alpha=0.4)

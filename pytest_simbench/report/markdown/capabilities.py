@@ -1,0 +1,25 @@
+"""What each simulator is and can do, for docs/simulators.md."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pytest_simbench.report.markdown.run import table
+from pytest_simbench.report.model.capabilities import columns
+from pytest_simbench.simulator.info import SimulatorInfo
+
+
+def capability_markdown(infos: Sequence[SimulatorInfo]) -> str:
+    """The table for a page of documentation."""
+    return table(columns(infos))
+
+
+def main() -> None:
+    """Print the table of all registered simulators."""
+    from pytest_simbench.simulator.registry import adapter, registered
+
+    print(capability_markdown([adapter(name).info for name in registered()]))
+
+
+if __name__ == "__main__":
+    main()

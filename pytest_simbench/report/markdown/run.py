@@ -1,0 +1,106 @@
+"""The report as GitHub Markdown: for the run folder, docs and the summary page of a CI job."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from pytest_simbench.ground.text import for_markdown, in_one_line
+from pytest_simbench.measure.gate import GateReport
+from pytest_simbench.report.model import changes, tables
+from pytest_simbench.report.model.claims import Claims
+from pytest_simbench.report.model.document import Column, Section, Table, capital
+from pytest_simbench.report.model.report import Report
+from pytest_simbench.report.model.summary import TaskSummary
+
+
+def render_run(report: Report, pictures: Sequence[str] = ()) -> str:
+    """The whole report; ends with a newline.
+
+    Args:
+        report: of the run.
+        pictures: addresses of pictures to show at the end, relative to the report.
+    """
+    if not (report.summaries or report.sweeps):
+        return "No repetition was recorded.\n"
+    parts = [render_claims(report.claims)] if report.claims else []
+    parts += map(render_section, report.sections)
+    parts.append(f"How to read it: {for_markdown(tables.LEGEND)}")
+    if deviations := tables.deviations(report.summaries):
+        lines = _bullets(f"{name}: {text}" for name, text in deviations)
+        parts.append(f"## Declared deviations from the scene\n\n{lines}")
+    if pictures:
+        parts.append("\n".join(["## Pictures", "", *(f"![{name}]({name})" for name in pictures)]))
+    return "\n\n".join(parts) + "\n"
+
+
+def render_claims(found: Claims) -> str:
+    """Pass or fail, and why."""
+    parts = [f"**{for_markdown(found.sentence)}**", table(found.table.columns)]
+    for trouble in found.troubles:
+        told = [f"- {for_markdown(trouble.what)}"]
+        told += [f"  worst: {for_markdown(trouble.worst)}"] if trouble.worst else []
+        if trouble.again and "`" not in trouble.again:
+            told.append(f"  again: `{in_one_line(trouble.again)}`")
+        parts.append("<br>\n".join(told))
+    if found.more:
+        parts.append(f"{found.more} more of them are in the run folder.")
+    return "\n\n".join(filter(None, parts))
+
+
+def render_task(summary: TaskSummary, level: int = 2) -> str:
+    """One task under a heading of that level."""
+    return render_section(tables.section(summary), level)
+
+
+def render_section(found: Section, level: int = 2) -> str:
+    """A section under a heading of that level: sentences, tables, notes."""
+    parts = [f"{'#' * level} {for_markdown(found.title)}", _bullets(found.sentences)]
+    for place, each in enumerate(found.tables):
+        parts += _titled(each, level + 1 if place else 0)
+    parts.append(_bullets(f"note: {text}" for text in found.notes))
+    return "\n\n".join(filter(None, parts))
+
+
+def render_changes(report: GateReport, baseline: str, limited: bool) -> str:
+    """The comparison with a baseline, for the page of a CI job; ends with a newline."""
+    passed = changes.passed(report) if limited else ""
+    parts = [
+        f"## {for_markdown(f'Compared with {baseline}')}",
+        _bullets(changes.warned(report)),
+        _bullets(changes.failed(report)),
+        f"Passed: {passed}." if passed else "",
+        table(changes.columns(report)),
+        _bullets(f"not compared: {sentence}" for sentence in report.notes),
+    ]
+    return "\n\n".join(filter(None, parts)) + "\n"
+
+
+def render_tables(title: str, found: Sequence[Table]) -> str:
+    """Tables of their own under one title; ends with a newline."""
+    parts = [f"# {title}", *(part for each in found for part in _titled(each, 2))]
+    return "\n\n".join(parts) + "\n"
+
+
+def table(found: Sequence[Column]) -> str:
+    """One table with a line for each row; nothing without columns."""
+    if not found:
+        return ""
+    lines = [
+        [for_markdown(column.heading, cell=True) for column in found],
+        [":--" if column.left else "--:" for column in found],
+        *(
+            [for_markdown(cell.text, cell=True) for cell in row]
+            for row in zip(*(column.cells for column in found), strict=True)
+        ),
+    ]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _titled(found: Table, level: int) -> list[str]:
+    """A table, under a heading where there is a level, and how to read it."""
+    heading = [f"{'#' * level} {for_markdown(capital(found.title))}"] if level else []
+    return [*heading, table(found.columns), *filter(None, [for_markdown(found.note)])]
+
+
+def _bullets(items: Iterable[str]) -> str:
+    return "\n".join(f"- {for_markdown(item)}" for item in items)

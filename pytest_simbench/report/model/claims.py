@@ -1,0 +1,209 @@
+"""Pass or fail, and why: what the terminal, the page, `report.md` and a CI comment open with."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+from pytest_simbench.measure.gate import GateReport
+from pytest_simbench.measure.limits import CRASHED
+from pytest_simbench.records.claims import Claim
+from pytest_simbench.records.folder import Reading
+from pytest_simbench.records.metrics import COSTS, Metric, significant
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.series import grouped
+from pytest_simbench.report.model.again import command
+from pytest_simbench.report.model.document import Column, Table, names
+
+MOST = 12
+"""Claims that fail, or are not decided, which the first screen tells in full."""
+
+ORDER = ("FAIL", "UNDECIDED", "PASS")
+
+Metrics = Mapping[str, Sequence[Metric]]
+"""What each task declares."""
+
+NO_CLAIM = "no claim was made"
+
+
+@dataclass(frozen=True)
+class Trouble:
+    """A claim that failed or is not decided.
+
+    Attributes:
+        what: simulator, test, and what came of the claim.
+        worst: which repetition to look at, in words; empty where none stands out.
+        again: the command that runs it again; may be empty.
+    """
+
+    what: str
+    worst: str = ""
+    again: str = ""
+
+
+@dataclass(frozen=True)
+class Claims:
+    """The claims of a run, ready to be drawn.
+
+    Attributes:
+        state: the worst verdict; empty where no claim was made.
+        sentence: the first line of every report.
+        table: a row for each test and claim, a column for each simulator.
+        troubles: what failed, then what is not decided.
+        more: how many troubles are left out.
+    """
+
+    state: str
+    sentence: str
+    table: Table
+    troubles: Sequence[Trouble]
+    more: int = 0
+
+
+@dataclass(frozen=True)
+class _Told:
+    """A claim with the metric that it is about, None where that is not known, and its subject: the
+    test's function and its variant; of many variants (laws) the function alone."""
+
+    claim: Claim
+    metric: Metric | None
+    subject: str
+
+    @property
+    def claimed(self) -> str:
+        """The claim in words: `placed >= 90 %`."""
+        claim, metric = self.claim, self.metric
+        if not claim.metric or claim.threshold is None:
+            return "the test passes"
+        sign = ">=" if claim.relation == "at least" else "<="
+        shown = metric.format(claim.threshold) if metric else significant(claim.threshold)
+        return f"{claim.metric} {sign} {shown}"
+
+    @property
+    def value(self) -> str:
+        """What was measured, with its bounds: `71 [60, 80]`, `4 of 5`."""
+        claim, metric = self.claim, self.metric
+        if metric is None or claim.mean is None:
+            return ""
+        if metric.kind == "yes_no":
+            return f"{round(claim.mean * claim.n)} of {claim.n}"
+        scale = 100 if metric.bounded else 1
+        known = [end for end in (claim.low, claim.high) if end is not None and isfinite(end)]
+        ends = [significant(scale * end) for end in known]
+        bounds = f" [{', '.join(ends)}]" if len(ends) == 2 and ends[0] != ends[1] else ""
+        return f"{significant(scale * claim.mean)}{bounds}"
+
+
+def claims_of(reading: Reading, comparison: GateReport | None = None) -> Claims:
+    """Of a run, with the limits against its baseline."""
+    claims = _that_count(reading.claims)
+    told = [_told(claim, claims, reading.metrics) for claim in claims]
+    failures = comparison.failures if comparison else ()
+    count = Counter[str](claim.verdict for claim in claims)
+    count["FAIL"] += len(failures)
+    state = next((verdict for verdict in ORDER if count[verdict]), "")
+    of_test = grouped(reading.records, lambda r: r.test)
+    fails = [one for one in told if one.claim.verdict == "FAIL"]
+    undecided = [one for one in told if one.claim.verdict == "UNDECIDED"]
+    troubles = [Trouble(text) for text in failures]
+    troubles += [_trouble(one, of_test.get(one.claim.test, [])) for one in fails]
+    for (subject, claimed), same in grouped(undecided, lambda t: (t.subject, t.claimed)).items():
+        found = [f"{one.claim.simulator} {one.value} ({one.claim.advice})" for one in same]
+        troubles.append(Trouble(f"UNDECIDED {subject}: {claimed}: {'; '.join(found)}"))
+    more = max(0, len(troubles) - MOST)
+    sentence = _sentence(state, count, reading.records)
+    return Claims(state, sentence, _table(told), troubles[:MOST], more)
+
+
+def _told(claim: Claim, claims: Sequence[Claim], metrics: Metrics) -> _Told:
+    known = (*metrics.get(claim.task, ()), *COSTS, CRASHED)
+    metric = next((metric for metric in known if metric.name == claim.metric), None)
+    variants = {c.variant for c in claims if c.function == claim.function}
+    return _Told(claim, metric, _name(claim) if len(variants) <= MOST // 3 else _function(claim))
+
+
+def _function(claim: Claim) -> str:
+    return claim.function.rpartition("::")[2]
+
+
+def _name(claim: Claim) -> str:
+    return f"{_function(claim)} {claim.variant}".rstrip()
+
+
+def _that_count(found: Sequence[Claim]) -> list[Claim]:
+    """The last of each; of a test as a whole, only that it failed and no claim of it says why."""
+    last = {claim.identity: claim for claim in found}.values()
+    failed = {claim.test for claim in last if claim.metric and claim.verdict == "FAIL"}
+    return [
+        claim
+        for claim in last
+        if claim.metric or (claim.verdict == "FAIL" and claim.test not in failed)
+    ]
+
+
+def _sentence(state: str, count: Counter[str], records: Sequence[Record]) -> str:
+    ended = [record for record in records if record.status != "interrupted"]
+    crashed = sum(record.status == "failed" for record in ended)
+    cut = len(records) - len(ended)
+    repetitions = f"{crashed} of {len(ended)} repetitions crashed" + f", {cut} cut short" * bool(
+        cut
+    )
+    if not state:
+        return f"{NO_CLAIM}; {repetitions}"
+    total = sum(count.values())
+    parts = [f"{count['FAIL']} of {total} claims fail" if count["FAIL"] else f"{total} claims"]
+    if not count["FAIL"]:
+        parts = [f"{count['PASS']} of {total} claims hold"]
+    if count["UNDECIDED"]:
+        parts.append(f"{count['UNDECIDED']} undecided")
+    return f"{state}   {', '.join(parts)}; {repetitions}"
+
+
+def _table(told: Sequence[_Told]) -> Table:
+    """A row for each subject and claim, a column for each simulator; several tests in one cell are
+    counted."""
+    if not told:
+        return Table("Claims", [])
+    of = [(one.claim.simulator, one.claim.mode, one.claim.profile) for one in told]
+    places = list(dict.fromkeys(of))
+    who = dict(zip(places, names(places, "{} {}", " "), strict=True))
+    rows = grouped(zip(of, told, strict=True), lambda pair: (pair[1].subject, pair[1].claimed))
+    found = [Column("claim", [f"{subject}: {text}" for subject, text in rows], left=True)]
+    for place, name in who.items():
+        cells = [_cell([one for at, one in row if at == place]) for row in rows.values()]
+        found.append(Column(name, cells, left=True))
+    return Table("Claims", found)
+
+
+def _cell(told: Sequence[_Told]) -> str:
+    """Verdict and value; of several claims how many have each verdict."""
+    if len(told) == 1:
+        return f"{told[0].claim.verdict} {told[0].value}".rstrip()
+    count = Counter[str](one.claim.verdict for one in told)
+    return ", ".join(f"{verdict} {count[verdict]}" for verdict in ORDER if count[verdict])
+
+
+def _trouble(told: _Told, records: Sequence[Record]) -> Trouble:
+    """A claim that failed, with the repetition that speaks most against it; a crashed one first."""
+    claim, metric = told.claim, told.metric
+    test = f"FAIL {claim.simulator}, {_name(claim)}"
+    crashed = [record for record in records if record.status == "failed"]
+    if not claim.metric:
+        worst = next(iter([*crashed, *records]), None)
+        return Trouble(f"{test}: {claim.advice}", "", command(worst) if worst else "")
+    many = f", {claim.crashed} crashed" if claim.crashed else ""
+    what = f"{test}: {told.claimed} is {told.value} over {claim.n} repetitions{many}"
+    own = [record for record in records if record.task == claim.task]
+    worst = next((record for record in crashed if record in own), None)
+    why = f"crashed: {worst.error.cause}" if worst and worst.error else ""
+    known = [] if metric is None else [(v, r) for r in own if (v := r.value(metric)) is not None]
+    if worst is None and metric is not None and known:
+        pick = min if claim.relation == "at least" else max
+        value, worst = pick(known, key=lambda pair: pair[0])
+        why = f"has {metric.format(value)}"
+    if worst is None:
+        return Trouble(what)
+    where = f"seed {worst.seed}, repetition {worst.repetition}"
+    return Trouble(what, f"{where} {why}", command(worst))

@@ -1,0 +1,96 @@
+"""How a run ended, kept in its folder: whether tests passed, and the comparison with a baseline.
+
+The records do not say either: what a test claims is in its code, and the baseline is elsewhere.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from pytest_simbench.measure.gate import GateReport
+from pytest_simbench.records import checked
+from pytest_simbench.records.paths import FolderError, inside, write_whole
+from pytest_simbench.simulator.files import FileError, read_file, read_json
+
+NAME = "outcome.json"
+
+Compared = tuple[str, GateReport]
+"""Name of a baseline, and what differs from it."""
+
+SCHEMA = 1
+
+LARGEST = 64 * 2**20
+"""[bytes]"""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended.
+
+    Attributes:
+        passed: whether the tests, and the limits against the baseline, passed; None: not known.
+        baseline: name of what it was compared with.
+        comparison: what differs from it; None when nothing was compared.
+        looks: how often the run was gone on with and judged again, with the first time.
+    """
+
+    passed: bool | None = None
+    baseline: str = ""
+    comparison: GateReport | None = None
+    looks: int = 1
+
+    @property
+    def compared(self) -> Compared | None:
+        """The comparison, if there is one."""
+        return None if self.comparison is None else (self.baseline, self.comparison)
+
+    def write(self, folder: Path) -> None:
+        """Write it into a run folder.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        found: dict[str, Any] = {"schema": SCHEMA, "passed": self.passed, "looks": self.looks}
+        if self.comparison is not None:
+            found["comparison"] = {"baseline": self.baseline, **asdict(self.comparison)}
+            for change in _changes(found):
+                # In the limit's terms it may be without bounds: of a baseline of 0.
+                change["loss"] = str(change["loss"])
+        write_whole(folder, NAME, json.dumps(found).encode())
+
+    @classmethod
+    def read(cls, folder: Path) -> tuple[Outcome, str]:
+        """That of a run folder, which anybody may have made; and what is wrong with it, or "".
+
+        A folder without one says nothing.
+        """
+        try:
+            path = inside(folder, NAME)
+            if not path.exists():
+                return cls(), ""
+            data = checked.plain(read_json(read_file(path, LARGEST, "how the run ended,")))
+            checked.schema(data, SCHEMA)
+            for change in _changes(data):
+                change["loss"] = float(change["loss"])
+            comparison = data.get("comparison") or {}
+            whole = {"baseline": comparison.pop("baseline", ""), "comparison": comparison or None}
+            whole |= {"passed": data.get("passed"), "looks": data.get("looks", 1)}
+            return checked.convert(whole, cls), ""
+        except (FolderError, FileError) as error:
+            return cls(), str(error)
+        except (ValueError, LookupError, TypeError, AttributeError) as error:
+            told = f"it lacks {error}" if isinstance(error, KeyError) else error
+            return cls(), f"{folder / NAME} does not say how the run ended: {told}"
+
+
+def _changes(data: Any) -> list[dict[str, Any]]:
+    """Every change in the plain data of an outcome.
+
+    Raises:
+        KeyError, TypeError, AttributeError: it is none.
+    """
+    report = data.get("comparison")
+    return [] if report is None else [*report["changes"], *report["others"]]

@@ -1,0 +1,81 @@
+"""All that is told of a run, whatever draws it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from pytest_simbench.measure.history import History, histories
+from pytest_simbench.measure.law_history import LawHistory, law_histories
+from pytest_simbench.measure.sweep import Swept
+from pytest_simbench.records.folder import Reading
+from pytest_simbench.records.record import Record
+from pytest_simbench.report.model import sweep, tables, truth
+from pytest_simbench.report.model.claims import Claims, claims_of
+from pytest_simbench.report.model.document import Section
+from pytest_simbench.report.model.outcome import Compared
+from pytest_simbench.report.model.summary import TaskSummary, at_own_steps, summarise
+
+AnyHistory = History | LawHistory
+
+
+@dataclass(frozen=True)
+class Report:
+    """A run.
+
+    Attributes:
+        summaries: of each task and law.
+        records: that all was made of, in order.
+        histories: of simulators of which there are several releases.
+        sweeps: laws over time steps.
+        claims: what the tests claimed, and what came of it, which comes first.
+        comparison: with a baseline, where there is one.
+    """
+
+    summaries: Sequence[TaskSummary] = ()
+    records: Sequence[Record] = ()
+    histories: Sequence[AnyHistory] = ()
+    sweeps: Sequence[Swept] = ()
+    claims: Claims | None = None
+    comparison: Compared | None = None
+
+    @classmethod
+    def of(cls, reading: Reading, comparison: Compared | None = None, looks: int = 1) -> Report:
+        """What a run folder holds, that was judged so often (`outcome.Outcome`)."""
+        return cls(
+            summaries_of(reading, looks),
+            in_order(reading.records),
+            histories_of(reading),
+            sweep.of_run(reading),
+            claims_of(reading, comparison[1] if comparison else None),
+            comparison,
+        )
+
+    @property
+    def tasks(self) -> list[TaskSummary]:
+        """What is no law."""
+        return truth.others(self.summaries)
+
+    @property
+    def sections(self) -> list[Section]:
+        """Laws, time steps, tasks, and releases."""
+        laws = filter(None, [truth.section(self.summaries), sweep.section(self.sweeps)])
+        told = [Section(f"History: {one.title}", one.sentences()) for one in self.histories]
+        return [*laws, *map(tables.section, self.tasks), *told]
+
+
+def histories_of(reading: Reading) -> list[AnyHistory]:
+    """The releases of simulators: of each test, and of all laws."""
+    return [*histories(reading.records, reading.metrics), *law_histories(reading.records)]
+
+
+def summaries_of(reading: Reading, looks: int = 1) -> list[TaskSummary]:
+    """What a run that was judged so often tells of each task."""
+    records = at_own_steps(in_order(reading.records))
+    found = summarise(records, reading.metrics, reading.references)
+    return [replace(summary, looks=looks) for summary in found]
+
+
+def in_order(records: Sequence[Record]) -> list[Record]:
+    """By test and repetition, however many processes wrote them."""
+    return sorted(records, key=lambda r: (r.test, r.repetition))

@@ -1,0 +1,297 @@
+"""From records to the rows of a table, and what differs between them, computed once for all media.
+
+A row is one test and configuration of a task. A crashed repetition counts with the worst value
+where a metric has one (`Record.value`); of everything else crashed and interrupted ones are left
+out.
+"""
+
+from __future__ import annotations
+
+import re
+import statistics
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from pytest_simbench.measure.differences import Difference, differences
+from pytest_simbench.measure.modes import compare_modes
+from pytest_simbench.records.choices import published_again
+from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.phenomena import PHENOMENON
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.series import comparable, grouped, series
+from pytest_simbench.report.model.document import Of, names
+from pytest_simbench.report.model.pooling import (
+    COST,
+    SAMPLED,
+    Spread,
+    pooled,
+    pooled_by_phase,
+    spread,
+)
+
+PHASES = ("launch", "compile", "load", "plan", "step", "other")
+"""Where the wall time of a repetition goes, in order."""
+
+SHOWN_COSTS = ("cpu", "ram", "rtf", "cpu_cost", "start", "end")
+"""Costs that tables have, in their order."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Failures of one row that share type and phase."""
+
+    type: str
+    phase: str
+    records: Sequence[Record]
+
+    @property
+    def repetitions(self) -> list[int]:
+        """Their numbers."""
+        return [record.repetition for record in self.records]
+
+    @property
+    def message(self) -> str:
+        """That of the first of them, in one line."""
+        error = self.records[0].error
+        return " ".join(error.message.split()) if error else "the record names no cause"
+
+    @property
+    def tail(self) -> list[str]:
+        """The last lines of that one's log, which is at `log`."""
+        error = self.records[0].error
+        return error.log_tail.strip().splitlines() if error else []
+
+    @property
+    def log(self) -> str:
+        return self.records[0].notes.log
+
+
+@dataclass(frozen=True)
+class Row:
+    """One configuration of one simulator at one task.
+
+    Attributes:
+        test: what tells it from other rows of its simulator, mode and profile, for instance
+            `timestep=0.004` or the test's function name; else empty.
+        finished, failed, interrupted: counts of repetitions.
+        metrics: by metric name; None where no repetition has the value.
+        costs: by the names of `metrics.COSTS`: those of `SHOWN_COSTS`.
+        by_phase: CPU in % of a core and RAM in MB by the task's phase, in order.
+        seconds: mean wall seconds by phase (`PHASES`, `total`).
+        notes: what a reader must know of these numbers (parallel repetitions, reused worker).
+        reasons: why scores are no better, in the task's words, and how often; the most frequent
+            first. Those that differ in numbers alone are counted together.
+        records: all of its repetitions.
+    """
+
+    task: str
+    simulator: str
+    mode: str
+    profile: str
+    test: str = ""
+    finished: int = 0
+    failed: int = 0
+    interrupted: int = 0
+    metrics: Mapping[str, Spread | None] = field(default_factory=dict)
+    costs: Mapping[str, Spread | None] = field(default_factory=dict)
+    by_phase: Mapping[str, tuple[Spread, Spread]] = field(default_factory=dict)
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    causes: tuple[Cause, ...] = ()
+    deviations: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    reasons: tuple[tuple[str, int], ...] = ()
+    records: Sequence[Record] = ()
+
+    @property
+    def of(self) -> Of:
+        return Of(self.simulator, self.mode, self.profile)
+
+    @property
+    def attempts(self) -> int:
+        """Repetitions that count: interrupted ones say nothing about the simulator."""
+        return self.finished + self.failed
+
+    @property
+    def variant(self) -> str:
+        """Mode and profile, and the test where it is needed, for instance `headless tuned`."""
+        return " ".join(part for part in (self.mode, self.profile, self.test) if part)
+
+    @property
+    def label(self) -> str:
+        return f"{self.simulator} {self.variant}"
+
+
+@dataclass(frozen=True)
+class TaskSummary:
+    """All rows of one task.
+
+    Attributes:
+        metrics: what the task declares; those with `study` make its first table, else all.
+        references: the value a perfect run would give, by metric name.
+        protocol: the protocol of its records; several are joined by commas.
+        differences: between rows of one mode and profile, by their places. Of laws there are none:
+            they are no sample of anything, see `measure.phenomena`.
+        modes: whether headless and GUI agree, in sentences.
+        described: whether the run says what the metrics mean; else they are plain numbers.
+        phenomenon: that the task is a law of; empty of one that is none.
+        looks: how often the run was judged, see `outcome.Outcome`.
+    """
+
+    task: str
+    metrics: tuple[Metric, ...]
+    rows: tuple[Row, ...]
+    references: Mapping[str, float] = field(default_factory=dict)
+    protocol: str = ""
+    differences: tuple[Difference, ...] = ()
+    modes: tuple[str, ...] = ()
+    described: bool = True
+    phenomenon: str = ""
+    looks: int = 1
+
+    @property
+    def study(self) -> tuple[Metric, ...]:
+        """Those of the first table: what the reference study reports too, else all."""
+        return tuple(metric for metric in self.metrics if metric.study) or self.metrics
+
+    @property
+    def stricter(self) -> tuple[Metric, ...]:
+        """The others."""
+        return tuple(metric for metric in self.metrics if metric not in self.study)
+
+    @property
+    def names(self) -> list[str]:
+        """What tells the rows apart: mode, profile and test only where they differ."""
+        return short_labels(self.rows)
+
+
+def short_labels(rows: Sequence[Row]) -> list[str]:
+    """Names that tell the rows apart."""
+    return names([(*row.of, row.test) for row in rows])
+
+
+def at_own_steps(records: Iterable[Record]) -> list[Record]:
+    """The records without those of laws at other time steps than their profile's own, which have
+    tables of their own (`report.sweep`)."""
+    return [r for r in records if not (r.swept and PHENOMENON in r.settings)]
+
+
+def summarise(
+    records: Iterable[Record],
+    metrics: Mapping[str, Sequence[Metric]],
+    references: Mapping[str, Mapping[str, float]] | None = None,
+) -> list[TaskSummary]:
+    """The records as one summary per task, tasks in order of appearance.
+
+    Args:
+        records: of one run, in any order.
+        metrics: what each task declares, by its name; of a task that is missing here, the record's
+            metrics are shown as plain values.
+        references: by task, then by metric.
+    """
+    return [
+        _summary(task, found, metrics.get(task), dict((references or {}).get(task, {})))
+        for task, found in grouped(records, lambda r: r.task).items()
+    ]
+
+
+def _summary(
+    task: str,
+    records: Sequence[Record],
+    declared: Sequence[Metric] | None,
+    references: Mapping[str, float],
+) -> TaskSummary:
+    metrics = tuple(_undeclared(records) if declared is None else declared)
+    found = series(records)
+    phenomenon = str(records[0].settings.get(PHENOMENON) or "")
+    apart: list[Difference] = []
+    modes: list[str] = []
+    if not phenomenon:
+        sides = {place: row.records for place, row in enumerate(found)}
+        apart = differences(sides, metrics, lambda a, b: comparable(found[a], found[b]), references)
+        ordered = [record for row in found for record in row.records]
+        modes = [compared.sentence for compared in compare_modes(ordered, metrics)]
+    return TaskSummary(
+        task,
+        metrics,
+        tuple(_row(row.records, metrics, row.label) for row in found),
+        references,
+        ", ".join(sorted({record.protocol for record in records})),
+        tuple(apart),
+        tuple(modes),
+        described=declared is not None,
+        phenomenon=phenomenon,
+    )
+
+
+def _undeclared(records: Sequence[Record]) -> list[Metric]:
+    names = dict.fromkeys(name for record in records for name in record.metrics)
+    return [Metric(name, name, better=None, study=True) for name in names]
+
+
+def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str) -> Row:
+    first = records[0]
+    done = [record for record in records if record.status == "ok"]
+    notes = list(dict.fromkeys(r.notes.untested for r in records if r.notes.untested))
+    again = published_again((r.task, r.seed, r.notes.sample, r.notes.chosen_on) for r in done)
+    notes += [again] * bool(again)
+    if any(record.contended for record in done):
+        notes.append("repetitions ran in parallel: its times and CPU are contended")
+    if any(record.notes.filmed for record in done):
+        notes.append("repetitions were filmed: CPU and RAM are those of simulator and renderer")
+    if any(record.reused_worker for record in done):
+        notes.append("one worker served several repetitions: launch and memory are not fresh")
+    return Row(
+        first.task,
+        first.simulator,
+        first.mode,
+        first.profile,
+        test,
+        finished=len(done),
+        failed=sum(record.status == "failed" for record in records),
+        interrupted=sum(record.status == "interrupted" for record in records),
+        metrics={m.name: spread([r.value(m) for r in records], m) for m in metrics},
+        costs={
+            name: pooled([r.resources for r in done], name)
+            if name in SAMPLED
+            else spread([r.cost(name) for r in done], COST[name])
+            for name in SHOWN_COSTS
+        },
+        by_phase=pooled_by_phase([r.resources for r in done]),
+        seconds=_seconds(done),
+        causes=_causes(records),
+        deviations=tuple(dict.fromkeys(text for r in records for text in r.deviations)),
+        notes=tuple(notes),
+        reasons=_reasons(done),
+        records=records,
+    )
+
+
+def _reasons(records: Sequence[Record]) -> tuple[tuple[str, int], ...]:
+    told = [text for record in records for text in record.reasons]
+    same = grouped(told, lambda text: _NUMBERS.sub("#", text))
+    counted = [
+        (texts[0] if len(set(texts)) == 1 else form, len(texts)) for form, texts in same.items()
+    ]
+    return tuple(sorted(counted, key=lambda item: -item[1]))
+
+
+_NUMBERS = re.compile(r"-?\d+(?:\.\d+)?")
+
+
+def _seconds(records: Sequence[Record]) -> dict[str, float]:
+    means = {}
+    for name in (*PHASES, "total"):
+        found = [r.seconds[name] for r in records if r.seconds.get(name) is not None]
+        if found:
+            means[name] = statistics.fmean(found)
+    return means
+
+
+def _causes(records: Sequence[Record]) -> tuple[Cause, ...]:
+    """The most frequent first."""
+    groups = grouped(
+        (record for record in records if record.status == "failed"),
+        lambda r: (r.error.type, r.error.phase) if r.error else ("unknown", ""),
+    )
+    ordered = sorted(groups.items(), key=lambda item: -len(item[1]))
+    return tuple(Cause(kind, phase, group) for (kind, phase), group in ordered)

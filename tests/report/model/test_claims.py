@@ -1,0 +1,146 @@
+"""Pass or fail, and why: what every report opens with."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from pytest_simbench.measure.gate import GateReport
+from pytest_simbench.records.claims import Claim
+from pytest_simbench.records.folder import Reading
+from pytest_simbench.records.record import Failure
+from pytest_simbench.report.markdown.run import render_claims
+from pytest_simbench.report.model.claims import claims_of
+from pytest_simbench.report.terminal.parts import claim_lines
+from tests.report.samples import METRICS, record
+
+STACK = "suites/test_stacking.py::test_stacking"
+
+
+def claim(simulator: str = "mujoco", verdict: str = "PASS", **changes: Any) -> Claim:
+    given: dict[str, Any] = {
+        "test": f"{STACK}[{simulator}-headless]",
+        "function": STACK,
+        "simulator": simulator,
+        "mode": "headless",
+        "profile": "tuned",
+        "task": "stacking",
+        "metric": "placed",
+        "relation": "at least",
+        "threshold": 0.9,
+        "mean": 1.0,
+        "n": 20,
+    }
+    return Claim(verdict=verdict, **{**given, **changes})  # type: ignore[arg-type]
+
+
+def stacked(simulator: str, k: int, placed: float | None) -> Any:
+    more: dict[str, Any] = {"test": f"{STACK}[{simulator}-headless]"}
+    if placed is None:
+        more |= {"status": "failed", "error": Failure("WorkerHung", "silent", "settle")}
+    return record(simulator, k, metrics={"placed": placed}, **more)
+
+
+RECORDS = (
+    *(stacked("mujoco", k, 1.0) for k in (1, 2)),
+    stacked("drake", 1, 0.8),
+    stacked("drake", 2, 0.2),
+)
+FAILED = claim("drake", "FAIL", mean=0.5, low=0.3, high=0.7, n=2)
+
+
+def reading(*claims: Claim, records: Any = RECORDS) -> Reading:
+    from pytest_simbench.records.description import TaskDescription
+
+    tasks = {name: TaskDescription(name, metrics) for name, metrics in METRICS.items()}
+    return Reading(records=records, tasks=tasks, claims=claims)
+
+
+def test_the_first_line_says_pass_or_fail_and_how_many_crashed() -> None:
+    undecided = claim("sapien", "UNDECIDED", advice="about 9 more repetitions needed")
+    for claims, sentence in (
+        ((), "no claim was made; 0 of 4 repetitions crashed"),
+        ((claim(),), "PASS   1 of 1 claims hold; 0 of 4 repetitions crashed"),
+        ((claim(), undecided), "UNDECIDED   1 of 2 claims hold, 1 undecided; 0 of 4 repetitions"),
+        ((claim(), undecided, FAILED), "FAIL   1 of 3 claims fail, 1 undecided; 0 of 4"),
+    ):
+        assert claims_of(reading(*claims)).sentence.startswith(sentence)
+
+
+def test_a_limit_against_the_baseline_that_is_exceeded_is_a_claim_that_fails() -> None:
+    gate = GateReport(broken=("test_x: nothing finished",))
+    found = claims_of(reading(claim()), gate)
+    assert found.state == "FAIL"
+    assert found.troubles[0].what == "test_x: nothing finished"
+
+
+def test_the_table_has_a_column_for_each_simulator_and_a_row_for_each_claim() -> None:
+    shown = claim_lines(claims_of(reading(claim(low=0.83, high=1.0), FAILED)), 80)
+    row = next(line for line in shown.splitlines() if line.startswith("test_stacking"))
+    assert row.split("  ") == ["test_stacking: placed >= 90 %", "PASS 100 [83, 100]",
+                               "FAIL 50 [30, 70]"]  # fmt: skip
+
+
+def test_a_claim_that_fails_names_the_worst_repetition_and_how_to_see_it_again() -> None:
+    (trouble,) = claims_of(reading(claim(), FAILED)).troubles
+    assert trouble.what == (
+        "FAIL drake, test_stacking: placed >= 90 % is 50 [30, 70] over 2 repetitions"
+    )
+    assert trouble.worst == "seed 1002, repetition 2 has 20 %"
+    assert "--sim-seed=1002" in trouble.again
+    assert "--sim-name=drake" in trouble.again
+
+
+def test_a_crash_is_worse_than_any_value() -> None:
+    records = (*RECORDS, stacked("drake", 3, None))
+    (trouble,) = claims_of(reading(FAILED, records=records)).troubles
+    assert trouble.worst == "seed 1003, repetition 3 crashed: WorkerHung in settle"
+
+
+def test_of_a_claim_that_was_made_again_the_last_verdict_holds() -> None:
+    assert claims_of(reading(FAILED, claim("drake"))).state == "PASS"
+
+
+def test_a_test_that_failed_as_a_whole_is_told_unless_a_claim_of_it_says_why() -> None:
+    whole = claim("drake", "FAIL", task="", metric="", relation=None, threshold=None, mean=None,
+                  advice="KeyError: 'x'")  # fmt: skip
+    assert "KeyError" in claims_of(reading(claim(), whole)).troubles[0].what
+    found = claims_of(reading(whole, FAILED))
+    assert [trouble.what for trouble in found.troubles if "KeyError" in trouble.what] == []
+    assert found.sentence.startswith("FAIL   1 of 1 claims fail")
+
+
+def test_many_variants_of_a_test_are_counted_in_one_cell() -> None:
+    laws = [claim(test=f"{STACK}[{k}]", variant=f"law{k}") for k in range(9)]
+    laws.append(claim(test=f"{STACK}[x]", variant="x", verdict="FAIL"))
+    shown = claim_lines(claims_of(reading(*laws)), 80)
+    assert "FAIL 1, PASS 9" in shown
+
+
+@pytest.mark.parametrize("width", [80, 200])
+def test_no_line_of_the_table_is_wider_than_the_terminal(width: int) -> None:
+    many = [claim(f"simulator{k}", low=0.83, high=1.0) for k in range(10)]
+    shown = claim_lines(claims_of(reading(*many)), width)
+    assert all(len(line) <= width for line in shown.splitlines())
+
+
+def test_markdown_opens_with_the_same() -> None:
+    text = render_claims(claims_of(reading(claim(), FAILED)))
+    assert text.startswith(
+        "**FAIL   1 of 2 claims fail; 0 of 4 repetitions crashed**".replace("   ", " ")
+    )
+    assert "| claim | mujoco | drake |" in text
+    assert "again: `pytest 'suites/test_stacking.py::test_stacking[drake-headless]'" in text
+
+
+def test_a_claim_that_is_not_decided_on_several_simulators_is_told_once() -> None:
+    open_ = [
+        claim(name, "UNDECIDED", advice="about 9 more repetitions needed", mean=0.9, n=9)
+        for name in ("mujoco", "sapien")
+    ]
+    (trouble,) = claims_of(reading(*open_)).troubles
+    assert trouble.what == (
+        "UNDECIDED test_stacking: placed >= 90 %: mujoco 90 (about 9 more repetitions needed); "
+        "sapien 90 (about 9 more repetitions needed)"
+    )

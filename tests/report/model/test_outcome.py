@@ -1,0 +1,96 @@
+"""How a run ended is read back as it was; what somebody else wrote is checked."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pytest
+
+from pytest_simbench.measure.gate import GateReport, run_gate
+from pytest_simbench.measure.limits import Limit
+from pytest_simbench.report.model.changes import columns
+from pytest_simbench.report.model.outcome import NAME, Outcome
+from tests.report.samples import METRICS, record
+
+
+def compared() -> GateReport:
+    """A run that lost cubes against its baseline, in other settings."""
+    worse = [record(repetition=k, metrics={"placed": 0.1}, settings={"x": 1}) for k in range(1, 7)]
+    before = [record(repetition=k, metrics={"placed": 0.9 + k / 100}) for k in range(1, 7)]
+    return run_gate(before, worse, (Limit("placed", 0.05, True),), METRICS)
+
+
+@pytest.mark.parametrize("passed", [True, False, None])
+def test_it_is_read_back(passed: bool | None, tmp_path: Path) -> None:
+    report = compared()
+    assert report.failures
+    assert report.differences
+    outcome = Outcome(passed, "runs/before", report, looks=2)
+    outcome.write(tmp_path)
+    found, problem = Outcome.read(tmp_path)
+    assert problem == ""
+    assert found == outcome
+    assert found.comparison is not None
+    assert found.comparison.failures == report.failures
+    assert columns(found.comparison) == columns(report)
+
+
+def test_a_loss_without_bounds_is_kept(tmp_path: Path) -> None:
+    report = compared()
+    change = replace(report.changes[0], loss=math.inf)
+    Outcome(False, "b", replace(report, changes=(change,))).write(tmp_path)
+    found, _ = Outcome.read(tmp_path)
+    assert found.comparison is not None
+    assert found.comparison.changes == (change,)
+
+
+def test_a_folder_without_one_says_nothing(tmp_path: Path) -> None:
+    assert Outcome.read(tmp_path) == (Outcome(), "")
+    Outcome(True).write(tmp_path)
+    assert Outcome.read(tmp_path) == (Outcome(True), "")
+    assert Outcome(True).compared is None
+
+
+def spoilt(**changes: Any) -> str:
+    """What is written of a comparison, with a part of its first change replaced."""
+    with TemporaryDirectory() as folder:
+        Outcome(True, "b", compared()).write(Path(folder))
+        data = json.loads((Path(folder) / NAME).read_text())
+    data["comparison"]["changes"][0].update(changes)
+    return json.dumps(data)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "does not say how the run ended"),
+        ("[]", "does not say how the run ended"),
+        ('{"schema": 2}', "written by a newer"),
+        ('{"passed": "yes"}', "'passed': expected 'bool"),
+        ('{"comparison": {}}', "it lacks 'changes'"),
+        ('{"comparison": {"differences": [1], "broken": [], "notes": []}}', "does not say"),
+        (spoilt(loss="x"), "does not say how the run ended"),
+        (spoilt(metric={"name": "x", "title": "x", "kind": "odd"}), "does not say how"),
+        (spoilt(limit={}), "there is no 'metric'"),
+        (spoilt(test=3), "changes[0].test': expected 'str'"),
+    ],
+)
+def test_what_is_none_is_told(text: str, told: str, tmp_path: Path) -> None:
+    (tmp_path / NAME).write_text(text)
+    found, problem = Outcome.read(tmp_path)
+    assert found == Outcome()
+    assert told in problem
+
+
+def test_it_leads_nowhere_else(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    Outcome(True).write(tmp_path)
+    (tmp_path / "run" / NAME).symlink_to(tmp_path / NAME)
+    found, problem = Outcome.read(tmp_path / "run")
+    assert found == Outcome()
+    assert "leads out of its folder" in problem

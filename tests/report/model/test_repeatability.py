@@ -1,0 +1,84 @@
+"""Repeatability as a reader sees it."""
+
+from __future__ import annotations
+
+import pytest
+
+from pytest_simbench.records.repeatability import Line
+from pytest_simbench.repeatability.agreement import Agreement, Parting
+from pytest_simbench.repeatability.motions import Difference
+from pytest_simbench.repeatability.replay_result import Again
+from pytest_simbench.report.markdown.run import render_tables as render_markdown
+from pytest_simbench.report.model.repeatability import tables
+from pytest_simbench.report.terminal.parts import render_tables as render_terminal
+
+AGAINS = (
+    Again("after a reset"),
+    Again("fresh process", Difference(1.234, "cube_1", {1.0: 0.0015, 5.0: 0.02}, 0.3), ("hit",)),
+    Again("with a window", skipped="no display"),
+    Again("restored", failure="WorkerExited: x"),
+)
+
+
+def line(kind: str, simulator: str, **result: object) -> Line:
+    return Line(kind, "t::x", simulator, "headless", "tuned", "throwing", 7, {}, {}, result)
+
+
+LINES = [
+    line("replay", "mujoco", claims=True, again=[Again("after a reset").to_wire()]),
+    line("replay", "wobbly", claims=False, again=[again.to_wire() for again in AGAINS]),
+    line("search", "mujoco", sentence="0.7 mm in x of cube_12 topples tower 2"),
+]
+AGREEMENTS = [
+    Agreement(
+        "mujoco headless tuned",
+        "wobbly headless tuned",
+        {0.001: Parting(0.5, "cube_1", (0.1, 0.2, 0.3)), 0.01: None},
+        2.5,
+        9.0,
+        False,
+    )
+]
+
+
+@pytest.mark.parametrize("width", [80, 100, 140])
+def test_terminal(width: int) -> None:
+    text = render_terminal(tables(LINES, AGREEMENTS), width)
+    flat = " ".join(text.split())
+    assert max(map(len, text.splitlines())) <= width
+    assert text.isascii()
+    for part in (
+        "Replay: throwing, seed 7",
+        "1.23 s",
+        "not run",
+        "failed",
+        "changed: hit",
+        "cube_12",
+        "0.50 s / never",
+        "2.50 s",
+        "never in 9.0 s",
+    ):
+        assert part in flat
+
+
+def test_the_row_says_it_all() -> None:
+    text = render_terminal(tables(LINES, []), 140)
+    rows = [row.split() for row in text.splitlines()]
+    assert ["mujoco", "headless", "tuned", "yes", "same"] in rows
+    assert [
+        *["wobbly", "headless", "tuned", "no", "same", "1.23", "s", "not", "run", "failed"]
+    ] in rows
+    growth = next(row for row in text.splitlines() if "fresh process" in row and "cube_1" in row)
+    assert growth.split()[-7:] == ["1.23", "cube_1", "1.5", "20", "300", "changed:", "hit"]
+
+
+def test_no_table_without_content() -> None:
+    assert tables([], []) == []
+    assert [table.title for table in tables(LINES[:1], [])] == ["Replay: throwing, seed 7"]
+
+
+def test_markdown() -> None:
+    text = render_markdown("Repeatability", tables(LINES, AGREEMENTS))
+    assert text.startswith("# Repeatability\n\n## Replay: throwing, seed 7\n")
+    assert "| mujoco headless tuned | yes | same |" in text
+    assert "| wobbly headless tuned | 0.50 s / never | - |" in text

@@ -1,0 +1,230 @@
+"""The result in the terminal: the answer first, no line too wide, without -v a screen at most."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from pytest_simbench.records.notes import Notes
+from pytest_simbench.records.record import Record
+from pytest_simbench.report.model import tables
+from pytest_simbench.report.model.document import Column
+from pytest_simbench.report.model.summary import TaskSummary, summarise
+from pytest_simbench.report.terminal.grid import render
+from pytest_simbench.report.terminal.run import MOST_LINES, render_brief, render_run, render_task
+
+from .samples import METRICS, REFERENCES, failed, record, stacking_run, text, throwing_run
+
+EIGHT = ("mujoco", "pybullet", "drake", "dart", "sapien", "ovphysx", "newton", "genesis")
+
+
+def run_of_eight(**changes: object) -> list[Record]:
+    """20 repetitions of two tasks on eight simulators."""
+    return [
+        record(
+            name, k, task, metrics={"placed": 1 - n / 30, "at_end": 0.9, "moved": (n + k % 3) / 12},
+            **changes,
+        )
+        for task in ("stacking", "throwing")
+        for n, name in enumerate(EIGHT)
+        for k in range(1, 21)
+    ]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def eight() -> list[TaskSummary]:
+    return summarise(run_of_eight(), METRICS)
+
+
+def test_the_whole_result_of_a_task_at_100_columns() -> None:
+    (stacking,) = summarise(stacking_run(), METRICS)
+    assert render_task(stacking, 100) == text(
+        """
+        stacking: 20 repetitions each, protocol fast
+        ============================================
+        placed: mujoco 99 % [79, 100] is ahead of pybullet 65 % [40, 78], by 33.3 points [16.7, 50].
+        at the end: mujoco 97 % [77, 99] is ahead of pybullet 77 % [46, 91], by 20 points [1.53, 38.5].
+        crashes: pybullet 3 of 20.
+
+        simulator                          crashed                 placed %            at the end %
+        -------------------------------------------------------------------------------------------
+        mujoco headless tuned    0 of 20 [0, 17] %  93 / 99 / 100 [79, 100]  87 / 97 / 100 [77, 99]
+        pybullet headless tuned  3 of 20 [3, 38] %     0 / 65 / 87 [40, 78]   0 / 77 / 100 [46, 91]
+
+                                                               x real      CPU  start  end
+        simulator                  CPU %               RAM MB    time  s/sim s      s    s
+        ----------------------------------------------------------------------------------
+        mujoco headless tuned    99 +- 3  150 +- 2 (peak 161)      20    0.048   0.80  9.8
+        pybullet headless tuned  99 +- 3  150 +- 2 (peak 161)      20    0.048   0.80  9.8
+
+        stacking, crashes
+        simulator                count  failure     phase   repetitions  message
+        ----------------------------------------------------------------------------------------------------
+        pybullet headless tuned      2  WorkerHung  settle  8, 9         no answer within 60 s; last line of
+                                                                         its log: died
+        pybullet headless tuned      1  WorkerDied  pick    3            the worker was killed by SIGSEGV;
+                                                                         last line of its log: died
+
+        stacking, further metrics: mean [95 % interval]
+                           placed  at the end               untouched
+        simulator        strict %    strict %  towers %   moved cubes    failed picks
+        -----------------------------------------------------------------------------
+        mujoco                 98          96        90             0            0.05
+        headless tuned  [78, 100]    [77, 99]  [71, 98]                [-0.078, 0.38]
+
+        pybullet               84          82        78          0.47           0.059
+        headless tuned   [51, 98]    [50, 97]  [47, 95]  [0.15, 0.81]  [-0.094, 0.45]
+
+        stacking, the row beats the column at (in brackets: differs from it)
+        simulator  mujoco  pybullet
+        --------------------------------------------------
+        mujoco             placed, at_end, untouched_moved
+        pybullet   -
+
+        stacking, where the time went: mean wall seconds and share
+                                                                                             total
+        simulator                  launch s      load s      plan s      step s     other s      s
+        ------------------------------------------------------------------------------------------
+        mujoco headless tuned    0.50 (5 %)  0.30 (3 %)  1.0 (10 %)  8.0 (80 %)  0.20 (2 %)   10.0
+        pybullet headless tuned  0.50 (5 %)  0.30 (3 %)  1.0 (10 %)  8.0 (80 %)  0.20 (2 %)   10.0
+        """  # noqa: E501
+    )
+
+
+def test_the_short_result() -> None:
+    assert render_brief(summarise([*stacking_run(), *throwing_run()], METRICS), 80) == text(
+        """
+        2 simulators did stacking and throwing: 80 repetitions, 3 crashed (pybullet
+          3).
+        Outcome: stacking, placed and at the end: mujoco ahead (behind: pybullet);
+          throwing, moved: a difference needs at least 6 pairs that differ; so far 1.
+        Cost: CPU s per simulated s, stacking and throwing: not compared; RAM,
+          stacking and throwing: a difference needs at least 6 pairs that differ; so far
+          none.
+
+        stacking: 20 repetitions each, protocol fast
+                                           at the end      CPU  RAM  x real
+        simulator  crashed      placed %            %  s/sim s   MB    time
+        -------------------------------------------------------------------
+        mujoco     0 of 20  99 [79, 100]  97 [77, 99]    0.048  150      20
+        pybullet   3 of 20   65 [40, 78]  77 [46, 91]    0.048  150      20
+
+        throwing: 20 repetitions each, protocol fast
+                                             CPU  RAM  x real
+        simulator  crashed      moved %  s/sim s   MB    time
+        -----------------------------------------------------
+        mujoco     0 of 20  42 [33, 54]    0.048  150      20
+        pybullet   0 of 20  39 [27, 52]    0.048  150      20
+
+        CRASHED stacking, pybullet headless tuned: 2 x WorkerHung in settle: no answer
+          within 60 s
+        CRASHED stacking, pybullet headless tuned: 1 x WorkerDied in pick: the worker
+          was killed by SIGSEGV
+        """
+    )
+
+
+@pytest.mark.parametrize("width", [80, 100, 140, 200])
+def test_every_line_fits_and_is_plain(eight: list[TaskSummary], width: int) -> None:
+    """And of eight simulators at two tasks the short result is a screen."""
+    both = summarise(stacking_run() + stacking_run("gui") + throwing_run(), METRICS, REFERENCES)
+    whole, brief = render_run(both, width).splitlines(), render_brief(eight, width).splitlines()
+    for lines in (whole, brief):
+        assert max(map(len, lines)) <= width
+        assert all(
+            line.isascii() and line.isprintable() and line == line.rstrip() for line in lines
+        )
+    assert whole[0].startswith("2 simulators did stacking and throwing: 120 repetitions,")
+    assert any("pybullet: rolling friction is not modelled" in line for line in whole)
+    assert len(brief) <= MOST_LINES
+    for name in EIGHT:
+        assert sum(line.startswith(f"{name} ") for line in brief) == 2
+
+
+@pytest.mark.parametrize("width", [80, 140])
+def test_warnings_take_what_is_left_and_say_how_many_more(width: int) -> None:
+    records = run_of_eight(contended=True, reused_worker=True, notes=Notes(untested="an old one"))
+    for n, name in enumerate(EIGHT):
+        records += [
+            failed(kind, "load", "gone " * 50, simulator=name, repetition=30 + 10 * n + k)
+            for k, kind in enumerate(("WorkerDied", "WorkerHung"))
+        ]
+    report = render_brief(summarise(records, METRICS), width)
+    lines = report.splitlines()
+    assert len(lines) <= MOST_LINES
+    assert max(map(len, lines)) <= width
+    assert "CRASHED stacking, dart headless tuned: 1 x WorkerDied in" in report
+    assert re.fullmatch(r"\d+ more warnings with -v and in the report", lines[-1])
+
+
+def test_notes_of_one_text_stand_together_and_say_what_is_not_described() -> None:
+    report = render_brief(summarise(run_of_eight(contended=True), METRICS), 100)
+    assert report.count("note:") == 1
+    assert "note: all: repetitions ran in parallel: its times and CPU are contended" in report
+    undescribed = render_brief(summarise([record(metrics={"placed": 1.0})], {}), 100)
+    assert "note: stacking: the run does not say what its metrics mean" in undescribed
+
+
+def test_colour_wishes_of_the_environment_are_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
+    summaries = summarise(stacking_run(), METRICS)
+    plain = render_run(summaries, 80)
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "200")
+    assert render_run(summaries, 80) == plain
+
+
+def test_long_messages_are_wrapped_and_kept_whole() -> None:
+    words = [f"word{number}" for number in range(40)]
+    (summary,) = summarise([failed("WorkerHung", "settle", " ".join(words))], METRICS)
+    report = render(tables.failures(summary), 80)
+    assert max(map(len, report.splitlines())) <= 80
+    assert set(words) <= {word.rstrip(";") for word in report.split()}
+
+
+def test_a_simulator_that_only_failed_still_has_its_row() -> None:
+    gone = failed("WorkerDied", "load", "gone", repetition=1)
+    (summary,) = summarise([gone], METRICS)
+    assert "0 / 0 / 0" in render(tables.study(summary), 140)  # it counts, but not for the study
+    (summary,) = summarise([failed("WorkerDied", "load", "gone", protocol="paper")], METRICS)
+    assert render(tables.study(summary), 140).splitlines()[-1].split() == [
+        *["mujoco", "headless", "tuned", "1", "of", "1", "[3,", "100]", "%"],
+        *["-"] * 8,
+    ]
+    assert tables.time_spent(summary) == tables.stricter(summary) == []
+
+
+def test_few_repetitions_give_no_false_confidence_and_interrupted_ones_are_named() -> None:
+    cut = record(repetition=2, status="interrupted")
+    (summary,) = summarise([record(metrics={"placed": 14 / 15, "at_end": 1.0}), cut], METRICS)
+    report = render_task(summary, 100)
+    assert "placed: mujoco 93 % [2, 100]." in report
+    assert "at the end: mujoco 100 % [2, 100]." in report
+    assert "0 of 1" in report
+    assert "1 cut" in report
+
+
+def test_an_empty_run_prints_nothing() -> None:
+    assert render_run([], 80) == render_brief([], 80) == ""
+
+
+def test_a_table_too_wide_is_cut_by_group_and_its_rows_named_again() -> None:
+    columns = [
+        Column("name", ["a", "b"], left=True),
+        Column("first one", ["1", "2"], "x"),
+        Column("second", ["3", "4"], "y"),
+    ]
+    assert render(columns, 14) == text(
+        """
+              first
+        name    one
+        -----------
+        a         1
+        b         2
+
+        name  second
+        ------------
+        a          3
+        b          4
+        """
+    )
