@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .coverage import Plant
+from .planted import Plant
 
 
 def part(s: Any, name: str) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .coverage import Plant
+from .planted import Plant
 
 
 def com(s: Any) -> None:

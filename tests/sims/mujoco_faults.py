@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .coverage import Plant
+from .planted import Plant
 
 
 def geom(name: str, array: str, value: Any) -> Plant:
@@ -50,21 +50,6 @@ def weld(s: Any) -> None:
 
     s.model.eq_type[0] = mujoco.mjtEq.mjEQ_WELD
     s.model.eq_obj1id[0] = s.model.body("cube").id
-
-
-def shorter_table(s: Any) -> None:
-    import mujoco
-
-    s.model.geom("table").size[2] -= 0.012
-    s.model.body("table").pos[2] -= 0.012
-    mujoco.mj_forward(s.model, s.data)
-
-
-def gain(index: int) -> Plant:
-    def plant(s: Any) -> None:
-        s.model.actuator("panda_joint4").biasprm[index] *= 1.1
-
-    return plant
 
 
 def effort_limit(s: Any) -> None:
@@ -132,16 +117,6 @@ FAULTS: dict[str, Plant] = {
     "gripper/coupled, equalities switched off": off("EQUALITY"),
     "joint/panda_joint4/limits, switched off": off("LIMIT"),
     "joint/panda_joint4/stiffness, switched off": off("ACTUATION"),
-    "body/cube/mass": body("cube", "body_mass", 1.0),
-    "body/cube/inertia": lambda s: s.model.body("cube").inertia.__imul__(1.2),
-    "body/cube/friction": lambda s: s.model.geom("cube").friction.__setitem__(0, 0.5),
-    "gravity": lambda s: s.model.opt.gravity.__setitem__(2, -9.7),
-    "body/table/boxes": shorter_table,
-    "body/table/pose": shorter_table,
-    "joint/panda_joint4/stiffness": gain(1),
-    "joint/panda_joint4/damping": gain(2),
     "joint/panda_joint4/effort_limit": effort_limit,
-    "joint/panda_joint4/armature": joint("dof_armature", 0.0),
-    "link/panda_link4/mass": body("panda_link4", "body_mass", 5.0),
     "link/panda_leftfinger/friction, one shape": finger_shape,
 }

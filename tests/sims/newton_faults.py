@@ -6,35 +6,12 @@ of its own; the setting `fault` names the quantity.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from pytest_simbench.sims.newton.adapter import Newton
-from pytest_simbench.sims.newton.settings import NewtonSettings
 
-from pytest_simbench.scene import Scene
-from pytest_simbench.simulator import Settings
-
-
-@dataclass(frozen=True)
-class FaultySettings(NewtonSettings):
-    """Adds `fault`, a key of `FAULTS` or "" for none."""
-
-    fault: str = ""
-
-
-class FaultyNewton(Newton):
-    profiles: ClassVar[Mapping[str, Settings]] = {
-        name: FaultySettings(**asdict(settings)) for name, settings in Newton.profiles.items()
-    }
-    settings: FaultySettings
-
-    def load(self, scene: Scene) -> None:
-        super().load(scene)
-        if self.settings.fault:
-            FAULTS[self.settings.fault](self)
+from .planted import Plant, Planting
 
 
 def geom(s: Any, name: str) -> Any:
@@ -54,41 +31,15 @@ def joint(s: Any, name: str = "panda_joint4") -> int:
     return int(numbers.index(labels.index(name)))
 
 
-def gain(column: int) -> Callable[[Any], None]:
-    def plant(s: Any) -> None:
-        model = s.solver.mj_model
-        model.actuator_biasprm[model.actuator_trnid[:, 0] == joint(s), column] *= 1.1
-
-    return plant
-
-
 def effort_limit(s: Any) -> None:
     model = s.solver.mj_model
     model.actuator_forcerange[model.actuator_trnid[:, 0] == joint(s)] *= 2.0
     model.jnt_actfrcrange[joint(s)] *= 2.0
 
 
-def in_model(array: str, value: float) -> Callable[[Any], None]:
-    """Sets the row of joint 4 in an array of MuJoCo's joints or degrees of freedom."""
-
-    def plant(s: Any) -> None:
-        model, at = s.solver.mj_model, joint(s)
-        row = model.jnt_dofadr[at] if array.startswith("dof") else at
-        getattr(model, array)[row] = value
-
-    return plant
-
-
-def in_data(s: Any) -> None:
-    model, data = s.solver.mj_model, s.solver.mj_data
-    data.qpos[model.jnt_qposadr[joint(s)]] += 0.1
-
-
-def sunk_table(s: Any) -> None:
-    import mujoco
-
-    geom(s, "table").pos[2] -= 0.012
-    mujoco.mj_kinematics(s.solver.mj_model, s.solver.mj_data)
+def rubbing(s: Any) -> None:
+    model = s.solver.mj_model
+    model.dof_frictionloss[model.jnt_dofadr[joint(s)]] = 0.5
 
 
 def one_finger_shape(s: Any) -> None:
@@ -101,7 +52,7 @@ def uncouple(s: Any) -> None:
     s.solver.mj_data.eq_active[:] = 0
 
 
-def in_geom(name: str, array: str, value: Any) -> Callable[[Any], None]:
+def in_geom(name: str, array: str, value: Any) -> Plant:
     """Sets an array's rows of all geoms of a link, or of the one of a body or the ground."""
 
     def plant(s: Any) -> None:
@@ -113,7 +64,7 @@ def in_geom(name: str, array: str, value: Any) -> Callable[[Any], None]:
     return plant
 
 
-def ghost(name: str) -> Callable[[Any], None]:
+def ghost(name: str) -> Plant:
     def plant(s: Any) -> None:
         for array in ("geom_contype", "geom_conaffinity"):
             in_geom(name, array, 0)(s)
@@ -137,14 +88,14 @@ def damped(s: Any) -> None:
     s.solver.mj_model.dof_damping[start : start + 6] = 0.1
 
 
-def weightless(name: str) -> Callable[[Any], None]:
+def weightless(name: str) -> Plant:
     return lambda s: s.solver.mj_model.body_gravcomp.__setitem__(body(s, name).id, 1.0)
 
 
 BOUNCY = (0.02, 0.1)
 """MuJoCo's time constant and damping ratio of a contact that gives back most of the speed."""
 
-FAULTS: dict[str, Callable[[Any], None]] = {
+FAULTS: dict[str, Plant] = {
     "ground/restitution": in_geom("ground", "geom_solref", BOUNCY),
     "body/cube_05/restitution": in_geom("cube_05", "geom_solref", BOUNCY),
     "body/cube_05/margin": in_geom("cube_05", "geom_margin", 0.002),
@@ -157,24 +108,15 @@ FAULTS: dict[str, Callable[[Any], None]] = {
     "link/panda_link4/touches": ghost("panda_link4"),
     "link/panda_link4/damping": lambda s: setattr(s.solver.mj_model.opt, "viscosity", 0.1),
     "link/panda_link4/gravity": weightless("panda_link4"),
-    "joint/panda_joint4/friction": in_model("dof_frictionloss", 0.5),
-    "body/cube_05/mass": lambda s: body(s, "cube_05").mass.__setitem__(0, 1.0),
-    "body/cube_05/inertia": lambda s: body(s, "cube_05").inertia.__imul__(1.2),
-    "body/cube_05/friction": lambda s: geom(s, "cube_05").friction.__setitem__(0, 0.5),
-    "body/cube_05/boxes": lambda s: geom(s, "cube_05").size.__setitem__(1, 0.02),
-    "body/table/pose": sunk_table,
+    "joint/panda_joint4/friction": rubbing,
     "gravity": lambda s: s.solver.mj_model.opt.gravity.__setitem__(2, -9.7),
     "timestep": lambda s: setattr(s.solver.mj_model.opt, "timestep", 0.005),
     "ground/height": lifted_ground,
-    "ground/friction": lambda s: geom(s, "ground").friction.__setitem__(0, 0.5),
-    "joint/panda_joint4/stiffness": gain(1),
-    "joint/panda_joint4/damping": gain(2),
     "joint/panda_joint4/effort_limit": effort_limit,
-    "joint/panda_joint4/armature": in_model("dof_armature", 0.0),
-    "joint/panda_joint4/limits": in_model("jnt_range", 1.0),
-    "joint/panda_joint4/initial_position": in_data,
-    "link/panda_link4/mass": lambda s: body(s, "panda_link4").mass.__setitem__(0, 5.0),
-    "link/panda_link4/inertia": lambda s: body(s, "panda_link4").inertia.__imul__(1.2),
     "link/panda_leftfinger/friction": one_finger_shape,
     "gripper/coupled": uncouple,
 }
+
+
+class FaultyNewton(Planting, Newton):
+    faults = FAULTS

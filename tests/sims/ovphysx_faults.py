@@ -19,22 +19,8 @@ FAULTS: dict[str, tuple[str, str, str]] = {
         '"Z"\ndouble3 xformOp:translate = (0, 0, 0.01)\n'
         'uniform token[] xformOpOrder = ["xformOp:translate"]',
     ),
-    "body/brick/mass": ("body_1", "physics:mass", "1"),
-    "body/brick/inertia": ("body_1", "physics:diagonalInertia", "(1e-4, 1e-4, 1e-4)"),
     "body/brick/pose": ("body_1", "xformOp:translate", "(0.5, 0.1, 0.316)"),
-    "body/brick/boxes": ("body_1", "xformOp:scale", "(0.1, 0.06, 0.031)"),
-    "body/brick/friction": ("body_1", "material:binding:physics", "</World/friction_1p0>"),
-    "body/table/pose": ("body_0", "xformOp:translate", "(0.8, 0, 0.14)"),
-    "body/table/boxes": ("body_0", "xformOp:scale", "(0.9, 0.8, 0.3)"),
-    "body/table/friction": ("friction_0p7", "physics:dynamicFriction", "0.6"),
-    "joint/panda_joint4/limits": ("joint_3", "physics:lowerLimit", "-170"),
-    "joint/panda_joint4/effort_limit": ("joint_3", "drive:angular:physics:maxForce", "90"),
-    "joint/panda_joint4/stiffness": ("joint_3", "drive:angular:physics:stiffness", "3500"),
-    "joint/panda_joint4/damping": ("joint_3", "drive:angular:physics:damping", "350"),
-    "joint/panda_joint4/armature": ("joint_3", "physxJointAxis:angular:armature", "0"),
     "joint/panda_joint4/initial_position": ("joint_3", "state:angular:physics:position", "-90"),
-    "link/panda_link4/mass": ("link_4", "physics:mass", "5"),
-    "link/panda_link4/inertia": ("link_4", "physics:diagonalInertia", "(1, 1, 1)"),
     "body/brick/com": ("body_1", "physics:centerOfMass", "(0.01, 0, 0)"),
     "body/brick/gravity": (
         "body_1",
@@ -62,11 +48,6 @@ FAULTS: dict[str, tuple[str, str, str]] = {
         "joint_3",
         "physxJointAxis:angular:armature",
         "0.1\nfloat physxJointAxis:angular:staticFrictionEffort = 0.5",
-    ),
-    "link/panda_leftfinger/friction": (
-        "link_8",
-        "material:binding:physics",
-        "</World/friction_0p7>",
     ),
 }
 """Prim, attribute and wrong value, by the quantity that must be found wrong."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .coverage import Plant
+from .planted import Plant
 
 
 def bullet(name: str, link: str = "", **change: Any) -> Plant:
@@ -29,20 +29,6 @@ def height(s: Any) -> None:
 
     pybullet.resetBasePositionAndOrientation(
         s._ground, [0, 0, 0.01], [0, 0, 0, 1], physicsClientId=s.client
-    )
-
-
-def gravity(s: Any) -> None:
-    import pybullet
-
-    pybullet.setGravity(0, 0, -9.7, physicsClientId=s.client)
-
-
-def table(s: Any) -> None:
-    import pybullet
-
-    pybullet.resetBasePositionAndOrientation(
-        s._bodies["table"], [0.8, 0, 0.138], [0, 0, 0, 1], physicsClientId=s.client
     )
 
 
@@ -90,11 +76,4 @@ FAULTS: dict[str, Plant] = {
     "body/cube/dynamic": held,
     "link/panda_link4/restitution": bullet("robot", "panda_link4", restitution=0.5),
     "gripper/coupled": uncoupled,
-    "gravity": gravity,
-    "body/table/pose": table,
-    "body/cube/mass": bullet("cube", mass=1.0),
-    "body/cube/inertia": bullet("cube", localInertiaDiagonal=[1e-4, 1e-4, 1e-4]),
-    "body/cube/friction": bullet("cube", lateralFriction=0.5),
-    "link/panda_leftfinger/friction": bullet("robot", "panda_leftfinger", lateralFriction=0.5),
-    "link/panda_link4/mass": bullet("robot", "panda_link4", mass=5.0),
 }

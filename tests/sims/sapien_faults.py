@@ -8,7 +8,7 @@ import numpy as np
 
 from pytest_simbench.testing.faults import true_scene
 
-from .coverage import Plant
+from .planted import Plant
 
 
 def shape(name: str, setter: str, *values: Any) -> Plant:

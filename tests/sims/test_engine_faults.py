@@ -2,7 +2,7 @@
 `read_back` then tells the change.
 
 What a scene can express is changed by the kit (`testing.faults`), in every engine; the rest here,
-through each engine's own functions (`ENGINE_faults.py`), and some of the former again.
+through each engine's own functions (`ENGINE_faults.py`).
 `test_nothing_is_left_out` holds the two lists together against all that the adapter reads back.
 """
 
@@ -21,7 +21,8 @@ from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.testing.faults import true_scene
 from tests.conftest import HERE
 
-from .coverage import Plant, uncovered
+from .coverage import uncovered
+from .planted import Plant
 
 SCENE = true_scene()
 
