@@ -21,9 +21,8 @@ from pytest_simbench.simulator.parity import ParityResult
 from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.testing import CHECKS, Subject
 from pytest_simbench.testing.expected import read_expected_failures, reason_for
-from pytest_simbench.testing.faults import FAULTS, rounds
+from pytest_simbench.testing.faults import FAULTS, Fault, rounds
 from pytest_simbench.testing.parity import planted
-from pytest_simbench.testing.robot_faults import Fault
 
 PAGE = Path(__file__).parent.parent / "docs" / "parity.md"
 EXPECTED = read_expected_failures(PAGE.parents[1] / "tests" / "sims" / "expected_failures.txt")

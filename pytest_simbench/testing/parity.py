@@ -15,8 +15,7 @@ from pytest_simbench.simulator.parity import ParityResult, compare
 from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
-from pytest_simbench.testing.faults import rounds, true_scene
-from pytest_simbench.testing.robot_faults import Fault, robot_faults
+from pytest_simbench.testing.faults import Fault, robot_faults, rounds, true_scene
 from pytest_simbench.testing.robots import any_robot
 from pytest_simbench.testing.state import require_same, swung
 from pytest_simbench.testing.subject import Subject, require
@@ -77,7 +76,7 @@ def reading_changes_nothing(subject: Subject) -> None:
 def planted_faults_are_seen(subject: Subject) -> None:
     """Parity sees each fault of `testing.faults.FAULTS` that the adapter does not declare as not
     told; also when the adapter is made to remember the true scene, so that it must ask the engine.
-    With another robot than the Panda the faults are those of `testing.robot_faults`.
+    With another robot than the Panda the faults are those of `testing.faults.robot_faults`.
     """
     missed = []
     robot, capabilities = subject.robot, subject.cls.info.capabilities
