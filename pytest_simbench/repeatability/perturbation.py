@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
-from pytest_simbench.scene import Pose, Robot, Scene, SceneError
+from pytest_simbench.scene import Pose, Scene, SceneError
 
 if TYPE_CHECKING:
     from hypothesis.strategies import SearchStrategy
@@ -97,25 +97,20 @@ class Perturbation:
         Raises:
             SceneError: a cube would be inside another body.
         """
+        factor = 1 + self.amount
         if self.quantity == "delay":
             return scene
         if self.quantity == "friction":
-            return _with_friction(scene, 1 + self.amount)
+            return _with_friction(scene, factor)
         if self.quantity == "squeeze":
-            return replace(scene, robot=_squeezing(_robot(scene), 1 + self.amount))
+            return _squeezing(scene, factor)
         body = scene.body(self.body)
         if self.quantity == "mass":
-            return scene.with_body(body.changed(mass=body.mass * (1 + self.amount)))
-        return scene.with_pose(self.body, _moved(body.pose, self.quantity, self.amount))
-
-
-def _moved(pose: Pose, quantity: str, amount: float) -> Pose:
-    if quantity == "x":
-        return pose.translated(x=amount)
-    if quantity == "y":
-        return pose.translated(y=amount)
-    turned = Pose.at(0, 0, 0, yaw=amount) * Pose(quaternion=pose.quaternion)
-    return Pose(pose.position, turned.quaternion)
+            return scene.with_body(body.changed(mass=body.mass * factor))
+        if self.quantity == "yaw":
+            turned = Pose.at(0, 0, 0, yaw=self.amount) * Pose(quaternion=body.pose.quaternion)
+            return scene.with_pose(self.body, Pose(body.pose.position, turned.quaternion))
+        return scene.with_pose(self.body, body.pose.translated(**{self.quantity: self.amount}))
 
 
 def _with_friction(scene: Scene, factor: float) -> Scene:
@@ -126,20 +121,17 @@ def _with_friction(scene: Scene, factor: float) -> Scene:
     )
 
 
-def _robot(scene: Scene) -> Robot:
-    if scene.robot is None:
+def _squeezing(scene: Scene, factor: float) -> Scene:
+    robot = scene.robot
+    if robot is None:
         raise ValueError(f"scene {scene.name!r} has no robot whose gripper could be perturbed")
-    return scene.robot
-
-
-def _squeezing(robot: Robot, factor: float) -> Robot:
     fingers = robot.gripper.joints
     joints = tuple(
         replace(joint, effort_limit=joint.effort_limit * factor) if joint.name in fingers else joint
         for joint in robot.joints
     )
     gripper = replace(robot.gripper, squeeze=robot.gripper.squeeze * factor)
-    return replace(robot, joints=joints, gripper=gripper)
+    return replace(scene, robot=replace(robot, joints=joints, gripper=gripper))
 
 
 def perturbed(scene: Scene, perturbations: Sequence[Perturbation]) -> Scene:

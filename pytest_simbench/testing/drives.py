@@ -106,17 +106,9 @@ def effort_limit_bounds_acceleration(subject: Subject) -> None:
     of rotor inertia is left out of M. An arm whose limit would turn it by more than 1 rad in that
     time, had it no rotor, gets the time for 1 rad."""
     robot = scenes.lifted(subject.arm)
-    start = robot.column("initial_position")
-    limit = robot.joints[0].effort_limit
+    start, limit = robot.column("initial_position"), robot.joints[0].effort_limit
     seconds = min(0.1, (2 * 1.0 * own_inertia(robot, start, 0, armature=False) / limit) ** 0.5)
-    goal = start.copy()
-    goal[0] += _far(robot)
-    far = Trajectory.holding(subject.timestep, goal)
-    with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "arm weightless")) as world:
-        world.follow(far)
-        world.wait(seconds - subject.timestep)
-        t, (q, v) = world.time, world.joints
-    momentum = float(joint_momentum(robot, q, v, has_armature(subject))[0])
+    t, momentum = pushed(subject, robot, 0, _far(robot), seconds)
     require(
         momentum <= 1.05 * limit * t,
         f"joint 1 gained {momentum:.3g} N m s in {t:.3g} s, its limit allows {limit * t:.3g}",
@@ -125,6 +117,20 @@ def effort_limit_bounds_acceleration(subject: Subject) -> None:
         momentum >= 0.8 * limit * t,
         f"joint 1 gained only {momentum:.3g} N m s of {limit * t:.3g}: the drive is too weak",
     )
+
+
+def pushed(
+    subject: Subject, robot: Robot, k: int, way: float, seconds: float
+) -> tuple[float, float]:
+    """Time [s] and momentum of joint `k` after it was told to go `way` [rad] from its start, too
+    far to get there, without gravity."""
+    goal = robot.column("initial_position")
+    goal[k] += way
+    with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "arm weightless")) as world:
+        world.follow(Trajectory.holding(subject.timestep, goal))
+        world.wait(seconds - subject.timestep)
+        q, v = world.joints
+        return world.time, float(joint_momentum(robot, q, v, has_armature(subject))[k])
 
 
 def _far(robot: Robot) -> float:

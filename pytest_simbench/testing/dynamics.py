@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.laws.loops import FourBarClosure, FourBarSwing
-from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Trajectory
+from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Trajectory, Vector3
 from pytest_simbench.simulator import Capability, PreparedRobot
 from pytest_simbench.simulator.kinematics import link_poses
 from pytest_simbench.testing import scenes
@@ -17,9 +17,9 @@ from pytest_simbench.testing.drives import (
     gravity_effort,
     has_armature,
     hold_command,
-    joint_momentum,
     model_of,
     own_inertia,
+    pushed,
 )
 from pytest_simbench.testing.robots import any_robot
 from pytest_simbench.testing.subject import Subject, asked, require, require_close
@@ -116,31 +116,23 @@ def every_effort_limit_counts(subject: Subject) -> None:
 
 def _speeds_up(subject: Subject, robot: Robot, k: int) -> None:
     """Joint `k`, under a far command without gravity, gains its limit times the time."""
-    seconds, name, armature = 0.05, robot.joints[k].name, has_armature(subject)
-    start = robot.column("initial_position")
-    limit = min(0.5, 2 * 0.3 * own_inertia(robot, start, k, armature) / seconds**2)
+    seconds, name, start = 0.05, robot.joints[k].name, robot.column("initial_position")
+    inertia = own_inertia(robot, start, k, has_armature(subject))
+    limit = min(0.5, 2 * 0.3 * inertia / seconds**2)
     robot = scenes.with_joint(robot, name, effort_limit=limit, stiffness=100.0, damping=1e-3)
-    goal = start.copy()
-    goal[k] += 1.0 if goal[k] < 0 else -1.0
-    far = Trajectory.holding(subject.timestep, goal)
-    with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "speeding up")) as world:
-        world.follow(far)
-        world.wait(seconds - subject.timestep)
-        t, (q, v) = world.time, world.joints
-    gained = abs(float(joint_momentum(robot, q, v, armature)[k]))
-    require_close(f"momentum gained by {name}", gained, 0.925 * limit * t, 0.125 * limit * t, "")
+    t, momentum = pushed(subject, robot, k, 1.0 if start[k] < 0 else -1.0, seconds)
+    middle, off = 0.925 * limit * t, 0.125 * limit * t
+    require_close(f"momentum gained by {name}", abs(momentum), middle, off, "")
 
 
-def _gives_way(subject: Subject, robot: Robot, gravity: tuple[float, float, float]) -> FloatArray:
+def _gives_way(subject: Subject, robot: Robot, gravity: Vector3) -> FloatArray:
     """How far the arm's joints move in `_GIVING` under a command to stay, gravity compensated."""
-    start = robot.column("initial_position")
-    effort = gravity_effort(robot, start, gravity)
-    hold = Trajectory.holding(subject.timestep, start, effort)
-    with subject.world(scenes.arm_alone(robot, gravity, "weak arm")) as world:
-        world.follow(hold)
+    scene = scenes.arm_alone(robot, gravity, "weak arm")
+    with subject.world(scene) as world:
+        world.follow(hold_command(scene, subject.timestep))
         world.wait(_GIVING)
-        moved = np.abs(world.joints[0] - start)[: len(robot.arm_joints)]
-    return np.asarray(moved)
+        moved = np.abs(world.joints[0] - robot.column("initial_position"))
+    return np.asarray(moved[: len(robot.arm_joints)])
 
 
 @check(robot=any_robot)

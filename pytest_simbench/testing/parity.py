@@ -15,13 +15,11 @@ from pytest_simbench.simulator.parity import ParityResult, compare
 from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
+from pytest_simbench.testing.contract import SINGLE
 from pytest_simbench.testing.faults import Fault, robot_faults, rounds, true_scene
 from pytest_simbench.testing.robots import any_robot
 from pytest_simbench.testing.state import require_same, swung
 from pytest_simbench.testing.subject import Subject, require
-
-POSITION = 1e-5
-"""Engines in single precision keep about 7 digits; after some arithmetic 5 are safe."""
 
 
 @check(robot=any_robot)
@@ -58,7 +56,7 @@ def read_back_is_the_engines(subject: Subject) -> None:
         pose = np.asarray(world.process.request("read_back")["body/falling/pose"])
         step = float(np.linalg.norm(world.bodies[0, 7:10])) * subject.timestep
         require(
-            np.allclose(pose[:3], world.bodies[0, :3], atol=POSITION + step),
+            np.allclose(pose[:3], world.bodies[0, :3], atol=SINGLE + step),
             f"read_back gives position {pose[:3]} of a cube that is at {world.bodies[0, :3]}",
         )
 
