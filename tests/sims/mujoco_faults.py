@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
-from .planted import Plant
+from .planted import Plant, Planting
 
 
 def geom(name: str, array: str, value: Any) -> Plant:
@@ -120,3 +121,7 @@ FAULTS: dict[str, Plant] = {
     "joint/panda_joint4/effort_limit": effort_limit,
     "link/panda_leftfinger/friction, one shape": finger_shape,
 }
+
+
+class FaultyMuJoCo(Planting, MuJoCo):
+    faults = FAULTS

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from .planted import Plant
+from pytest_simbench.sims.pybullet.adapter import PyBullet
+
+from .planted import Plant, Planting
 
 
 def bullet(name: str, link: str = "", **change: Any) -> Plant:
@@ -42,7 +44,7 @@ def held(s: Any) -> None:
 
 
 def com(s: Any) -> None:
-    """A cube like the other, its centre of mass aside, in its place."""
+    """A cube like the other in its place, its centre of mass aside in it."""
     import pybullet
 
     pybullet.removeBody(s._bodies["cube"], physicsClientId=s.client)
@@ -51,7 +53,7 @@ def com(s: Any) -> None:
         pybullet.GEOM_BOX, halfExtents=half, physicsClientId=s.client
     )
     s._bodies["cube"] = pybullet.createMultiBody(
-        0.1, shape, -1, [0.6, -0.1, 0.325], baseInertialFramePosition=[0.01, 0, 0],
+        0.1, shape, -1, [0.59, -0.1, 0.325], baseInertialFramePosition=[0.01, 0, 0],
         physicsClientId=s.client,
     )  # fmt: skip
 
@@ -77,3 +79,7 @@ FAULTS: dict[str, Plant] = {
     "link/panda_link4/restitution": bullet("robot", "panda_link4", restitution=0.5),
     "gripper/coupled": uncoupled,
 }
+
+
+class FaultyPyBullet(Planting, PyBullet):
+    faults = FAULTS
