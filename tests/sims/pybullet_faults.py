@@ -6,6 +6,8 @@ from typing import Any
 
 from pytest_simbench.sims.pybullet.adapter import PyBullet
 
+from pytest_simbench.scene import Pose
+
 from .planted import Plant, Planting
 
 
@@ -52,9 +54,11 @@ def com(s: Any) -> None:
     shape = pybullet.createCollisionShape(
         pybullet.GEOM_BOX, halfExtents=half, physicsClientId=s.client
     )
+    pose = s.scene.body("cube").pose
+    (w, *xyz), aside = pose.quaternion, Pose.at(-0.01, 0.0, 0.0)
     s._bodies["cube"] = pybullet.createMultiBody(
-        0.1, shape, -1, [0.59, -0.1, 0.325], baseInertialFramePosition=[0.01, 0, 0],
-        physicsClientId=s.client,
+        0.1, shape, -1, (pose * aside).position, [*xyz, w],
+        baseInertialFramePosition=[0.01, 0, 0], physicsClientId=s.client,
     )  # fmt: skip
 
 
