@@ -9,7 +9,6 @@ import pytest
 
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.repeatability.episode import Episodes
-from pytest_simbench.repeatability.motions import Difference
 from pytest_simbench.repeatability.replay import replay
 from pytest_simbench.repeatability.replay_result import Again, Replay
 from pytest_simbench.simulator import Capability
@@ -225,23 +224,3 @@ def test_an_interrupt_ends_what_runs_side_by_side(
             jobs=3,
         )
     assert [handle._process for handle in workers] == [None, None]
-
-
-@pytest.mark.parametrize(
-    "again",
-    [
-        Again("a"),
-        Again("b", Difference(1.5, "cube", {1.0: 0.1, 20.0: None}, 0.2), ("left",), 1.0),
-        Again("c", skipped="no display"),
-        Again("d", failure="WorkerExited: x"),
-    ],
-)
-def test_results_travel(again: Again) -> None:
-    assert Again.from_wire(again.to_wire()) == again
-
-
-def test_text_of_a_difference() -> None:
-    again = Again("b", Difference(1.5, "cube", {1.0: 0.1, 20.0: None}, 0.2), ("left",))
-    assert again.text == (
-        "first differs at t = 1.50 s (cube), then 100 mm 1 s later, 200 mm at most; changed left"
-    )
