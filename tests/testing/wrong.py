@@ -47,11 +47,6 @@ class NoTuned(MuJoCo):
     del profiles["default"]
 
 
-class DoubleGravity(Lying):
-    def tamper(self) -> None:
-        self.model.opt.gravity *= 2
-
-
 class Air(Lying):
     def step(self) -> None:
         super().step()
@@ -182,10 +177,6 @@ class OneShot(MuJoCo):
             self.data.ctrl[:] = self.scene.robot.column("initial_position")
 
 
-class Echo(Lying):
-    """Reads back the scene as it was loaded."""
-
-
 class WrongMass(Lying):
     def tamper(self) -> None:
         self.model.body_mass[-1] *= 1.5
@@ -193,23 +184,11 @@ class WrongMass(Lying):
         self.model.dof_M0[-6:] *= 1.5  # which the engine takes for bodies that nothing hangs on
 
 
-class HalfFriction(Lying):
-    def tamper(self) -> None:
-        self.model.geom_friction[:, 0] *= 0.9
-
-
 class DeepGround(Lying):
     def tamper(self) -> None:
         ground = self.model.geom("ground").id
         self.model.geom_pos[ground, 2] -= 0.003
         self.model.geom_sameframe[ground] = 0  # else the engine takes the body's frame
-
-
-class Shaking(Lying):
-    """Pushes every body sideways with a tenth of its weight."""
-
-    def tamper(self) -> None:
-        self.model.opt.gravity[0] += 12.0
 
 
 class Meddler(MuJoCo):
