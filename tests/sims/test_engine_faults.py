@@ -82,7 +82,7 @@ ENGINES = {
     ),
     "genesis": Engine(genesis_faults.FaultyGenesis, genesis_faults.FAULTS, STACKING),
     "mujoco": Engine(mujoco_faults.FaultyMuJoCo, mujoco_faults.FAULTS),
-    "newton": Engine(newton_faults.FaultyNewton, newton_faults.FAULTS, STACKING),
+    "newton": Engine(newton_faults.FaultyNewton, newton_faults.FAULTS),
     "ode": Engine(ode_faults.FaultyODE, ode_faults.FAULTS, STACKING),
     "pybullet": Engine(
         pybullet_faults.FaultyPyBullet,
