@@ -132,15 +132,8 @@ def _require_touch(subject: Subject, approach: Approach, places: FloatArray) -> 
     declared = [d.within or 0.0 for d in subject.cls.info.deviations if d.excuses(name)]
     allowed = 3e-3 + max(declared, default=0.0)
     travelled = (places - approach.start) @ approach.direction
-    far = float(travelled.max())
-    require(
-        far < approach.distance + allowed,
-        f"a cube flew {1000 * (far - approach.distance):.2g} mm into {approach.link}",
-    )
-    require(
-        far > approach.distance - allowed,
-        f"a cube stopped {1000 * (approach.distance - far):.2g} mm before {approach.link}",
-    )
+    what = f"way of a cube that flies upon {approach.link}"
+    require_close(what, float(travelled.max()), approach.distance, allowed, "m")
 
 
 @check()

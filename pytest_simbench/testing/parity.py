@@ -88,19 +88,12 @@ def planted_faults_are_seen(subject: Subject) -> None:
 
 def planted(subject: Subject, faults: Iterable[Fault]) -> ParityResult:
     """A world with the faults, read back by an adapter that remembers the true scene."""
-    truth = _truth(subject)
-    subject.can_build(truth)
-    process = subject.shared()
-    faulty = truth
+    truth = faulty = _truth(subject)
     with tempfile.TemporaryDirectory() as folder:
         for fault in faults:
             faulty = fault.plant(faulty, Path(folder))
-        wire = faulty.to_wire()
-        subject.construct(process)
-        if process.launch.compile_timeout:
-            process.request("compile", timeout=process.launch.compile_timeout, scene=wire)
-        process.request("load", timeout=600.0, scene=wire, parity=False)
-        reported = process.request("read_back", remember=truth.to_wire())
+        with subject.world(faulty, parity=False) as world:
+            reported = world.process.request("read_back", remember=truth.to_wire())
     return compare(
         expected_quantities(truth, subject.settings),
         reported,
