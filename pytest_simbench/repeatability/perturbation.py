@@ -178,39 +178,27 @@ def perturbations(
     from hypothesis import strategies as st
 
     limits = {q.name: q.bound for q in QUANTITIES.values()} if bounds is None else dict(bounds)
-    choices = [
-        _of_quantity(scene, quantity, limits[quantity.name])
-        for quantity in _chosen(scene, limits, explicit=bounds is not None)
-    ]
+    for name in (name for name in limits if name not in QUANTITIES):
+        raise ValueError(f"no quantity is named {name!r}; choose from {', '.join(QUANTITIES)}")
+    there = {"cube": bool(scene.free_bodies), "scene": True, "robot": scene.robot is not None}
+    choices = []
+    for quantity in (q for q in QUANTITIES.values() if q.name in limits):
+        bound = limits[quantity.name]
+        if not bound >= quantity.step:
+            raise ValueError(
+                f"the bound of {quantity.name}, {bound:g}, is below its smallest step, "
+                f"{quantity.step:g}"
+            )
+        if there[quantity.of]:
+            choices.append(_of_quantity(scene, quantity, bound))
+        elif bounds is not None:
+            raise ValueError(f"scene {scene.name!r} has no {quantity.of} to perturb")
     if not choices:
         raise ValueError(f"scene {scene.name!r} has nothing that could be perturbed")
     lists = st.lists(
         st.one_of(choices), min_size=1, max_size=at_most, unique_by=lambda p: (p.quantity, p.body)
     )
     return lists.map(tuple).filter(lambda found: fits(scene, found))
-
-
-def _chosen(scene: Scene, limits: Mapping[str, float], *, explicit: bool) -> list[Quantity]:
-    unknown = [name for name in limits if name not in QUANTITIES]
-    if unknown:
-        raise ValueError(
-            f"no quantity is named {unknown[0]!r}; choose from {', '.join(QUANTITIES)}"
-        )
-    chosen = []
-    for quantity in QUANTITIES.values():
-        if quantity.name not in limits:
-            continue
-        if not limits[quantity.name] >= quantity.step:
-            raise ValueError(
-                f"the bound of {quantity.name}, {limits[quantity.name]:g}, is below its smallest "
-                f"step, {quantity.step:g}"
-            )
-        there = {"cube": bool(scene.free_bodies), "scene": True, "robot": scene.robot is not None}
-        if there[quantity.of]:
-            chosen.append(quantity)
-        elif explicit:
-            raise ValueError(f"scene {scene.name!r} has no {quantity.of} to perturb")
-    return chosen
 
 
 def _of_quantity(scene: Scene, quantity: Quantity, bound: float) -> SearchStrategy[Perturbation]:
