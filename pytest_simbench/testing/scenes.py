@@ -48,6 +48,15 @@ def falling() -> Scene:
     )
 
 
+def thrown() -> Scene:
+    """A turned cube that starts with velocities in all six directions."""
+    turn = Pose((0.1, -0.2, 2.0), (0.5, 0.5, -0.1, 0.7))
+    body = replace(
+        cube("thrown", turn), linear_velocity=(1.0, -0.7, 1.5), angular_velocity=(3.0, -2.0, 1.5)
+    )
+    return Scene("thrown", (body,))
+
+
 def ball(height: float, **values: Any) -> Sphere:
     """A ball whose centre is so high above the origin [m]."""
     return Sphere("ball", RADIUS, Pose.at(0.0, 0.0, height), MASS, **values)

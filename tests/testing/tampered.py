@@ -78,6 +78,12 @@ def fat_link(s: Any) -> None:
     s.model.geom_sameframe[rows] = 0
 
 
+def own_spin(s: Any) -> None:
+    """Bodies start with the scene's angular velocity in their own axes."""
+    for body, rows in zip(s.scene.free_bodies, s._body_v, strict=True):
+        s.data.qvel[rows + 3] = body.angular_velocity
+
+
 def wrong_centre(s: Any) -> None:
     """The centre of mass of link 4 is 100 mm off."""
     link = s.model.body("panda_link4").id
@@ -91,6 +97,7 @@ NO_LIMIT = (put("model.actuator_forcelimited", 0), put("model.jnt_actfrclimited"
 WORLDS: dict[str, tuple[tuple[Tamper, ...], tuple[str, ...]]] = {
     "Echo": ((), ("read_back_is_the_engines",)),
     "DoubleGravity": ((times("model.opt.gravity", 2),), ("free_fall",)),
+    "OwnSpin": ((own_spin,), ("thrown_as_the_scene_says",)),
     "HalfFriction": ((times("model.geom_friction", 0.9, SLIDING),),
                      ("slides_above_mu", "slides_alike_diagonally", "meshes_rest_and_slide")),
     "Shaking": ((add("model.opt.gravity", 12.0, 0),), ("tower_stands",)),
