@@ -1,16 +1,19 @@
 """Omniverse PhysX with one planted fault each: its stage says something else than the scene.
 
-Workers load the adapters from here as `tests.sims.ovphysx_faults:NAME`.
+Workers load the adapter from here as `tests.sims.ovphysx_faults:FaultyOvPhysX`; its setting `fault`
+names the quantity.
 """
 
 from __future__ import annotations
 
 import re
-from typing import Any, ClassVar
+from typing import Any
 
 import pytest_simbench.sims.ovphysx.adapter as adapter
 
 from pytest_simbench.scene import Scene
+
+from .planted import Planting
 
 FAULTS: dict[str, tuple[str, str, str]] = {
     "ground/height": (
@@ -53,14 +56,12 @@ FAULTS: dict[str, tuple[str, str, str]] = {
 """Prim, attribute and wrong value, by the quantity that must be found wrong."""
 
 
-class Edited(adapter.OvPhysX):
+class FaultyOvPhysX(Planting, adapter.OvPhysX):
     """Hands PhysX a stage in which one attribute has another value."""
-
-    fault: ClassVar[tuple[str, str, str]]
 
     def load(self, scene: Scene) -> None:
         honest = adapter.Session
-        prim, attribute, value = self.fault
+        prim, attribute, value = FAULTS[self.settings.fault]
         pattern = rf'(def \w+ "{prim}".*?\n[\w\[\] ]+ {attribute} = )[^\n]+'
 
         def edited(text: str, threads: int) -> Any:
@@ -71,22 +72,6 @@ class Edited(adapter.OvPhysX):
 
         adapter.Session = edited
         try:
-            super().load(scene)
+            adapter.OvPhysX.load(self, scene)
         finally:
             adapter.Session = honest
-
-
-def faulty(quantity: str) -> type[Edited]:
-    """The adapter that gets that quantity wrong."""
-    found: type[Edited] = globals()[_name(quantity)]
-    return found
-
-
-def _name(quantity: str) -> str:
-    return "Wrong_" + quantity.replace("/", "_")
-
-
-for _quantity, _fault in FAULTS.items():
-    globals()[_name(_quantity)] = type(
-        _name(_quantity), (Edited,), {"fault": _fault, "__module__": __name__}
-    )

@@ -22,27 +22,20 @@ def bullet(name: str, link: str = "", **change: Any) -> Plant:
     return plant
 
 
-def timestep(s: Any) -> None:
-    import pybullet
+def call(name: str, *arguments: Any) -> Plant:
+    """A function of PyBullet called; arguments may be functions of the adapter."""
 
-    pybullet.setTimeStep(0.002, physicsClientId=s.client)
+    def plant(s: Any) -> None:
+        import pybullet
 
+        given = (argument(s) if callable(argument) else argument for argument in arguments)
+        getattr(pybullet, name)(*given, physicsClientId=s.client)
 
-def height(s: Any) -> None:
-    import pybullet
-
-    pybullet.resetBasePositionAndOrientation(
-        s._ground, [0, 0, 0.01], [0, 0, 0, 1], physicsClientId=s.client
-    )
+    return plant
 
 
-def held(s: Any) -> None:
-    import pybullet
-
-    pybullet.createConstraint(
-        s._bodies["cube"], -1, -1, -1, pybullet.JOINT_FIXED, [0] * 3, [0] * 3, [0] * 3,
-        physicsClientId=s.client,
-    )  # fmt: skip
+HELD = (-1, -1, -1, 4, [0] * 3, [0] * 3, [0] * 3)
+"""A cube's fixed joint (`JOINT_FIXED` is 4) with the world."""
 
 
 def com(s: Any) -> None:
@@ -66,20 +59,20 @@ def uncoupled(s: Any) -> None:
     import pybullet
 
     pybullet.removeConstraint(s._couplings[0], physicsClientId=s.client)
-    s._couplings[0] = pybullet.createConstraint(
-        s._bodies["cube"], -1, -1, -1, pybullet.JOINT_FIXED, [0] * 3, [0] * 3, [0] * 3,
-        physicsClientId=s.client,
-    )  # fmt: skip
+    cube = s._bodies["cube"]
+    s._couplings[0] = pybullet.createConstraint(cube, *HELD, physicsClientId=s.client)
 
 
 FAULTS: dict[str, Plant] = {
-    "timestep": timestep,
-    "ground/height": height,
+    "timestep": call("setTimeStep", 0.002),
+    "ground/height": call(
+        "resetBasePositionAndOrientation", lambda s: s._ground, [0, 0, 0.01], [0, 0, 0, 1]
+    ),
     "ground/restitution": bullet("ground", restitution=0.5),
     "body/cube/restitution": bullet("cube", restitution=0.5),
     "body/cube/margin": bullet("cube", collisionMargin=0.005),
     "body/cube/com": com,
-    "body/cube/dynamic": held,
+    "body/cube/dynamic": call("createConstraint", lambda s: s._bodies["cube"], *HELD),
     "link/panda_link4/restitution": bullet("robot", "panda_link4", restitution=0.5),
     "gripper/coupled": uncoupled,
 }
