@@ -17,6 +17,7 @@ from pytest_simbench.records.lines import Found, LinesFile, Unwritten
 NAME = "repeatability.jsonl"
 SCHEMA = 1
 
+Kind = Literal["replay", "search", "stability", "sensitivity"]
 Seconds = Annotated[str, msgspec.Meta(pattern=r"^\d+(\.\d+)?$")]
 """A time as a key."""
 
@@ -60,7 +61,7 @@ class Line:
         result: `Replayed` or `Told`, with more, see `replay`, `search` and `stability`.
     """
 
-    kind: Literal["replay", "search", "stability", "sensitivity"]
+    kind: Kind
     test: str
     simulator: str
     mode: str
