@@ -22,9 +22,8 @@ from pytest_simbench.simulator.parity import ParityResult
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.testing import CHECKS, Subject
 from pytest_simbench.testing.expected import read_expected_failures, reason_for
-from pytest_simbench.testing.faults import FAULTS, rounds
+from pytest_simbench.testing.faults import FAULTS, Fault, rounds
 from pytest_simbench.testing.parity import planted
-from pytest_simbench.testing.robot_faults import Fault
 
 TABLE = ROOT / "docs" / "data" / "planted_faults.csv"
 EXPECTED = read_expected_failures(ROOT / "tests" / "sims" / "expected_failures.txt")

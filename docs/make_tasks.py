@@ -190,7 +190,7 @@ def arm_following() -> str:
 
 
 def source_simulations() -> str:
-    """What the source's own simulations have (`benchmarks/source_simulations.py` of commit 6084227)."""
+    """The source's own simulations (`benchmarks/source_simulations.py` of commit 6084227)."""
     cells: dict[str, list[str]] = {}
     for line in Kept("source_simulations", (), (), lambda record: None).lines():
         free = line["experiment"] == "Single"

@@ -74,7 +74,7 @@ class Run:
         if metric.kind == "yes_no" and found:
             yes = f"{round(found.mean * found.count)} of {found.count}"
             return f"{yes} {cells.interval(found, metric)}"
-        return " ".join(cells.mean_interval(found, metric)).rstrip()
+        return " ".join(cells.mean_interval(found, metric).lines).rstrip()
 
     @property
     def repetitions(self) -> str:

@@ -18,7 +18,7 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.plugin.arguments import can_do
-from pytest_simbench.records.repeatability import NAME, Line, append
+from pytest_simbench.records.repeatability import NAME, Kind, Line, append
 from pytest_simbench.repeatability import search, stability
 from pytest_simbench.repeatability.agreement import FOLDER, Sample
 from pytest_simbench.repeatability.episode import Episodes
@@ -91,7 +91,7 @@ class ReplayFixture:
         return handle(replace(self.case, mode=other, display=display))
 
 
-def _keep(kind: str, episodes: Episodes, result: Mapping[str, Any]) -> None:
+def _keep(kind: Kind, episodes: Episodes, result: Mapping[str, Any]) -> None:
     case, constructed = episodes.experiment.case, episodes.handle.constructed
     line = Line(
         kind,

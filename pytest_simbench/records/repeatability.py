@@ -7,7 +7,9 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, TypedDict
+
+import msgspec
 
 from pytest_simbench.records import checked, lines
 from pytest_simbench.records.lines import Found, LinesFile, Unwritten
@@ -15,21 +17,51 @@ from pytest_simbench.records.lines import Found, LinesFile, Unwritten
 NAME = "repeatability.jsonl"
 SCHEMA = 1
 
+Kind = Literal["replay", "search", "stability", "sensitivity"]
+Seconds = Annotated[str, msgspec.Meta(pattern=r"^\d+(\.\d+)?$")]
+"""A time as a key."""
+
+
+class Way(TypedDict):
+    """One way of running again, see `repeatability.replay_result.Again`."""
+
+    way: str
+    first: float | None
+    body: str | None
+    growth: dict[Seconds, float | None] | None
+    largest: float | None
+    changed: list[str]
+    left_at: float | None
+    skipped: str
+    failure: str
+
+
+class Replayed(TypedDict):
+    """Result of a replay."""
+
+    claims: bool
+    again: list[Way]
+
+
+class Told(TypedDict):
+    """Result of any other kind."""
+
+    sentence: str
+
 
 @dataclass(frozen=True)
 class Line:
     """One result.
 
     Attributes:
-        kind: `replay`, `search`, `stability` or `sensitivity`.
         test: id of the test.
         simulator, mode, profile: what it is of.
         task, seed: what was run.
         settings, versions: of the simulator, and the task's parameters as `task.NAME`.
-        result: by kind, see `replay`, `search` and `stability`.
+        result: `Replayed` or `Told`, with more, see `replay`, `search` and `stability`.
     """
 
-    kind: str
+    kind: Kind
     test: str
     simulator: str
     mode: str
@@ -75,46 +107,16 @@ def _line(data: dict[str, Any], where: str) -> Line:
     """
     schema = data.pop("schema", None)
     try:
-        line = Line(**checked.plain(data))
-        fine = _is_line(line)
-    except (ValueError, KeyError, TypeError, AttributeError):
-        fine = False
-    if not fine:
-        raise ValueError(f"{where}: not a result on repeatability")
+        line = checked.convert(checked.plain(data), Line)
+        if line.kind == "replay":
+            for way in checked.convert(line.result, Replayed)["again"]:
+                parted = [way[key] for key in ("first", "body", "growth", "largest")]
+                if None in parted and any(part is not None for part in parted):
+                    raise checked.CheckError(f"{way['way']!r} parted in part")
+        else:
+            checked.convert(line.result, Told)
+    except checked.CheckError:
+        raise ValueError(f"{where}: not a result on repeatability") from None
     if schema != SCHEMA:
         raise ValueError(f"{where}: schema {checked.short(schema)}, this reads {SCHEMA}")
     return line
-
-
-def _is_line(line: Line) -> bool:
-    """Whether its parts are what the tables read.
-
-    Raises:
-        KeyError, TypeError, AttributeError: they are not.
-    """
-    texts = (line.test, line.simulator, line.mode, line.profile, line.task)
-    if not (all(isinstance(text, str) for text in texts) and isinstance(line.seed, int)):
-        return False
-    if line.kind != "replay":
-        sentence = line.result["sentence"]
-        return line.kind in ("search", "stability", "sensitivity") and isinstance(sentence, str)
-    return isinstance(line.result["claims"], bool) and all(
-        _is_again(again) for again in line.result["again"]
-    )
-
-
-def _is_again(data: Mapping[str, Any]) -> bool:
-    if not isinstance(data["changed"], list):
-        return False
-    texts = [data["way"], data["skipped"], data["failure"], *data["changed"]]
-    if data["first"] is not None:
-        texts.append(data["body"])
-        numbers = [data["first"], data["largest"], *data["growth"].values()]
-        if not all(isinstance(number, int | float | None) for number in numbers):
-            return False
-        [float(time) for time in data["growth"]]
-        if None in numbers[:2]:
-            return False
-    return all(isinstance(text, str) for text in texts) and isinstance(
-        data["left_at"], int | float | None
-    )

@@ -33,8 +33,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="use the description files that FILE names, for a robot that is not known here",
     )
     given = parser.parse_args(arguments)
-    with tempfile.TemporaryDirectory() as folder:
-        try:
+    try:
+        with tempfile.TemporaryDirectory() as folder:
             example = read_example(
                 given.file,
                 Path(folder),
@@ -43,18 +43,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 spec=given.spec,
                 trust_robot=given.trust_robot,
             )
-        except ExampleError as error:
-            return _complain(error, 2)
-        if example.case.mode == "gui" and not (
-            os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-        ):
-            return _complain("there is no display for a window; try xvfb-run", 2)
-        try:
+            if example.case.mode == "gui" and not (
+                os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+            ):
+                raise ExampleError("there is no display for a window; try xvfb-run")
             _replay(example)
-        except WorkerError as error:
-            return _complain(error, 1)
-        except KeyboardInterrupt:
-            return _complain("interrupted", 130)
+    except ExampleError as error:
+        return _complain(error, 2)
+    except WorkerError as error:
+        return _complain(error, 1)
+    except KeyboardInterrupt:
+        return _complain("interrupted", 130)
     return 0
 
 

@@ -12,14 +12,14 @@ import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, zip_longest
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
-from pytest_simbench.client.tape import Operation
 from pytest_simbench.client.world import Motion
+from pytest_simbench.records import checked
 from pytest_simbench.records.paths import inside, write_whole
 from pytest_simbench.repeatability.episode import Episode
 from pytest_simbench.repeatability.motions import gaps
@@ -37,6 +37,16 @@ FOLDER = "motions"
 
 LARGEST = 256 * 2**20
 """Of a file, packed and unpacked [bytes]; a whole stacking has 7 MB."""
+
+
+class Facts(TypedDict):
+    """What a file holds besides arrays, see `Sample`."""
+
+    label: str
+    task: str
+    seed: int
+    bodies: list[str]
+    counts: dict[str, float | None]
 
 
 @dataclass(frozen=True)
@@ -64,10 +74,19 @@ class Sample:
 
     @classmethod
     def of(cls, episode: Episode, label: str, task: str, seed: int) -> Sample:
-        commands = [_command(operation) for operation in episode.tape]
+        commands = [
+            None if o.kind == "wait" else np.asarray(o.arguments["position"][-1], dtype=float)
+            for o in episode.tape
+        ]
         durations = [operation.duration for operation in episode.tape]
         bodies, motions, counts = list(episode.bodies), episode.motions, episode.counts
         return cls(label, task, seed, bodies, motions, commands, durations, counts)
+
+    @property
+    def asked(self) -> list[FloatArray]:
+        """Of each operation its duration [s] and, if it is a motion, the positions at its end."""
+        pairs = zip(self.durations, self.commands, strict=False)
+        return [np.array([lasting, *([] if goal is None else goal)]) for lasting, goal in pairs]
 
     def save(self, folder: Path, name: str) -> None:
         """Write it as .npz into a run folder.
@@ -78,13 +97,10 @@ class Sample:
         joined = Motion.joined(list(self.motions))
         width = max((len(c) for c in self.commands if c is not None), default=0)
         commands = [np.full(width, np.nan) if c is None else c for c in self.commands]
-        facts = {
-            "label": self.label,
-            "task": self.task,
-            "seed": self.seed,
-            "bodies": list(self.bodies),
-            "counts": dict(self.counts),
-        }
+        facts = Facts(
+            label=self.label, task=self.task, seed=self.seed, bodies=list(self.bodies),
+            counts=dict(self.counts),
+        )  # fmt: skip
         file = io.BytesIO()
         np.savez_compressed(
             file,
@@ -107,7 +123,9 @@ class Sample:
         """
         data = read_arrays(path, LARGEST)
         try:
-            facts = _checked(data)
+            facts = checked.convert(read_json(str(data["facts"])), Facts)
+            if not _fits(data, len(facts["bodies"])):
+                raise ValueError("its arrays do not fit each other")
         except (ValueError, KeyError, TypeError) as error:
             raise ValueError(f"{path} holds no motion of pytest-simbench: {error}") from None
         cuts = np.cumsum(data["lengths"])[:-1]
@@ -118,43 +136,26 @@ class Sample:
         return cls(**facts, motions=motions, commands=commands, durations=durations)
 
 
-def _checked(data: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """The facts of a file whose arrays are what `Sample.save` writes.
+def _fits(data: Mapping[str, np.ndarray], bodies: int) -> bool:
+    """Whether the arrays of a file are what `Sample.save` writes of so many bodies.
 
     Raises:
-        ValueError, KeyError, TypeError: they are not.
+        KeyError, TypeError: they are not.
     """
-    facts = read_json(str(data["facts"]))
-    label, task, seed, bodies, counts = (
-        facts[key] for key in ("label", "task", "seed", "bodies", "counts")
-    )
     time, lengths, durations = data["time"], data["lengths"], data["durations"]
-    fine = (
-        set(facts) == {"label", "task", "seed", "bodies", "counts"}
-        and all(isinstance(text, str) for text in (label, task, *bodies, *counts))
-        and all(isinstance(value, int | float | None) for value in counts.values())
-        and isinstance(seed, int)
-        and all(data[name].dtype.kind == "f" for name in ("time", "joints", "bodies", "commands"))
+    return (
+        all(data[name].dtype.kind == "f" for name in ("time", "joints", "bodies", "commands"))
         and (lengths.ndim, lengths.dtype.kind, durations.dtype.kind) == (1, "i", "f")
         and len(lengths) > 0
         and int(lengths.min()) > 0
         and time.shape == (int(lengths.sum()),)
-        and data["bodies"].shape == (len(time), len(bodies), 13)
+        and data["bodies"].shape == (len(time), bodies, 13)
         and data["joints"].shape[:2] == (len(time), 2)
         and data["commands"].ndim == 2
         and durations.shape == (len(data["commands"]),)
         and all(np.isfinite(data[name]).all() for name in ("time", "bodies", "durations"))
         and bool((np.diff(time) >= 0).all())
     )
-    if not fine:
-        raise ValueError("its arrays do not fit each other")
-    return dict(facts)
-
-
-def _command(operation: Operation) -> FloatArray | None:
-    if operation.kind == "wait":
-        return None
-    return np.asarray(operation.arguments["position"][-1], dtype=float)
 
 
 @dataclass(frozen=True)
@@ -207,19 +208,18 @@ def agreement(first: Sample, second: Sample) -> Agreement:
     if mine != other:
         raise ValueError(f"{first.label} ran {mine[:2]}, {second.label} ran {other[:2]}")
     between = gaps(first.motions, second.motions)
-    partings: dict[float, Parting | None] = {}
-    for limit in LIMITS:
+
+    def parting(limit: float) -> Parting | None:
         found = between.first_beyond(limit)
         if found is None:
-            partings[limit] = None
-            continue
-        sample, body = found
-        x, y, z = (float(value) for value in between.position[sample, body])
-        partings[limit] = Parting(float(between.time[sample]), first.bodies[body], (x, y, z))
+            return None
+        x, y, z = (float(value) for value in between.position[found])
+        return Parting(float(between.time[found[0]]), first.bodies[found[1]], (x, y, z))
+
     return Agreement(
         first.label,
         second.label,
-        partings,
+        {limit: parting(limit) for limit in LIMITS},
         _commands_part(first, second),
         float(between.time[-1]),
         dict(first.counts) == dict(second.counts),
@@ -227,17 +227,10 @@ def agreement(first: Sample, second: Sample) -> Agreement:
 
 
 def _commands_part(first: Sample, second: Sample) -> float | None:
-    for number in range(max(len(first.commands), len(second.commands))):
-        began = float(first.motions[min(number, len(first.motions) - 1)].time[-1])
-        if number >= min(len(first.commands), len(second.commands)):
-            return began
-        a, b = first.commands[number], second.commands[number]
-        if (a is None) != (b is None):
-            return began
-        if a is not None and b is not None and not np.allclose(a, b, rtol=0, atol=SAME_COMMAND):
-            return began
-        if abs(first.durations[number] - second.durations[number]) > SAME_COMMAND:
-            return began
+    for number, (a, b) in enumerate(zip_longest(first.asked, second.asked)):
+        same = a is not None and b is not None and a.shape == b.shape
+        if not same or not np.allclose(a, b, rtol=0, atol=SAME_COMMAND):
+            return float(first.motions[min(number, len(first.motions) - 1)].time[-1])
     return None
 
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
-from pytest_simbench.scene import Pose, Robot, Scene, SceneError
+from pytest_simbench.scene import Pose, Scene, SceneError
 
 if TYPE_CHECKING:
     from hypothesis.strategies import SearchStrategy
@@ -97,25 +97,20 @@ class Perturbation:
         Raises:
             SceneError: a cube would be inside another body.
         """
+        factor = 1 + self.amount
         if self.quantity == "delay":
             return scene
         if self.quantity == "friction":
-            return _with_friction(scene, 1 + self.amount)
+            return _with_friction(scene, factor)
         if self.quantity == "squeeze":
-            return replace(scene, robot=_squeezing(_robot(scene), 1 + self.amount))
+            return _squeezing(scene, factor)
         body = scene.body(self.body)
         if self.quantity == "mass":
-            return scene.with_body(body.changed(mass=body.mass * (1 + self.amount)))
-        return scene.with_pose(self.body, _moved(body.pose, self.quantity, self.amount))
-
-
-def _moved(pose: Pose, quantity: str, amount: float) -> Pose:
-    if quantity == "x":
-        return pose.translated(x=amount)
-    if quantity == "y":
-        return pose.translated(y=amount)
-    turned = Pose.at(0, 0, 0, yaw=amount) * Pose(quaternion=pose.quaternion)
-    return Pose(pose.position, turned.quaternion)
+            return scene.with_body(body.changed(mass=body.mass * factor))
+        if self.quantity == "yaw":
+            turned = Pose.at(0, 0, 0, yaw=self.amount) * Pose(quaternion=body.pose.quaternion)
+            return scene.with_pose(self.body, Pose(body.pose.position, turned.quaternion))
+        return scene.with_pose(self.body, body.pose.translated(**{self.quantity: self.amount}))
 
 
 def _with_friction(scene: Scene, factor: float) -> Scene:
@@ -126,20 +121,17 @@ def _with_friction(scene: Scene, factor: float) -> Scene:
     )
 
 
-def _robot(scene: Scene) -> Robot:
-    if scene.robot is None:
+def _squeezing(scene: Scene, factor: float) -> Scene:
+    robot = scene.robot
+    if robot is None:
         raise ValueError(f"scene {scene.name!r} has no robot whose gripper could be perturbed")
-    return scene.robot
-
-
-def _squeezing(robot: Robot, factor: float) -> Robot:
     fingers = robot.gripper.joints
     joints = tuple(
         replace(joint, effort_limit=joint.effort_limit * factor) if joint.name in fingers else joint
         for joint in robot.joints
     )
     gripper = replace(robot.gripper, squeeze=robot.gripper.squeeze * factor)
-    return replace(robot, joints=joints, gripper=gripper)
+    return replace(scene, robot=replace(robot, joints=joints, gripper=gripper))
 
 
 def perturbed(scene: Scene, perturbations: Sequence[Perturbation]) -> Scene:
@@ -186,39 +178,27 @@ def perturbations(
     from hypothesis import strategies as st
 
     limits = {q.name: q.bound for q in QUANTITIES.values()} if bounds is None else dict(bounds)
-    choices = [
-        _of_quantity(scene, quantity, limits[quantity.name])
-        for quantity in _chosen(scene, limits, explicit=bounds is not None)
-    ]
+    for name in (name for name in limits if name not in QUANTITIES):
+        raise ValueError(f"no quantity is named {name!r}; choose from {', '.join(QUANTITIES)}")
+    there = {"cube": bool(scene.free_bodies), "scene": True, "robot": scene.robot is not None}
+    choices = []
+    for quantity in (q for q in QUANTITIES.values() if q.name in limits):
+        bound = limits[quantity.name]
+        if not bound >= quantity.step:
+            raise ValueError(
+                f"the bound of {quantity.name}, {bound:g}, is below its smallest step, "
+                f"{quantity.step:g}"
+            )
+        if there[quantity.of]:
+            choices.append(_of_quantity(scene, quantity, bound))
+        elif bounds is not None:
+            raise ValueError(f"scene {scene.name!r} has no {quantity.of} to perturb")
     if not choices:
         raise ValueError(f"scene {scene.name!r} has nothing that could be perturbed")
     lists = st.lists(
         st.one_of(choices), min_size=1, max_size=at_most, unique_by=lambda p: (p.quantity, p.body)
     )
     return lists.map(tuple).filter(lambda found: fits(scene, found))
-
-
-def _chosen(scene: Scene, limits: Mapping[str, float], *, explicit: bool) -> list[Quantity]:
-    unknown = [name for name in limits if name not in QUANTITIES]
-    if unknown:
-        raise ValueError(
-            f"no quantity is named {unknown[0]!r}; choose from {', '.join(QUANTITIES)}"
-        )
-    chosen = []
-    for quantity in QUANTITIES.values():
-        if quantity.name not in limits:
-            continue
-        if not limits[quantity.name] >= quantity.step:
-            raise ValueError(
-                f"the bound of {quantity.name}, {limits[quantity.name]:g}, is below its smallest "
-                f"step, {quantity.step:g}"
-            )
-        there = {"cube": bool(scene.free_bodies), "scene": True, "robot": scene.robot is not None}
-        if there[quantity.of]:
-            chosen.append(quantity)
-        elif explicit:
-            raise ValueError(f"scene {scene.name!r} has no {quantity.of} to perturb")
-    return chosen
 
 
 def _of_quantity(scene: Scene, quantity: Quantity, bound: float) -> SearchStrategy[Perturbation]:

@@ -7,9 +7,8 @@ again, to the last bit, after each of the things that should not matter.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from dataclasses import replace
 from functools import partial
 
 from pytest_simbench.client.errors import Unavailable, WorkerError
@@ -64,57 +63,44 @@ def replay(
     moments = episodes.task.moments if moments is None else moments
     first = episodes.run()
     mode = "headless" if episodes.handle.case.mode == "gui" else "with a window"
-    elsewhere = [_Elsewhere("fresh process", fresh), _Elsewhere(mode, other_mode)]
-    with _side_by_side(jobs - 1, elsewhere, episodes, first) as started:
-        results = [
-            _again("after a reset", first, lambda: episodes.run(play=first.tape)),
-            _again("after another episode", first, lambda: _after_another(episodes, first)),
-            *_restored_at(moments, capabilities, episodes, first),
-        ]
-        results += [again() for again in started]
+    ways: list[tuple[str, SimulatorHandle | str]] = [("fresh process", fresh), (mode, other_mode)]
+    elsewhere = [partial(_elsewhere, way, handle, episodes, first) for way, handle in ways]
+    with ThreadPoolExecutor(max(1, jobs - 1), thread_name_prefix="simbench-replay") as pool:
+        started = [pool.submit(run) for run in elsewhere if jobs > 1]
+        try:
+            results = [
+                _again("after a reset", first, lambda: episodes.run(play=first.tape)),
+                _again("after another episode", first, lambda: _after_another(episodes, first)),
+                *_restored_at(moments, capabilities, episodes, first),
+            ]
+            results += [future.result() for future in started] or [run() for run in elsewhere]
+        except BaseException:
+            _end(started, [handle for _, handle in ways])
+            raise
     if not claims:
         results = [replace(again, claimed=False) for again in results]
     return Replay(simulator, claims, first, tuple(results))
 
 
-@dataclass(frozen=True)
-class _Elsewhere:
-    """A way that has a worker of its own, or the reason why it cannot be gone."""
-
-    way: str
-    handle: SimulatorHandle | str
-
-    def run(self, episodes: Episodes, first: Episode) -> Again:
-        handle = self.handle
-        if isinstance(handle, str):
-            return Again(self.way, skipped=handle)
-        return _again(self.way, first, lambda: episodes.run(play=first.tape, handle=handle))
-
-    def end(self) -> None:
-        if isinstance(self.handle, SimulatorHandle):
-            self.handle.close()
+def _elsewhere(
+    way: str, handle: SimulatorHandle | str, episodes: Episodes, first: Episode
+) -> Again:
+    """In a worker of its own, or the reason why there is none."""
+    if isinstance(handle, str):
+        return Again(way, skipped=handle)
+    return _again(way, first, lambda: episodes.run(play=first.tape, handle=handle))
 
 
-@contextmanager
-def _side_by_side(
-    threads: int, ways: Sequence[_Elsewhere], episodes: Episodes, first: Episode
-) -> Iterator[list[Callable[[], Again]]]:
-    """Functions that give the results, from that many threads (0: when they are called)."""
-    if threads < 1:
-        yield [partial(way.run, episodes, first) for way in ways]
-        return
-    with ThreadPoolExecutor(threads, thread_name_prefix="simbench-replay") as pool:
-        futures = [pool.submit(way.run, episodes, first) for way in ways]
-        try:
-            yield [future.result for future in futures]
-        except BaseException:
-            for future in futures:
-                future.cancel()
-            while True:  # a worker that was just being started is there only in the next round
-                for way in ways:
-                    way.end()
-                if not wait(futures, timeout=0.1).not_done:
-                    raise
+def _end(started: Sequence[Future[Again]], handles: Sequence[SimulatorHandle | str]) -> None:
+    """End what runs side by side."""
+    for future in started:
+        future.cancel()
+    while True:
+        for handle in handles:  # a worker that was just being started is there in the next round
+            if isinstance(handle, SimulatorHandle):
+                handle.close()
+        if not wait(started, timeout=0.1).not_done:
+            return
 
 
 def _restored_at(

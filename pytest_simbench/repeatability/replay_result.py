@@ -58,36 +58,25 @@ class Again:
         return what + (f"; changed {', '.join(self.changed)}" if self.changed else "")
 
     def to_wire(self) -> dict[str, Any]:
-        parted: dict[str, Any] = dict.fromkeys(("first", "body", "growth", "largest"))
-        if self.difference is not None:
-            growth = {f"{after:g}": gap for after, gap in self.difference.growth.items()}
-            parted = {**vars(self.difference), "growth": growth}
-        return {
-            "way": self.way,
-            "identical": self.identical,
-            **parted,
-            "changed": list(self.changed),
-            "left_at": self.left_at,
-            "skipped": self.skipped,
-            "failure": self.failure,
-            "claimed": self.claimed,
-        }
+        """Plain data, `records.repeatability.Way`."""
+        own = {**vars(self), "identical": self.identical, "changed": list(self.changed)}
+        found = own.pop("difference")
+        if found is None:
+            return {**own, **dict.fromkeys(("first", "body", "growth", "largest"))}
+        growth = {f"{after:g}": gap for after, gap in found.growth.items()}
+        return {**own, **vars(found), "growth": growth}
 
     @classmethod
     def from_wire(cls, data: Mapping[str, Any]) -> Again:
         found = None
         if data["first"] is not None:
-            growth = {float(key): value for key, value in data["growth"].items()}
+            growth = {float(after): gap for after, gap in data["growth"].items()}
             found = Difference(data["first"], data["body"], growth, data["largest"])
+        own = {key: data[key] for key in ("way", "left_at", "skipped", "failure")}
         return cls(
-            data["way"],
-            found,
-            tuple(data["changed"]),
-            data["left_at"],
-            data["skipped"],
-            data["failure"],
-            data.get("claimed", True),
-        )
+            **own, difference=found, changed=tuple(data["changed"]),
+            claimed=data.get("claimed", True),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -238,15 +238,7 @@ def bounds_in_words(episodes: Episodes, bounds: Mapping[str, float] | None) -> s
 
 def to_wire(finding: Finding) -> dict[str, Any]:
     """Plain data for the run's records."""
-    return {
-        "sentence": finding.sentence,
-        "smallest": None if finding.smallest is None else [vars(p) for p in finding.smallest],
-        "effect": finding.effect,
-        "examples": finding.examples,
-        "runs": finding.runs,
-        "confirmed": finding.confirmed,
-        "first": None if finding.first is None else described(finding.first),
-        "bounds": finding.bounds,
-        "before": finding.before,
-        "replay": finding.replay,
-    }
+    own = {key: value for key, value in vars(finding).items() if key != "simulator"}
+    smallest = None if finding.smallest is None else [vars(p) for p in finding.smallest]
+    first = None if finding.first is None else described(finding.first)
+    return {**own, "sentence": finding.sentence, "smallest": smallest, "first": first}

@@ -86,13 +86,8 @@ class Stability:
 
     def to_wire(self) -> dict[str, Any]:
         """Plain data for the run's records."""
-        return {
-            "kept": list(self.kept),
-            "unchanged": self.unchanged,
-            "bounds": self.bounds,
-            "worst": self.worst,
-            "sentence": self.sentence,
-        }
+        own = {key: getattr(self, key) for key in ("unchanged", "bounds", "worst", "sentence")}
+        return {**own, "kept": list(self.kept)}
 
 
 def stability(
@@ -198,13 +193,9 @@ class Sensitivity:
 
     def to_wire(self) -> dict[str, Any]:
         """Plain data for the run's records."""
-        return {
-            "perturbation": self.perturbation,
-            "ratio": {f"{time:g}": value for time, value in self.ratio.items()},
-            "until": dict(self.until),
-            "largest": self.largest,
-            "sentence": self.sentence,
-        }
+        own = {key: getattr(self, key) for key in ("perturbation", "largest", "sentence")}
+        ratio = {f"{time:g}": value for time, value in self.ratio.items()}
+        return {**own, "ratio": ratio, "until": dict(self.until)}
 
 
 def sensitivity(

@@ -8,12 +8,15 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
 from pytest_simbench.client.errors import WorkerError
+from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.ground.versions import base_name
-from pytest_simbench.scene import Pose, Trajectory
+from pytest_simbench.laws.free import rotation_of
+from pytest_simbench.scene import Trajectory
 from pytest_simbench.simulator import Capability, Settings
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.testing import scenes
@@ -169,11 +172,7 @@ def velocity_frames(subject: Subject) -> None:
         require_close(
             "linear velocity's error", slip, 0.0, 0.01 * float(np.linalg.norm(speed)), "m/s"
         )
-        first, second = Pose.from_array(a), Pose.from_array(b)
-        turn = Pose(quaternion=second.quaternion) * Pose(quaternion=first.quaternion).inverse()
-        vector = np.array(turn.quaternion)
-        vector *= np.sign(vector[0]) or 1.0
-        omega = 2 * vector[1:] / dt
+        omega = (rotation_of(b[3:7]) * rotation_of(a[3:7]).inv()).as_rotvec() / dt
         mean = (a[10:] + b[10:]) / 2
         turned = float(np.linalg.norm(omega - mean))
         limit = 0.05 * float(np.linalg.norm(mean)) + float(np.linalg.norm(b[10:] - a[10:]))
@@ -220,13 +219,10 @@ def bad_description_rejected(subject: Subject) -> None:
     """A robot description that does not exist is an error which names the file, and the same
     worker then loads a good scene."""
     robot = dataclasses.replace(subject.arm, urdf="/nowhere/robot.urdf")
-    process = subject.shared()
-    subject.construct(process)
     wire = scenes.arm_alone(robot).to_wire()
-    with refused("a robot description that does not exist was") as error:
-        process.request("load", timeout=600.0, scene=wire, parity=False)
-    what = error[0].what
-    require("/nowhere/robot.urdf" in what, f"the error does not name it: {what}")
+    process = _refused_load(
+        subject, wire, "a robot description that does not exist was", robot.urdf
+    )
     require(process.alive, "the worker died of a bad robot description")
     with subject.world(scenes.falling()) as world:
         require(world.time == 0, "the next scene does not start at time 0")
@@ -237,9 +233,15 @@ def overlap_rejected(subject: Subject) -> None:
     """A scene whose bodies overlap is rejected by the worker too, with both their names."""
     wire = scenes.tower().to_wire()
     wire["bodies"][1]["pose"]["position"][2] -= 0.01
+    _refused_load(subject, wire, "overlapping bodies were", "level0", "level1")
+
+
+def _refused_load(subject: Subject, wire: dict[str, Any], what: str, *named: str) -> WorkerProcess:
+    """A scene that must be an error which names some things; the process that refused it."""
     process = subject.shared()
     subject.construct(process)
-    with refused("overlapping bodies were") as error:
+    with refused(what) as error:
         process.request("load", timeout=600.0, scene=wire, parity=False)
-    what = error[0].what
-    require("level0" in what and "level1" in what, f"the error does not name both bodies: {what}")
+    missing = [name for name in named if name not in error[0].what]
+    require(not missing, f"the error does not name {missing}: {error[0].what}")
+    return process

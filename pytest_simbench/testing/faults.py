@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Collection
-from dataclasses import replace
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,33 +19,49 @@ from pytest_simbench.scene import (
     Capsule,
     ConvexMesh,
     Cylinder,
+    FloatArray,
     Pose,
+    Robot,
     Scene,
     Sphere,
 )
-from pytest_simbench.simulator import Capability
+from pytest_simbench.simulator import Capability, PreparedRobot
 from pytest_simbench.simulator.mesh_check import TRIANGLE
+from pytest_simbench.simulator.robot_files import description_xml, digest
 from pytest_simbench.simulator.shapes import mesh_points
 from pytest_simbench.testing import scenes
-from pytest_simbench.testing.robot_faults import (
-    Edit,
-    Fault,
-    Plant,
-    edited,
-    faults_about,
-    of_robot,
-    shift,
-)
+
+Plant = Callable[[Scene, Path], Scene]
+"""Makes the faulty scene of the true one; files go into the folder."""
+
+Edit = Callable[[ET.Element, Path], None]
+"""Changes an element of a description; files go into the folder."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One way in which a world may be built wrong.
+
+    Attributes:
+        what: in plain words.
+        quantity: that must be found to differ.
+        plant: makes the faulty scene.
+        needs: the capability without which an engine cannot be wrong in this way.
+    """
+
+    what: str
+    quantity: str
+    plant: Plant
+    needs: Capability | None = None
+
 
 TURNED, SPIN = Pose.at(0.5, 0.1, 0.315, yaw=0.4), (0.7, -0.5, 0.4)
 """Of the true scene's brick: where it is, and its angular velocity [rad/s]."""
-
 
 LYING = Pose((0.7, -0.1, 0.42), (math.cos(0.3), math.sin(0.3), 0.0, 0.0)) * Pose(
     quaternion=(math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
 )
 """Of the true scene's can, which falls: it lies across, and is turned about the x axis."""
-
 
 LEANING = Pose((0.6, 0.25, 0.4), (math.cos(0.4), 0.6 * math.sin(0.4), 0.8 * math.sin(0.4), 0.0))
 """Of the true scene's wedge, which falls."""
@@ -54,43 +70,23 @@ LEANING = Pose((0.6, 0.25, 0.4), (math.cos(0.4), 0.6 * math.sin(0.4), 0.8 * math
 def true_scene() -> Scene:
     """The Panda in front of a table with a brick that starts up and a cube: odd sizes and
     velocities, tilted gravity."""
+    bodies = (
+        Box("table", (0.9, 0.9, 0.3), Pose.at(0.8, 0.0, 0.15)),
+        Box("brick", (0.1, 0.06, 0.03), TURNED, 0.23, linear_velocity=(0.2, -0.1, 0.3),
+            angular_velocity=SPIN),
+        scenes.cube("cube", Pose.at(0.6, -0.1, 0.325, yaw=-1.0)),
+        Sphere("ball", 0.03, Pose.at(0.7, 0.1, 0.33), 0.12, restitution=0.6, linear_damping=0.3,
+               angular_damping=0.2),
+        Cylinder("can", 0.033, 0.11, LYING, 0.3),
+        Capsule("pill", 0.02, 0.06, Pose.at(0.8, -0.2, 0.36, yaw=0.3), 0.08),
+        ConvexMesh("wedge", scenes.wedge(), LEANING, 0.15),
+        Box("belt", (0.5, 0.2, 0.1), Pose.at(-0.6, 0.5, 0.3, yaw=0.2),
+            linear_velocity=(0.3, 0.0, 0.0), prescribed=True),
+        Cylinder("pillar", 0.04, 0.2, Pose.at(0.5, -0.6, 0.1)),
+    )  # fmt: skip
     return Scene(
         "full",
-        (
-            Box("table", (0.9, 0.9, 0.3), Pose.at(0.8, 0.0, 0.15), friction=0.7),
-            Box(
-                "brick",
-                (0.1, 0.06, 0.03),
-                TURNED,
-                0.23,
-                0.7,
-                linear_velocity=(0.2, -0.1, 0.3),
-                angular_velocity=SPIN,
-            ),
-            scenes.cube("cube", Pose.at(0.6, -0.1, 0.325, yaw=-1.0), friction=0.7),
-            Sphere(
-                "ball",
-                0.03,
-                Pose.at(0.7, 0.1, 0.33),
-                0.12,
-                0.7,
-                restitution=0.6,
-                linear_damping=0.3,
-                angular_damping=0.2,
-            ),
-            Cylinder("can", 0.033, 0.11, LYING, 0.3, 0.7),
-            Capsule("pill", 0.02, 0.06, Pose.at(0.8, -0.2, 0.36, yaw=0.3), 0.08, 0.7),
-            ConvexMesh("wedge", scenes.wedge(), LEANING, 0.15, 0.7),
-            Box(
-                "belt",
-                (0.5, 0.2, 0.1),
-                Pose.at(-0.6, 0.5, 0.3, yaw=0.2),
-                friction=0.7,
-                linear_velocity=(0.3, 0.0, 0.0),
-                prescribed=True,
-            ),
-            Cylinder("pillar", 0.04, 0.2, Pose.at(0.5, -0.6, 0.1), friction=0.7),
-        ),
+        tuple(replace(body, friction=0.7) for body in bodies),
         robot=replace(scenes.arm(), friction=0.7),
         gravity=(0.3, -0.2, -3.7),
         ground_friction=0.7,
@@ -104,6 +100,68 @@ def of_scene(**values: Any) -> Plant:
 
 def of_body(name: str, **values: Any) -> Plant:
     return lambda scene, _: scene.with_body(replace(scene.body(name), **values))
+
+
+def of_robot(change: Callable[[Robot], Robot]) -> Plant:
+    """Another robot."""
+    return lambda scene, _: replace(scene, robot=change(scenes.of_scene(scene)))
+
+
+def of_joints(*names: str, farther: float = 0.0, **factors: float) -> Plant:
+    """Values of the joints' drives, multiplied; they start `farther` [rad]."""
+
+    def change(robot: Robot) -> Robot:
+        for joint in robot.joints:
+            if joint.name in names:
+                values = {key: factor * getattr(joint, key) for key, factor in factors.items()}
+                start = joint.initial_position + farther
+                robot = scenes.with_joint(robot, joint.name, initial_position=start, **values)
+        return robot
+
+    return of_robot(change)
+
+
+def edited(path: str, edit: Edit) -> Plant:
+    """An element of the URDF, edited; the meshes come along."""
+
+    def plant(scene: Scene, folder: Path) -> Scene:
+        def beside(mesh: Path) -> str:
+            data = mesh.read_bytes()
+            (folder / f"{digest(data)}.stl").write_bytes(data)
+            return f"{digest(data)}.stl"
+
+        robot = scenes.of_scene(scene)
+        root = description_xml(robot, beside)
+        element = root.find(path)
+        if element is None:
+            raise LookupError(f"{robot.urdf} has no {path}")
+        edit(element, folder)
+        ET.ElementTree(root).write(folder / "faulty.urdf")
+        return replace(scene, robot=replace(robot, urdf=str(folder / "faulty.urdf")))
+
+    return plant
+
+
+def add(key: str, value: float) -> Edit:
+    """A larger value of an attribute."""
+
+    def edit(element: ET.Element, _: Path) -> None:
+        element.attrib[key] = str(float(element.attrib[key]) + value)
+
+    return edit
+
+
+def shift(y: float = 0.0, z: float = 0.0) -> Edit:
+    """The <origin> of an element, moved [m]."""
+
+    def edit(element: ET.Element, _: Path) -> None:
+        origin = element.find("origin")
+        if origin is None:
+            origin = ET.SubElement(element, "origin")
+        at = _numbers(origin.attrib.get("xyz", "0 0 0"))
+        origin.attrib["xyz"] = _text(at + np.array([0.0, y, z]))
+
+    return edit
 
 
 def _set(**values: str) -> Edit:
@@ -129,115 +187,150 @@ def _turned_inertia(inertia: ET.Element, _: Path) -> None:
     inertia.attrib.update(ixx=old["iyy"], iyy=old["ixx"], ixy=negative, ixz=turned, iyz=old["ixz"])
 
 
+def without_shapes(link: ET.Element, _: Path) -> None:
+    for shape in link.findall("collision"):
+        link.remove(shape)
+
+
+def _tilt(joint: ET.Element, _: Path) -> None:
+    """The <axis>, turned by 5 degrees."""
+    axis = joint.find("axis")
+    if axis is None:
+        axis = ET.SubElement(joint, "axis", xyz="1 0 0")
+    old, tilt = _numbers(axis.attrib["xyz"]), math.radians(5)
+    aside = np.cross(old, np.roll(old, 1))
+    turned = math.cos(tilt) * old + math.sin(tilt) * aside / np.linalg.norm(aside)
+    axis.attrib["xyz"] = _text(turned)
+
+
+def _larger(inertia: ET.Element, _: Path) -> None:
+    for key, value in inertia.attrib.items():
+        inertia.attrib[key] = str(1.2 * float(value))
+
+
+def _numbers(text: str) -> FloatArray:
+    return np.array([float(part) for part in text.split()])
+
+
+def _text(values: FloatArray) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def robot_faults(robot: Robot) -> dict[str, Fault]:
+    """Faults of the middle joint of an arm, of the link that it moves, of the base and the fingers.
+    No two concern one quantity, so one world holds them all."""
+    first, middle = robot.arm_joints[0].name, robot.arm_joints[len(robot.arm_joints) // 2].name
+    moved = {joint.name: joint.child for joint in PreparedRobot(robot).joints}
+    return _faults_about(moved[first], middle, moved[middle], robot.gripper.joints)
+
+
+def _faults_about(
+    first: str, middle: str, moved: str, fingers: tuple[str, ...]
+) -> dict[str, Fault]:
+    """The same by names: of the first link, of a joint, of the link that this moves, of the joints
+    of the fingers."""
+    joint, link = f"joint[@name='{middle}']", f"link[@name='{moved}']"
+    inertial, drive, of_link = f"{link}/inertial", f"joint/{middle}", f"link/{moved}"
+    rows: dict[str, tuple[str, str, Plant]] = {
+        "joint_origin": (f"{middle} is 10 mm aside", f"{of_link}/pose",
+                         edited(joint, shift(y=0.01))),
+        "joint_axis": (f"the axis of {middle} is turned by 5 degrees", f"{drive}/axis",
+                       edited(joint, _tilt)),
+        "joint_limits": (f"{middle} stops 0.1 rad earlier", f"{drive}/limits",
+                         edited(f"{joint}/limit", add("lower", 0.1))),
+        "no_shape": (f"{moved} has no collision shape", f"{of_link}/meshes",
+                     edited(link, without_shapes)),
+        "link_mass": (f"{moved} weighs 0.1 kg more", f"{of_link}/mass",
+                      edited(f"{inertial}/mass", add("value", 0.1))),
+        "centre_of_mass": (f"the centre of mass of {moved} is 10 mm off", f"{of_link}/com",
+                           edited(inertial, shift(y=0.01))),
+        "inertia": (f"the inertia of {moved} is 20 % larger", f"{of_link}/inertia",
+                    edited(f"{inertial}/inertia", _larger)),
+        "base": ("the base is 10 mm aside", f"link/{first}/pose",
+                 of_robot(lambda robot: replace(robot, base=robot.base * Pose.at(0.0, 0.01, 0.0)))),
+        "friction": ("the robot's friction is 4", f"{of_link}/friction",
+                     of_robot(lambda robot: replace(robot, friction=4.0))),
+        "stiffness": (f"{middle} has a drive 10 % stiffer", f"{drive}/stiffness",
+                      of_joints(middle, stiffness=1.1)),
+        "drive_damping": (f"{middle} has a drive that damps 10 % more", f"{drive}/damping",
+                          of_joints(middle, damping=1.1)),
+        "effort_limit": (f"{middle} has twice its effort limit", f"{drive}/effort_limit",
+                         of_joints(middle, effort_limit=2.0)),
+        "armature": (f"{middle} has half its rotor inertia", f"{drive}/armature",
+                     of_joints(middle, armature=0.5)),
+        "initial_position": (f"{middle} starts 10 mrad farther", f"{drive}/initial_position",
+                             of_joints(middle, farther=0.01)),
+    }  # fmt: skip
+    if fingers:
+        twice = of_joints(*fingers, effort_limit=2.0)
+        quantity = f"joint/{fingers[0]}/effort_limit"
+        rows["squeeze"] = "the fingers squeeze twice as strongly", quantity, twice
+    return {name: Fault(*row) for name, row in rows.items()}
+
+
 _LINK4, _TIP = "link[@name='panda_link4']", "link[@name='panda_leftfinger']/collision[4]"
 _THINNER = (0.1, 0.058, 0.03)
 
+_ROWS: dict[str, tuple[Any, ...]] = {
+    "finger_shape": ("the rubber tip of a finger is 3 mm thinner", "link/panda_leftfinger/boxes",
+                     edited(f"{_TIP}/geometry/box", _set(size="17.5e-3 12.2e-3 18.5e-3"))),
+    "finger_pad": ("the rubber tip of a finger is 2 mm nearer to the hand",
+                   "link/panda_leftfinger/boxes", edited(_TIP, shift(z=-0.002))),
+    "mesh_scale": ("the mesh of link 4 is 1.3 times as large", "link/panda_link4/meshes",
+                   edited(f"{_LINK4}/collision/geometry/mesh", _scaled)),
+    "inertia_turned": ("the inertia of link 4 is turned by 90 degrees", "link/panda_link4/inertia",
+                       edited(f"{_LINK4}/inertial/inertia", _turned_inertia)),
+    "self_collide": ("the robot's links collide with each other", "link/panda_link4/touches",
+                     of_robot(lambda robot: replace(robot, self_collide=True)),
+                     Capability.SELF_COLLIDE),
+    "body_mass": ("the brick weighs 1 kg", "body/brick/mass", of_body("brick", mass=1.0)),
+    "body_size": ("the brick is 2 mm thinner", "body/brick/boxes",
+                  of_body("brick", size=_THINNER)),
+    "ball_size": ("the ball is 1 mm smaller", "body/ball/rounds", of_body("ball", radius=0.0295)),
+    "can_length": ("the can is 2 mm shorter", "body/can/rounds", of_body("can", length=0.108)),
+    "can_inertia": ("the can is 1 mm thinner, and its inertia with it", "body/can/inertia",
+                    of_body("can", radius=0.0325)),
+    "pill_length": ("the pill is 2 mm longer", "body/pill/rounds", of_body("pill", length=0.062)),
+    "wedge_corners": ("the wedge is 2 mm longer", "body/wedge/meshes",
+                      of_body("wedge", vertices=scenes.wedge(length=0.102))),
+    "wedge_inertia": ("the wedge is 2 mm wider, and its inertia with it", "body/wedge/inertia",
+                      of_body("wedge", vertices=scenes.wedge(width=0.052))),
+    "wedge_is_a_box": ("the wedge is the box around it", "body/wedge/meshes",
+                       lambda scene, _: scene.with_body(
+                           Box("wedge", scene.body("wedge").extents, LEANING, 0.15, 0.7))),
+    "restitution": ("the ball bounces less", "body/ball/restitution",
+                    of_body("ball", restitution=0.55)),
+    "ground_restitution": ("the ground bounces less", "ground/restitution",
+                           of_scene(ground_restitution=0.55)),
+    "body_damping": ("the ball turns on undamped", "body/ball/damping",
+                     of_body("ball", angular_damping=0.0)),
+    "round_kind": ("the pillar is a capsule as long as it", "body/pillar/rounds",
+                   lambda scene, _: scene.with_body(
+                       Capsule("pillar", 0.04, 0.12, scene.body("pillar").pose, friction=0.7))),
+    "body_inertia": ("the brick is 2 mm thinner, and its inertia with it", "body/brick/inertia",
+                     of_body("brick", size=_THINNER)),
+    "linear_velocity": ("the brick starts 1 cm/s faster", "body/brick/velocity",
+                        of_body("brick", linear_velocity=(0.2, -0.1, 0.31))),
+    "angular_velocity": ("the brick's spin is in its own frame", "body/brick/velocity",
+                         of_body("brick", angular_velocity=tuple(TURNED.rotation().T @ SPIN))),
+    "body_pose": ("the cube is 1 mm aside", "body/cube/pose",
+                  of_body("cube", pose=Pose.at(0.601, -0.1, 0.325, yaw=-1.0))),
+    "body_friction": ("the brick's friction is 0.5", "body/brick/friction",
+                      of_body("brick", friction=0.5)),
+    "fixed_body": ("the cube is fixed in the world", "body/cube/dynamic",
+                   of_body("cube", mass=0.0)),
+    "driven_body": ("the belt is a free body", "body/belt/dynamic",
+                    of_body("belt", prescribed=False, mass=0.4)),
+    "gravity": ("gravity is 1 % stronger", "gravity", of_scene(gravity=(0.303, -0.202, -3.737))),
+    "ground_friction": ("the ground's friction is 0.5", "ground/friction",
+                        of_scene(ground_friction=0.5)),
+}  # fmt: skip
 
-def _described(what: str, quantity: str, path: str, edit: Edit) -> Fault:
-    """An element of the URDF, edited."""
-    return Fault(what, quantity, edited(path, edit))
-
-
-def _built(what: str, quantity: str, **values: Any) -> Fault:
-    """A body with other values; the quantity is `NAME/QUANTITY`."""
-    return Fault(what, f"body/{quantity}", of_body(quantity.partition("/")[0], **values))
-
+_FINGERS = ("panda_finger_joint1", "panda_finger_joint2")
 
 FAULTS: dict[str, Fault] = {
-    **faults_about(
-        "panda_link1",
-        "panda_joint4",
-        "panda_link4",
-        ("panda_finger_joint1", "panda_finger_joint2"),
-    ),
-    "finger_shape": _described(
-        "the rubber tip of a finger is 3 mm thinner",
-        "link/panda_leftfinger/boxes",
-        f"{_TIP}/geometry/box",
-        _set(size="17.5e-3 12.2e-3 18.5e-3"),
-    ),
-    "finger_pad": _described(
-        "the rubber tip of a finger is 2 mm nearer to the hand",
-        "link/panda_leftfinger/boxes",
-        _TIP,
-        shift(z=-0.002),
-    ),
-    "mesh_scale": _described(
-        "the mesh of link 4 is 1.3 times as large",
-        "link/panda_link4/meshes",
-        f"{_LINK4}/collision/geometry/mesh",
-        _scaled,
-    ),
-    "inertia_turned": _described(
-        "the inertia of link 4 is turned by 90 degrees",
-        "link/panda_link4/inertia",
-        f"{_LINK4}/inertial/inertia",
-        _turned_inertia,
-    ),
-    "self_collide": Fault(
-        "the robot's links collide with each other",
-        "link/panda_link4/touches",
-        of_robot(lambda robot: replace(robot, self_collide=True)),
-        Capability.SELF_COLLIDE,
-    ),
-    "body_mass": _built("the brick weighs 1 kg", "brick/mass", mass=1.0),
-    "body_size": _built("the brick is 2 mm thinner", "brick/boxes", size=_THINNER),
-    "ball_size": _built("the ball is 1 mm smaller", "ball/rounds", radius=0.0295),
-    "can_length": _built("the can is 2 mm shorter", "can/rounds", length=0.108),
-    "can_inertia": _built(
-        "the can is 1 mm thinner, and its inertia with it", "can/inertia", radius=0.0325
-    ),
-    "pill_length": _built("the pill is 2 mm longer", "pill/rounds", length=0.062),
-    "wedge_corners": _built(
-        "the wedge is 2 mm longer", "wedge/meshes", vertices=scenes.wedge(length=0.102)
-    ),
-    "wedge_inertia": _built(
-        "the wedge is 2 mm wider, and its inertia with it",
-        "wedge/inertia",
-        vertices=scenes.wedge(width=0.052),
-    ),
-    "wedge_is_a_box": Fault(
-        "the wedge is the box around it",
-        "body/wedge/meshes",
-        lambda scene, _: scene.with_body(
-            Box("wedge", scene.body("wedge").extents, LEANING, 0.15, 0.7)
-        ),
-    ),
-    "restitution": _built("the ball bounces less", "ball/restitution", restitution=0.55),
-    "ground_restitution": Fault(
-        "the ground bounces less", "ground/restitution", of_scene(ground_restitution=0.55)
-    ),
-    "body_damping": _built("the ball turns on undamped", "ball/damping", angular_damping=0.0),
-    "round_kind": Fault(
-        "the pillar is a capsule as long as it",
-        "body/pillar/rounds",
-        lambda scene, _: scene.with_body(
-            Capsule("pillar", 0.04, 0.12, scene.body("pillar").pose, friction=0.7)
-        ),
-    ),
-    "body_inertia": _built(
-        "the brick is 2 mm thinner, and its inertia with it", "brick/inertia", size=_THINNER
-    ),
-    "linear_velocity": _built(
-        "the brick starts 1 cm/s faster", "brick/velocity", linear_velocity=(0.2, -0.1, 0.31)
-    ),
-    "angular_velocity": _built(
-        "the brick's spin is in its own frame",
-        "brick/velocity",
-        angular_velocity=tuple(TURNED.rotation().T @ SPIN),
-    ),
-    "body_pose": _built(
-        "the cube is 1 mm aside", "cube/pose", pose=Pose.at(0.601, -0.1, 0.325, yaw=-1.0)
-    ),
-    "body_friction": _built("the brick's friction is 0.5", "brick/friction", friction=0.5),
-    "fixed_body": _built("the cube is fixed in the world", "cube/dynamic", mass=0.0),
-    "driven_body": _built("the belt is a free body", "belt/dynamic", prescribed=False, mass=0.4),
-    "gravity": Fault(
-        "gravity is 1 % stronger", "gravity", of_scene(gravity=(0.303, -0.202, -3.737))
-    ),
-    "ground_friction": Fault(
-        "the ground's friction is 0.5", "ground/friction", of_scene(ground_friction=0.5)
-    ),
+    **_faults_about("panda_link1", "panda_joint4", "panda_link4", _FINGERS),
+    **{name: Fault(*row) for name, row in _ROWS.items()},
 }
 """By short names."""
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
 from pytest_simbench.client.world import Motion
-from pytest_simbench.scene import FloatArray, Pose, Wrench
+from pytest_simbench.laws.free import rotation_of
+from pytest_simbench.scene import Pose, Wrench
 from pytest_simbench.tasks.manipulator import Manipulator
 from pytest_simbench.tasks.throw_analysis import Thrown
 from pytest_simbench.testing import scenes
@@ -66,7 +66,7 @@ def released_cube_is_let_be(subject: Subject) -> None:
     scene = scenes.grip(robot, name="let go")
     at = np.asarray(scene.body("held").pose.position)
     x, y, z = (float(part) for part in at - [0.008, 0.004, EDGE + 0.003])
-    yaw = _yaw(scene.body("held").pose) + 0.1
+    yaw = scene.body("held").pose.yaw + 0.1
     pillar = scenes.cube("pillar", Pose.at(x, y, (z - EDGE / 2) / 2, yaw=yaw), mass=0.0)
     pillar = replace(pillar, size=(EDGE, EDGE, z - EDGE / 2))
     below = scenes.cube("below", Pose.at(x, y, z, yaw=yaw))
@@ -83,25 +83,15 @@ def released_cube_is_let_be(subject: Subject) -> None:
     limit = 1.0 * subject.timestep + 5e-4
     require_close("longest way of a released cube in a step", ways.max(), 0.0, limit, "m")
     limit = 10.0 * subject.timestep + 0.01
-    turn = max(_turned(a, b) for a, b in pairwise(rows))
+    turns = rotation_of(rows[:, 3:7])
+    turn = float((turns[1:] * turns[:-1].inv()).magnitude().max())
     require_close("largest turn of a released cube in a step", turn, 0.0, limit, "rad")
     aside = float(np.hypot(*(rows[-1, :2] - start[:2])))
     require_close("way aside of a released cube", aside, 0.0, 3e-3, "m")
-    require_close("turn of a released cube", _turned(start, rows[-1]), 0.0, 0.05, "rad")
+    turn = float((turns[-1] * turns[0].inv()).magnitude())
+    require_close("turn of a released cube", turn, 0.0, 0.05, "rad")
     fallen = float(start[2] - rows[-1, 2])
     require(fallen > 1e-3, f"the hand did not let the cube go: it fell by {fallen:.2g} m")
-
-
-def _yaw(pose: Pose) -> float:
-    """Of a pose's x axis about the vertical [rad]."""
-    x, y, _ = pose.rotation()[:, 0]
-    return float(np.arctan2(y, x))
-
-
-def _turned(a: FloatArray, b: FloatArray) -> float:
-    """Angle between two rows of body states [rad]."""
-    cosine = min(1.0, abs(float(a[3:7] @ b[3:7])))
-    return 2.0 * float(np.arccos(cosine))
 
 
 @check(robot=throwing)

@@ -15,14 +15,11 @@ from pytest_simbench.simulator.parity import ParityResult, compare
 from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
-from pytest_simbench.testing.faults import rounds, true_scene
-from pytest_simbench.testing.robot_faults import Fault, robot_faults
+from pytest_simbench.testing.contract import SINGLE
+from pytest_simbench.testing.faults import Fault, robot_faults, rounds, true_scene
 from pytest_simbench.testing.robots import any_robot
 from pytest_simbench.testing.state import require_same, swung
 from pytest_simbench.testing.subject import Subject, require
-
-POSITION = 1e-5
-"""Engines in single precision keep about 7 digits; after some arithmetic 5 are safe."""
 
 
 @check(robot=any_robot)
@@ -59,7 +56,7 @@ def read_back_is_the_engines(subject: Subject) -> None:
         pose = np.asarray(world.process.request("read_back")["body/falling/pose"])
         step = float(np.linalg.norm(world.bodies[0, 7:10])) * subject.timestep
         require(
-            np.allclose(pose[:3], world.bodies[0, :3], atol=POSITION + step),
+            np.allclose(pose[:3], world.bodies[0, :3], atol=SINGLE + step),
             f"read_back gives position {pose[:3]} of a cube that is at {world.bodies[0, :3]}",
         )
 
@@ -77,7 +74,7 @@ def reading_changes_nothing(subject: Subject) -> None:
 def planted_faults_are_seen(subject: Subject) -> None:
     """Parity sees each fault of `testing.faults.FAULTS` that the adapter does not declare as not
     told; also when the adapter is made to remember the true scene, so that it must ask the engine.
-    With another robot than the Panda the faults are those of `testing.robot_faults`.
+    With another robot than the Panda the faults are those of `testing.faults.robot_faults`.
     """
     missed = []
     robot, capabilities = subject.robot, subject.cls.info.capabilities
@@ -91,19 +88,12 @@ def planted_faults_are_seen(subject: Subject) -> None:
 
 def planted(subject: Subject, faults: Iterable[Fault]) -> ParityResult:
     """A world with the faults, read back by an adapter that remembers the true scene."""
-    truth = _truth(subject)
-    subject.can_build(truth)
-    process = subject.shared()
-    faulty = truth
+    truth = faulty = _truth(subject)
     with tempfile.TemporaryDirectory() as folder:
         for fault in faults:
             faulty = fault.plant(faulty, Path(folder))
-        wire = faulty.to_wire()
-        subject.construct(process)
-        if process.launch.compile_timeout:
-            process.request("compile", timeout=process.launch.compile_timeout, scene=wire)
-        process.request("load", timeout=600.0, scene=wire, parity=False)
-        reported = process.request("read_back", remember=truth.to_wire())
+        with subject.world(faulty, parity=False) as world:
+            reported = world.process.request("read_back", remember=truth.to_wire())
     return compare(
         expected_quantities(truth, subject.settings),
         reported,

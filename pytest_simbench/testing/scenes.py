@@ -19,7 +19,6 @@ from pytest_simbench.scene import (
     Scene,
     Sphere,
     Vector3,
-    Wrench,
 )
 
 GRAVITY = -STANDARD_GRAVITY[2]
@@ -58,67 +57,37 @@ def thrown() -> Scene:
     return Scene("thrown", (body,))
 
 
+def ball(height: float, **values: Any) -> Sphere:
+    """A ball whose centre is so high above the origin [m]."""
+    return Sphere("ball", RADIUS, Pose.at(0.0, 0.0, height), MASS, **values)
+
+
 def bouncing() -> Scene:
     """A ball that falls on the plane at 3 m/s, and leaves with 0.6 of it."""
-    ball = Sphere(
-        "ball",
-        RADIUS,
-        Pose.at(0.0, 0.0, RADIUS + 0.05),
-        MASS,
-        linear_velocity=(0.0, 0.0, -3.0),
-        restitution=0.6,
-    )
-    return Scene("bouncing", (ball,), ground_restitution=0.6)
+    falling = ball(RADIUS + 0.05, linear_velocity=(0.0, 0.0, -3.0), restitution=0.6)
+    return Scene("bouncing", (falling,), ground_restitution=0.6)
 
 
 def damped() -> Scene:
     """A ball that flies and turns, braked in both, far from everything and without weight."""
-    ball = Sphere(
-        "ball",
-        RADIUS,
-        Pose.at(0.0, 0.0, 3.0),
-        MASS,
-        linear_velocity=(1.0, 0.0, 0.5),
-        angular_velocity=(2.0, -1.0, 4.0),
-        linear_damping=0.8,
-        angular_damping=0.5,
-    )
-    return Scene("damped", (ball,), gravity=(0.0, 0.0, 0.0))
-
-
-def kicked() -> Scene:
-    """A turned brick that a force pulls and a turned cube that a torque turns, from 0.1 s to 0.3 s,
-    without weight."""
-    turn = Pose((0.1, -0.2, 2.0), (0.5, 0.5, -0.1, 0.7))
-    force = Wrench(force=(1.0, -2.0, 0.5), start=0.1, end=0.3)
-    torque = Wrench(torque=(1e-4, -2e-4, 5e-5), start=0.1, end=0.3)
-    brick = Box("brick", (0.1, 0.06, 0.03), turn, 0.5, wrenches=(force,))
-    turned = replace(cube("cube", turn.translated(x=0.5)), wrenches=(torque,))
-    return Scene("kicked", (brick, turned), gravity=(0.0, 0.0, 0.0))
+    flying = ball(3.0, linear_velocity=(1.0, 0.0, 0.5), angular_velocity=(2.0, -1.0, 4.0))
+    braked = replace(flying, linear_damping=0.8, angular_damping=0.5)
+    return Scene("damped", (braked,), gravity=(0.0, 0.0, 0.0))
 
 
 def driven() -> Scene:
     """A belt with a cube on it, and a plate that turns as it rises, both prescribed."""
-    turn = Pose((0.0, 1.5, 0.8), (0.8, 0.0, 0.6, 0.0))
-    belt = Box(
-        "belt",
-        (2.0, 0.4, 0.1),
-        Pose.at(0.0, 0.0, 0.5),
-        friction=0.5,
-        linear_velocity=(0.5, 0.0, 0.0),
-        prescribed=True,
+    belt = Box("belt", (2.0, 0.4, 0.1), Pose.at(0.0, 0.0, 0.5), prescribed=True)
+    plate = Box("plate", (0.4, 0.3, 0.1), Pose((0.0, 1.5, 0.8), (0.8, 0.0, 0.6, 0.0)))
+    turning = {"linear_velocity": (0.0, 0.0, 0.2), "angular_velocity": (0.5, -0.3, 1.0)}
+    return Scene(
+        "driven",
+        (
+            replace(belt, linear_velocity=(0.5, 0.0, 0.0)),
+            cube("cube", Pose.at(0.0, 0.0, 0.55 + EDGE / 2)),
+            replace(plate, prescribed=True, **turning),  # type: ignore[arg-type]
+        ),
     )
-    plate = Box(
-        "plate",
-        (0.4, 0.3, 0.1),
-        turn,
-        friction=0.5,
-        linear_velocity=(0.0, 0.0, 0.2),
-        angular_velocity=(0.5, -0.3, 1.0),
-        prescribed=True,
-    )
-    carried = cube("cube", Pose.at(0.0, 0.0, 0.55 + EDGE / 2), friction=0.5)
-    return Scene("driven", (belt, carried, plate), ground_friction=0.5)
 
 
 def standing() -> Scene:
@@ -127,7 +96,7 @@ def standing() -> Scene:
     return Scene(
         "standing",
         (
-            Sphere("ball", RADIUS, Pose.at(0.0, 0.0, RADIUS), MASS),
+            ball(RADIUS),
             Cylinder("can", RADIUS, 2 * RADIUS, Pose.at(0.3, 0.0, RADIUS), MASS),
             Capsule("pill", RADIUS, 2 * RADIUS, lying, MASS),
         ),
@@ -149,14 +118,8 @@ def block(size: Vector3) -> Vertices:
 
 def meshes() -> Scene:
     """Meshes: a slab that slides off at 1 m/s, a wedge at rest, and a box on a block on a block."""
-    slab = ConvexMesh(
-        "slab",
-        block((0.1, 0.1, 0.02)),
-        Pose.at(0.0, 0.0, 0.01),
-        MASS,
-        0.5,
-        linear_velocity=(1.0, 0.0, 0.0),
-    )
+    slab = ConvexMesh("slab", block((0.1, 0.1, 0.02)), Pose.at(0.0, 0.0, 0.01), MASS, 0.5)
+    slab = replace(slab, linear_velocity=(1.0, 0.0, 0.0))
     lying = ConvexMesh("wedge", wedge(), Pose.at(0.0, 0.3, 0.04 / 3), MASS, 0.5)
     cubes = [
         ConvexMesh(name, block((EDGE,) * 3), Pose.at(0.4, 0.3, EDGE * (level + 0.5)), MASS, 0.5)

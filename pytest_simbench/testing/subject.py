@@ -7,7 +7,7 @@ import os
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -66,14 +66,12 @@ class Subject:
         python: interpreter of its worker; None for that of its own environment where it has one
             (`pytest --sim-install`), else this one.
         robot: that the laws are asked with; None: the Panda.
-        motions: what was asked already.
     """
 
     cls: type[Simulator]
     profile: str = "tuned"
     python: str | None = None
     robot: Robot | None = None
-    motions: dict[tuple[Any, ...], Motion] = field(default_factory=dict, compare=False)
 
     @property
     def adapter(self) -> str:
@@ -167,12 +165,9 @@ class Subject:
                 process.close()
 
     def motion(self, scene: Scene, seconds: float, log_period: float) -> Motion:
-        """What happens by itself in `scene`; the same question is answered from memory."""
-        key = (scene.name, seconds, log_period)
-        if key not in self.motions:
-            with self.world(scene) as world:
-                self.motions[key] = logged(world.wait(seconds, log_period=log_period))
-        return self.motions[key]
+        """What happens by itself in `scene`."""
+        with self.world(scene) as world:
+            return logged(world.wait(seconds, log_period=log_period))
 
 
 def asked(subject: Subject, *laws: Law, within: float | None = None) -> None:

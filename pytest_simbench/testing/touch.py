@@ -40,7 +40,7 @@ class Approach:
     distance: float = _GAP
 
     def cube(self) -> Box:
-        pose = Pose(_triple(self.start), _facing(self.direction))
+        pose = Pose.from_array([*self.start, *_facing(self.direction)])
         return Box(f"to_{self.link}", (_EDGE,) * 3, pose, MASS)
 
 
@@ -124,8 +124,3 @@ def _facing(direction: FloatArray) -> tuple[float, float, float, float]:
         return (0.0, 1.0, 0.0, 0.0)
     length = float(np.sqrt(2 + 2 * z))
     return (length / 2, -y / length, x / length, 0.0)
-
-
-def _triple(values: FloatArray) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in values)
-    return (x, y, z)

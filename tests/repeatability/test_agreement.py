@@ -35,31 +35,31 @@ def sample(label: str, times: Sequence[float], x: Sequence[float]) -> Sample:
 TIMES = (0.1, 0.2, 0.3, 0.4)
 
 
-def test_time_and_place() -> None:
+def test_an_agreement_is_known_in_full() -> None:
+    """Time and place of the first sample beyond each distance."""
     first = sample("a", TIMES, [0.2, 0.2, 0.2, 0.2])
-    second = sample("b", TIMES, [0.2, 0.2005, 0.2015, 0.25])
-    found = agreement(first, second)
-    millimetre, centimetre = found.partings[0.001], found.partings[0.01]
-    assert millimetre is not None
-    assert centimetre is not None
-    assert (millimetre.time, millimetre.body) == (0.3, "moving")
-    assert millimetre.position == (0.2, 0.0, 0.0)
-    assert str(centimetre) == "0.40 s, moving at (0.20, 0.00, 0.00)"
-    assert (found.until, found.commands_part, found.same_outcome) == (0.4, None, True)
-
-
-def test_never() -> None:
-    found = agreement(sample("a", TIMES, [0.2] * 4), sample("b", TIMES, [0.2009] * 4))
-    assert found.partings == {0.001: None, 0.01: None}
+    second = replace(sample("b", TIMES, [0.2, 0.2005, 0.2015, 0.25]), counts={"n": 0.5})
+    place = (0.2, 0.0, 0.0)
+    partings = {0.001: Parting(0.3, "moving", place), 0.01: Parting(0.4, "moving", place)}
+    assert agreement(first, second) == Agreement("a", "b", partings, None, 0.4, False)
+    assert str(partings[0.01]) == "0.40 s, moving at (0.20, 0.00, 0.00)"
+    near = sample("b", TIMES, [0.2009] * 4)
+    never = Agreement("a", "b", {0.001: None, 0.01: None}, None, 0.4, True)
+    assert agreement(first, near) == never
 
 
 @pytest.mark.parametrize(
-    "changes", [{"task": "other"}, {"seed": 2}, {"bodies": ["moving", "other"]}]
+    ("changes", "told"),
+    [
+        ({"task": "u"}, r"^a ran \('t', 1\), b ran \('u', 1\)$"),
+        ({"seed": 2}, "a ran"),
+        ({"bodies": ["moving", "other"]}, "a ran"),
+    ],
 )
-def test_only_the_same_can_be_compared(changes: dict[str, object]) -> None:
+def test_only_the_same_can_be_compared(changes: dict[str, object], told: str) -> None:
     first = sample("a", TIMES, [0.2] * 4)
-    with pytest.raises(ValueError, match="a ran"):
-        agreement(first, replace(first, **changes))  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=told):
+        agreement(first, replace(first, label="b", **changes))  # type: ignore[arg-type]
 
 
 def test_commands_that_part() -> None:
@@ -96,20 +96,16 @@ def test_each_operation_has_a_clock_of_its_own() -> None:
     assert found.until == pytest.approx(0.9)
 
 
-def test_a_parting_is_told_by_the_first_one_s_time() -> None:
+def test_partings_are_told_by_the_first_one_s_time() -> None:
     first, second = moving("a", (0.4, 0.9)), moving("b", (0.41, 0.91))
     second.motions[2].bodies[3:, 0, 0] += 0.02
-    for one, other, when in ((first, second, 0.8), (second, first, 0.81)):
-        millimetre = agreement(one, other).partings[0.001]
+    second = replace(second, durations=[0.4, 0.6])
+    for one, other, when, asked in ((first, second, 0.8, 0.4), (second, first, 0.81, 0.41)):
+        found = agreement(one, other)
+        millimetre = found.partings[0.001]
         assert millimetre is not None
         assert millimetre.time == pytest.approx(when)
-
-
-def test_commands_that_part_later_are_told_by_the_first_one_s_time() -> None:
-    first, second = moving("a", (0.4, 0.9)), moving("b", (0.41, 0.91))
-    other = replace(second, durations=[0.4, 0.6])
-    assert agreement(first, other).commands_part == pytest.approx(0.4)
-    assert agreement(other, first).commands_part == pytest.approx(0.41)
+        assert found.commands_part == pytest.approx(asked)
 
 
 def test_kept_and_read_back(tmp_path: Path) -> None:
@@ -180,19 +176,6 @@ def test_a_file_with_something_else_in_it(tmp_path: Path, wrong: dict[str, objec
     np.savez(path, **{k: v for k, v in arrays.items() if v is not None})  # type: ignore[arg-type]
     with pytest.raises(ValueError, match=f"{path} holds no motion of pytest-simbench"):
         Sample.load(path)
-
-
-def test_an_agreement_is_known_in_full() -> None:
-    first = sample("a", TIMES, [0.2, 0.2, 0.2, 0.2])
-    second = replace(sample("b", TIMES, [0.2, 0.2, 0.2015, 0.2]), counts={"n": 0.5})
-    partings = {0.001: Parting(0.3, "moving", (0.2, 0.0, 0.0)), 0.01: None}
-    assert agreement(first, second) == Agreement("a", "b", partings, None, 0.4, False)
-
-
-def test_what_was_run_otherwise_is_told() -> None:
-    first = sample("a", TIMES, [0.2] * 4)
-    with pytest.raises(ValueError, match=r"^a ran \('t', 1\), b ran \('u', 2\)$"):
-        agreement(first, replace(first, label="b", task="u", seed=2))
 
 
 def test_what_is_commanded_is_the_end_of_each_motion() -> None:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.repeatability.episode import Episodes
-from pytest_simbench.repeatability.motions import Difference
 from pytest_simbench.repeatability.replay import replay
-from pytest_simbench.repeatability.replay_result import Again, Replay
+from pytest_simbench.repeatability.replay_result import Replay
 from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks import Moment, Throwing
 from tests.repeatability.conftest import first_seed
@@ -31,24 +31,14 @@ WAYS = (
 def replayed(
     tumbling: Callable[..., Episodes], handle_of: Callable[..., SimulatorHandle]
 ) -> Callable[..., Replay]:
-    """Falling cubes, run again in a simulator that claims to be deterministic."""
+    """Falling cubes, run again in a simulator that claims to be deterministic and to do all."""
 
-    def run(
-        name: str,
-        *,
-        gui: bool = False,
-        claims: bool = True,
-        capabilities: frozenset[Capability] = EVERYTHING,
-    ) -> Replay:
-        other = handle_of(name, "gui") if gui else "no display"
-        return replay(
-            tumbling(name),
-            claims=claims,
-            capabilities=capabilities,
-            fresh=handle_of(name),
-            other_mode=other,
-            moments=MOMENTS,
-        )
+    def run(name: str = "mujoco", episodes: Episodes | None = None, **options: Any) -> Replay:
+        given = {
+            "claims": True, "capabilities": EVERYTHING, "fresh": handle_of(name),
+            "other_mode": "no display", "moments": MOMENTS, **options,
+        }  # fmt: skip
+        return replay(episodes or tumbling(name), **given)
 
     return run
 
@@ -114,8 +104,10 @@ def test_a_restore_that_nobody_claims_to_be_exact_is_a_result(
     result.assert_as_claimed()
 
 
-def test_an_effect_of_the_window_is_found(replayed: Callable[..., Replay]) -> None:
-    result = replayed("Windowed", gui=True)
+def test_an_effect_of_the_window_is_found(
+    replayed: Callable[..., Replay], handle_of: Callable[..., SimulatorHandle]
+) -> None:
+    result = replayed("Windowed", other_mode=handle_of("Windowed", "gui"))
     assert broken(result) == {"with a window"}
     with pytest.raises(AssertionError, match="with a window"):
         result.assert_as_claimed()
@@ -133,50 +125,22 @@ def test_failure_to_run_again_is_a_failure_without_a_claim(
         result.assert_as_claimed()
 
 
-def test_what_cannot_be_done_is_told(
-    tumbling: Callable[..., Episodes], handle_of: Callable[..., SimulatorHandle]
-) -> None:
-    def run(capabilities: frozenset[Capability], moment: Moment) -> Again:
-        result = replay(
-            tumbling(),
-            claims=True,
-            capabilities=capabilities,
-            fresh=handle_of(),
-            other_mode="no display",
-            moments=(moment,),
-        )
+def test_what_cannot_be_done_is_told(replayed: Callable[..., Replay]) -> None:
+    for options, way, why in (
+        ({"capabilities": frozenset()}, "restored in flight", "mujoco cannot save and restore"),
+        ({"moments": (Moment("x", "swim"),)}, "restored x", "the task never came to swim"),
+        ({"moments": None}, "restored", "the task 'tumbling' declares no moments"),
+    ):
+        result = replayed(**options)
         result.assert_as_claimed()
-        return result.again[2]
-
-    assert run(frozenset(), MOMENTS[0]).text == "mujoco cannot save and restore"
-    assert run(EVERYTHING, Moment("x", "swim")).text == "the task never came to swim"
-
-
-def test_a_task_without_moments_is_restored_nowhere(
-    tumbling: Callable[..., Episodes], handle_of: Callable[..., SimulatorHandle]
-) -> None:
-    result = replay(
-        tumbling(),
-        claims=True,
-        capabilities=EVERYTHING,
-        fresh=handle_of(),
-        other_mode="no display",
-    )
-    assert [again.way for again in result.again][2] == "restored"
-    assert result.again[2].text == "the task 'tumbling' declares no moments"
+        assert (result.again[2].way, result.again[2].text) == (way, why)
 
 
 def test_a_throw_with_the_cube_in_the_grip_and_after_the_swing(
-    handle_of: Callable[..., SimulatorHandle],
+    replayed: Callable[..., Replay], handle_of: Callable[..., SimulatorHandle]
 ) -> None:
     episodes = first_seed(handle_of(), replace(Throwing(), settle=0.5), seed=2022)
-    result = replay(
-        episodes,
-        claims=True,
-        capabilities=EVERYTHING,
-        fresh=handle_of(),
-        other_mode="no display",
-    )
+    result = replayed(episodes=episodes, moments=None)
     result.assert_as_claimed()
     assert [again.way for again in result.again if again.identical][2:4] == [
         "restored in the grip",
@@ -185,27 +149,16 @@ def test_a_throw_with_the_cube_in_the_grip_and_after_the_swing(
 
 
 def test_side_by_side_gives_the_same(
-    tumbling: Callable[..., Episodes], handle_of: Callable[..., SimulatorHandle]
+    replayed: Callable[..., Replay], handle_of: Callable[..., SimulatorHandle]
 ) -> None:
-    def run(jobs: int) -> Replay:
-        return replay(
-            tumbling("mujoco"),
-            claims=True,
-            capabilities=EVERYTHING,
-            fresh=handle_of("mujoco"),
-            other_mode=handle_of("mujoco"),
-            moments=MOMENTS,
-            jobs=jobs,
-        )
-
-    one, three = run(1), run(3)
+    one, three = (replayed(other_mode=handle_of(), jobs=jobs) for jobs in (1, 3))
     assert tuple(again.way for again in three.again) == WAYS
     assert three.to_wire() == one.to_wire()
     assert all(again.identical for again in three.again)
 
 
 def test_an_interrupt_ends_what_runs_side_by_side(
-    tumbling: Callable[..., Episodes],
+    replayed: Callable[..., Replay],
     handle_of: Callable[..., SimulatorHandle],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -213,35 +166,7 @@ def test_an_interrupt_ends_what_runs_side_by_side(
         raise KeyboardInterrupt
 
     monkeypatch.setattr("pytest_simbench.repeatability.replay._after_another", interrupted)
-    workers = [handle_of("mujoco"), handle_of("mujoco")]
+    workers = [handle_of(), handle_of()]
     with pytest.raises(KeyboardInterrupt):
-        replay(
-            tumbling("mujoco"),
-            claims=True,
-            capabilities=EVERYTHING,
-            fresh=workers[0],
-            other_mode=workers[1],
-            moments=MOMENTS,
-            jobs=3,
-        )
+        replayed(fresh=workers[0], other_mode=workers[1], jobs=3)
     assert [handle._process for handle in workers] == [None, None]
-
-
-@pytest.mark.parametrize(
-    "again",
-    [
-        Again("a"),
-        Again("b", Difference(1.5, "cube", {1.0: 0.1, 20.0: None}, 0.2), ("left",), 1.0),
-        Again("c", skipped="no display"),
-        Again("d", failure="WorkerExited: x"),
-    ],
-)
-def test_results_travel(again: Again) -> None:
-    assert Again.from_wire(again.to_wire()) == again
-
-
-def test_text_of_a_difference() -> None:
-    again = Again("b", Difference(1.5, "cube", {1.0: 0.1, 20.0: None}, 0.2), ("left",))
-    assert again.text == (
-        "first differs at t = 1.50 s (cube), then 100 mm 1 s later, 200 mm at most; changed left"
-    )

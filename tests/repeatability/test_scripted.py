@@ -22,7 +22,7 @@ from pytest_simbench.repeatability.perturbation import Perturbation, described
 from pytest_simbench.repeatability.replay_result import Again, Replay
 from pytest_simbench.repeatability.search import Finding, bounds_in_words, search, to_wire
 from pytest_simbench.repeatability.stability import Stability
-from pytest_simbench.tasks import Jitter, Throwing
+from pytest_simbench.tasks import Jitter, Stacking, Throwing
 from pytest_simbench.tasks.base import Outcome
 from tests.repeatability.scripted import METRICS, Scripted, episode, motion, operation
 
@@ -130,6 +130,9 @@ def test_effects_of_what_is_none() -> None:
     assert effect(task, more, some, ["standing"]) == "saves b from toppling"
     assert effect(task, some, some, ["standing"]) == "changes standing from none to none"
     assert effect(task, some, more, []) == ""
+    before, after = Outcome({"at_end": 1.0}), Outcome({"at_end": 0.8})
+    words = "changes at the end from 100 % to 80 %"  # a task that says nothing of its own
+    assert effect(Stacking(), before, after, ["at_end"]) == words
 
 
 def test_what_counts_as_changed() -> None:
@@ -160,6 +163,8 @@ def test_a_search_of_a_known_world(monkeypatch: pytest.MonkeyPatch) -> None:
     found.assert_found()
     found.assert_not_below("x", 4e-4)
     found.assert_not_below("yaw", 1.0)
+    same = search(Scripted(toppling), {"x": 2e-3}, examples=40, at_once=1)  # type: ignore[arg-type]
+    assert same == found
     with pytest.raises(AssertionError) as caught:
         found.assert_not_below("x", 6e-4)
     assert str(caught.value) == (
@@ -199,6 +204,27 @@ def test_shrinking_has_its_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     experiment = Scripted(toppling)
     found = search(experiment, {"x": 2e-3}, examples=40, shrinks=2, at_once=1)  # type: ignore[arg-type]
     assert found.runs <= found.examples + 2
+
+
+@pytest.mark.parametrize("bad", [range(3, 4), range(3, 10_000)], ids=["moody", "aging"])
+def test_what_the_perturbation_did_not_do_is_not_confirmed(
+    bad: range, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A world that was bad by itself, the third or all from there on: the same perturbation, or
+    none, gives another result."""
+    monkeypatch.setattr(
+        "pytest_simbench.repeatability.search._kept_example", lambda attack, smallest: ""
+    )
+    worlds = iter(range(1, 10_000))
+
+    def run(perturbed: Perturbed) -> Episode:
+        return toppling((Perturbation("x", 5 * (next(worlds) in bad), "a"),))
+
+    found = search(Scripted(run), {"y": 1e-3}, examples=8, shrinks=5, at_once=1)  # type: ignore[arg-type]
+    assert (found.effect, found.examples, found.confirmed) == ("topples one", 2, False)
+    assert found.sentence.endswith(" topples one (not confirmed by a second run)")
+    with pytest.raises(AssertionError, match="not confirmed"):
+        found.assert_found()
 
 
 def test_several_count_together() -> None:

@@ -1,66 +1,183 @@
-"""What random perturbations leave, and how a displacement grows."""
+"""What random perturbations leave, and how a displacement grows: in worlds that are known, and in
+engines."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from pytest_simbench.client.world import World
 from pytest_simbench.measure.results import InconclusiveWarning
-from pytest_simbench.repeatability.episode import Episodes
-from pytest_simbench.repeatability.motions import gaps
+from pytest_simbench.repeatability.episode import Episode, Episodes
 from pytest_simbench.repeatability.perturbation import Perturbation
-from pytest_simbench.repeatability.stability import (
-    Sensitivity,
-    Stability,
-    sensitivity,
-    stability,
-)
-from pytest_simbench.robot.panda import panda
-from pytest_simbench.scene import Scene, Trajectory
-from pytest_simbench.tasks import Jitter, Moment
-from pytest_simbench.tasks.base import Count, Outcome
-from tests.repeatability.conftest import Tumbling, first_seed
+from pytest_simbench.repeatability.stability import Sensitivity, Stability, sensitivity, stability
+from pytest_simbench.tasks.moments import Moment
+from tests.repeatability.scripted import Scripted, episode, motion, operation
+from tests.repeatability.test_scripted import ALL, Perturbed, shift, toppling
+
+GROWING = [
+    # at 0.1 s after the first motion began, at 0.2 s, the cube is 1, 2, ... displacements away
+    ([0.0], [1.0]),
+    ([0.2, 0.4], [1.0, 2.0]),
+    ([0.5, 0.9, 1.4], [3.0, 4.0, 6.0]),
+    ([2.0, 6.0], [5.0, 1.0]),
+]
+TAPE = [
+    operation("wait", "settle", 0.4),
+    operation("follow", "swing", 1.0),
+    operation("wait", "swing", 4.6),
+]
 
 
-def test_within_the_margin_all_is_kept(towers: Callable[..., Episodes]) -> None:
-    result = stability(towers(), {"x": 0.001, "mass": 0.05}, examples=8)
-    assert list(result.kept) == [1.0] * 8
-    assert (result.unchanged, result.worst) == (8, "")
-    assert result.sentence == (
-        "kept 100 % [58, 100] within 1 mm in x, 5 % in mass; the same outcome in 8 of 8"
+def growing(perturbed: Perturbed) -> Episode:
+    x = shift(perturbed)
+    return episode(
+        ALL, [motion(t, [0.1 + x * g for g in way], [0.5] * len(t)) for t, way in GROWING], TAPE
     )
-    result.assert_kept_at_least(0.5)
+
+
+@pytest.mark.parametrize("steps", [2, -2])
+def test_growth_per_displacement(steps: int) -> None:
+    """From the end of the settling on, at 0.4 s, with the commands of the unperturbed run."""
+    experiment = Scripted(growing)
+    perturbation = Perturbation("x", steps, "a")
+    moments = [Moment("swung", "swing", 1), Moment("at first", "settle"), Moment("never", "swim")]
+    found = sensitivity(experiment, perturbation, moments)  # type: ignore[arg-type]
+    assert experiment.asked == [((), None), ((perturbation,), TAPE)]
+    assert found.simulator == "sim"
+    assert found.perturbation == f"{0.1 * steps:g} mm in x of a"
+    assert found.ratio == {
+        0.1: pytest.approx(3.0),
+        1.0: pytest.approx(6.0),
+        5.0: pytest.approx(1.0),
+        20.0: None,
+    }
+    assert found.largest == pytest.approx(6.0)
+    assert found.until == {
+        "swung": pytest.approx(6.0),
+        "at first": pytest.approx(1.0),
+        "never": None,
+    }
+    assert found.sentence == (
+        f"mm per mm after {0.1 * steps:g} mm in x of a: 3 at 0.1 s, 6 at 1 s, 1 at 5 s, "
+        "6 until swung, 1 until at first; most 6"
+    )
+    assert found.to_wire() == {
+        "perturbation": found.perturbation,
+        "ratio": {
+            "0.1": found.ratio[0.1],
+            "1": found.ratio[1.0],
+            "5": found.ratio[5.0],
+            "20": None,
+        },
+        "until": found.until,
+        "largest": found.largest,
+        "sentence": found.sentence,
+    }
+
+
+def test_a_world_that_is_left_alone_begins_at_once() -> None:
+    """No motion, so times count from 0."""
+
+    def run(perturbed: Perturbed) -> Episode:
+        found = growing(perturbed)
+        return episode(ALL, found.motions, [operation("wait", "fall", 1.0)] * 3)
+
+    found = sensitivity(Scripted(run), Perturbation("x", 1, "a"))  # type: ignore[arg-type]
+    assert found.ratio[0.1] == pytest.approx(1.0)
+    assert found.ratio[1.0] == pytest.approx(6.0)
+
+
+def test_only_what_comes_before_is_judged() -> None:
+    grown = Sensitivity("sim", "it", {0.1: 1.0, 5.0: 4.0, 20.0: None}, 9.0, {"a": 2.0, "b": None})
+    grown.assert_below(4.5, until=5.0)
+    grown.assert_below(2.5, until="a")
+    with pytest.raises(AssertionError) as caught:
+        grown.assert_below(4.0, until=5.0)
+    assert str(caught.value) == f"sim: {grown.sentence}; expected below 4 until 5 s"
+    with pytest.raises(AssertionError) as caught:
+        grown.assert_below(9.0, until="b")
+    assert str(caught.value) == "sim: the task never came to b"
+    with pytest.raises(AssertionError, match=r"the task never came to 0\.05 s"):
+        grown.assert_below(9.0, until=0.05)
+    with pytest.raises(ValueError, match="^no moment is named 'c'; there are: a, b$"):
+        grown.assert_below(9.0, until="c")
+    with pytest.raises(ValueError, match="^no moment is named 'c'; there are: none$"):
+        Sensitivity("sim", "it", {}, 9.0).assert_below(9.0, until="c")
+
+
+def test_no_growth_is_told_of_what_is_no_displacement() -> None:
+    experiment = Scripted(growing)
+    with pytest.raises(ValueError, match="^sensitivity is told per millimetre, not for 1 deg of"):
+        sensitivity(experiment, Perturbation("yaw", 10, "a"))  # type: ignore[arg-type]
+    assert not experiment.asked
+
+
+def test_stability_of_a_known_world() -> None:
+    experiment = Scripted(toppling)
+    found = stability(experiment, {"x": 1e-3}, examples=12, at_most=1)  # type: ignore[arg-type]
+    assert len(experiment.asked) == 13
+    trials = [toppling(asked[0]).counts["standing"] for asked in experiment.asked[1:]]
+    assert list(found.kept) == trials
+    assert found.unchanged == trials.count(1.0)
+    assert (found.simulator, found.bounds) == ("sim", "1 mm in x")
+    worst = min(experiment.asked[1:], key=lambda asked: toppling(asked[0]).counts["standing"] or 0)
+    assert min(trials) < 1.0
+    names = {0.75: "topples one", 0.5: "topples one and two"}
+    assert found.worst == f"{worst[0][0]} {names[min(trials)]}"
+    assert found.share.mean == pytest.approx(np.mean(trials))
+    assert found.same.mean == pytest.approx(found.unchanged / 12)
+    again = stability(Scripted(toppling), {"x": 1e-3}, examples=12, at_most=1)  # type: ignore[arg-type]
+    assert again == found
+    other = Scripted(toppling)
+    stability(other, {"x": 1e-3}, examples=12, at_most=1, random_seed=1)  # type: ignore[arg-type]
+    assert other.asked != experiment.asked
+
+
+def test_what_a_stability_says() -> None:
+    kept = [1.0, 0.5, 1.0, 1.0, 1.0]
+    found = Stability("sim", kept, 4, "1 mm in x", "it topples one")
+    low, high = (100 * end for end in (found.share.low, found.share.high))
+    assert found.sentence == (
+        f"kept 90 % [{low:.0f}, {high:.0f}] within 1 mm in x; the same outcome in 4 of 5; worst: "
+        "it topples one"
+    )
+    assert found.to_wire() == {
+        "kept": kept,
+        "unchanged": 4,
+        "bounds": "1 mm in x",
+        "worst": "it topples one",
+        "sentence": found.sentence,
+    }
+    with pytest.raises(AssertionError) as caught:
+        Stability("sim", [0.0] * 9, 0, "1 mm in x", "").assert_kept_at_least(0.9)
+    assert str(caught.value).startswith("sim: at least 90 % should be kept, but kept 0 % [0, ")
+    assert "worst" not in str(caught.value)
+
+
+def test_what_is_not_decided_warns_or_fails_if_strict() -> None:
+    found = Stability("sim", [1.0] * 8, 8, "1 mm in x", "")
+    assert found.sentence == "kept 100 % [58, 100] within 1 mm in x; the same outcome in 8 of 8"
+    found.assert_kept_at_least(0.5)
     with pytest.warns(
         InconclusiveWarning, match="at least 90 % should be kept, inconclusive: kept"
     ):
-        result.assert_kept_at_least(0.9)
+        found.assert_kept_at_least(0.9)
     with pytest.raises(AssertionError, match=r"inconclusive: kept 100 % .*\(--sim-strict\)"):
-        replace(result, strict=True).assert_kept_at_least(0.9)
-
-
-def test_few_runs_are_not_judged() -> None:
-    result = Stability("x", [0.0] * 4, 0, "1 mm in x", "")
+        replace(found, strict=True).assert_kept_at_least(0.9)
     with pytest.warns(InconclusiveWarning, match="not judged: .*a claim needs 5 repetitions"):
-        result.assert_kept_at_least(0.9)
+        Stability("sim", [0.0] * 4, 0, "1 mm in x", "").assert_kept_at_least(0.9)
 
 
-def test_beyond_it_towers_fall(towers: Callable[..., Episodes]) -> None:
+def test_beyond_their_margin_towers_fall(towers: Callable[..., Episodes]) -> None:
     result = stability(towers(margin=0.003), {"x": 0.012}, examples=20)
     assert 0 < result.unchanged < 20
     assert min(result.kept) == 0.0
     assert result.worst.endswith("topples tower 1")
     with pytest.raises(AssertionError, match="mujoco: at least 97 % should be kept, but kept"):
         result.assert_kept_at_least(0.97)
-
-
-def test_a_crash_keeps_nothing(towers: Callable[..., Episodes]) -> None:
-    result = stability(towers("Brittle"), {"friction": 0.2}, examples=10)
-    assert set(result.kept) == {0.0, 1.0}
-    assert "ends in WorkerExited" in result.worst
 
 
 def test_a_tower_that_stands_keeps_the_displacement(towers: Callable[..., Episodes]) -> None:
@@ -70,98 +187,3 @@ def test_a_tower_that_stands_keeps_the_displacement(towers: Callable[..., Episod
     assert result.ratio[1.0] == pytest.approx(1.0, abs=0.1)
     assert result.ratio[20.0] is None
     result.assert_below(1.2, until=1.0)
-
-
-def test_falling_cubes_part(tumbling: Callable[..., Episodes]) -> None:
-    result = sensitivity(tumbling(), Perturbation("x", 1, "cube_1"))
-    assert result.ratio[0.1] == pytest.approx(1.0, abs=0.3)
-    assert result.largest > 3
-    with pytest.raises(AssertionError, match="mm per mm after 0.1 mm in x of cube_1.*below 0.5"):
-        result.assert_below(0.5, until=1.0)
-
-
-@dataclass(frozen=True)
-class Peeking(Tumbling):
-    """Waits as long as it reads off the cube's place: 10 ms more for each 0.1 mm."""
-
-    def perform(self, world: World, seed: int, count: Count) -> Outcome:
-        for phase in ("look", "fall", "land"):
-            with world.phase(phase):
-                world.wait(round(0.05 + 100 * (world.pose("cube_1").position[0] - 0.02), 3))
-        return Outcome({"left": 0.0})
-
-
-def test_the_same_commands_are_sent_whatever_the_task_would_plan(
-    tumbling: Callable[..., Episodes],
-) -> None:
-    """Were the waits planned anew, the falling cubes would be 8 mm apart: 80 mm per mm."""
-    episodes = first_seed(tumbling().handle, Peeking(), jitter=0.0)
-    base, moved = (episodes.run([Perturbation("x", n, "cube_1")] if n else []) for n in (0, 1))
-    assert base.tape[1].duration != moved.tape[1].duration
-    assert sensitivity(episodes, Perturbation("x", 1, "cube_1")).largest < 1.5
-
-
-@dataclass(frozen=True)
-class Late(Tumbling):
-    """The cubes rest for a while before anything is done to them."""
-
-    def scene(self, seed: int, jitter: Jitter) -> Scene:
-        bodies = super().scene(seed, jitter).bodies
-        return Scene("late", bodies, panda(), room=(100.0, 100.0, 100.0))
-
-    def perform(self, world: World, seed: int, count: Count) -> Outcome:
-        with world.phase("settle start"):
-            world.wait(0.05)
-        rows = np.zeros((26, 9))
-        start = rows + world.scene.robot.column("initial_position")  # type: ignore[union-attr]
-        with world.phase("swing"):
-            world.follow(Trajectory(0.004, start, rows, rows))
-            world.wait(1.0)
-        return Outcome({"left": 0.0})
-
-
-def test_times_count_from_the_first_motion_of_the_task(tumbling: Callable[..., Episodes]) -> None:
-    """Nothing has happened at 0.1 s of a world that rests for 0.05 s first but what is told at
-    0.05 s after the task began."""
-    episodes = first_seed(tumbling().handle, Late())
-    moments = (Moment("at first", "swing"), Moment("swung", "swing", 1), Moment("never", "swim"))
-    found = sensitivity(episodes, Perturbation("x", 1, "cube_1"), moments)
-    base = episodes.run()
-    moved = episodes.run([Perturbation("x", 1, "cube_1")], play=base.tape)
-    between = gaps(base.motions, moved.motions)
-    expected = between.after(0.05 + 0.1)
-    assert expected is not None
-    assert found.ratio[0.1] == pytest.approx(expected / 1e-4)
-    assert found.until["at first"] == pytest.approx(
-        between.largest()[between.time <= 0.051].max() / 1e-4
-    )
-    assert found.until["swung"] == pytest.approx(
-        between.largest()[between.time <= 0.151].max() / 1e-4
-    )
-    assert found.until["never"] is None
-    assert found.largest > found.until["swung"] > found.until["at first"] * 1.001
-    with pytest.raises(AssertionError, match="the task never came to never"):
-        found.assert_below(10.0, until="never")
-
-
-def test_a_moment_bounds_what_is_judged() -> None:
-    grown = Sensitivity("x", "0.1 mm in x of a", {0.1: 1.0}, 400.0, {"in flight": 30.0})
-    grown.assert_below(31.0, until="in flight")
-    with pytest.raises(AssertionError, match="30 until in flight.*expected below 30 until in fl"):
-        grown.assert_below(30.0, until="in flight")
-    with pytest.raises(ValueError, match="no moment is named 'lost'; there are: in flight"):
-        grown.assert_below(30.0, until="lost")
-    with pytest.raises(AssertionError, match=r"the task never came to 0\.05 s"):
-        grown.assert_below(30.0, until=0.05)
-
-
-def test_later_times_are_not_judged() -> None:
-    grown = Sensitivity("x", "0.1 mm in x of a", {0.1: 1.0, 5.0: 400.0, 20.0: None}, 400.0)
-    grown.assert_below(2.0, until=1.0)
-    with pytest.raises(AssertionError, match="expected below 2 until 5 s"):
-        grown.assert_below(2.0, until=5.0)
-
-
-def test_only_displacements(towers: Callable[..., Episodes]) -> None:
-    with pytest.raises(ValueError, match="per millimetre, not for 1 % in the mass of cube_01"):
-        sensitivity(towers(), Perturbation("mass", 1, "cube_01"))

@@ -76,32 +76,3 @@ class Stale(MuJoCo):
         super().restore(state)
         if old - self.data.time > 0.2:
             self.data.qvel[self._body_v] += 1e-9
-
-
-class Numbered(MuJoCo):
-    """Tilts the world by half a g when its number in the process is one of `tilted`."""
-
-    tilted: ClassVar[range] = range(0)
-    worlds: ClassVar[dict[type, int]] = {}
-
-    def load(self, scene: Scene) -> None:
-        super().load(scene)
-        number = Numbered.worlds[type(self)] = Numbered.worlds.get(type(self), 0) + 1
-        self._tilted = number in self.tilted
-
-    def step(self) -> None:
-        if self._tilted:  # not yet in `load`, where it would be read back
-            self.model.opt.gravity[0] = -5.0
-        super().step()
-
-
-class Moody(Numbered):
-    """One bad world, the third: it never comes again."""
-
-    tilted = range(3, 4)
-
-
-class Aging(Numbered):
-    """All worlds are bad from the third on, also the unperturbed one."""
-
-    tilted = range(3, 10_000)

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import Any
+from collections.abc import Iterable
 
 from pytest_simbench.testing.faults import FAULTS
-
-Plant = Callable[[Any], None]
-"""Changes a quantity in the engine of a loaded simulator, behind the adapter's back."""
 
 
 def pattern(quantity: str) -> str:

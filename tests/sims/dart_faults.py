@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from .coverage import Plant
+from pytest_simbench.sims.dart.adapter import DART
+
+from .planted import Plant, Planting
 
 
 def part(s: Any, name: str) -> Any:
@@ -60,3 +62,7 @@ FAULTS: dict[str, Plant] = {
     ),
     "gripper/coupled": uncoupled,
 }
+
+
+class FaultyDART(Planting, DART):
+    faults = FAULTS

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from .coverage import Plant
+from pytest_simbench.sims.drake.adapter import Drake
+
+from .planted import Plant, Planting
 
 
 def com(s: Any) -> None:
@@ -61,3 +63,7 @@ FAULTS: dict[str, Plant] = {
     "link/panda_link4/touches": ghost("panda_link4"),
     "gripper/coupled": coupling,
 }
+
+
+class FaultyDrake(Planting, Drake):
+    faults = FAULTS

@@ -8,16 +8,15 @@ is what Gazebo is told.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from collections.abc import Callable
+from typing import Any
 
 from pytest_simbench.sims.gazebo import adapter
 from pytest_simbench.sims.gazebo.adapter import Gazebo
-from pytest_simbench.sims.gazebo.settings import GazeboSettings
 
 from pytest_simbench.scene import Scene
-from pytest_simbench.simulator import Settings
+
+from .planted import Planting
 
 LINK = "model[@name='robot']/link[@name='panda_link4']"
 JOINT = "model[@name='robot']/joint[@name='panda_joint4']/axis"
@@ -26,19 +25,7 @@ BOX = f"{CUBE}/link/collision"
 GROUND = "model[@name='ground']/link/collision"
 
 
-@dataclass(frozen=True)
-class FaultySettings(GazeboSettings):
-    """Adds `fault`, a key of `PLANTS` or "" for none."""
-
-    fault: str = ""
-
-
-class FaultyGazebo(Gazebo):
-    profiles: ClassVar[Mapping[str, Settings]] = {
-        name: FaultySettings(**asdict(settings)) for name, settings in Gazebo.profiles.items()
-    }
-    settings: FaultySettings
-
+class FaultyGazebo(Planting, Gazebo):
     def load(self, scene: Scene) -> None:
         honest = adapter.world_text
 
@@ -52,7 +39,7 @@ class FaultyGazebo(Gazebo):
         if self.settings.fault:
             adapter.world_text = text
         try:
-            super().load(scene)
+            Gazebo.load(self, scene)
         finally:
             adapter.world_text = honest
 
@@ -96,10 +83,6 @@ def added(path: str, tags: str, text: str) -> Fault:
     return plant
 
 
-def rough(path: str) -> Fault:
-    return scaled(f"{path}/surface/friction/ode/mu", 0.5)
-
-
 def bouncing(path: str) -> Fault:
     return added(path, "surface/bounce/restitution_coefficient", "0.5")
 
@@ -109,32 +92,17 @@ def ghost(path: str) -> Fault:
 
 
 FAULTS: dict[str, Fault] = {
-    "gravity": scaled("gravity", 0.99, at=2),
     "timestep": scaled("physics/max_step_size", 0.5),
     "ground/height": moved("model[@name='ground']/pose", 2, 0.01),
-    "ground/friction": rough(GROUND),
     "ground/restitution": bouncing(GROUND),
-    "body/table/pose": moved("model[@name='table']/pose", 2, -0.012),
-    "body/cube_05/friction": rough(BOX),
     "body/cube_05/restitution": bouncing(BOX),
-    "body/cube_05/mass": scaled(f"{CUBE}/link/inertial/mass", 2.0),
-    "body/cube_05/inertia": scaled(f"{CUBE}/link/inertial/inertia/ixx", 1.2),
     "body/cube_05/com": moved(f"{CUBE}/link/inertial/pose", 0, 0.01),
     "body/cube_05/gravity": added(f"{CUBE}/link", "gravity", "false"),
     "body/cube_05/touches": ghost(BOX),
     "body/cube_05/dynamic": added(f"{CUBE}/link", "kinematic", "true"),
-    "body/cube_05/boxes": scaled(f"{BOX}/geometry/box/size", 0.8, at=1),
-    "link/panda_link4/friction": rough(f"{LINK}/collision"),
     "link/panda_link4/restitution": bouncing(f"{LINK}/collision"),
-    "link/panda_link4/mass": scaled(f"{LINK}/inertial/mass", 1.2),
-    "link/panda_link4/inertia": scaled(f"{LINK}/inertial/inertia/iyy", 1.2),
-    "link/panda_link4/com": moved(f"{LINK}/inertial/pose", 1, 0.01),
     "link/panda_link4/gravity": added(LINK, "gravity", "false"),
     "link/panda_link4/touches": ghost(f"{LINK}/collision"),
-    "link/panda_link4/meshes": moved(f"{LINK}/collision/pose", 1, 0.01),
-    "joint/panda_joint4/axis": scaled(f"{JOINT}/xyz", -1.0, at=2),
-    "joint/panda_joint4/limits": scaled(f"{JOINT}/limit/upper", 0.9),
-    "joint/panda_joint4/effort_limit": scaled(f"{JOINT}/limit/effort", 2.0),
     "joint/panda_joint4/friction": added(JOINT, "dynamics/damping", "1.0"),
 }
 """By quantity; `gripper/coupled` is dartsim's own to break, see `test_gazebo`."""

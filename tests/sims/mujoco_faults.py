@@ -4,45 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
-from .coverage import Plant
-
-
-def geom(name: str, array: str, value: Any) -> Plant:
-    def plant(s: Any) -> None:
-        body = s.model.body(name).id if name != "ground" else -1
-        geoms = s.model.geom_bodyid == body if body >= 0 else [s.model.geom("ground").id]
-        getattr(s.model, array)[geoms] = value
-
-    return plant
+from .compiled_faults import LINK, Compiled, faults, geom
+from .planted import Plant, Planting
 
 
-def body(name: str, array: str, value: Any) -> Plant:
-    return lambda s: getattr(s.model, array).__setitem__(s.model.body(name).id, value)
+def compiled(s: Any) -> Compiled:
+    def body(name: str) -> int:
+        return int(s.model.body(name).id)
 
-
-def height(s: Any) -> None:
-    ground = s.model.geom("ground").id
-    s.model.geom_pos[ground, 2] = 0.01
-    s.model.geom_sameframe[ground] = 0
-
-
-def com(s: Any) -> None:
-    cube = s.model.body("cube").id
-    s.model.body_ipos[cube, 0] = 0.01
-    s.model.body_sameframe[cube] = 0
-
-
-def damping(s: Any) -> None:
-    start = s.model.body("cube").dofadr[0]
-    s.model.dof_damping[start : start + 6] = 0.1
-
-
-def joint(array: str, value: Any) -> Plant:
-    return lambda s: getattr(s.model, array).__setitem__(
-        s.model.joint("panda_joint4").dofadr[0], value
-    )
+    joint, ground = s.model.joint("panda_joint4").id, s.model.geom("ground").id
+    return Compiled(s.model, s.data, body, joint, ground)
 
 
 def weld(s: Any) -> None:
@@ -52,32 +25,8 @@ def weld(s: Any) -> None:
     s.model.eq_obj1id[0] = s.model.body("cube").id
 
 
-def shorter_table(s: Any) -> None:
-    import mujoco
-
-    s.model.geom("table").size[2] -= 0.012
-    s.model.body("table").pos[2] -= 0.012
-    mujoco.mj_forward(s.model, s.data)
-
-
-def gain(index: int) -> Plant:
-    def plant(s: Any) -> None:
-        s.model.actuator("panda_joint4").biasprm[index] *= 1.1
-
-    return plant
-
-
 def effort_limit(s: Any) -> None:
     s.model.actuator("panda_joint4").forcerange[1] *= 2  # one end only
-
-
-def finger_shape(s: Any) -> None:
-    finger = s.model.body("panda_leftfinger").id
-    s.model.geom_friction[np.flatnonzero(s.model.geom_bodyid == finger)[-1], 0] = 0.3
-
-
-BOUNCY = (0.02, 0.1)
-"""MuJoCo's time constant and damping ratio of a contact that gives back most of the speed."""
 
 
 def override(array: str, value: Any) -> Plant:
@@ -105,23 +54,9 @@ def off(switch: str) -> Plant:
 
 
 FAULTS: dict[str, Plant] = {
-    "timestep": lambda s: setattr(s.model.opt, "timestep", 0.005),
-    "ground/height": height,
-    "ground/restitution": geom("ground", "geom_solref", BOUNCY),
-    "body/cube/restitution": geom("cube", "geom_solref", BOUNCY),
-    "body/cube/margin": geom("cube", "geom_margin", 0.002),
-    "body/cube/touches": geom("cube", "geom_conaffinity", 0),
-    "body/cube/com": com,
-    "body/cube/damping": damping,
-    "body/cube/gravity": body("cube", "body_gravcomp", 1.0),
+    **faults(compiled),
     "body/cube/dynamic": weld,
-    "link/panda_link4/restitution": geom("panda_link4", "geom_solref", BOUNCY),
-    "link/panda_link4/margin": geom("panda_link4", "geom_margin", 0.002),
-    "link/panda_link4/touches": geom("panda_link4", "geom_contype", 0),
-    "link/panda_link4/damping": lambda s: setattr(s.model.opt, "viscosity", 0.1),
-    "link/panda_link4/gravity": body("panda_link4", "body_gravcomp", 1.0),
-    "joint/panda_joint4/friction": joint("dof_frictionloss", 0.5),
-    "gripper/coupled": lambda s: s.data.eq_active.__setitem__(0, 0),
+    "link/panda_link4/touches, one way": lambda s: geom(LINK, "geom_contype", 0)(compiled(s)),
     "gripper/coupled, to another joint": lambda s: s.model.eq_obj1id.__setitem__(0, 0),
     "body/cube/friction, overridden": override("o_friction", (20.0, 20.0)),
     "link/panda_leftfinger/friction, overridden": override("o_friction", (20.0, 20.0)),
@@ -132,16 +67,9 @@ FAULTS: dict[str, Plant] = {
     "gripper/coupled, equalities switched off": off("EQUALITY"),
     "joint/panda_joint4/limits, switched off": off("LIMIT"),
     "joint/panda_joint4/stiffness, switched off": off("ACTUATION"),
-    "body/cube/mass": body("cube", "body_mass", 1.0),
-    "body/cube/inertia": lambda s: s.model.body("cube").inertia.__imul__(1.2),
-    "body/cube/friction": lambda s: s.model.geom("cube").friction.__setitem__(0, 0.5),
-    "gravity": lambda s: s.model.opt.gravity.__setitem__(2, -9.7),
-    "body/table/boxes": shorter_table,
-    "body/table/pose": shorter_table,
-    "joint/panda_joint4/stiffness": gain(1),
-    "joint/panda_joint4/damping": gain(2),
     "joint/panda_joint4/effort_limit": effort_limit,
-    "joint/panda_joint4/armature": joint("dof_armature", 0.0),
-    "link/panda_link4/mass": body("panda_link4", "body_mass", 5.0),
-    "link/panda_leftfinger/friction, one shape": finger_shape,
 }
+
+
+class FaultyMuJoCo(Planting, MuJoCo):
+    faults = FAULTS

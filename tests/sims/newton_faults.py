@@ -1,4 +1,5 @@
-"""Newton with one planted fault: a world that differs from the scene in one quantity.
+"""Newton with one planted fault: its solver's compiled model differs from the scene in one
+quantity.
 
 Loaded by workers as `tests.sims.newton_faults:FaultyNewton`, since Newton lives in an interpreter
 of its own; the setting `fault` names the quantity.
@@ -6,175 +7,40 @@ of its own; the setting `fault` names the quantity.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from typing import Any
 
-import numpy as np
 from pytest_simbench.sims.newton.adapter import Newton
-from pytest_simbench.sims.newton.settings import NewtonSettings
 
-from pytest_simbench.scene import Scene
-from pytest_simbench.simulator import Settings
-
-
-@dataclass(frozen=True)
-class FaultySettings(NewtonSettings):
-    """Adds `fault`, a key of `FAULTS` or "" for none."""
-
-    fault: str = ""
+from .compiled_faults import Compiled, faults
+from .planted import Plant, Planting
 
 
-class FaultyNewton(Newton):
-    profiles: ClassVar[Mapping[str, Settings]] = {
-        name: FaultySettings(**asdict(settings)) for name, settings in Newton.profiles.items()
-    }
-    settings: FaultySettings
+def compiled(s: Any) -> Compiled:
+    """MuJoCo has numbers of its own for Newton's bodies and joints."""
+    solver = s.solver
 
-    def load(self, scene: Scene) -> None:
-        super().load(scene)
-        if self.settings.fault:
-            FAULTS[self.settings.fault](self)
+    def number(numbers: Any, labels: Any, name: str) -> int:
+        known = [label.rpartition("/")[2] for label in labels]
+        return int(numbers.numpy()[0].tolist().index(known.index(name)))
 
+    def body(name: str) -> int:
+        return number(solver.mjc_body_to_newton, s.model.body_label, name)
 
-def geom(s: Any, name: str) -> Any:
-    return s.solver.mj_model.geom(s._geom(name))
-
-
-def body(s: Any, name: str) -> Any:
-    numbers = s.solver.mjc_body_to_newton.numpy()[0].tolist()
-    labels = [label.rpartition("/")[2] for label in s.model.body_label]
-    return s.solver.mj_model.body(numbers.index(labels.index(name)))
-
-
-def joint(s: Any, name: str = "panda_joint4") -> int:
-    """MuJoCo's number of a joint."""
-    numbers = s.solver.mjc_jnt_to_newton_jnt.numpy()[0].tolist()
-    labels = [label.rpartition("/")[2] for label in s.model.joint_label]
-    return int(numbers.index(labels.index(name)))
-
-
-def gain(column: int) -> Callable[[Any], None]:
-    def plant(s: Any) -> None:
-        model = s.solver.mj_model
-        model.actuator_biasprm[model.actuator_trnid[:, 0] == joint(s), column] *= 1.1
-
-    return plant
+    joint = number(solver.mjc_jnt_to_newton_jnt, s.model.joint_label, "panda_joint4")
+    return Compiled(solver.mj_model, solver.mj_data, body, joint, s._geom("ground"))
 
 
 def effort_limit(s: Any) -> None:
-    model = s.solver.mj_model
-    model.actuator_forcerange[model.actuator_trnid[:, 0] == joint(s)] *= 2.0
-    model.jnt_actfrcrange[joint(s)] *= 2.0
+    model, joint = s.solver.mj_model, compiled(s).joint
+    model.actuator_forcerange[model.actuator_trnid[:, 0] == joint] *= 2.0
+    model.jnt_actfrcrange[joint] *= 2.0
 
 
-def in_model(array: str, value: float) -> Callable[[Any], None]:
-    """Sets the row of joint 4 in an array of MuJoCo's joints or degrees of freedom."""
-
-    def plant(s: Any) -> None:
-        model, at = s.solver.mj_model, joint(s)
-        row = model.jnt_dofadr[at] if array.startswith("dof") else at
-        getattr(model, array)[row] = value
-
-    return plant
-
-
-def in_data(s: Any) -> None:
-    model, data = s.solver.mj_model, s.solver.mj_data
-    data.qpos[model.jnt_qposadr[joint(s)]] += 0.1
-
-
-def sunk_table(s: Any) -> None:
-    import mujoco
-
-    geom(s, "table").pos[2] -= 0.012
-    mujoco.mj_kinematics(s.solver.mj_model, s.solver.mj_data)
-
-
-def one_finger_shape(s: Any) -> None:
-    model = s.solver.mj_model
-    shapes = np.flatnonzero(model.geom_bodyid == body(s, "panda_leftfinger").id)
-    model.geom_friction[shapes[-1], 0] = 0.3
-
-
-def uncouple(s: Any) -> None:
-    s.solver.mj_data.eq_active[:] = 0
-
-
-def in_geom(name: str, array: str, value: Any) -> Callable[[Any], None]:
-    """Sets an array's rows of all geoms of a link, or of the one of a body or the ground."""
-
-    def plant(s: Any) -> None:
-        model = s.solver.mj_model
-        link = name.startswith("panda")
-        rows = model.geom_bodyid == body(s, name).id if link else [geom(s, name).id]
-        getattr(model, array)[rows] = value
-
-    return plant
-
-
-def ghost(name: str) -> Callable[[Any], None]:
-    def plant(s: Any) -> None:
-        for array in ("geom_contype", "geom_conaffinity"):
-            in_geom(name, array, 0)(s)
-
-    return plant
-
-
-def lifted_ground(s: Any) -> None:
-    ground = geom(s, "ground").id
-    s.solver.mj_model.geom_pos[ground, 2] = 0.01
-    s.solver.mj_model.geom_sameframe[ground] = 0  # else MuJoCo takes the body's frame
-
-
-def centre(s: Any) -> None:
-    s.solver.mj_model.body_ipos[body(s, "cube_05").id, 0] += 0.01
-    s.solver.mj_model.body_sameframe[body(s, "cube_05").id] = 0
-
-
-def damped(s: Any) -> None:
-    start = body(s, "cube_05").dofadr[0]
-    s.solver.mj_model.dof_damping[start : start + 6] = 0.1
-
-
-def weightless(name: str) -> Callable[[Any], None]:
-    return lambda s: s.solver.mj_model.body_gravcomp.__setitem__(body(s, name).id, 1.0)
-
-
-BOUNCY = (0.02, 0.1)
-"""MuJoCo's time constant and damping ratio of a contact that gives back most of the speed."""
-
-FAULTS: dict[str, Callable[[Any], None]] = {
-    "ground/restitution": in_geom("ground", "geom_solref", BOUNCY),
-    "body/cube_05/restitution": in_geom("cube_05", "geom_solref", BOUNCY),
-    "body/cube_05/margin": in_geom("cube_05", "geom_margin", 0.002),
-    "body/cube_05/touches": ghost("cube_05"),
-    "body/cube_05/com": centre,
-    "body/cube_05/damping": damped,
-    "body/cube_05/gravity": weightless("cube_05"),
-    "link/panda_link4/restitution": in_geom("panda_link4", "geom_solref", BOUNCY),
-    "link/panda_link4/margin": in_geom("panda_link4", "geom_margin", 0.002),
-    "link/panda_link4/touches": ghost("panda_link4"),
-    "link/panda_link4/damping": lambda s: setattr(s.solver.mj_model.opt, "viscosity", 0.1),
-    "link/panda_link4/gravity": weightless("panda_link4"),
-    "joint/panda_joint4/friction": in_model("dof_frictionloss", 0.5),
-    "body/cube_05/mass": lambda s: body(s, "cube_05").mass.__setitem__(0, 1.0),
-    "body/cube_05/inertia": lambda s: body(s, "cube_05").inertia.__imul__(1.2),
-    "body/cube_05/friction": lambda s: geom(s, "cube_05").friction.__setitem__(0, 0.5),
-    "body/cube_05/boxes": lambda s: geom(s, "cube_05").size.__setitem__(1, 0.02),
-    "body/table/pose": sunk_table,
-    "gravity": lambda s: s.solver.mj_model.opt.gravity.__setitem__(2, -9.7),
-    "timestep": lambda s: setattr(s.solver.mj_model.opt, "timestep", 0.005),
-    "ground/height": lifted_ground,
-    "ground/friction": lambda s: geom(s, "ground").friction.__setitem__(0, 0.5),
-    "joint/panda_joint4/stiffness": gain(1),
-    "joint/panda_joint4/damping": gain(2),
+FAULTS: dict[str, Plant] = {
+    **faults(compiled),
     "joint/panda_joint4/effort_limit": effort_limit,
-    "joint/panda_joint4/armature": in_model("dof_armature", 0.0),
-    "joint/panda_joint4/limits": in_model("jnt_range", 1.0),
-    "joint/panda_joint4/initial_position": in_data,
-    "link/panda_link4/mass": lambda s: body(s, "panda_link4").mass.__setitem__(0, 5.0),
-    "link/panda_link4/inertia": lambda s: body(s, "panda_link4").inertia.__imul__(1.2),
-    "link/panda_leftfinger/friction": one_finger_shape,
-    "gripper/coupled": uncouple,
 }
+
+
+class FaultyNewton(Planting, Newton):
+    faults = FAULTS

@@ -1,16 +1,19 @@
 """Omniverse PhysX with one planted fault each: its stage says something else than the scene.
 
-Workers load the adapters from here as `tests.sims.ovphysx_faults:NAME`.
+Workers load the adapter from here as `tests.sims.ovphysx_faults:FaultyOvPhysX`; its setting `fault`
+names the quantity.
 """
 
 from __future__ import annotations
 
 import re
-from typing import Any, ClassVar
+from typing import Any
 
 import pytest_simbench.sims.ovphysx.adapter as adapter
 
 from pytest_simbench.scene import Scene
+
+from .planted import Planting
 
 FAULTS: dict[str, tuple[str, str, str]] = {
     "ground/height": (
@@ -19,22 +22,8 @@ FAULTS: dict[str, tuple[str, str, str]] = {
         '"Z"\ndouble3 xformOp:translate = (0, 0, 0.01)\n'
         'uniform token[] xformOpOrder = ["xformOp:translate"]',
     ),
-    "body/brick/mass": ("body_1", "physics:mass", "1"),
-    "body/brick/inertia": ("body_1", "physics:diagonalInertia", "(1e-4, 1e-4, 1e-4)"),
     "body/brick/pose": ("body_1", "xformOp:translate", "(0.5, 0.1, 0.316)"),
-    "body/brick/boxes": ("body_1", "xformOp:scale", "(0.1, 0.06, 0.031)"),
-    "body/brick/friction": ("body_1", "material:binding:physics", "</World/friction_1p0>"),
-    "body/table/pose": ("body_0", "xformOp:translate", "(0.8, 0, 0.14)"),
-    "body/table/boxes": ("body_0", "xformOp:scale", "(0.9, 0.8, 0.3)"),
-    "body/table/friction": ("friction_0p7", "physics:dynamicFriction", "0.6"),
-    "joint/panda_joint4/limits": ("joint_3", "physics:lowerLimit", "-170"),
-    "joint/panda_joint4/effort_limit": ("joint_3", "drive:angular:physics:maxForce", "90"),
-    "joint/panda_joint4/stiffness": ("joint_3", "drive:angular:physics:stiffness", "3500"),
-    "joint/panda_joint4/damping": ("joint_3", "drive:angular:physics:damping", "350"),
-    "joint/panda_joint4/armature": ("joint_3", "physxJointAxis:angular:armature", "0"),
     "joint/panda_joint4/initial_position": ("joint_3", "state:angular:physics:position", "-90"),
-    "link/panda_link4/mass": ("link_4", "physics:mass", "5"),
-    "link/panda_link4/inertia": ("link_4", "physics:diagonalInertia", "(1, 1, 1)"),
     "body/brick/com": ("body_1", "physics:centerOfMass", "(0.01, 0, 0)"),
     "body/brick/gravity": (
         "body_1",
@@ -63,23 +52,16 @@ FAULTS: dict[str, tuple[str, str, str]] = {
         "physxJointAxis:angular:armature",
         "0.1\nfloat physxJointAxis:angular:staticFrictionEffort = 0.5",
     ),
-    "link/panda_leftfinger/friction": (
-        "link_8",
-        "material:binding:physics",
-        "</World/friction_0p7>",
-    ),
 }
 """Prim, attribute and wrong value, by the quantity that must be found wrong."""
 
 
-class Edited(adapter.OvPhysX):
+class FaultyOvPhysX(Planting, adapter.OvPhysX):
     """Hands PhysX a stage in which one attribute has another value."""
-
-    fault: ClassVar[tuple[str, str, str]]
 
     def load(self, scene: Scene) -> None:
         honest = adapter.Session
-        prim, attribute, value = self.fault
+        prim, attribute, value = FAULTS[self.settings.fault]
         pattern = rf'(def \w+ "{prim}".*?\n[\w\[\] ]+ {attribute} = )[^\n]+'
 
         def edited(text: str, threads: int) -> Any:
@@ -90,22 +72,6 @@ class Edited(adapter.OvPhysX):
 
         adapter.Session = edited
         try:
-            super().load(scene)
+            adapter.OvPhysX.load(self, scene)
         finally:
             adapter.Session = honest
-
-
-def faulty(quantity: str) -> type[Edited]:
-    """The adapter that gets that quantity wrong."""
-    found: type[Edited] = globals()[_name(quantity)]
-    return found
-
-
-def _name(quantity: str) -> str:
-    return "Wrong_" + quantity.replace("/", "_")
-
-
-for _quantity, _fault in FAULTS.items():
-    globals()[_name(_quantity)] = type(
-        _name(_quantity), (Edited,), {"fault": _fault, "__module__": __name__}
-    )

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from .coverage import Plant
+from pytest_simbench.sims.pybullet.adapter import PyBullet
+
+from pytest_simbench.scene import Pose
+
+from .planted import Plant, Planting
 
 
 def bullet(name: str, link: str = "", **change: Any) -> Plant:
@@ -18,45 +22,24 @@ def bullet(name: str, link: str = "", **change: Any) -> Plant:
     return plant
 
 
-def timestep(s: Any) -> None:
-    import pybullet
+def call(name: str, *arguments: Any) -> Plant:
+    """A function of PyBullet called; arguments may be functions of the adapter."""
 
-    pybullet.setTimeStep(0.002, physicsClientId=s.client)
+    def plant(s: Any) -> None:
+        import pybullet
 
+        given = (argument(s) if callable(argument) else argument for argument in arguments)
+        getattr(pybullet, name)(*given, physicsClientId=s.client)
 
-def height(s: Any) -> None:
-    import pybullet
-
-    pybullet.resetBasePositionAndOrientation(
-        s._ground, [0, 0, 0.01], [0, 0, 0, 1], physicsClientId=s.client
-    )
+    return plant
 
 
-def gravity(s: Any) -> None:
-    import pybullet
-
-    pybullet.setGravity(0, 0, -9.7, physicsClientId=s.client)
-
-
-def table(s: Any) -> None:
-    import pybullet
-
-    pybullet.resetBasePositionAndOrientation(
-        s._bodies["table"], [0.8, 0, 0.138], [0, 0, 0, 1], physicsClientId=s.client
-    )
-
-
-def held(s: Any) -> None:
-    import pybullet
-
-    pybullet.createConstraint(
-        s._bodies["cube"], -1, -1, -1, pybullet.JOINT_FIXED, [0] * 3, [0] * 3, [0] * 3,
-        physicsClientId=s.client,
-    )  # fmt: skip
+HELD = (-1, -1, -1, 4, [0] * 3, [0] * 3, [0] * 3)
+"""A cube's fixed joint (`JOINT_FIXED` is 4) with the world."""
 
 
 def com(s: Any) -> None:
-    """A cube like the other, its centre of mass aside, in its place."""
+    """A cube like the other in its place, its centre of mass aside in it."""
     import pybullet
 
     pybullet.removeBody(s._bodies["cube"], physicsClientId=s.client)
@@ -64,9 +47,11 @@ def com(s: Any) -> None:
     shape = pybullet.createCollisionShape(
         pybullet.GEOM_BOX, halfExtents=half, physicsClientId=s.client
     )
+    pose = s.scene.body("cube").pose
+    (w, *xyz), aside = pose.quaternion, Pose.at(-0.01, 0.0, 0.0)
     s._bodies["cube"] = pybullet.createMultiBody(
-        0.1, shape, -1, [0.6, -0.1, 0.325], baseInertialFramePosition=[0.01, 0, 0],
-        physicsClientId=s.client,
+        0.1, shape, -1, (pose * aside).position, [*xyz, w],
+        baseInertialFramePosition=[0.01, 0, 0], physicsClientId=s.client,
     )  # fmt: skip
 
 
@@ -74,27 +59,24 @@ def uncoupled(s: Any) -> None:
     import pybullet
 
     pybullet.removeConstraint(s._couplings[0], physicsClientId=s.client)
-    s._couplings[0] = pybullet.createConstraint(
-        s._bodies["cube"], -1, -1, -1, pybullet.JOINT_FIXED, [0] * 3, [0] * 3, [0] * 3,
-        physicsClientId=s.client,
-    )  # fmt: skip
+    cube = s._bodies["cube"]
+    s._couplings[0] = pybullet.createConstraint(cube, *HELD, physicsClientId=s.client)
 
 
 FAULTS: dict[str, Plant] = {
-    "timestep": timestep,
-    "ground/height": height,
+    "timestep": call("setTimeStep", 0.002),
+    "ground/height": call(
+        "resetBasePositionAndOrientation", lambda s: s._ground, [0, 0, 0.01], [0, 0, 0, 1]
+    ),
     "ground/restitution": bullet("ground", restitution=0.5),
     "body/cube/restitution": bullet("cube", restitution=0.5),
     "body/cube/margin": bullet("cube", collisionMargin=0.005),
     "body/cube/com": com,
-    "body/cube/dynamic": held,
+    "body/cube/dynamic": call("createConstraint", lambda s: s._bodies["cube"], *HELD),
     "link/panda_link4/restitution": bullet("robot", "panda_link4", restitution=0.5),
     "gripper/coupled": uncoupled,
-    "gravity": gravity,
-    "body/table/pose": table,
-    "body/cube/mass": bullet("cube", mass=1.0),
-    "body/cube/inertia": bullet("cube", localInertiaDiagonal=[1e-4, 1e-4, 1e-4]),
-    "body/cube/friction": bullet("cube", lateralFriction=0.5),
-    "link/panda_leftfinger/friction": bullet("robot", "panda_leftfinger", lateralFriction=0.5),
-    "link/panda_link4/mass": bullet("robot", "panda_link4", mass=5.0),
 }
+
+
+class FaultyPyBullet(Planting, PyBullet):
+    faults = FAULTS

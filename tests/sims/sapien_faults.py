@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from pytest_simbench.sims.sapien.adapter import SAPIEN
 
 from pytest_simbench.testing.faults import true_scene
 
-from .coverage import Plant
+from .planted import Plant, Planting
 
 
 def shape(name: str, setter: str, *values: Any) -> Plant:
@@ -66,3 +67,7 @@ def raised(pose: Any) -> Any:
     import sapien
 
     return sapien.Pose(pose.p + np.array([0, 0, 0.01]), pose.q)
+
+
+class FaultySAPIEN(Planting, SAPIEN):
+    faults = FAULTS

@@ -20,7 +20,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pytest_simbench.sims.gazebo import bindings, messages
-from pytest_simbench.sims.gazebo.adapter import Gazebo
 from pytest_simbench.sims.gazebo.sdf import Physics, robot_model, world_text
 from pytest_simbench.sims.gazebo.window import Window
 
@@ -28,13 +27,10 @@ from pytest_simbench.client.errors import EngineFailed, WorkerExited, WorkerHung
 from pytest_simbench.client.world import World
 from pytest_simbench.scene import Box, Pose, Scene, Sphere
 from pytest_simbench.simulator import PreparedRobot, UnavailableError
-from pytest_simbench.simulator.parity import compare
-from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.tasks import Jitter, Stacking
 from pytest_simbench.testing import Subject
 
-from .coverage import uncovered
-from .gazebo_faults import FAULTS, FaultyGazebo
+from .gazebo_faults import FaultyGazebo
 from .worlds import Worlds
 
 CUBE = Box("cube", (0.05, 0.05, 0.05), Pose.at(0.0, 0.0, 0.025), mass=0.1)
@@ -143,25 +139,6 @@ def test_the_world_is_that_of_the_engine(tmp_path: Path) -> None:
             found = [float(limit.findtext(what, "")) for what in ("lower", "upper")]
             expected = prepared.limits[joint.name] - joint.initial_position
             np.testing.assert_allclose(found, expected)
-
-
-@pytest.mark.parametrize("profile", ["default", "tuned"])
-def test_an_honest_world_passes(worlds: Worlds, profile: str) -> None:
-    assert worlds.load(SCENE, profile).time == 0.0
-
-
-@pytest.mark.parametrize("quantity", FAULTS)
-def test_fault_is_caught(worlds: Worlds, quantity: str) -> None:
-    world = worlds.load(SCENE, "default", parity=False, fault=quantity)
-    expected = expected_quantities(SCENE, Gazebo.profiles["default"])
-    reported = world.process.request("read_back")
-    wrong = compare(expected, reported, Gazebo.info.deviations, "gazebo").wrong
-    assert wrong[quantity].startswith("scene ")
-
-
-def test_nothing_is_left_out(worlds: Worlds) -> None:
-    reported = worlds.load(SCENE).process.request("read_back")
-    assert uncovered(reported, FAULTS, impossible={"gripper/coupled"}) == set()
 
 
 def test_it_starts_where_the_scene_does(worlds: Worlds) -> None:

@@ -19,7 +19,7 @@ from pytest_simbench.tasks import Jitter, Stacking, Throwing
 from pytest_simbench.testing import ConformanceFailure, Subject, scenes
 
 from .coverage import uncovered
-from .ovphysx_faults import FAULTS, faulty
+from .ovphysx_faults import FAULTS, FaultyOvPhysX
 
 ABSENT = missing(OvPhysX.info)
 pytestmark = pytest.mark.skipif(ABSENT is not None, reason=str(ABSENT))
@@ -54,7 +54,7 @@ def test_fault_is_caught(quantity: str) -> None:
         error, wrong = ConformanceFailure, r"starts at \(.*\), where the scene has"
     with (
         pytest.raises(error, match=wrong),
-        Subject(faulty(quantity)).world(SCENE, fresh=True),
+        Subject(FaultyOvPhysX).world(SCENE, fresh=True, changes={"fault": quantity}),
     ):
         pass
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,16 +11,10 @@ from pytest_simbench.simulator import ParityError, Simulator
 from pytest_simbench.simulator.parity import check
 from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.tasks import Jitter, Stacking, Throwing
+from pytest_simbench.tasks import Jitter, Stacking
 from tests.conftest import HERE
 
 SCENE = Stacking().scene(1, Jitter())
-
-
-def compared(simulator: Simulator) -> list[str]:
-    expected = expected_quantities(SCENE, simulator.settings)
-    info = simulator.info
-    return check(expected, simulator.read_back(), info.deviations, info.name)
 
 
 @pytest.fixture(params=HERE)
@@ -31,21 +24,6 @@ def loaded(request: pytest.FixtureRequest) -> Iterator[Simulator]:
     simulator.load(SCENE)
     yield simulator
     simulator.close()
-
-
-@pytest.mark.parametrize("profile", ["default", "tuned"])
-@pytest.mark.parametrize("task", [Stacking(), Throwing()], ids=lambda task: task.name)
-@pytest.mark.parametrize("name", HERE)
-def test_an_honest_world_passes(name: str, task: Any, profile: str) -> None:
-    cls = adapter(name)
-    simulator = cls(cls.profiles[profile])
-    scene = task.scene(7, Jitter())
-    simulator.load(scene)
-    try:
-        expected = expected_quantities(scene, simulator.settings)
-        check(expected, simulator.read_back(), cls.info.deviations, cls.info.name)
-    finally:
-        simulator.close()
 
 
 def test_what_is_not_reported_must_be_declared(loaded: Simulator) -> None:

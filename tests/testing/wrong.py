@@ -6,6 +6,7 @@ check under test has to find it, not the parity check at loading.
 
 from __future__ import annotations
 
+import fnmatch
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -47,21 +48,18 @@ class NoTuned(MuJoCo):
     del profiles["default"]
 
 
-class DoubleGravity(Lying):
-    def tamper(self) -> None:
-        self.model.opt.gravity *= 2
-
-
 class Air(Lying):
+    """Brakes the first free body."""
+
+    braked: ClassVar[slice] = slice(0, 3)
+
     def step(self) -> None:
         super().step()
-        self.data.qvel[:3] *= 1 - 0.04 * self.settings.timestep
+        self.data.qvel[self.braked] *= 1 - 0.04 * self.settings.timestep
 
 
-class AngularDamping(Lying):
-    def step(self) -> None:
-        super().step()
-        self.data.qvel[3:6] *= 1 - 0.04 * self.settings.timestep
+class AngularDamping(Air):
+    braked = slice(3, 6)
 
 
 class NoForce(MuJoCo):
@@ -107,28 +105,28 @@ class StandingBelt(MuJoCo):
         super().lead(before, after)
 
 
-class WrongSign(MuJoCo):
+class Wrenched(MuJoCo):
+    """Tells contact forces and torques, (6,), multiplied."""
+
+    factor: ClassVar[FloatArray]
+
+    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        for first, second, wrench in super().contact_forces():
+            yield first, second, self.factor * wrench
+
+
+class WrongSign(Wrenched):
     """Tells what the first does to the second."""
 
-    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
-        return ((first, second, -wrench) for first, second, wrench in super().contact_forces())
+    factor = -np.ones(6)
 
 
-class WrongTorque(MuJoCo):
-    """Tells the right forces, and torques of the wrong sign."""
-
-    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
-        signs = np.repeat([1.0, -1.0], 3)
-        return (
-            (first, second, signs * wrench) for first, second, wrench in super().contact_forces()
-        )
+class WrongTorque(Wrenched):
+    factor = np.repeat([1.0, -1.0], 3)
 
 
-class NormalAlone(MuJoCo):
-    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
-        upright = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-        for first, second, wrench in super().contact_forces():
-            yield first, second, upright * wrench
+class NormalAlone(Wrenched):
+    factor = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
 
 class LongStep(Lying):
@@ -182,10 +180,6 @@ class OneShot(MuJoCo):
             self.data.ctrl[:] = self.scene.robot.column("initial_position")
 
 
-class Echo(Lying):
-    """Reads back the scene as it was loaded."""
-
-
 class WrongMass(Lying):
     def tamper(self) -> None:
         self.model.body_mass[-1] *= 1.5
@@ -193,23 +187,11 @@ class WrongMass(Lying):
         self.model.dof_M0[-6:] *= 1.5  # which the engine takes for bodies that nothing hangs on
 
 
-class HalfFriction(Lying):
-    def tamper(self) -> None:
-        self.model.geom_friction[:, 0] *= 0.9
-
-
 class DeepGround(Lying):
     def tamper(self) -> None:
         ground = self.model.geom("ground").id
         self.model.geom_pos[ground, 2] -= 0.003
         self.model.geom_sameframe[ground] = 0  # else the engine takes the body's frame
-
-
-class Shaking(Lying):
-    """Pushes every body sideways with a tenth of its weight."""
-
-    def tamper(self) -> None:
-        self.model.opt.gravity[0] += 12.0
 
 
 class Meddler(MuJoCo):
@@ -222,30 +204,25 @@ class Meddler(MuJoCo):
 
 
 class EchoLimits(MuJoCo):
-    """Tells the joint limits of the description instead of the engine's."""
+    """Tells what it should have built, of some quantities, instead of the engine's."""
+
+    echoed: ClassVar[str] = "joint/*/limits"
 
     def read_back(self) -> dict[str, Any]:
-        limits = self.prepared.limits if self.prepared is not None else {}
-        return super().read_back() | {f"joint/{name}/limits": limits[name] for name in limits}
+        wanted = expected_quantities(self.scene, self.settings)
+        return super().read_back() | {k: wanted[k] for k in fnmatch.filter(wanted, self.echoed)}
 
 
-class EchoGroundFriction(MuJoCo):
-    def read_back(self) -> dict[str, Any]:
-        return super().read_back() | {"ground/friction": self.scene.ground_friction}
+class EchoGroundFriction(EchoLimits):
+    echoed = "ground/friction"
 
 
-class EchoLinkInertia(MuJoCo):
-    def read_back(self) -> dict[str, Any]:
-        links = self.prepared.moving_links if self.prepared is not None else []
-        told = {f"link/{link.name}/inertia": link.inertia for link in links}
-        return super().read_back() | told
+class EchoLinkInertia(EchoLimits):
+    echoed = "link/*/inertia"
 
 
-class EchoScene(MuJoCo):
-    """Tells all that it should have built."""
-
-    def read_back(self) -> dict[str, Any]:
-        return expected_quantities(self.scene, self.settings)
+class EchoScene(EchoLimits):
+    echoed = "*"
 
 
 class NoContacts(MuJoCo):

@@ -1,0 +1,152 @@
+"""MuJoCo whose compiled model is changed behind its adapter's back, one row a fault: what is
+changed, and the laws that must find it. `read_back` goes on telling the scene's value."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from operator import attrgetter
+from typing import Any
+
+from pytest_simbench.sims.mujoco.world import ROBOT
+
+from tests.testing.wrong import Lying
+
+Tamper = Callable[[Any], None]
+Rows = Any
+"""An index of an array, or a function that tells it of an adapter."""
+
+ALL = slice(None)
+SLIDING = (ALL, 0)
+"""The first of MuJoCo's three coefficients of friction."""
+
+FINGERS = ("panda_leftfinger", "panda_rightfinger")
+
+
+def put(array: str, value: Any, rows: Rows = ALL) -> Tamper:
+    """An array of the model or the data, set."""
+
+    def tamper(s: Any) -> None:
+        attrgetter(array)(s)[rows(s) if callable(rows) else rows] = value
+
+    return tamper
+
+
+def times(array: str, factor: float, rows: Rows = ALL) -> Tamper:
+    """The same, multiplied."""
+
+    def tamper(s: Any) -> None:
+        attrgetter(array)(s)[rows(s) if callable(rows) else rows] *= factor
+
+    return tamper
+
+
+def add(array: str, value: Any, rows: Rows = ALL) -> Tamper:
+    """The same, added to."""
+
+    def tamper(s: Any) -> None:
+        attrgetter(array)(s)[rows(s) if callable(rows) else rows] += value
+
+    return tamper
+
+
+def lift(link: int | str) -> Tamper:
+    """A force that holds a body's weight."""
+
+    def tamper(s: Any) -> None:
+        body = s.model.body(link).id if isinstance(link, str) else link
+        s.data.xfrc_applied[body, 2] = s.model.body_mass[body] * -s.model.opt.gravity[2]
+
+    return tamper
+
+
+def geoms(*links: str) -> Callable[[Any], Any]:
+    return lambda s: [s.model.body(int(b)).name in links for b in s.model.geom_bodyid]
+
+
+def joint(name: str) -> Callable[[Any], Any]:
+    return lambda s: s.model.joint(name).id
+
+
+def dof(name: str) -> Callable[[Any], Any]:
+    return lambda s: s.model.joint(name).dofadr
+
+
+def fat_link(s: Any) -> None:
+    """The shapes of link 3 are 10 mm aside."""
+    turn, rows = s.data.body("panda_link3").xmat.reshape(3, 3), geoms("panda_link3")(s)
+    s.model.geom_pos[rows] += turn.T @ [0.0, -0.01, 0.0]
+    s.model.geom_sameframe[rows] = 0
+
+
+def own_spin(s: Any) -> None:
+    """Bodies start with the scene's angular velocity in their own axes."""
+    for body, rows in zip(s.scene.free_bodies, s._body_v, strict=True):
+        s.data.qvel[rows + 3] = body.angular_velocity
+
+
+def wrong_centre(s: Any) -> None:
+    """The centre of mass of link 4 is 100 mm off."""
+    link = s.model.body("panda_link4").id
+    s.model.body_ipos[link, 1] -= 0.1
+    s.model.body_sameframe[link] = 0
+
+
+NO_LIMIT = (put("model.actuator_forcelimited", 0), put("model.jnt_actfrclimited", 0))
+"""Of effort: the drive's, and the URDF's, which is the same."""
+
+WORLDS: dict[str, tuple[tuple[Tamper, ...], tuple[str, ...]]] = {
+    "Echo": ((), ("read_back_is_the_engines",)),
+    "DoubleGravity": ((times("model.opt.gravity", 2),), ("free_fall",)),
+    "OwnSpin": ((own_spin,), ("thrown_as_the_scene_says",)),
+    "HalfFriction": ((times("model.geom_friction", 0.9, SLIDING),),
+                     ("slides_above_mu", "slides_alike_diagonally", "meshes_rest_and_slide")),
+    "Shaking": ((add("model.opt.gravity", 12.0, 0),), ("tower_stands",)),
+    "Bouncy": ((put("model.geom_solref", (0.02, 0.05)),), ("nothing_bounces",)),
+    "SlipperyHand": ((put("model.geom_friction", 0.01, SLIDING),),
+                     ("sticks_below_mu", "grip_holds")),
+    "OpenLoop": ((put("data.eq_active", 0),), ("loops_stay_closed",)),
+    "StuckLoop": ((put("model.dof_damping", 1e3),), ("loops_stay_closed",)),
+    "PassingLinks": ((put("model.geom_conaffinity", 0, lambda s: s.model.geom_contype == ROBOT),),
+                     ("links_collide_when_asked",)),
+    "JoinedLinksCollide": ((put("model.exclude_signature", 0),), ("links_collide_when_asked",)),
+    "NoEffortLimit": (NO_LIMIT, ("effort_limit_bounds_acceleration", "weak_joint_sags")),
+    "FreeFingers": ((put("data.eq_active", 0),), ("fingers_stay_coupled",)),
+}  # fmt: skip
+"""In every scene."""
+
+ROBOTS: dict[str, tuple[tuple[Tamper, ...], tuple[str, ...]]] = {
+    "StickyFingers": ((put("model.geom_friction", 20.0, lambda s: (geoms(*FINGERS)(s), 0)),),
+                      ("squeeze_bounds_the_grip",)),
+    "DoubleSqueeze": ((times("model.actuator_forcerange", 2, [7, 8]),
+                       times("model.jnt_actfrcrange", 2)), ("squeeze_bounds_the_grip",)),
+    "OneFloats": ((lift(-1),), ("every_body_falls",)),
+    "GhostLink": ((put("model.geom_contype", 0, geoms("panda_link5")),), ("links_are_felt",)),
+    "FatLink": ((fat_link,), ("links_are_felt",)),
+    "WrongCentre": ((wrong_centre,), ("limp_arm_falls",)),
+    "StiffJoint": ((put("model.dof_damping", 1.0, dof("panda_joint4")),), ("limp_arm_falls",)),
+    "WeightlessLink": ((lift("panda_link6"),), ("limp_arm_falls",)),
+    "NoLimits": ((put("model.jnt_limited", 0),), ("joints_stop_at_their_limits",)),
+    "StrongWrist": ((times("model.actuator_forcerange", 2, 6),
+                     times("model.jnt_actfrcrange", 2, joint("panda_joint7"))),
+                    ("every_effort_limit_counts",)),
+}  # fmt: skip
+"""Where there is a robot."""
+
+
+def tampered(name: str) -> type[Lying]:
+    """The adapter of a row; workers find it by the name of its class."""
+
+    def tamper(self: Lying) -> None:
+        if name in WORLDS or self.scene.robot is not None:
+            for change in (WORLDS | ROBOTS)[name][0]:
+                change(self)
+
+    return type(name, (Lying,), {"tamper": tamper, "__module__": __name__})
+
+
+FAULTS: list[tuple[type[Lying], str]] = []
+"""Adapter and law."""
+
+for _name, (_, _laws) in (WORLDS | ROBOTS).items():
+    globals()[_name] = tampered(_name)
+    FAULTS += [(globals()[_name], law) for law in _laws]
