@@ -46,8 +46,9 @@ class BounceHeight(Law):
 
     def measure(self, world: World) -> Reading:
         seen = watch(world, self.fall * (1 + 2 * self.restitution))
-        allowed = 2 * GRAVITY * self.fall * seen.dt + rounding(1.0, seen.steps)
-        return Reading(self.rises(seen)[0], self.restitution**2 * self.height, allowed)
+        return seen.reading(
+            self.rises(seen)[0], self.restitution**2 * self.height, 2 * GRAVITY * self.fall, 1.0
+        )
 
 
 @dataclass(frozen=True)
@@ -98,10 +99,8 @@ class ElasticChain(Law):
         ]
         return Scene(self.name, tuple(balls), ground_friction=0.0, ground_restitution=1.0)
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
-        allowed = GRAVITY * seen.dt + rounding(self.speed, seen.steps)
-        return Reading(float(seen.bodies[-1, -1, 7]), self.speed, allowed)
+    def read(self, seen: Watched) -> Reading:
+        return seen.reading(seen.bodies[-1, -1, 7], self.speed, GRAVITY, self.speed)
 
 
 @dataclass(frozen=True)
@@ -147,8 +146,7 @@ class ObliqueBounce(Law):
         fall = math.sqrt(2 * self.height / GRAVITY)
         seen = watch(world, fall * (1 + self.restitution))
         share = self.friction * (1 + self.restitution)
-        allowed = share * GRAVITY * seen.dt + rounding(self.level, seen.steps)
-        return Reading(float(seen.bodies[-1, 0, 7]), self.exact, allowed)
+        return seen.reading(seen.bodies[-1, 0, 7], self.exact, share * GRAVITY, self.level)
 
 
 @dataclass(frozen=True)

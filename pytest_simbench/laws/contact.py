@@ -1,4 +1,4 @@
-"""Laws of bodies that rest on each other, and of impacts."""
+"""Laws of bodies that rest on each other, of what they press with, and of impacts."""
 
 from __future__ import annotations
 
@@ -11,13 +11,15 @@ from scipy.integrate import solve_ivp
 
 from pytest_simbench.client.world import World
 from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, stillness, watch
-from pytest_simbench.laws.friction import BETWEEN, SHARES, WEDGE, boundary, slope_pose
+from pytest_simbench.laws.sticking import BETWEEN, SHARES, WEDGE, boundary, slope_pose
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Vector3, rotation_matrix
+from pytest_simbench.simulator import Capability
 
 EDGE = 0.1
 CUBE: Vector3 = (EDGE,) * 3
 
 
+@dataclass(frozen=True)
 class _Stack(Law):
     """Cubes upon each other; how far the top one is from its place."""
 
@@ -27,6 +29,7 @@ class _Stack(Law):
 
     masses: ClassVar[tuple[float, ...]]
     overhangs: ClassVar[tuple[float, ...]] = ()
+
     seconds: float = 1.0
 
     def build(self) -> Scene:
@@ -53,8 +56,6 @@ class RestDepth(_Stack):
     name = "rest_depth"
     masses: ClassVar[tuple[float, ...]] = (1.0,)
 
-    seconds: float = 1.0
-
 
 @dataclass(frozen=True)
 class Tower(_Stack):
@@ -62,8 +63,6 @@ class Tower(_Stack):
 
     name = "tower"
     masses: ClassVar[tuple[float, ...]] = (1.0,) * 5
-
-    seconds: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -73,8 +72,6 @@ class HeavyOnTop(_Stack):
 
     name = "heavy_on_top"
     masses: ClassVar[tuple[float, ...]] = (1.0, 1.0, 1.0, 100.0)
-
-    seconds: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -86,8 +83,6 @@ class Overhang(_Stack):
     name = "overhang"
     masses: ClassVar[tuple[float, ...]] = (1.0,) * 4
     overhangs: ClassVar[tuple[float, ...]] = tuple(0.9 * EDGE / 2 / k for k in (3, 2, 1))
-
-    seconds: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -194,11 +189,10 @@ class Pivot(Law):
     def measure(self, world: World) -> Reading:
         before = rotation_matrix(world.bodies[0, 3:7])
         seen = watch(world, self.seconds)
-        t = float(seen.t[-1])
+        t = seen.end
         along = before[:, 0] @ rotation_matrix(seen.bodies[-1, 0, 3:7])[:, 0]
         exact, rate, change = self.exact(t)
-        allowed = (rate + change * t) * seen.dt + rounding(1.0, seen.steps)
-        return Reading(math.acos(min(1.0, float(along))), exact, allowed)
+        return seen.reading(math.acos(min(1.0, float(along))), exact, (rate + change * t), 1.0)
 
 
 @dataclass(frozen=True)
@@ -237,17 +231,24 @@ class DeadLanding(LandingTime):
         seen = watch(world, 2 * fall)
         landed = seen.bodies[seen.t > 1.1 * fall, 0, 2] - EDGE / 2
         rise = max(0.0, float(landed.max()))
-        return Reading(rise, 0.0, GRAVITY * fall * seen.dt + rounding(1.0, seen.steps))
+        return seen.reading(rise, 0.0, GRAVITY * fall, 1.0)
 
 
+@dataclass(frozen=True)
 class _Collision(Law):
     """A cube hits another one that is at rest, face on face, on ground without friction."""
 
     phenomenon = "impact"
     unit: ClassVar[str] = "m/s"
 
-    speed: float
     masses: ClassVar[tuple[float, float]] = (1.0, 2.0)
+
+    speed: float = 1.0
+
+    @property
+    def common(self) -> float:
+        """Speed of the common centre of mass [m/s]."""
+        return self.speed * self.masses[0] / sum(self.masses)
 
     def build(self) -> Scene:
         at = Pose.at(0.0, 0.0, EDGE / 2)
@@ -265,13 +266,9 @@ class DeadCollision(_Collision):
     name = "dead_collision"
     quantity: ClassVar[str] = "speed of the cube that was hit"
 
-    speed: float = 1.0
-
     def measure(self, world: World) -> Reading:
         seen = watch(world, 0.3)
-        exact = self.speed * self.masses[0] / sum(self.masses)
-        allowed = GRAVITY * seen.dt + rounding(1.0, seen.steps)
-        return Reading(float(seen.bodies[-1, 1, 7]), exact, allowed)
+        return seen.reading(seen.bodies[-1, 1, 7], self.common, GRAVITY, 1.0)
 
 
 @dataclass(frozen=True)
@@ -282,15 +279,72 @@ class CollisionMomentum(_Collision):
     name = "collision_momentum"
     quantity: ClassVar[str] = "speed of the common centre of mass"
 
-    speed: float = 1.0
-
     def measure(self, world: World) -> Reading:
         seen = watch(world, 0.3)
-        exact = self.speed * self.masses[0] / sum(self.masses)
         found = float(seen.bodies[-1, :, 7] @ self.masses) / sum(self.masses)
-        return Reading(found, exact, rounding(2.0, seen.steps))
+        return seen.reading(found, self.common, 0.0, 2.0)
 
 
 def tilt(row: FloatArray) -> float:
     """Of a body's upper face from the horizontal [rad]."""
     return math.acos(min(1.0, max(-1.0, float(rotation_matrix(row[3:7])[2, 2]))))
+
+
+@dataclass(frozen=True)
+class RestForce(Law):
+    """The ground carries a cube at rest with m g (Newton's first law).
+
+    The force is the mean of a time T after one of settling, step by step. By the law of momentum
+    it is m g and m (v1 - v0) / T. Tolerance: both speeds are late by one step, g dt each:
+    2 m g dt / T.
+    """
+
+    name = "rest_force"
+    phenomenon = "stacking"
+    quantity: ClassVar[str] = "force upward"
+    unit: ClassVar[str] = "N"
+    needs: ClassVar[tuple[Capability, ...]] = (Capability.CONTACT_FORCES,)
+
+    carrying: ClassVar[str] = "ground"
+    masses: ClassVar[tuple[float, ...]] = (1.0,)
+    settling: float = 0.3
+    seconds: float = 0.1
+
+    def build(self) -> Scene:
+        bodies = [
+            Box(f"cube {k}", CUBE, Pose.at(0.0, 0.0, EDGE * (k + 0.5)), mass)
+            for k, mass in enumerate(self.masses)
+        ]
+        return Scene(self.name, tuple(bodies))
+
+    @property
+    def carried(self) -> tuple[str, float]:
+        """The body that is pressed upward, and the mass that it carries, its own included [kg]."""
+        return "body/cube 0", sum(self.masses)
+
+    def measure(self, world: World) -> Reading:
+        dt = watch(world, self.settling).dt
+        body, mass = self.carried
+        forces, count = [], max(1, round(self.seconds / dt))
+        for _ in range(count):
+            world.wait(dt)
+            wrench = world.contact_forces().get((body, self.carrying))
+            forces.append(0.0 if wrench is None else float(wrench[2]))
+        weight = mass * GRAVITY
+        allowed = 2 * weight / count + rounding(weight, 1)
+        return Reading(float(np.mean(forces)), weight, allowed)
+
+
+@dataclass(frozen=True)
+class TowerForce(RestForce):
+    """In a tower of four equal cubes the lowest carries the other three with 3 m g. Tolerance as of
+    `RestForce`."""
+
+    name = "tower_force"
+
+    carrying: ClassVar[str] = "body/cube 0"
+    masses: ClassVar[tuple[float, ...]] = (1.0,) * 4
+
+    @property
+    def carried(self) -> tuple[str, float]:
+        return "body/cube 1", sum(self.masses[1:])

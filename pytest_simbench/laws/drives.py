@@ -15,9 +15,7 @@ from pytest_simbench.laws.base import (
     Law,
     Reading,
     Watched,
-    rounding,
     stillness,
-    watch,
     watched,
 )
 from pytest_simbench.laws.mechanisms import Part, mechanism
@@ -53,7 +51,6 @@ class _Driven(Law):
     unit: ClassVar[str] = "rad"
 
     inertia: ClassVar[float] = 0.5
-    seconds: float
 
     def wheel(
         self, stiffness: float, damping: float, start: float = 0.0, effort: float = STRONG
@@ -83,12 +80,11 @@ class StepResponse(_Driven):
 
     def measure(self, world: World) -> Reading:
         seen = follow(world, held(0.0, self.seconds))
-        t = float(seen.t[-1])
+        t = seen.end
         x = self.rate * t
         exact = self.start * (1 + x) * math.exp(-x)
         late = self.start * self.rate * (1 / math.e + x)
-        allowed = late * seen.dt + rounding(self.start, seen.steps)
-        return Reading(float(seen.joints[-1, 0, 0]), exact, allowed)
+        return seen.reading(seen.joints[-1, 0, 0], exact, late, self.start)
 
 
 @dataclass(frozen=True)
@@ -109,12 +105,11 @@ class SpringAndDamper(_Driven):
 
     def measure(self, world: World) -> Reading:
         seen = follow(world, held(0.0, self.seconds))
-        t, w, z = float(seen.t[-1]), self.rate, self.damping
+        t, w, z = seen.end, self.rate, self.damping
         u = w * math.sqrt(1 - z * z)
         exact = self.start * math.exp(-z * w * t)
         exact *= math.cos(u * t) + z * w / u * math.sin(u * t)
-        allowed = self.start * w * (1 + w * t) * seen.dt + rounding(self.start, seen.steps)
-        return Reading(float(seen.joints[-1, 0, 0]), exact, allowed)
+        return seen.reading(seen.joints[-1, 0, 0], exact, self.start * w * (1 + w * t), self.start)
 
 
 @dataclass(frozen=True)
@@ -132,9 +127,8 @@ class EffortLimit(_Driven):
 
     def measure(self, world: World) -> Reading:
         seen = follow(world, held(5.0, self.seconds))
-        t, pull = float(seen.t[-1]), self.effort / self.inertia
-        allowed = pull * t * seen.dt + rounding(1.0, seen.steps)
-        return Reading(float(seen.joints[-1, 0, 0]), pull * t * t / 2, allowed)
+        t, pull = seen.end, self.effort / self.inertia
+        return seen.reading(seen.joints[-1, 0, 0], pull * t * t / 2, pull * t, 1.0)
 
 
 @dataclass(frozen=True)
@@ -154,10 +148,9 @@ class Tracking(_Driven):
 
     def measure(self, world: World) -> Reading:
         seen = follow(world, held(self.speed * self.seconds, self.seconds, self.speed))
-        t = float(seen.t[-1])
+        t = seen.end
         exact = self.speed * t * (1 - math.exp(-self.rate * t))
-        allowed = 2 * self.speed * seen.dt + rounding(1.0, seen.steps)
-        return Reading(float(seen.joints[-1, 0, 0]), exact, allowed)
+        return seen.reading(seen.joints[-1, 0, 0], exact, 2 * self.speed, 1.0)
 
 
 @dataclass(frozen=True)
@@ -180,8 +173,7 @@ class Sag(Law):
         )  # fmt: skip
         return Scene(self.name, robot=mechanism(self.name, part))
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         exact = brentq(lambda x: self.stiffness * x - GRAVITY * math.cos(x), 0.0, 1.5)
         allowed = stillness(seen.dt, 1.0)
         return Reading(float(seen.joints[-1, 0, 0]), float(exact), allowed)

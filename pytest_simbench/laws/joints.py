@@ -1,4 +1,4 @@
-"""Laws of joints that move freely: pendulums and sliders."""
+"""Laws of joints that move freely, pendulums and sliders, and of what a joint transmits."""
 
 from __future__ import annotations
 
@@ -11,17 +11,10 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import (
-    GRAVITY,
-    LONG,
-    Law,
-    Reading,
-    Watched,
-    rounding,
-    watch,
-)
+from pytest_simbench.laws.base import GRAVITY, LONG, Law, Reading, Watched, rounding, watch
 from pytest_simbench.laws.mechanisms import INERTIA_OF_A_POINT, MOUNT, Part, mechanism
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Scene, Vector3
+from pytest_simbench.simulator import Capability
 
 Y: Vector3 = (0.0, 1.0, 0.0)
 
@@ -31,8 +24,6 @@ class Passive(Law):
 
     phenomenon = "joints"
     gravity: ClassVar[Vector3] = STANDARD_GRAVITY
-
-    seconds: float
 
     def parts(self) -> tuple[Part, ...]:
         raise NotImplementedError
@@ -90,13 +81,12 @@ class Motion(Passive):
     quantity: ClassVar[str] = "largest distance of a joint from its place"
     unit: ClassVar[str] = "rad or m"
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
-        t = float(seen.t[-1])
+    def read(self, seen: Watched) -> Reading:
+        t = seen.end
         q, v, a = self.exact(t)
         off = float(np.abs(seen.joints[-1, 0] - q[-1]).max())
         late = float(np.abs(v).max()) + float(np.abs(a).max(axis=1).mean()) * t
-        return Reading(off, 0.0, late * seen.dt + rounding(float(np.abs(q).max()), seen.steps))
+        return seen.reading(off, 0.0, late, float(np.abs(q).max()))
 
 
 class _Energy(Passive):
@@ -105,8 +95,7 @@ class _Energy(Passive):
     quantity: ClassVar[str] = "largest change of the energy"
     unit: ClassVar[str] = "J"
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         kinetic, potential = self.energy(seen)
         robot = self.build().robot
         assert robot is not None
@@ -116,7 +105,7 @@ class _Energy(Passive):
         off = float(np.abs(kinetic + potential - before[0]).max())
         scale = float(np.ptp(potential))
         late = self.late(np.gradient(potential, seen.dt))
-        return Reading(off, 0.0, late * seen.dt + rounding(scale, seen.steps))
+        return seen.reading(off, 0.0, late, scale)
 
     def late(self, power: FloatArray) -> float:
         """By what the energy may be off for each second of a step [W], from the power of gravity at
@@ -158,8 +147,7 @@ class PendulumPeriod(Passive):
     def period(self) -> float:
         return _period(self.length, self.angle, 1.0, INERTIA_OF_A_POINT)
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         found = seen.crossings(seen.joints[:, 0, 0])
         period = float(found[1] - found[0]) if len(found) > 1 else self.seconds
         return Reading(period, self.period, 2 * seen.dt)
@@ -219,8 +207,7 @@ class TwoPendulums(Passive):
             )
         return tuple(made)
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         errors = []
         for k, (length, angle, mass) in enumerate(
             zip(self.lengths, self.angles, self.masses, strict=True)
@@ -322,3 +309,97 @@ class SphericalPendulum(Motion):
     def parts(self) -> tuple[Part, ...]:
         bob = Part("across", Y, centre=(0.0, 0.1, -0.5), start=0.3, inertia=(0.02, 0.04, 0.03))
         return Part("along", (1.0, 0.0, 0.0), start=0.8), bob
+
+
+LOOKS = 20
+"""How often the joint is asked, at even times."""
+
+MASS = 2.0
+"""Of the bob [kg]."""
+
+
+@dataclass(frozen=True)
+class _Loaded(Passive):
+    """A pendulum whose bob hangs aside of its plane: its hinge carries a force, and a torque
+    across its axis."""
+
+    phenomenon = "mechanisms"
+    needs: ClassVar[tuple[Capability, ...]] = (Capability.JOINT_WRENCHES,)
+
+    length: ClassVar[float] = 0.5
+    aside: ClassVar[float] = 0.3
+    angle: ClassVar[float] = 2.0
+
+    seconds: float = 1.2
+
+    def parts(self) -> tuple[Part, ...]:
+        centre = (0.0, self.aside, -self.length)
+        return (Part("swing", Y, centre=centre, mass=MASS, start=self.angle),)
+
+    @property
+    def slow(self) -> float:
+        """m g l / I about the hinge [1/s^2]."""
+        return MASS * GRAVITY * self.length / (MASS * self.length**2 + INERTIA_OF_A_POINT)
+
+    def carried(self, angle: float) -> FloatArray:
+        """The hinge's wrench on the rod at an angle [rad] while it swings, (6,).
+
+        Newton: F = m (a - g) with the bob's acceleration, along and across the rod; the speed of
+        the swing is that of energy conservation. Of the torque about the hinge, the part about its
+        axis is 0, and that across it is the bob's way aside times F.
+        """
+        bend = -self.slow * math.sin(angle)
+        inward = np.array([math.sin(angle), 0.0, math.cos(angle)])
+        onward = np.array([-math.cos(angle), 0.0, math.sin(angle)])
+        acceleration = self.length * (self.rate(angle) ** 2 * inward + bend * onward)
+        force = MASS * (acceleration + np.array([0.0, 0.0, GRAVITY]))
+        torque = np.cross([0.0, self.aside, 0.0], force)
+        return np.concatenate([force, torque])
+
+    def rate(self, angle: float) -> float:
+        """Of the swing at an angle, by energy conservation [rad/s], (its size)."""
+        fallen = math.cos(angle) - math.cos(self.angle)
+        return math.sqrt(max(0.0, 2 * self.slow * fallen))
+
+    def compare(self, world: World, which: slice) -> Reading:
+        """The largest error of force or torque, and by how much they change in a step."""
+        errors = []
+        for _ in range(LOOKS):
+            dt = watch(world, self.seconds / LOOKS).dt
+            told = world.joint_wrenches()[0] - self.carried(float(world.joints[0, 0]))
+            errors.append(float(np.linalg.norm(told[which])))
+        angles = np.linspace(-self.angle, self.angle, 401)
+        right = np.array([self.carried(angle)[which] for angle in angles])
+        bend = np.linalg.norm(np.gradient(right, angles, axis=0), axis=1)
+        fastest = max(a * self.rate(angle) for a, angle in zip(bend, angles, strict=True))
+        scale = float(np.linalg.norm(right, axis=1).max())
+        return Reading(max(errors), 0.0, 2 * float(fastest) * dt + rounding(scale, 1))
+
+
+@dataclass(frozen=True)
+class PendulumForce(_Loaded):
+    """The hinge of a pendulum carries F = m (a - g): along the rod m g cos q + m l w^2, and across
+    it what an inertia about the bob's centre asks for (Newton; Huygens, Horologium oscillatorium,
+    1673). Tolerance: what is told is of the last step, whose begin is one step ago, and the speed
+    was late by one then: two steps, 2 dt times the largest |dF/dt| of the swing."""
+
+    name = "pendulum_force"
+    quantity: ClassVar[str] = "largest error of the hinge's force"
+    unit: ClassVar[str] = "N"
+
+    def measure(self, world: World) -> Reading:
+        return self.compare(world, slice(0, 3))
+
+
+@dataclass(frozen=True)
+class PendulumTorque(_Loaded):
+    """The hinge of a pendulum whose bob hangs aside of its plane carries a torque across its axis,
+    the bob's way aside times the force, and none about it (Euler's second law). Tolerance as of
+    `PendulumForce`, of the torque."""
+
+    name = "pendulum_torque"
+    quantity: ClassVar[str] = "largest error of the hinge's torque"
+    unit: ClassVar[str] = "N m"
+
+    def measure(self, world: World) -> Reading:
+        return self.compare(world, slice(3, 6))

@@ -10,8 +10,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import Reading, rounding, watch
+from pytest_simbench.laws.base import Reading, Watched, rounding
 from pytest_simbench.laws.joints import Motion, Passive, Y, model_of
 from pytest_simbench.laws.mechanisms import MOUNT, Part, mechanism
 from pytest_simbench.scene import Closure, FloatArray, Scene, Vector3
@@ -33,6 +32,7 @@ H = 1e-4
 a part in 1e12, which the integrator below does not see."""
 
 
+@dataclass(frozen=True)
 class _FourBar(Passive):
     """Three rods: a crank and a rocker that hang on the mount, GROUND apart, and a coupler that is
     hinged to the crank and held at the rocker's end. It is let go at a crank angle."""
@@ -40,7 +40,7 @@ class _FourBar(Passive):
     phenomenon = "mechanisms"
     needs: ClassVar[tuple[Capability, ...]] = (Capability.LOOPS,)
 
-    crank: float
+    crank: float = 1.2
 
     def build(self) -> Scene:
         hinge = Closure("coupler link", "rocker link", (COUPLER, 0.0, 0.0), (0.0, 0.0, -ROCKER))
@@ -126,11 +126,9 @@ class FourBarClosure(_FourBar):
     quantity: ClassVar[str] = "largest opening of the loop"
     unit: ClassVar[str] = "mm"
 
-    crank: float = 1.2
     seconds: float = 2.0
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         robot = self.build().robot
         assert robot is not None
         prepared = PreparedRobot(robot)
@@ -151,7 +149,6 @@ class FourBarSwing(_FourBar, Motion):
 
     name = "four_bar_swing"
 
-    crank: float = 1.2
     seconds: float = 1.0
 
 

@@ -1,4 +1,4 @@
-"""Laws of sliding: how friction moves and stops what slides."""
+"""Laws of sliding: how friction moves and stops what slides, or lies on a belt."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from typing import ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, watch
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, rounding, watch
 from pytest_simbench.laws.drives import follow
-from pytest_simbench.laws.friction import SLAB, SLAB_AT, acceleration, slab_on
-from pytest_simbench.laws.sticking import Carried
-from pytest_simbench.scene import Box, Scene
+from pytest_simbench.laws.sticking import SLAB, SLAB_AT, Carried, acceleration, slab_on
+from pytest_simbench.scene import Body, Box, Pose, Scene, Sphere
 
 
 @dataclass(frozen=True)
@@ -35,8 +34,7 @@ class SlideX(Law):
     def build(self) -> Scene:
         return slab_on(self.name, self.slope, self.direction, self.friction)
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         angle = math.atan(self.slope)
         along = seen.bodies[:, 0, 7:9] @ [math.cos(self.direction), math.sin(self.direction)]
         exact = GRAVITY * (math.sin(angle) - self.friction * math.cos(angle))
@@ -70,12 +68,11 @@ class SlideStraight(SlideX):
     unit: ClassVar[str] = "deg"
     direction: float = math.pi / 8
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         x, y = seen.bodies[-1, 0, 7:9]
         off = math.degrees(math.atan2(y, x) - self.direction)
         angle = math.atan(self.slope)
-        exact = GRAVITY * (math.sin(angle) - self.friction * math.cos(angle)) * float(seen.t[-1])
+        exact = GRAVITY * (math.sin(angle) - self.friction * math.cos(angle)) * seen.end
         late = GRAVITY * math.sin(angle) * seen.dt + rounding(1.0, seen.steps)
         return Reading(off, 0.0, math.degrees(late / exact))
 
@@ -106,7 +103,7 @@ class StoppingDistance(Law):
         exact = self.speed**2 / (2 * self.friction * GRAVITY)
         seen = watch(world, 1.5 * self.speed / (self.friction * GRAVITY))
         way = float(np.hypot(*seen.bodies[-1, 0, :2]))
-        return Reading(way, exact, self.speed * seen.dt + rounding(1.0, seen.steps))
+        return seen.reading(way, exact, self.speed, 1.0)
 
 
 @dataclass(frozen=True)
@@ -134,8 +131,7 @@ class Glide(Law):
         slab = Box("slab", SLAB, SLAB_AT, 1.0, 0.0, linear_velocity=(self.speed, 0.0, 0.0))
         return Scene(self.name, (slab,), ground_friction=0.0)
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         return Reading(
             float(seen.bodies[-1, 0, 7]), self.speed, rounding(2 * self.speed, seen.steps)
         )
@@ -159,3 +155,64 @@ class Belt(Carried):
         seen = follow(world, self.ride())
         return acceleration(seen.dt, seen.t, seen.bodies[:, 0, 7], 0.1, self.friction * GRAVITY,
                              self.friction * GRAVITY)  # fmt: skip
+
+
+BALL = 0.05
+"""Radius of the ball on the belt [m]."""
+
+TOP = 0.5
+"""Height of the belt's upper side [m]."""
+
+
+@dataclass(frozen=True)
+class BeltSpeed(Law):
+    """A box laid on a running belt slips until it has the belt's speed: a distance x = v^2 / (2 mu
+    g) from where it was laid (Coulomb's friction does the work of the kinetic energy), and goes on
+    with the belt from v / (mu g) on. Its place is read when it goes with the belt. Tolerance: its
+    speed is late by one step all the time, v dt."""
+
+    name = "belt_speed"
+    phenomenon = "sliding"
+    quantity: ClassVar[str] = "way"
+    unit: ClassVar[str] = "m"
+
+    speed: float = 0.8
+    friction: float = 0.4
+    seconds: float = 0.6
+
+    def body(self) -> Body:
+        return Box("box", (0.1, 0.1, 0.05), Pose.at(0.0, 0.0, TOP + 0.025), 0.5, self.friction)
+
+    def build(self) -> Scene:
+        belt = Box(
+            "belt",
+            (4.0, 0.4, 0.1),
+            Pose.at(0.0, 0.0, TOP - 0.05),
+            friction=self.friction,
+            linear_velocity=(self.speed, 0.0, 0.0),
+            prescribed=True,
+        )
+        return Scene(self.name, (belt, self.body()), ground_friction=self.friction)
+
+    def read(self, seen: Watched) -> Reading:
+        t, slips = seen.end, self.speed / (self.friction * GRAVITY)
+        exact = self.speed * (t - slips / 2)
+        return seen.reading(seen.bodies[-1, 1, 0], exact, self.speed, 1.0)
+
+
+@dataclass(frozen=True)
+class BallOnBelt(BeltSpeed):
+    """A ball laid on a running belt comes to roll on it with 2/7 of the belt's speed: friction
+    gives it m v and turns it back by 2/5 m r^2 w = m v r until v + w r is that of the belt.
+    Tolerance: its speed is late by one step, mu g dt."""
+
+    name = "ball_on_belt"
+    phenomenon = "rolling"
+    quantity: ClassVar[str] = "speed"
+    unit: ClassVar[str] = "m/s"
+
+    def body(self) -> Body:
+        return Sphere("ball", BALL, Pose.at(0.0, 0.0, TOP + BALL), 0.5, self.friction)
+
+    def read(self, seen: Watched) -> Reading:
+        return seen.reading(seen.bodies[-1, 1, 7], 2 / 7 * self.speed, self.friction * GRAVITY, 1.0)

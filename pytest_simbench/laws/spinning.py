@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import LONG, Law, Reading, Watched, rounding, watch
+from pytest_simbench.laws.base import LONG, Law, Reading, Watched, rounding
 from pytest_simbench.laws.free import FREE, WEIGHTLESS, rotation_of
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Vector3
 
@@ -38,8 +37,7 @@ class Spin(Law):
         )
         return Scene(self.name, (body,), gravity=WEIGHTLESS)
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         return Reading(
             float(seen.bodies[-1, 0, 12]), self.spin, rounding(2 * self.spin, seen.steps)
         )
@@ -73,9 +71,8 @@ class FreeTop(Law):
         turn = Rotation.from_rotvec(momentum / moments[0] * t)
         return turn * Rotation.from_rotvec([0.0, 0.0, axial * t])
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
-        t = float(seen.t[-1])
+    def read(self, seen: Watched) -> Reading:
+        t = seen.end
         off = (rotation_of(seen.bodies[-1, 0, 3:7]) * self.attitude(t).inv()).magnitude()
         moments = self.build().bodies[0].inertia()
         momentum = moments * self.omega
@@ -92,8 +89,6 @@ class _Tumble(Law):
 
     size: ClassVar[Vector3] = (0.3, 0.2, 0.05)
     omega: ClassVar[Vector3] = (0.05, 6.0, 0.05)
-
-    seconds: float
 
     def build(self) -> Scene:
         body = Box("body", self.size, Pose.at(0.0, 0.0, 2.0), 1.0, angular_velocity=self.omega)
@@ -139,8 +134,7 @@ class TumbleEnergy(_Tumble):
 
     seconds: float = 4.0
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         rows = seen.bodies[:, 0]
         omega = rotation_of(rows[:, 3:7]).inv().apply(rows[:, 10:])
         start = float(self.inertia @ np.square(self.omega)) / 2
@@ -160,8 +154,7 @@ class TumbleMomentum(_Tumble):
 
     seconds: float = 4.0
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         start = self.inertia * self.omega
         rows = seen.bodies[:, 0]
         turn = rotation_of(rows[:, 3:7])
@@ -172,6 +165,7 @@ class TumbleMomentum(_Tumble):
         return Reading(100 * worst, 0.0, 100 * allowed)
 
 
+@dataclass(frozen=True)
 class _TumbleDrift(_Tumble):
     """The same for a minute, three times slower: 6 turns over. A first-order method adds to energy
     and momentum in each step, and does not take it back: at 6 rad/s it may lose all that there is
@@ -179,6 +173,11 @@ class _TumbleDrift(_Tumble):
 
     omega: ClassVar[Vector3] = (2 / 120, 2.0, 2 / 120)
     study_timeout: ClassVar[float] = LONG
+
+    seconds: float = 60.0
+
+    def smoke(self) -> Self:
+        return replace(self, seconds=3.0)
 
     def rates(self) -> tuple[FloatArray, FloatArray]:
         """Angular velocity and acceleration in the body's frame, exactly, at even times, (n, 3)."""
@@ -203,13 +202,7 @@ class TumbleEnergyDrift(_TumbleDrift):
     quantity: ClassVar[str] = "change of the energy"
     unit: ClassVar[str] = "%"
 
-    seconds: float = 60.0
-
-    def smoke(self) -> TumbleEnergyDrift:
-        return replace(self, seconds=3.0)
-
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         start = float(self.inertia @ np.square(self.omega)) / 2
         found = np.square(self.spun(seen)) @ self.inertia / 2
         _, rate = self.rates()
@@ -229,13 +222,7 @@ class TumbleMomentumDrift(_TumbleDrift):
     quantity: ClassVar[str] = "change of the angular momentum's size"
     unit: ClassVar[str] = "%"
 
-    seconds: float = 60.0
-
-    def smoke(self) -> TumbleMomentumDrift:
-        return replace(self, seconds=3.0)
-
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         start = float(np.linalg.norm(self.inertia * self.omega))
         found = np.linalg.norm(self.inertia * self.spun(seen), axis=1)
         _, rate = self.rates()
