@@ -25,8 +25,8 @@ from pytest_simbench.data.pushes import PUSH, ArmRun, ArmRuns
 from pytest_simbench.data.tosses import Half
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.robot.adapting import bound_joints, lock_joints
+from pytest_simbench.robot.kinematics import track
 from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.tracking import track
 from pytest_simbench.scene import Box, FloatArray, Gripper, Joint, Pose, Robot, Scene, Trajectory
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.robot_files import keep

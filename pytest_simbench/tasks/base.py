@@ -9,12 +9,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from pytest_simbench.client.tape import Tape
 from pytest_simbench.client.world import World
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.readings import Reading
 from pytest_simbench.robot.errors import RobotError
 from pytest_simbench.scene import Box, Pose, Robot, Scene, Vector3
-from pytest_simbench.tasks.moments import Moment
 
 CUBE_SIZE = 0.05
 """Edge of every cube [m] (the study)."""
@@ -198,3 +198,23 @@ def generators(seed: int) -> tuple[np.random.Generator, np.random.Generator, np.
         np.random.default_rng(order),
         np.random.default_rng(planner),
     )
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A moment of a task.
+
+    Attributes:
+        name: for tables.
+        phase: of the task.
+        operation: number of the operation in that phase before which it is, from 0.
+    """
+
+    name: str
+    phase: str
+    operation: int = 0
+
+    def place(self, tape: Tape) -> int | None:
+        """Number of the operation of a tape before which it is; None: there is none."""
+        numbers = [k for k, operation in enumerate(tape) if operation.phase == self.phase]
+        return numbers[self.operation] if self.operation < len(numbers) else None

@@ -33,8 +33,7 @@ from pytest_simbench.tasks.base import (
     generators,
     scaled,
 )
-from pytest_simbench.tasks.manipulator import Manipulator
-from pytest_simbench.tasks.reach import cannot_handle
+from pytest_simbench.tasks.manipulator import Manipulator, cannot_handle
 
 TABLE_TOP = 0.30
 """Height of the table top [m] (study code, Webots)."""

@@ -40,17 +40,15 @@ from pytest_simbench.tasks.base import (
     STUDY_TOLERANCE,
     Count,
     Jitter,
+    Moment,
     Outcome,
     Task,
     cube,
     generators,
     scaled,
 )
-from pytest_simbench.tasks.impact import impact
-from pytest_simbench.tasks.manipulator import Manipulator
-from pytest_simbench.tasks.moments import Moment
-from pytest_simbench.tasks.reach import cannot_handle
-from pytest_simbench.tasks.throw_analysis import Thrown
+from pytest_simbench.tasks.manipulator import Manipulator, cannot_handle
+from pytest_simbench.tasks.throw_analysis import Thrown, impact
 
 PROJECTILE = Pose.at(0.5, 0.0, CUBE_SIZE / 2)
 """The cube to be thrown lies on the ground (study code)."""

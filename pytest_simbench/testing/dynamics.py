@@ -10,8 +10,7 @@ import numpy as np
 from pytest_simbench.laws.loops import FourBarSwing
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Trajectory
 from pytest_simbench.simulator import Capability, PreparedRobot
-from pytest_simbench.simulator.kinematics import link_poses
-from pytest_simbench.simulator.loops import ends, reduced
+from pytest_simbench.simulator.links import ends, link_poses, reduced
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
 from pytest_simbench.testing.drives import (

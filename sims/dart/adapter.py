@@ -32,7 +32,7 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
-from pytest_simbench.simulator.loops import ends, reduced
+from pytest_simbench.simulator.links import ends, reduced
 
 from .bodies import ONE_CONTACT_ON_A_PLANE, add_body, add_ground, set_surface
 from .readback import ReadBack

@@ -44,7 +44,7 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
-from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
+from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
 
 from . import releases
 from .readback import ReadBack

@@ -30,12 +30,10 @@ from pytest_simbench.simulator import (
 
 from . import releases
 from .bounces import BOUNCES
-from .heavy import leave_out
 from .pictures import DISABLED, camera, renderer
-from .readback import Numbers, ReadBack
+from .readback import Numbers, ReadBack, contact_forces, joint_wrenches
 from .settings import CHOSEN_ON, PROFILES, MuJoCoSettings
-from .touching import contact_forces, joint_wrenches
-from .world import build
+from .world import build, leave_out
 
 mujoco = lazy_import("mujoco")
 

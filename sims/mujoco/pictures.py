@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
+from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
 
 from .releases import gl_context
 

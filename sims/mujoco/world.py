@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,19 +11,19 @@ from pytest_simbench.scene import (
     Body,
     Box,
     Capsule,
+    Closure,
     ConvexMesh,
     Cylinder,
+    FloatArray,
     Joint,
     Scene,
     Sphere,
 )
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, heavy, lazy_import
-from pytest_simbench.simulator.loops import reduced
+from pytest_simbench.simulator.links import reduced
 
 from . import releases
 from .bounces import direct
-from .loops import close_loops
-from .self_collision import part_joined
 from .settings import MuJoCoSettings
 
 mujoco = lazy_import("mujoco")
@@ -198,3 +198,63 @@ def _couple_fingers(spec: Any, first: str, second: str) -> None:
         data=releases.equality_data(mujoco, [0.0, 1.0]),
         solref=[2 * spec.option.timestep, 1.0],
     )
+
+
+def close_loops(spec: Any, closures: Iterable[Closure]) -> None:
+    """Hold the points together, as stiffly as the step allows.
+
+    MuJoCo's `connect` takes the point of the first link, and finds that of the second at the
+    model's own zero posture, where the loop is open. So two sites are held together.
+    """
+    for k, closure in enumerate(closures):
+        names = []
+        for link, point in (
+            (closure.first, closure.first_point),
+            (closure.second, closure.second_point),
+        ):
+            names.append(f"closure {k} {link}")
+            spec.body(link).add_site(name=names[-1], pos=point)
+        spec.add_equality(
+            name=f"closure {k}",
+            type=mujoco.mjtEq.mjEQ_CONNECT,
+            objtype=mujoco.mjtObj.mjOBJ_SITE,
+            name1=names[0],
+            name2=names[1],
+            solref=[2 * spec.option.timestep, 1.0],
+        )
+
+
+def closed(model: Any, active: Any) -> dict[str, FloatArray]:
+    """The quantity `closure/NUMBER/points` of each active closure, held by two sites or, as with
+    Newton, by two bodies with a point each."""
+    loops = np.flatnonzero((model.eq_type == mujoco.mjtEq.mjEQ_CONNECT) & active)
+    return {
+        f"closure/{k}/points": _points(model, number) for k, number in enumerate(loops.tolist())
+    }
+
+
+def _points(model: Any, number: int) -> FloatArray:
+    """What a closure holds together, (2, 3), each in the frame of its link [m]."""
+    if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
+        sites = [model.eq_obj1id[number], model.eq_obj2id[number]]
+        return np.array(model.site_pos[sites])
+    return np.array(model.eq_data[number, :6]).reshape(2, 3)
+
+
+def leave_out(model: Any, first: Sequence[int]) -> None:
+    """Have the solver stop where it would without these bodies: its tolerance is relative to the
+    mean inertia of all degrees of freedom.
+
+    Args:
+        model: of MuJoCo.
+        first: degree of freedom of each heavy body.
+    """
+    light = np.delete(model.dof_M0, [dof + k for dof in first for k in range(6)])
+    model.stat.meaninertia = light.mean() if len(light) else 1.0
+
+
+def part_joined(spec: Any, prepared: PreparedRobot) -> None:
+    """Have links that one joint joins pass through each other. MuJoCo does so by itself, but where
+    one of them is fixed in the world."""
+    for joint in prepared.joints:
+        spec.add_exclude(bodyname1=joint.parent, bodyname2=joint.child)

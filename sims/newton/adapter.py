@@ -33,10 +33,9 @@ from pytest_simbench.simulator import (
 )
 
 from ..mujoco.bounces import BOUNCES, direct
-from ..mujoco.heavy import leave_out
 from ..mujoco.pictures import DISABLED, camera, renderer
-from ..mujoco.readback import Numbers, ReadBack
-from ..mujoco.touching import contact_forces, joint_wrenches
+from ..mujoco.readback import Numbers, ReadBack, contact_forces, joint_wrenches
+from ..mujoco.world import leave_out
 from .settings import CHOSEN_ON, PROFILES, NewtonSettings
 from .world import build_model, make_solver, names
 

@@ -26,8 +26,7 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
-from pytest_simbench.simulator.loops import reduced
-from pytest_simbench.simulator.self_collision import joined
+from pytest_simbench.simulator.links import joined, reduced
 
 from . import world as build
 from .axes import Axis

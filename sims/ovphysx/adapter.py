@@ -36,11 +36,10 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
-from pytest_simbench.simulator.kinematics import link_poses
+from pytest_simbench.simulator.links import link_poses
 
 from . import stage as usd
-from .loads import wrenches
-from .readback import read_back
+from .readback import read_back, wrenches
 from .session import Session
 from .settings import CHOSEN_ON, PROFILES, OvPhysXSettings
 

@@ -9,10 +9,12 @@ import numpy as np
 
 from pytest_simbench.scene import Box, ConvexMesh, FloatArray, Pose, Scene
 from pytest_simbench.simulator import PreparedRobot, one_value
+from pytest_simbench.simulator.links import link_poses
 from pytest_simbench.simulator.shapes import box_corners, outlines, reach
 
 from . import stage as usd
 from .session import Session
+from .usd_text import turn_from_x
 
 _FRICTIONS = ("staticFriction", "dynamicFriction")
 _ATTRIBUTES = (
@@ -169,3 +171,24 @@ def _each_shape(values: _Values, attribute: str, path: str) -> FloatArray:
     """An attribute of all shapes of a prim."""
     count = int(values["shapeCount"][path])
     return np.atleast_1d(values[attribute][path])[:count]
+
+
+def wrenches(told: FloatArray, prepared: PreparedRobot, positions: FloatArray) -> FloatArray:
+    """Of the driven joints, on the links below about their origins, in the world, (n_joints, 6).
+
+    Args:
+        told: by PhysX of each link by its number in `prepared.links`, (n_links, 6), in the axes of
+            the frame of the joint above it, whose x is the joint's axis.
+        prepared: whose joints they are.
+        positions: of the joints, (n_joints,).
+    """
+    names = prepared.robot.joint_names
+    poses = link_poses(prepared, dict(zip(names, positions, strict=True)))
+    numbers = {name: k for k, name in enumerate(prepared.links)}
+    joints = {joint.name: joint for joint in prepared.joints}
+    rows = []
+    for joint in (joints[name] for name in names):
+        axes = Pose(quaternion=turn_from_x(np.asarray(joint.axis)))
+        turn = (poses[joint.child] * axes).rotation()
+        rows.append((told[numbers[joint.child]].reshape(2, 3) @ turn.T).ravel())
+    return np.array(rows).reshape(-1, 6)

@@ -30,17 +30,13 @@ from pytest_simbench.simulator import (
     heavy,
     lazy_import,
 )
-from pytest_simbench.simulator.kinematics import motion_subspace
-from pytest_simbench.simulator.loops import reduced
-from pytest_simbench.simulator.self_collision import joined
-from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
+from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
+from pytest_simbench.simulator.links import joined, motion_subspace, reduced
 
 from .anchors import Anchors
-from .loads import wrench
-from .loops import close_loop
-from .readback import ReadBack
+from .readback import ReadBack, wrench
 from .settings import CHOSEN_ON, PROFILES, PyBulletSettings
-from .world import ROBOT, WORLD, add_body, set_surface
+from .world import ROBOT, WORLD, add_body, close_loop, set_surface
 
 pybullet = lazy_import("pybullet")
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose, Robot
+from pytest_simbench.scene import FloatArray, Pose, Robot, rotation_matrix
 from pytest_simbench.simulator import PreparedRobot, lazy_import
 from pytest_simbench.simulator.shapes import (
     box_corners,
@@ -22,7 +22,7 @@ from pytest_simbench.simulator.shapes import (
     round_reach,
 )
 
-from .loops import points
+from .world import points
 
 pybullet = lazy_import("pybullet")
 
@@ -217,3 +217,28 @@ def _pose(position: Sequence[float], quaternion: Sequence[float]) -> Pose:
     """Of Bullet's quaternions, which end with w."""
     x, y, z, w = quaternion
     return Pose.from_array([*position, w, x, y, z])
+
+
+def wrench(client: int, robot: int, joint: int, subspace: FloatArray) -> FloatArray:
+    """On a joint's child about the origin of its frame, in the world, (6,).
+
+    Bullet's sensor tells it about the child's centre of mass, in the axes of its inertial frame,
+    and without the motor.
+
+    Args:
+        client, robot, joint: Bullet's numbers.
+        subspace: of the joint, `simulator.links.motion_subspace`.
+    """
+    told = pybullet.getJointState(robot, joint, physicsClientId=client)
+    state = pybullet.getLinkState(robot, joint, physicsClientId=client)
+    inertial, link = (_turn(quaternion) for quaternion in (state[1], state[5]))
+    force = inertial @ told[2][:3] + told[3] * link @ subspace[3:]
+    torque = inertial @ told[2][3:] + told[3] * link @ subspace[:3]
+    arm = np.subtract(state[0], state[4])
+    return np.concatenate([force, torque + np.cross(arm, force)])
+
+
+def _turn(quaternion: tuple[float, ...]) -> FloatArray:
+    """Of Bullet's quaternions, which end with w."""
+    x, y, z, w = quaternion
+    return rotation_matrix(np.array([w, x, y, z]))

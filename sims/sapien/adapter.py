@@ -29,7 +29,7 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
-from pytest_simbench.simulator.loops import reduced
+from pytest_simbench.simulator.links import reduced
 
 from .bodies import ROBOT, WORLD, add_body, add_ground
 from .drawing import Drawing

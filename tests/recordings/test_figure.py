@@ -8,7 +8,7 @@ import pytest
 from pytest_simbench.recordings.figure import Figure
 from pytest_simbench.robot.registry import known, known_robot
 from pytest_simbench.scene import Pose
-from pytest_simbench.simulator.kinematics import link_poses
+from pytest_simbench.simulator.links import link_poses
 from pytest_simbench.simulator.urdf import PreparedRobot
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pytest_simbench.robot import choosing
-from pytest_simbench.robot.choosing import choose
+from pytest_simbench.robot import grasping
 from pytest_simbench.robot.collision import PlanningScene
 from pytest_simbench.robot.errors import PlanningError
+from pytest_simbench.robot.grasping import choose
 from pytest_simbench.robot.kinematics import tool_over, top_down_grasps
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.registry import find
@@ -47,7 +47,7 @@ def test_every_cube_can_be_taken(name: str) -> None:
 def test_the_nearest_positions_alone_leave_cubes_of_the_ur5(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(choosing, "FURTHER_RESTARTS", 0)
+    monkeypatch.setattr(grasping, "FURTHER_RESTARTS", 0)
     problems = choices("ur5")
     assert any(problem.startswith("in collision: upper_arm") for problem in problems)
 

@@ -10,7 +10,7 @@ from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import panda
 from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import PreparedRobot
-from pytest_simbench.simulator.kinematics import link_poses, motion_subspace
+from pytest_simbench.simulator.links import link_poses, motion_subspace
 
 ROBOT = panda(base=Pose.at(0.2, -0.1, 0.3, yaw=0.7))
 PREPARED, MODEL = PreparedRobot(ROBOT), RobotModel(ROBOT)

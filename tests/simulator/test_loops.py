@@ -10,7 +10,7 @@ import pytest
 from pytest_simbench.laws.loops import FourBarClosure
 from pytest_simbench.scene import Closure, Robot, Scene, SceneError
 from pytest_simbench.simulator import DescriptionError, NotSupportedError, PreparedRobot
-from pytest_simbench.simulator.loops import check_loops, ends, reduced
+from pytest_simbench.simulator.links import check_loops, ends, reduced
 from pytest_simbench.simulator.registry import adapter
 
 

@@ -10,13 +10,13 @@ from pytest_simbench.laws.domino import DominoWave
 from pytest_simbench.robot.panda import panda
 from pytest_simbench.scene import Robot, Scene
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot
-from pytest_simbench.simulator.quantities import expected_quantities
-from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.simulator.self_collision import (
+from pytest_simbench.simulator.links import (
     check_self_collision,
     joined,
     links_collide,
 )
+from pytest_simbench.simulator.quantities import expected_quantities
+from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.simulator.settings import Settings
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pytest_simbench.scene import FloatArray
-from pytest_simbench.tasks.impact import impact
+from pytest_simbench.tasks.throw_analysis import impact
 
 STEP = 0.004
 TIME = STEP * np.arange(1001)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.tasks.sliding import lever, smallest_turning_radius
+from pytest_simbench.tasks.pushing import lever, smallest_turning_radius
 
 EDGES = st.floats(0.02, 0.5)
 

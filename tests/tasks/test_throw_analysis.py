@@ -14,13 +14,13 @@ from pytest_simbench.client.world import World
 from pytest_simbench.robot.throw import swing_of
 from pytest_simbench.scene import Scene
 from pytest_simbench.tasks import Jitter, Throwing
-from pytest_simbench.tasks.impact import may_touch
 from pytest_simbench.tasks.manipulator import Manipulator
 from pytest_simbench.tasks.throw_analysis import (
     OUT_OF_HAND,
     Thrown,
     _apart,
     free_flight,
+    may_touch,
     unclenched,
 )
 from pytest_simbench.testing.drives import close_command
