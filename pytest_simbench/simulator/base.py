@@ -89,6 +89,8 @@ class Simulator(ABC):
     profiles: ClassVar[Mapping[str, Settings]]
     chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {}
 
+    _steps: int = 0
+
     def __init__(self, settings: Settings, *, gui: bool = False) -> None:
         self.settings = settings
         self.gui = gui
@@ -138,9 +140,10 @@ class Simulator(ABC):
         """Advance the world by one time step."""
 
     @property
-    @abstractmethod
     def time(self) -> float:
-        """Simulated time since `load` [s]."""
+        """Simulated time since `load` [s]; that of the steps that the adapter counts in `_steps`,
+        unless it tells another one."""
+        return self._steps * self.settings.timestep
 
     @abstractmethod
     def body_state(self) -> FloatArray:

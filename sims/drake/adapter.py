@@ -72,19 +72,9 @@ class Drake(Simulator):
         language="C++",
         tested_version="1.51.1",
         oldest_version=releases.OLDEST,
-        capabilities=frozenset(
-            {
-                Capability.WINDOW,
-                Capability.OFFSCREEN,
-                Capability.SAVE_RESTORE,
-                Capability.EXACT_RESTORE,
-                Capability.CONTACT_COUNT,
-                Capability.CONTACT_FORCES,
-                Capability.LOOPS,
-                Capability.SELF_COLLIDE,
-                Capability.JOINT_WRENCHES,
-                Capability.DETERMINISTIC,
-            }
+        capabilities=Capability.named(
+            "window offscreen save_restore exact_restore contact_count contact_forces loops "
+            "self_collide joint_wrenches deterministic"
         ),
         deviations=(
             Deviation(
@@ -172,7 +162,7 @@ class Drake(Simulator):
         self._commanded = (initial, rest, rest)
 
     def read_back(self) -> dict[str, Any]:
-        return ReadBack(self.world, self.context).all()
+        return ReadBack(self).all()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self._commanded = (position, velocity, effort)

@@ -52,19 +52,9 @@ class MuJoCo(Simulator):
         language="C, C++",
         tested_version="4.0.0",
         oldest_version=releases.OLDEST,
-        capabilities=frozenset(
-            {
-                Capability.WINDOW,
-                Capability.OFFSCREEN,
-                Capability.SAVE_RESTORE,
-                Capability.EXACT_RESTORE,
-                Capability.CONTACT_COUNT,
-                Capability.CONTACT_FORCES,
-                Capability.LOOPS,
-                Capability.SELF_COLLIDE,
-                Capability.JOINT_WRENCHES,
-                Capability.DETERMINISTIC,
-            }
+        capabilities=Capability.named(
+            "window offscreen save_restore exact_restore contact_count contact_forces loops "
+            "self_collide joint_wrenches deterministic"
         ),
         deviations=(
             Deviation("", "contacts are soft by design: cubes sink in and creep a little"),
@@ -114,7 +104,7 @@ class MuJoCo(Simulator):
             self._open_window()
 
     def read_back(self) -> dict[str, Any]:
-        return ReadBack(self.model, self.data, self.scene, self.prepared, self._numbers()).all()
+        return ReadBack(self, self.model, self.data, self._numbers()).all()
 
     def _numbers(self) -> Numbers:
         model, prepared = self.model, self.prepared

@@ -224,13 +224,11 @@ def close_loops(spec: Any, closures: Iterable[Closure]) -> None:
         )
 
 
-def closed(model: Any, active: Any) -> dict[str, FloatArray]:
-    """The quantity `closure/NUMBER/points` of each active closure, held by two sites or, as with
-    Newton, by two bodies with a point each."""
+def closed(model: Any, active: Any) -> list[FloatArray]:
+    """The points of each active closure, held by two sites or, as with Newton, by two bodies with a
+    point each."""
     loops = np.flatnonzero((model.eq_type == mujoco.mjtEq.mjEQ_CONNECT) & active)
-    return {
-        f"closure/{k}/points": _points(model, number) for k, number in enumerate(loops.tolist())
-    }
+    return [_points(model, number) for number in loops.tolist()]
 
 
 def _points(model: Any, number: int) -> FloatArray:

@@ -62,15 +62,8 @@ class OvPhysX(Simulator):
         language="C++",
         tested_version="0.7.0.74035321",
         oldest_version="0.7.0.74035321",  # older ones tell no joint before the first step
-        capabilities=frozenset(
-            {
-                Capability.DETERMINISTIC,
-                Capability.SAVE_RESTORE,
-                Capability.CONTACT_FORCES,
-                Capability.LOOPS,
-                Capability.SELF_COLLIDE,
-                Capability.JOINT_WRENCHES,
-            }
+        capabilities=Capability.named(
+            "deterministic save_restore contact_forces loops self_collide joint_wrenches"
         ),
         deviations=(
             Deviation(
@@ -205,10 +198,6 @@ class OvPhysX(Simulator):
         if self._steps == 1 and self._joints:
             names = self._binding("ARTICULATION_DOF_POSITION")[0].dof_names
             self._columns = [names.index(path.rpartition("/")[2]) for path in self._joints]
-
-    @property
-    def time(self) -> float:
-        return self._steps * self.settings.timestep
 
     def body_state(self) -> FloatArray:
         state = np.empty((len(self._free), 13))
