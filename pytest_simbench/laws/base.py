@@ -51,7 +51,9 @@ def stillness(dt: float, scale: float, contacts: int = 1) -> float:
 
 
 class Law(Task):
-    """One law. Subclasses are frozen dataclasses; formula, source and tolerance in the docstring.
+    """One law. Subclasses are frozen dataclasses; formula, source and tolerance in the docstring,
+    and what follows in the head: `class FallSpeed(FreeFall, name="fall_speed", quantity="speed")`.
+    What a head does not say is that of the class above.
 
     A law draws nothing: seed and jitter do not matter, and one repetition is enough of an engine
     that is deterministic.
@@ -75,10 +77,12 @@ class Law(Task):
     seconds: float
 
     known: ClassVar[list[type[Law]]] = []
-    """Every law: a subclass with a name of its own registers when it is defined."""
+    """Every law: a subclass with a name registers when it is defined."""
 
-    def __init_subclass__(cls) -> None:
-        if "name" in vars(cls):
+    def __init_subclass__(cls, **head: str) -> None:
+        for attribute, value in head.items():
+            setattr(cls, attribute, value)
+        if "name" in head:
             Law.known.append(cls)
 
     @property

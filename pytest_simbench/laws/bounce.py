@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 from pytest_simbench.client.world import World
 from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, rounding, watch
@@ -15,14 +14,11 @@ RADIUS = 0.05
 
 
 @dataclass(frozen=True)
-class BounceHeight(Law):
+class BounceHeight(
+    Law, name="bounce_height", phenomenon="impact", quantity="height of the bounce", unit="m"
+):
     """A ball let go at the height h rises again to e^2 h (Newton's coefficient of restitution).
     Tolerance: the impact is late by one step, in its place and in its speed, 2 v dt."""
-
-    name = "bounce_height"
-    phenomenon = "impact"
-    quantity: ClassVar[str] = "height of the bounce"
-    unit: ClassVar[str] = "m"
 
     restitution: float = 0.8
     height: float = 0.5
@@ -52,13 +48,11 @@ class BounceHeight(Law):
 
 
 @dataclass(frozen=True)
-class BounceRatio(BounceHeight):
+class BounceRatio(
+    BounceHeight, name="bounce_ratio", quantity="second bounce over the first", unit=""
+):
     """Each bounce is e^2 times as high as the one before. Tolerance: twice that of a bounce, as a
     share of the first."""
-
-    name = "bounce_ratio"
-    quantity: ClassVar[str] = "second bounce over the first"
-    unit: ClassVar[str] = ""
 
     def measure(self, world: World) -> Reading:
         e = self.restitution
@@ -70,16 +64,13 @@ class BounceRatio(BounceHeight):
 
 
 @dataclass(frozen=True)
-class ElasticChain(Law):
+class ElasticChain(
+    Law, name="elastic_chain", phenomenon="impact", quantity="speed of the last ball", unit="m/s"
+):
     """A ball hits a row of three equal ones, all elastic and without friction: the last one goes on
     with its speed, the others rest (Mariotte; Newton's cradle). The balls stand 1 cm apart, so that
     the impacts come one after the other. Tolerance: what gravity changes within one step, g dt: an
     impact is solved at once, whatever the step."""
-
-    name = "elastic_chain"
-    phenomenon = "impact"
-    quantity: ClassVar[str] = "speed of the last ball"
-    unit: ClassVar[str] = "m/s"
 
     speed: float = 2.0
     seconds: float = 0.3
@@ -104,15 +95,16 @@ class ElasticChain(Law):
 
 
 @dataclass(frozen=True)
-class ObliqueBounce(Law):
+class ObliqueBounce(
+    Law,
+    name="oblique_bounce_slip",
+    phenomenon="impact",
+    quantity="level speed after the bounce",
+    unit="m/s",
+):
     """A ball that hits the ground aslant, without spin, slips all the time when mu is small: its
     level speed loses mu (1 + e) v (Routh, Rigid Dynamics; Coulomb's law for impulses). Tolerance:
     the impact is late by one step, mu (1 + e) g dt."""
-
-    name = "oblique_bounce_slip"
-    phenomenon = "impact"
-    quantity: ClassVar[str] = "level speed after the bounce"
-    unit: ClassVar[str] = "m/s"
 
     friction: float = 0.2
     restitution: float = 0.5
@@ -150,11 +142,9 @@ class ObliqueBounce(Law):
 
 
 @dataclass(frozen=True)
-class ObliqueBounceStick(ObliqueBounce):
+class ObliqueBounceStick(ObliqueBounce, name="oblique_bounce_stick"):
     """Where mu is large it sticks, and leaves rolling: 5/7 of its level speed is left, whatever mu
     and e. Tolerance as of `ObliqueBounce`."""
-
-    name = "oblique_bounce_stick"
 
     friction: float = 0.8
     level: float = 2.0

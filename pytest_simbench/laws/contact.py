@@ -20,12 +20,8 @@ CUBE: Vector3 = (EDGE,) * 3
 
 
 @dataclass(frozen=True)
-class _Stack(Law):
+class _Stack(Law, phenomenon="stacking", quantity="way of the top cube", unit="m"):
     """Cubes upon each other; how far the top one is from its place."""
-
-    phenomenon = "stacking"
-    quantity: ClassVar[str] = "way of the top cube"
-    unit: ClassVar[str] = "m"
 
     masses: ClassVar[tuple[float, ...]]
     overhangs: ClassVar[tuple[float, ...]] = ()
@@ -49,52 +45,49 @@ class _Stack(Law):
 
 
 @dataclass(frozen=True)
-class RestDepth(_Stack):
+class RestDepth(_Stack, name="rest_depth"):
     """A cube put on the ground stays there: it neither sinks nor moves aside. Tolerance: an
     equilibrium, g dt^2."""
 
-    name = "rest_depth"
     masses: ClassVar[tuple[float, ...]] = (1.0,)
 
 
 @dataclass(frozen=True)
-class Tower(_Stack):
+class Tower(_Stack, name="tower"):
     """A tower of five equal cubes stands. Tolerance: g dt^2 for each contact."""
 
-    name = "tower"
     masses: ClassVar[tuple[float, ...]] = (1.0,) * 5
 
 
 @dataclass(frozen=True)
-class HeavyOnTop(_Stack):
+class HeavyOnTop(_Stack, name="heavy_on_top"):
     """Three cubes of 1 kg carry one of 100 kg: masses do not matter to statics. Tolerance as of
     `Tower`. Solvers that iterate converge the slower, the larger the ratio of masses."""
 
-    name = "heavy_on_top"
     masses: ClassVar[tuple[float, ...]] = (1.0, 1.0, 1.0, 100.0)
 
 
 @dataclass(frozen=True)
-class Overhang(_Stack):
+class Overhang(_Stack, name="overhang"):
     """Four cubes, each shifted on the one below by 0.9 of what statics allows, L / 2 (1, 1/2, 1/3)
     from the top (Coffin 1923; Paterson, Zwick, Overhang, 2009): the stack stands. Tolerance as of
     `Tower`."""
 
-    name = "overhang"
     masses: ClassVar[tuple[float, ...]] = (1.0,) * 4
     overhangs: ClassVar[tuple[float, ...]] = tuple(0.9 * EDGE / 2 / k for k in (3, 2, 1))
 
 
 @dataclass(frozen=True)
-class TippingEdge(Law):
+class TippingEdge(
+    Law,
+    name="tipping_edge",
+    phenomenon="stacking",
+    quantity="largest overhang that stands",
+    unit="m",
+):
     """A cube that lies over an edge tips when its centre is beyond it: six cubes, whose overhang is
     0.92 to 1.08 of half their length. One has tipped that is turned by 0.05 rad. Tolerance: half of
     the gap between those on either side, 0.02 of it; no step."""
-
-    name = "tipping_edge"
-    phenomenon = "stacking"
-    quantity: ClassVar[str] = "largest overhang that stands"
-    unit: ClassVar[str] = "m"
 
     seconds: float = 0.8
 
@@ -115,15 +108,16 @@ class TippingEdge(Law):
 
 
 @dataclass(frozen=True)
-class TippingSlope(Law):
+class TippingSlope(
+    Law,
+    name="tipping_slope",
+    phenomenon="stacking",
+    quantity="tangent of the steepest slope that holds",
+    unit="",
+):
     """A tall block on a slope tips, and does not slide, when the slope's tangent is above its width
     over its height, and mu is more than that: six slopes. Turned by 0.05 rad it has tipped.
     Tolerance: half of the gap between the slopes on either side; no step."""
-
-    name = "tipping_slope"
-    phenomenon = "stacking"
-    quantity: ClassVar[str] = "tangent of the steepest slope that holds"
-    unit: ClassVar[str] = ""
 
     size: Vector3 = (0.1, 0.1, 0.25)
     seconds: float = 0.8
@@ -151,15 +145,10 @@ class TippingSlope(Law):
 
 
 @dataclass(frozen=True)
-class Pivot(Law):
+class Pivot(Law, name="pivot", phenomenon="rolling", quantity="angle turned", unit="rad"):
     """A plank that stands on an edge, leaning, turns about that edge: (I + m r^2) x'' = m g r cos
     x, with x the angle of its centre above the edge; friction 1 holds the edge. Against DOP853.
     Tolerance: late by one step and a rate late by one step all the time: |v| dt + |a| t dt."""
-
-    name = "pivot"
-    phenomenon = "rolling"
-    quantity: ClassVar[str] = "angle turned"
-    unit: ClassVar[str] = "rad"
 
     size: Vector3 = (0.4, 0.2, 0.1)
     lean: float = math.radians(60.0)
@@ -196,14 +185,11 @@ class Pivot(Law):
 
 
 @dataclass(frozen=True)
-class LandingTime(Law):
+class LandingTime(
+    Law, name="landing_time", phenomenon="impact", quantity="time of the landing", unit="s"
+):
     """A cube let go at the height h lands after sqrt(2 h / g): its speed is the largest then.
     Tolerance: late by one step, and read to one step."""
-
-    name = "landing_time"
-    phenomenon = "impact"
-    quantity: ClassVar[str] = "time of the landing"
-    unit: ClassVar[str] = "s"
 
     height: float = 0.5
 
@@ -218,13 +204,9 @@ class LandingTime(Law):
 
 
 @dataclass(frozen=True)
-class DeadLanding(LandingTime):
+class DeadLanding(LandingTime, name="dead_landing", quantity="rise after the landing", unit="m"):
     """It does not rise again: e = 0 (Newton). Tolerance: the impact is late by one step, so that
     it is pushed out of the ground by v dt."""
-
-    name = "dead_landing"
-    quantity: ClassVar[str] = "rise after the landing"
-    unit: ClassVar[str] = "m"
 
     def measure(self, world: World) -> Reading:
         fall = math.sqrt(2 * self.height / GRAVITY)
@@ -235,11 +217,8 @@ class DeadLanding(LandingTime):
 
 
 @dataclass(frozen=True)
-class _Collision(Law):
+class _Collision(Law, phenomenon="impact", unit="m/s"):
     """A cube hits another one that is at rest, face on face, on ground without friction."""
-
-    phenomenon = "impact"
-    unit: ClassVar[str] = "m/s"
 
     masses: ClassVar[tuple[float, float]] = (1.0, 2.0)
 
@@ -259,12 +238,9 @@ class _Collision(Law):
 
 
 @dataclass(frozen=True)
-class DeadCollision(_Collision):
+class DeadCollision(_Collision, name="dead_collision", quantity="speed of the cube that was hit"):
     """With e = 0 both go on with the common speed m1 v / (m1 + m2). Tolerance: what gravity changes
     within one step, g dt: an impact is solved at once, whatever the step."""
-
-    name = "dead_collision"
-    quantity: ClassVar[str] = "speed of the cube that was hit"
 
     def measure(self, world: World) -> Reading:
         seen = watch(world, 0.3)
@@ -272,12 +248,11 @@ class DeadCollision(_Collision):
 
 
 @dataclass(frozen=True)
-class CollisionMomentum(_Collision):
+class CollisionMomentum(
+    _Collision, name="collision_momentum", quantity="speed of the common centre of mass"
+):
     """Whatever else happens, momentum stays: (m1 v1 + m2 v2) / (m1 + m2) is what it was. Tolerance
     as of `DeadCollision`."""
-
-    name = "collision_momentum"
-    quantity: ClassVar[str] = "speed of the common centre of mass"
 
     def measure(self, world: World) -> Reading:
         seen = watch(world, 0.3)
@@ -291,7 +266,7 @@ def tilt(row: FloatArray) -> float:
 
 
 @dataclass(frozen=True)
-class RestForce(Law):
+class RestForce(Law, name="rest_force", phenomenon="stacking", quantity="force upward", unit="N"):
     """The ground carries a cube at rest with m g (Newton's first law).
 
     The force is the mean of a time T after one of settling, step by step. By the law of momentum
@@ -299,10 +274,6 @@ class RestForce(Law):
     2 m g dt / T.
     """
 
-    name = "rest_force"
-    phenomenon = "stacking"
-    quantity: ClassVar[str] = "force upward"
-    unit: ClassVar[str] = "N"
     needs: ClassVar[tuple[Capability, ...]] = (Capability.CONTACT_FORCES,)
 
     carrying: ClassVar[str] = "ground"
@@ -336,11 +307,9 @@ class RestForce(Law):
 
 
 @dataclass(frozen=True)
-class TowerForce(RestForce):
+class TowerForce(RestForce, name="tower_force"):
     """In a tower of four equal cubes the lowest carries the other three with 3 m g. Tolerance as of
     `RestForce`."""
-
-    name = "tower_force"
 
     carrying: ClassVar[str] = "body/cube 0"
     masses: ClassVar[tuple[float, ...]] = (1.0,) * 4

@@ -43,12 +43,8 @@ def held(position: float, seconds: float, velocity: float = 0.0, effort: float =
     return Trajectory(seconds, ends, np.full((2, 1), velocity), np.full((2, 1), effort))
 
 
-class _Driven(Law):
+class _Driven(Law, phenomenon="joints", quantity="angle", unit="rad"):
     """A wheel of 0.5 kg m^2 on a vertical axis, and its drive."""
-
-    phenomenon = "joints"
-    quantity: ClassVar[str] = "angle"
-    unit: ClassVar[str] = "rad"
 
     inertia: ClassVar[float] = 0.5
 
@@ -64,11 +60,9 @@ class _Driven(Law):
 
 
 @dataclass(frozen=True)
-class StepResponse(_Driven):
+class StepResponse(_Driven, name="step_response"):
     """A critically damped drive that is told to go from x0 to 0 is at x0 (1 + w t) exp(-w t), with
     w^2 = k / I. Tolerance: |v| dt + |a| t dt at the largest, x0 w / e and x0 w^2."""
-
-    name = "step_response"
 
     rate: float = 10.0
     start: float = 0.5
@@ -88,11 +82,9 @@ class StepResponse(_Driven):
 
 
 @dataclass(frozen=True)
-class SpringAndDamper(_Driven):
+class SpringAndDamper(_Driven, name="spring_damper"):
     """A weakly damped one swings: x0 exp(-z w t) (cos(u t) + z w / u sin(u t)), u = w sqrt(1 -
     z^2). Tolerance as of `StepResponse`, with |v| up to x0 w."""
-
-    name = "spring_damper"
 
     rate: float = 10.0
     damping: float = 0.1
@@ -113,11 +105,9 @@ class SpringAndDamper(_Driven):
 
 
 @dataclass(frozen=True)
-class EffortLimit(_Driven):
+class EffortLimit(_Driven, name="effort_limit"):
     """A drive told to go far away pushes with its limit and no more: x = (F / I) t^2 / 2.
     Tolerance: (F / I) t dt."""
-
-    name = "effort_limit"
 
     effort: float = 2.0
     seconds: float = 0.5
@@ -132,12 +122,10 @@ class EffortLimit(_Driven):
 
 
 @dataclass(frozen=True)
-class Tracking(_Driven):
+class Tracking(_Driven, name="tracking"):
     """A drive that is told position and velocity of a steady turn follows it: x = v t (1 - exp(-w
     t)) from rest, critically damped. Tolerance: late by one step, and a set point of the end of
     each step holds from its beginning on: 2 v dt."""
-
-    name = "tracking"
 
     speed: float = 1.0
     rate: float = 10.0
@@ -154,14 +142,9 @@ class Tracking(_Driven):
 
 
 @dataclass(frozen=True)
-class Sag(Law):
+class Sag(Law, name="sag", phenomenon="joints", quantity="angle", unit="rad"):
     """A level rod on a spring sags until k x = m g l cos x. Tolerance: what gravity turns it by
     within one step, (g / l) dt^2, and rounding."""
-
-    name = "sag"
-    phenomenon = "joints"
-    quantity: ClassVar[str] = "angle"
-    unit: ClassVar[str] = "rad"
 
     stiffness: float = 50.0
     seconds: float = 2.0
@@ -180,11 +163,9 @@ class Sag(Law):
 
 
 @dataclass(frozen=True)
-class FeedForward(Sag):
+class FeedForward(Sag, name="feed_forward"):
     """The same rod is told the torque that gravity asks for, m g l: it stays level. Tolerance as
     of `Sag`."""
-
-    name = "feed_forward"
 
     seconds: float = 1.0
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -21,14 +20,9 @@ WEIGHTLESS: Vector3 = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class FreeFall(Law):
+class FreeFall(Law, name="free_fall", phenomenon=FREE, quantity="height fallen", unit="m"):
     """A body that is let go falls s = g t^2 / 2 (Galilei). Tolerance: its speed is late by one step
     all the time, g t dt; semi-implicit Euler's is g t dt / 2."""
-
-    name = "free_fall"
-    phenomenon = FREE
-    quantity: ClassVar[str] = "height fallen"
-    unit: ClassVar[str] = "m"
 
     seconds: float = 1.0
 
@@ -42,12 +36,8 @@ class FreeFall(Law):
 
 
 @dataclass(frozen=True)
-class FallSpeed(FreeFall):
+class FallSpeed(FreeFall, name="fall_speed", quantity="speed of the fall", unit="m/s"):
     """It then has the speed v = g t: nothing damps it. Tolerance: late by one step, g dt."""
-
-    name = "fall_speed"
-    quantity: ClassVar[str] = "speed of the fall"
-    unit: ClassVar[str] = "m/s"
 
     def read(self, seen: Watched) -> Reading:
         t = seen.end
@@ -55,13 +45,9 @@ class FallSpeed(FreeFall):
 
 
 @dataclass(frozen=True)
-class DampedFall(FreeFall):
+class DampedFall(FreeFall, name="damped_fall", quantity="speed of the fall", unit="m/s"):
     """A body that is damped by c v / m falls ever less fast, v = (g / c) (1 - exp(-c t)), towards
     its terminal speed g / c (Stokes' law of resistance). Tolerance: late by one step, g dt."""
-
-    name = "damped_fall"
-    quantity: ClassVar[str] = "speed of the fall"
-    unit: ClassVar[str] = "m/s"
 
     damping: float = 2.0
 
@@ -75,14 +61,11 @@ class DampedFall(FreeFall):
 
 
 @dataclass(frozen=True)
-class ObliqueGravity(Law):
+class ObliqueGravity(
+    Law, name="oblique_gravity", phenomenon=FREE, quantity="distance from the place", unit="m"
+):
     """Gravity has three components: after t a body has moved by g t^2 / 2 in each; the distance
     between where it is and where it should be is 0. Tolerance as of `FreeFall`."""
-
-    name = "oblique_gravity"
-    phenomenon = FREE
-    quantity: ClassVar[str] = "distance from the place"
-    unit: ClassVar[str] = "m"
 
     gravity: Vector3 = (1.0, -2.0, -4.0)
     seconds: float = 1.0
@@ -100,15 +83,16 @@ class ObliqueGravity(Law):
 
 
 @dataclass(frozen=True)
-class Projectile(Law):
+class Projectile(
+    Law,
+    name="projectile",
+    phenomenon=FREE,
+    quantity="distance from the place, turn included",
+    unit="m",
+):
     """A thrown body flies p0 + v t + g t^2 / 2 and turns about a principal axis by w t: where it is
     after 1 s, in all six components (an angle counts as the way of a point 1 m from the axis).
     Tolerance as of `FreeFall`, and the turn late by one step, w dt."""
-
-    name = "projectile"
-    phenomenon = FREE
-    quantity: ClassVar[str] = "distance from the place, turn included"
-    unit: ClassVar[str] = "m"
 
     velocity: Vector3 = (2.0, -1.5, 4.0)
     spin: float = 3.0
@@ -143,14 +127,11 @@ RADIUS, LENGTH, MASS = 0.05, 0.3, 2.0
 
 
 @dataclass(frozen=True)
-class AxialForce(Law):
+class AxialForce(
+    Law, name="axial_force", phenomenon=FREE, quantity="speed along the axis", unit="m/s"
+):
     """A rod that a force pulls along its axis from t0 to t1 has v = F (t1 - t0) / m from then on
     (Newton's second law). Tolerance: late by one step, F dt / m."""
-
-    name = "axial_force"
-    phenomenon = FREE
-    quantity: ClassVar[str] = "speed along the axis"
-    unit: ClassVar[str] = "m/s"
 
     force: float = 5.0
     start: float = 0.1
@@ -179,13 +160,11 @@ class AxialForce(Law):
 
 
 @dataclass(frozen=True)
-class AxialTorque(AxialForce):
+class AxialTorque(
+    AxialForce, name="axial_torque", quantity="angular velocity about the axis", unit="rad/s"
+):
     """A rod under a torque about its axis has omega = T (t1 - t0) / I with I = m r^2 / 2.
     Tolerance: late by one step, T dt / I."""
-
-    name = "axial_torque"
-    quantity: ClassVar[str] = "angular velocity about the axis"
-    unit: ClassVar[str] = "rad/s"
 
     torque: float = 0.02
 

@@ -39,11 +39,9 @@ SQUEEZE = 5.0
 """Of each finger [N]."""
 
 
-class _Grip(Law):
+class _Grip(Law, phenomenon="grasping"):
     """The Panda holds a cube between its fingers, whose friction is 1; what of it two fingers can
     carry, 2 mu F, is `1 / load` of its weight."""
-
-    phenomenon = "grasping"
 
     load: float
     aside: ClassVar[float] = 0.0
@@ -88,14 +86,10 @@ class _Grip(Law):
 
 
 @dataclass(frozen=True)
-class GripSlips(_Grip):
+class GripSlips(_Grip, name="grip_slips", quantity="acceleration", unit="m/s^2"):
     """Two fingers that press with F carry 2 mu F and no more (Coulomb): a cube of 1.15 times that
     weight slips down with a = g - 2 mu F / m. Tolerance: its speed is late by one step at either
     end of the time T over which it is taken: 2 g dt / T."""
-
-    name = "grip_slips"
-    quantity: ClassVar[str] = "acceleration"
-    unit: ClassVar[str] = "m/s^2"
 
     load: float = 1.15
 
@@ -109,22 +103,18 @@ class GripSlips(_Grip):
 
 
 @dataclass(frozen=True)
-class GripSlipsDiagonally(GripSlips):
+class GripSlipsDiagonally(GripSlips, name="grip_slips_diagonally"):
     """The same when the load pulls at 45 degrees, within the plane of the fingers: a friction
     pyramid holds up to sqrt(2) times as much there."""
 
-    name = "grip_slips_diagonally"
     aside: ClassVar[float] = math.pi / 4
 
 
 @dataclass(frozen=True)
-class GripHolds(_Grip):
+class GripHolds(_Grip, name="grip_holds", quantity="way in the hand in 0.35 s", unit="m"):
     """A cube of 0.8 times what the fingers carry stays where it is in the hand, from 0.15 s on.
     Tolerance: an equilibrium, g dt^2."""
 
-    name = "grip_holds"
-    quantity: ClassVar[str] = "way in the hand in 0.35 s"
-    unit: ClassVar[str] = "m"
     held_for: ClassVar[float] = 0.5
 
     load: float = 0.8
@@ -147,11 +137,8 @@ BAR: Vector3 = (0.05, 0.3, 0.05)
 
 
 @dataclass(frozen=True)
-class _Push(Law):
+class _Push(Law, phenomenon="pushing", unit="m"):
     """A bar on a slide pushes a block over the ground."""
-
-    phenomenon = "pushing"
-    unit: ClassVar[str] = "m"
 
     friction: ClassVar[float] = 0.4
     speed: ClassVar[float] = 0.05
@@ -176,13 +163,10 @@ class _Push(Law):
 
 
 @dataclass(frozen=True)
-class PushForce(_Push):
+class PushForce(_Push, name="push_force", quantity="lag of the bar"):
     """The bar hangs on a spring that pulls it on: it lags behind by mu m g / k while it pushes a
     block steadily (Coulomb, Hooke). Tolerance: what gravity moves within one step, g dt^2, and the
     bar late by two steps, as of `Tracking`: 2 v dt."""
-
-    name = "push_force"
-    quantity: ClassVar[str] = "lag of the bar"
 
     def measure(self, world: World) -> Reading:
         seen = follow(world, self.push())
@@ -193,12 +177,9 @@ class PushForce(_Push):
 
 
 @dataclass(frozen=True)
-class PushStraight(_Push):
+class PushStraight(_Push, name="push_straight", quantity="distance from its place at the bar"):
     """A block that is pushed in its middle stays at the bar: it neither runs ahead, nor turns, nor
     is it entered. Tolerance as of `PushForce`."""
-
-    name = "push_straight"
-    quantity: ClassVar[str] = "distance from its place at the bar"
 
     def measure(self, world: World) -> Reading:
         seen = follow(world, self.push())
@@ -209,17 +190,14 @@ class PushStraight(_Push):
 
 
 @dataclass(frozen=True)
-class PushTips(Law):
+class PushTips(
+    Law, name="push_tips", phenomenon="pushing", quantity="depth at which it tips", unit="m"
+):
     """A block that is pushed at the height h slides when its depth is more than 2 mu h / (1 + mu^2)
     and tips when it is less, all friction alike: the ground pulls with F = mu N, the bar holds its
     back down with mu F, and torques are taken about its front edge. Six depths, pushed by one bar.
     Turned by 0.05 rad it has tipped. Tolerance: half of the gap between the depths on either side;
     no step."""
-
-    name = "push_tips"
-    phenomenon = "pushing"
-    quantity: ClassVar[str] = "depth at which it tips"
-    unit: ClassVar[str] = "m"
 
     friction: float = 0.5
     height: float = 0.2
@@ -267,7 +245,7 @@ FEET: FloatArray = np.array([[-INSIDE, -SIDE / 2], [-INSIDE, SIDE / 2], [2 * INS
 
 
 @dataclass(frozen=True)
-class PushTurns(Law):
+class PushTurns(Law, name="push_turns", phenomenon="pushing", quantity="angle turned", unit="rad"):
     """A block that slides is pushed beside its centre, and turns as its limit surface says.
 
     The friction that the ground can give a sliding body is a surface in the space of force and
@@ -280,11 +258,6 @@ class PushTurns(Law):
     tolerance of 1e-9. Tolerance: late by one step, w dt, and the rate is late by one step all the
     time T, T dt times the largest angular acceleration.
     """
-
-    name = "push_turns"
-    phenomenon = "pushing"
-    quantity: ClassVar[str] = "angle turned"
-    unit: ClassVar[str] = "rad"
 
     push: float = 1.2
     aside: float = 0.02

@@ -33,11 +33,10 @@ a part in 1e12, which the integrator below does not see."""
 
 
 @dataclass(frozen=True)
-class _FourBar(Passive):
+class _FourBar(Passive, phenomenon="mechanisms"):
     """Three rods: a crank and a rocker that hang on the mount, GROUND apart, and a coupler that is
     hinged to the crank and held at the rocker's end. It is let go at a crank angle."""
 
-    phenomenon = "mechanisms"
     needs: ClassVar[tuple[Capability, ...]] = (Capability.LOOPS,)
 
     crank: float = 1.2
@@ -116,15 +115,13 @@ def slope(crank: float) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class FourBarClosure(_FourBar):
+class FourBarClosure(
+    _FourBar, name="four_bar_closure", quantity="largest opening of the loop", unit="mm"
+):
     """A loop stays closed: in a four-bar linkage that swings, the coupler's end is where the
     rocker's is (Freudenstein, Approximate synthesis of four-bar linkages, 1955: the loop equation).
     Tolerance: one end is late by one step, the speed of the crank's end times dt; rounding of one
     step, since what holds the loop also restores it."""
-
-    name = "four_bar_closure"
-    quantity: ClassVar[str] = "largest opening of the loop"
-    unit: ClassVar[str] = "mm"
 
     seconds: float = 2.0
 
@@ -142,12 +139,10 @@ class FourBarClosure(_FourBar):
 
 
 @dataclass(frozen=True)
-class FourBarSwing(_FourBar, Motion):
+class FourBarSwing(_FourBar, Motion, name="four_bar_swing"):
     """A four-bar linkage that is let go swings as its one degree of freedom has it: Lagrange's
     equation of the crank's angle, coupler and rocker by the loop equation. Tolerance as of
     `DoublePendulum`."""
-
-    name = "four_bar_swing"
 
     seconds: float = 1.0
 

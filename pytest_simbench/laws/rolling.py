@@ -22,15 +22,12 @@ ON_ITS_SIDE = Pose((0.0, 0.0, RADIUS), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0
 
 
 @dataclass(frozen=True)
-class RollingSphere(Law):
+class RollingSphere(
+    Law, name="rolling_sphere", phenomenon="rolling", quantity="acceleration", unit="m/s^2"
+):
     """Down a slope a sphere rolls without slipping with a = 5/7 g sin a, where mu is more than 2/7
     of the slope (I = 2/5 m r^2). Tolerance: its speed is late by one step at either end of the time
     T over which it is taken, under the largest of the forces: 2 g sin a dt / T."""
-
-    name = "rolling_sphere"
-    phenomenon = "rolling"
-    quantity: ClassVar[str] = "acceleration"
-    unit: ClassVar[str] = "m/s^2"
 
     share: ClassVar[float] = 5 / 7
     slope: float = 0.3
@@ -54,10 +51,9 @@ class RollingSphere(Law):
 
 
 @dataclass(frozen=True)
-class RollingCylinder(RollingSphere):
+class RollingCylinder(RollingSphere, name="rolling_cylinder"):
     """A cylinder rolls with a = 2/3 g sin a (I = m r^2 / 2). Tolerance as of `RollingSphere`."""
 
-    name = "rolling_cylinder"
     share: ClassVar[float] = 2 / 3
 
     def body(self) -> Body:
@@ -65,15 +61,10 @@ class RollingCylinder(RollingSphere):
 
 
 @dataclass(frozen=True)
-class SlipToRoll(Law):
+class SlipToRoll(Law, name="slip_to_roll", phenomenon="rolling", quantity="speed", unit="m/s"):
     """A sphere that is pushed off with v0 and w0 slips until it rolls, with (5 v0 + 2 w0 r) / 7,
     whatever mu (angular momentum about the ground; Coriolis, Billard, 1835). Tolerance: its speed
     is late by one step, mu g dt."""
-
-    name = "slip_to_roll"
-    phenomenon = "rolling"
-    quantity: ClassVar[str] = "speed"
-    unit: ClassVar[str] = "m/s"
 
     speed: float = 1.0
     spin: float = 0.0
@@ -98,22 +89,18 @@ class SlipToRoll(Law):
 
 
 @dataclass(frozen=True)
-class SpinToRoll(SlipToRoll):
+class SpinToRoll(SlipToRoll, name="spin_to_roll"):
     """A sphere that only spins about a level axis runs off: the same with v0 = 0. Tolerance
     as of `SlipToRoll`."""
-
-    name = "spin_to_roll"
 
     speed: float = 0.0
     spin: float = 40.0
 
 
 @dataclass(frozen=True)
-class FreeCylinder(FreeTop):
+class FreeCylinder(FreeTop, name="free_cylinder"):
     """The same for a cylinder (I1 = m (3 r^2 + l^2) / 12, I3 = m r^2 / 2).
     Tolerance as of `FreeTop`."""
-
-    name = "free_cylinder"
 
     def build(self) -> Scene:
         body = Cylinder("rod", 0.05, 0.4, Pose.at(0.0, 0.0, 2.0), 1.0, angular_velocity=self.omega)
@@ -121,7 +108,13 @@ class FreeCylinder(FreeTop):
 
 
 @dataclass(frozen=True)
-class RimlessWheel(Law):
+class RimlessWheel(
+    Law,
+    name="rimless_wheel",
+    phenomenon="rolling",
+    quantity="angular speed above the next edge",
+    unit="rad/s",
+):
     """A regular prism of n sides rolls on its edges: a step of a wheel without a rim.
 
     It turns about an edge (r to the axis, J about it) until the next edge strikes, 2 pi / n
@@ -136,11 +129,6 @@ class RimlessWheel(Law):
     time, a w T dt; the impact is late by one step, a dt; an error of the speed before is k of it
     after, and grows by w / w_top until the top.
     """
-
-    name = "rimless_wheel"
-    phenomenon = "rolling"
-    quantity: ClassVar[str] = "angular speed above the next edge"
-    unit: ClassVar[str] = "rad/s"
 
     sides: int = 8
     radius: float = 0.2
@@ -197,15 +185,16 @@ class RimlessWheel(Law):
 
 
 @dataclass(frozen=True)
-class MeshTwin(Law):
+class MeshTwin(
+    Law,
+    name="mesh_twin",
+    phenomenon="sliding",
+    quantity="distance of the mesh from where the box is",
+    unit="m",
+):
     """A box, and a mesh with its corners beside it, fall, land flat, slide and stop alike: it is
     one body. Each is thrown from the height h with the speed v. Tolerance: each may land and stop
     late by one step, 2 v dt each."""
-
-    name = "mesh_twin"
-    phenomenon = "sliding"
-    quantity: ClassVar[str] = "distance of the mesh from where the box is"
-    unit: ClassVar[str] = "m"
 
     size: Vector3 = (0.2, 0.2, 0.05)
     height: float = 0.01

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -16,15 +15,10 @@ from pytest_simbench.scene import Body, Box, Pose, Scene, Sphere
 
 
 @dataclass(frozen=True)
-class SlideX(Law):
+class SlideX(Law, name="slide_x", phenomenon="sliding", quantity="acceleration", unit="m/s^2"):
     """Down a slope steeper than mu a slab accelerates by g (sin a - mu cos a) (Coulomb). Tolerance:
     the speed is late by one step at either end of the time T over which it is taken, under the
     largest of the forces: 2 g sin a dt / T."""
-
-    name = "slide_x"
-    phenomenon = "sliding"
-    quantity: ClassVar[str] = "acceleration"
-    unit: ClassVar[str] = "m/s^2"
 
     direction: float = 0.0
     slope: float = 0.75
@@ -42,30 +36,25 @@ class SlideX(Law):
 
 
 @dataclass(frozen=True)
-class SlideY(SlideX):
+class SlideY(SlideX, name="slide_y"):
     """The same in the direction y."""
 
-    name = "slide_y"
     direction: float = math.pi / 2
 
 
 @dataclass(frozen=True)
-class SlideDiagonal(SlideX):
+class SlideDiagonal(SlideX, name="slide_diagonal"):
     """The same along a diagonal, where a friction pyramid differs most from the cone."""
 
-    name = "slide_diagonal"
     direction: float = math.pi / 4
 
 
 @dataclass(frozen=True)
-class SlideStraight(SlideX):
+class SlideStraight(SlideX, name="slide_straight", quantity="angle aside", unit="deg"):
     """A slab slides straight down, at 22.5 degrees to the axes too: friction is against the motion
     (a pyramid's is not, and the slab veers). Tolerance: the speed aside is late by one step, as an
     angle: g sin a dt / v."""
 
-    name = "slide_straight"
-    quantity: ClassVar[str] = "angle aside"
-    unit: ClassVar[str] = "deg"
     direction: float = math.pi / 8
 
     def read(self, seen: Watched) -> Reading:
@@ -78,13 +67,10 @@ class SlideStraight(SlideX):
 
 
 @dataclass(frozen=True)
-class StoppingDistance(Law):
+class StoppingDistance(
+    Law, name="stopping_distance", phenomenon="sliding", quantity="way", unit="m"
+):
     """A slab that is given the speed v slides v^2 / (2 mu g). Tolerance: v dt."""
-
-    name = "stopping_distance"
-    phenomenon = "sliding"
-    quantity: ClassVar[str] = "way"
-    unit: ClassVar[str] = "m"
 
     direction: float = 0.0
     speed: float = 2.0
@@ -107,22 +93,16 @@ class StoppingDistance(Law):
 
 
 @dataclass(frozen=True)
-class StoppingDistanceDiagonal(StoppingDistance):
+class StoppingDistanceDiagonal(StoppingDistance, name="stopping_distance_oblique"):
     """The same at 30 degrees to an axis. Tolerance as of `StoppingDistance`."""
 
-    name = "stopping_distance_oblique"
     direction: float = math.pi / 6
 
 
 @dataclass(frozen=True)
-class Glide(Law):
+class Glide(Law, name="glide", phenomenon="sliding", quantity="speed", unit="m/s"):
     """On ground without friction a slab keeps its speed (Newton's first law). Tolerance: rounding,
     for every consistent method keeps a constant."""
-
-    name = "glide"
-    phenomenon = "sliding"
-    quantity: ClassVar[str] = "speed"
-    unit: ClassVar[str] = "m/s"
 
     speed: float = 1.0
     seconds: float = 1.0
@@ -138,15 +118,10 @@ class Glide(Law):
 
 
 @dataclass(frozen=True)
-class Belt(Carried):
+class Belt(Carried, name="belt", phenomenon="sliding", quantity="acceleration", unit="m/s^2"):
     """On one that starts faster than mu g the box slips, and friction alone moves it: it goes with
     a = mu g. Tolerance: its speed is late by one step at either end of the time T over which it is
     taken: 2 mu g dt / T."""
-
-    name = "belt"
-    phenomenon = "sliding"
-    quantity: ClassVar[str] = "acceleration"
-    unit: ClassVar[str] = "m/s^2"
 
     acceleration: float = 8.0
     seconds: float = 0.4
@@ -165,16 +140,11 @@ TOP = 0.5
 
 
 @dataclass(frozen=True)
-class BeltSpeed(Law):
+class BeltSpeed(Law, name="belt_speed", phenomenon="sliding", quantity="way", unit="m"):
     """A box laid on a running belt slips until it has the belt's speed: a distance x = v^2 / (2 mu
     g) from where it was laid (Coulomb's friction does the work of the kinetic energy), and goes on
     with the belt from v / (mu g) on. Its place is read when it goes with the belt. Tolerance: its
     speed is late by one step all the time, v dt."""
-
-    name = "belt_speed"
-    phenomenon = "sliding"
-    quantity: ClassVar[str] = "way"
-    unit: ClassVar[str] = "m"
 
     speed: float = 0.8
     friction: float = 0.4
@@ -201,15 +171,12 @@ class BeltSpeed(Law):
 
 
 @dataclass(frozen=True)
-class BallOnBelt(BeltSpeed):
+class BallOnBelt(
+    BeltSpeed, name="ball_on_belt", phenomenon="rolling", quantity="speed", unit="m/s"
+):
     """A ball laid on a running belt comes to roll on it with 2/7 of the belt's speed: friction
     gives it m v and turns it back by 2/5 m r^2 w = m v r until v + w r is that of the belt.
     Tolerance: its speed is late by one step, mu g dt."""
-
-    name = "ball_on_belt"
-    phenomenon = "rolling"
-    quantity: ClassVar[str] = "speed"
-    unit: ClassVar[str] = "m/s"
 
     def body(self) -> Body:
         return Sphere("ball", BALL, Pose.at(0.0, 0.0, TOP + BALL), 0.5, self.friction)

@@ -15,14 +15,9 @@ from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Vector3
 
 
 @dataclass(frozen=True)
-class Spin(Law):
+class Spin(Law, name="spin", phenomenon=FREE, quantity="angular velocity", unit="rad/s"):
     """A body that nobody touches keeps spinning about a principal axis: w is constant (Euler).
     Tolerance: rounding, for every consistent method keeps a constant."""
-
-    name = "spin"
-    phenomenon = FREE
-    quantity: ClassVar[str] = "angular velocity"
-    unit: ClassVar[str] = "rad/s"
 
     spin: float = 5.0
     seconds: float = 1.0
@@ -44,16 +39,13 @@ class Spin(Law):
 
 
 @dataclass(frozen=True)
-class FreeTop(Law):
+class FreeTop(
+    Law, name="free_top", phenomenon=FREE, quantity="angle from the attitude", unit="rad"
+):
     """A symmetric body turns about its own axis while the axis turns about the constant angular
     momentum L, at |L| / I1 (Landau, Lifshitz, Mechanics, section 33): the angle between its
     attitude and that after t is 0. Tolerance: its angular velocity w is late by one step all the
     time, |dw/dt| t dt, and the turn by one, |w| dt."""
-
-    name = "free_top"
-    phenomenon = FREE
-    quantity: ClassVar[str] = "angle from the attitude"
-    unit: ClassVar[str] = "rad"
 
     size: Vector3 = (0.1, 0.1, 0.4)
     omega: Vector3 = (2.0, 0.0, 6.0)
@@ -81,11 +73,9 @@ class FreeTop(Law):
         return Reading(float(off), 0.0, allowed + rounding(1.0, seen.steps))
 
 
-class _Tumble(Law):
+class _Tumble(Law, phenomenon=FREE):
     """A body that turns about its middle principal axis, almost: it turns over again and again
     (Dzhanibekov; Poinsot 1834)."""
-
-    phenomenon = FREE
 
     size: ClassVar[Vector3] = (0.3, 0.2, 0.05)
     omega: ClassVar[Vector3] = (0.05, 6.0, 0.05)
@@ -124,13 +114,9 @@ class _Tumble(Law):
 
 
 @dataclass(frozen=True)
-class TumbleEnergy(_Tumble):
+class TumbleEnergy(_Tumble, name="tumble_energy", quantity="change of the energy", unit="%"):
     """A body that turns over keeps its rotational energy, w I w / 2, wherever it stands. Tolerance:
     twice what the angular velocity is off by, as a share: the step times the sum of |d2w/dt2|."""
-
-    name = "tumble_energy"
-    quantity: ClassVar[str] = "change of the energy"
-    unit: ClassVar[str] = "%"
 
     seconds: float = 4.0
 
@@ -144,13 +130,11 @@ class TumbleEnergy(_Tumble):
 
 
 @dataclass(frozen=True)
-class TumbleMomentum(_Tumble):
+class TumbleMomentum(
+    _Tumble, name="tumble_momentum", quantity="change of the angular momentum", unit="%"
+):
     """It keeps its angular momentum L too, in size and direction. Tolerance: as a share of |L|,
     what the angular velocity is off by, and the turn within one step, |w| dt."""
-
-    name = "tumble_momentum"
-    quantity: ClassVar[str] = "change of the angular momentum"
-    unit: ClassVar[str] = "%"
 
     seconds: float = 4.0
 
@@ -192,15 +176,13 @@ class _TumbleDrift(_Tumble):
 
 
 @dataclass(frozen=True)
-class TumbleEnergyDrift(_TumbleDrift):
+class TumbleEnergyDrift(
+    _TumbleDrift, name="tumble_energy_drift", quantity="change of the energy", unit="%"
+):
     """A body that turns over for a minute keeps its rotational energy E = w I w / 2 (Euler's
     equations I w' = I w x w: w I w' = 0). Tolerance: explicit Euler adds w' I w' dt^2 / 2 to it in
     each step, implicit Euler takes as much away; late by one step is twice that, dt times the sum
     of w' I w' over the time, as a share of E. The protocol `smoke` takes 3 s."""
-
-    name = "tumble_energy_drift"
-    quantity: ClassVar[str] = "change of the energy"
-    unit: ClassVar[str] = "%"
 
     def read(self, seen: Watched) -> Reading:
         start = float(self.inertia @ np.square(self.omega)) / 2
@@ -212,15 +194,16 @@ class TumbleEnergyDrift(_TumbleDrift):
 
 
 @dataclass(frozen=True)
-class TumbleMomentumDrift(_TumbleDrift):
+class TumbleMomentumDrift(
+    _TumbleDrift,
+    name="tumble_momentum_drift",
+    quantity="change of the angular momentum's size",
+    unit="%",
+):
     """It keeps the size of its angular momentum I w (Euler: I w (I w)' = 0). Tolerance: explicit
     Euler adds |I w'|^2 dt^2 to its square in each step, implicit Euler takes as much away, a half
     of that to its size; late by one step is twice that, dt times the sum of |I w'|^2 over the time,
     as a share of |I w|^2. The protocol `smoke` takes 3 s."""
-
-    name = "tumble_momentum_drift"
-    quantity: ClassVar[str] = "change of the angular momentum's size"
-    unit: ClassVar[str] = "%"
 
     def read(self, seen: Watched) -> Reading:
         start = float(np.linalg.norm(self.inertia * self.omega))

@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -73,15 +72,16 @@ def acceleration(
 
 
 @dataclass(frozen=True)
-class StickAngle(Law):
+class StickAngle(
+    Law,
+    name="stick_angle_x",
+    phenomenon="sticking",
+    quantity="tangent of the steepest slope that holds",
+    unit="",
+):
     """A slab on a slope stays up to the angle atan mu and slides above it (Coulomb; Amontons): six
     slopes, from 0.92 to 1.08 mu. It slides where it has gone half as far as the least steep one
     that must. Tolerance: half of the gap between the slopes on either side, 0.02 mu; no step."""
-
-    name = "stick_angle_x"
-    phenomenon = "sticking"
-    quantity: ClassVar[str] = "tangent of the steepest slope that holds"
-    unit: ClassVar[str] = ""
 
     direction: float = 0.0
     friction: float = 0.5
@@ -110,31 +110,24 @@ class StickAngle(Law):
 
 
 @dataclass(frozen=True)
-class StickAngleAcross(StickAngle):
+class StickAngleAcross(StickAngle, name="stick_angle_y"):
     """The same in the direction y."""
 
-    name = "stick_angle_y"
     direction: float = math.pi / 2
 
 
 @dataclass(frozen=True)
-class StickAngleDiagonal(StickAngle):
+class StickAngleDiagonal(StickAngle, name="stick_angle_diagonal"):
     """The same along a diagonal, where a friction pyramid holds up to sqrt(2) mu, or only up to
     mu / sqrt(2)."""
 
-    name = "stick_angle_diagonal"
     direction: float = math.pi / 4
 
 
 @dataclass(frozen=True)
-class Creep(Law):
+class Creep(Law, name="creep", phenomenon="sticking", quantity="way in 1 s", unit="m"):
     """A slab on a slope of 0.8 mu stays where it is. Tolerance: an equilibrium, g dt^2; it is
     looked at from 0.2 s on."""
-
-    name = "creep"
-    phenomenon = "sticking"
-    quantity: ClassVar[str] = "way in 1 s"
-    unit: ClassVar[str] = "m"
 
     friction: float = 0.5
     share: float = 0.8
@@ -151,15 +144,10 @@ class Creep(Law):
 
 
 @dataclass(frozen=True)
-class Carried(Law):
+class Carried(Law, name="carried", phenomenon="sticking", quantity="way on the carriage", unit="m"):
     """A box on a carriage that starts with less than mu g goes with it: it stays where it lies on
     the carriage. Tolerance: an equilibrium in the carriage's frame, g dt^2, and the carriage's
     motion late by one step, a dt^2."""
-
-    name = "carried"
-    phenomenon = "sticking"
-    quantity: ClassVar[str] = "way on the carriage"
-    unit: ClassVar[str] = "m"
 
     friction: float = 0.5
     acceleration: float = 2.0
