@@ -4,8 +4,9 @@ which forces act on them."""
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self, cast
 
 import numpy as np
 
@@ -19,12 +20,13 @@ from pytest_simbench.scene.checks import (
 )
 from pytest_simbench.scene.overlap import Core
 from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
+from pytest_simbench.scene.wire import Wire
 
 NONE: Vector3 = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wrench:
+class Wrench(Wire):
     """A force and a torque on a free body, both constant, in the world frame.
 
     Attributes:
@@ -58,13 +60,6 @@ class Wrench:
         share = max(0.0, min(end, self.end) - max(begin, self.start)) / (end - begin)
         return share * np.array([*self.force, *self.torque])
 
-    def to_wire(self) -> dict[str, Any]:
-        return {**vars(self), "force": list(self.force), "torque": list(self.torque)}
-
-    @classmethod
-    def from_wire(cls, data: dict[str, Any]) -> Wrench:
-        return cls(**{**data, "force": tuple(data["force"]), "torque": tuple(data["torque"])})
-
 
 Colour = tuple[float, float, float, float]
 
@@ -91,7 +86,7 @@ class Solid:
     mesh: tuple[tuple[Vector3, ...], tuple[tuple[int, int, int], ...]] = ((), ())
 
 
-class _Placed(ABC):
+class _Placed(Wire, ABC):
     """The fields that all kinds of bodies have and give by position, after those of their kind."""
 
     name: str
@@ -138,6 +133,11 @@ class Body(_Placed):
     moments: Vector3 | None = None
     prescribed: bool = False
     wrenches: tuple[Wrench, ...] = ()
+
+    optional = (
+        "linear_velocity", "angular_velocity", "restitution", "linear_damping", "angular_damping",
+        "moments", "prescribed", "wrenches",
+    )  # fmt: skip
 
     kinds: ClassVar[dict[str, type[Body]]] = {}
     """Every kind of body, by what `to_wire` calls it."""
@@ -239,40 +239,12 @@ class Body(_Placed):
         return self.changed(pose=pose)
 
     def to_wire(self) -> dict[str, Any]:
-        """As plain data; what is as by default is left out, but for what a box always had."""
-        data = {
-            "name": self.name,
-            "pose": self.pose.to_wire(),
-            "mass": self.mass,
-            "friction": self.friction,
-            "colour": list(self.colour),
-        }
-        if self.linear_velocity != STILL:
-            data["linear_velocity"] = list(self.linear_velocity)
-        if self.angular_velocity != STILL:
-            data["angular_velocity"] = list(self.angular_velocity)
-        for name in ("restitution", "linear_damping", "angular_damping"):
-            if getattr(self, name):
-                data[name] = getattr(self, name)
-        if self.moments is not None:
-            data["moments"] = list(self.moments)
-        if self.prescribed:
-            data["prescribed"] = True
-        if self.wrenches:
-            data["wrenches"] = [wrench.to_wire() for wrench in self.wrenches]
-        return data
+        """With its kind; a box names none, as before there were other bodies."""
+        return ({} if self.kind == "box" else {"kind": self.kind}) | super().to_wire()
 
     @classmethod
-    def from_wire(cls, data: dict[str, Any]) -> Body:
+    def from_wire(cls, data: Mapping[str, Any]) -> Self:
         """The body of `to_wire`, of its own kind."""
-        values: dict[str, Any] = {name: _frozen(value) for name, value in data.items()}
-        values["pose"] = Pose.from_wire(data["pose"])
-        values["wrenches"] = tuple(map(Wrench.from_wire, data.get("wrenches", ())))
-        kind: Any = cls.kinds[values.pop("kind", "box")]
-        made: Body = kind(**values)
-        return made
-
-
-def _frozen(value: Any) -> Any:
-    """The value, its lists as tuples."""
-    return tuple(map(_frozen, value)) if isinstance(value, list) else value
+        told = dict(data)
+        kind: Any = cls.kinds[told.pop("kind", "box")]
+        return cast("Self", super(Body, kind).from_wire(told))
