@@ -16,7 +16,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pytest_simbench.sims.sapien.adapter import SAPIEN
-from pytest_simbench.sims.sapien.settings import SAPIENSettings
 
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene
 from pytest_simbench.simulator import ParityError, PreparedRobot
@@ -25,6 +24,8 @@ from pytest_simbench.simulator.parity import check
 from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.tasks import Jitter, Stacking
 from pytest_simbench.testing import scenes
+
+from .settings_told import told_sapien
 
 sapien = pytest.importorskip("sapien")
 
@@ -41,69 +42,6 @@ def world(scene: Scene, chosen: Any = TUNED) -> Iterator[SAPIEN]:
         simulator.close()
 
 
-def arm_and_cube() -> Scene:
-    return replace(scenes.arm_alone(), bodies=(scenes.cube("cube", Pose.at(0.6, 0.3, 0.025)),))
-
-
-@settings(max_examples=10, deadline=None)
-@given(
-    chosen=st.builds(
-        SAPIENSettings,
-        timestep=st.sampled_from([0.001, 0.004, 0.01]),
-        position_iterations=st.integers(1, 50),
-        velocity_iterations=st.integers(0, 4),
-        tgs=st.booleans(),
-        pcm=st.booleans(),
-        friction_every_iteration=st.booleans(),
-        enhanced_determinism=st.booleans(),
-        bounce_threshold=st.sampled_from([0.2, 2.0]),
-        contact_offset=st.sampled_from([0.002, 0.01]),
-        sleep_threshold=st.sampled_from([0.0, 0.005]),
-        angular_damping=st.sampled_from([0.0, 0.05]),
-        link_damping=st.sampled_from([0.0, 0.05]),
-        joint_friction=st.sampled_from([0.0, 0.05]),
-    )
-)
-def test_every_setting_reaches_the_engine(chosen: SAPIENSettings) -> None:
-    """Whatever was set in the process before: SAPIEN's configuration is global."""
-    with world(arm_and_cube(), chosen) as simulator:
-        assert reported(simulator) == pytest.approx(
-            {
-                name: getattr(chosen, name)
-                for name in vars(chosen)
-                if name != "coupling_stiffness"  # SAPIEN does not report its tendons
-            }
-        )
-
-
-def reported(simulator: SAPIEN) -> dict[str, Any]:
-    """The settings as the engine's own objects report them."""
-    config, cube, robot = simulator._system.config, simulator._bodies["cube"], simulator._robot
-    values = {
-        "timestep": {simulator._system.timestep},
-        "position_iterations": {b.solver_position_iterations for b in (cube, robot)},
-        "velocity_iterations": {b.solver_velocity_iterations for b in (cube, robot)},
-        "tgs": {config.enable_tgs},
-        "pcm": {config.enable_pcm},
-        "friction_every_iteration": {config.enable_friction_every_iteration},
-        "enhanced_determinism": {config.enable_enhanced_determinism},
-        "bounce_threshold": {config.bounce_threshold},
-        "contact_offset": {
-            shape.contact_offset for b in (cube, *robot.links) for shape in b.collision_shapes
-        },
-        "sleep_threshold": {b.sleep_threshold for b in (cube, robot)},
-        "angular_damping": {cube.angular_damping},
-        "link_damping": {d for b in robot.links for d in (b.linear_damping, b.angular_damping)},
-        "joint_friction": {joint.friction for joint in robot.active_joints},
-    }
-    return {name: single(found) for name, found in values.items()}
-
-
-def single(found: set[Any]) -> Any:
-    assert len(found) == 1, found
-    return found.pop()
-
-
 def test_default_is_what_the_engine_does_by_itself(tmp_path: Path) -> None:
     """A world built by SAPIEN's own tools, nothing set, reports the profile `default`."""
     from sapien import physx
@@ -118,14 +56,14 @@ def test_default_is_what_the_engine_does_by_itself(tmp_path: Path) -> None:
     builder.add_box_collision(half_size=[0.025] * 3)
     builder.initial_pose = sapien.Pose([0.6, 0.3, 0.025])
     cube = builder.build("cube").find_component_by_type(physx.PhysxRigidDynamicComponent)
-    simulator._bodies = {"cube": cube}
+    simulator._ground, simulator._free = cube, [cube]
     path = PreparedRobot(scenes.arm()).write_urdf(tmp_path)
     without_visuals(path)
     simulator._robot = (
         bare.create_urdf_loader().load_file_as_articulation_builder(str(path)).build(True)
     )
     expected = {k: v for k, v in vars(simulator.settings).items() if k != "coupling_stiffness"}
-    assert reported(simulator) == pytest.approx(expected)
+    assert told_sapien(simulator) == pytest.approx(expected)
 
 
 def without_visuals(path: Path) -> None:
