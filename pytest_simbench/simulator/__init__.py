@@ -1,7 +1,7 @@
 """What an adapter implements, its settings, capabilities and report of the world it built."""
 
 from pytest_simbench.records.choices import Seen
-from pytest_simbench.simulator.base import Simulator, heavy, lazy_import
+from pytest_simbench.simulator.base import Simulator, chosen_on, heavy, lazy_import
 from pytest_simbench.simulator.errors import (
     DescriptionError,
     DivergedError,
@@ -36,6 +36,7 @@ __all__ = [
     "SimulatorInfo",
     "StateError",
     "UnavailableError",
+    "chosen_on",
     "heavy",
     "lazy_import",
     "one_value",

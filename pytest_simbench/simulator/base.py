@@ -45,6 +45,12 @@ FIELD_OF_VIEW = math.radians(40.0)
 """Vertical [rad]."""
 
 
+def chosen_on(*tuned: Seen, real: tuple[Seen, ...] = ()) -> Mapping[str, tuple[Seen, ...]]:
+    """What the settings of an adapter were chosen on, by profile: `tuned` on seeds, `real` on these
+    and on each third toss of those that are not held out, and on what else is named."""
+    return {"tuned": tuned, "real": (*tuned, Seen.motions("cube_tosses", 0, 564, 6), *real)}
+
+
 class _LazyModule(ModuleType):
     def __getattr__(self, attribute: str) -> Any:
         if attribute.startswith("__"):

@@ -110,6 +110,11 @@ class Task(ABC):
         held against, if it is."""
         return None
 
+    @property
+    def scale(self) -> float:
+        """All lengths of the scene over those for an arm of full size, as the study's."""
+        return 1.0
+
     def smoke(self) -> Task:
         """The smallest version of the task that still exercises every part of it."""
         return self
@@ -145,7 +150,8 @@ class Task(ABC):
         is a part of the record by itself."""
         told = asdict(self)  # type: ignore[call-overload]
         told.pop(ROBOT, None)
-        return dict(_flat("task", told))
+        scaled = {} if self.scale == 1.0 else {"task.scale": self.scale}
+        return {**dict(_flat("task", told)), **scaled}
 
     @abstractmethod
     def scene(self, seed: int, jitter: Jitter) -> Scene:

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from scipy.optimize import brentq
@@ -112,10 +112,6 @@ class Pushing(Task):
     def begin(self) -> Pose:
         """Of the block."""
         return Pose.at(*(self.scale * part for part in START.position))
-
-    def parameters(self) -> dict[str, Any]:
-        told = super().parameters()
-        return told if self.scale == 1.0 else told | {"task.scale": self.scale}
 
     @property
     def metrics(self) -> tuple[Metric, ...]:

@@ -118,8 +118,7 @@ class Stacking(Task):
         return grasping_scale_of(self.robot or panda())
 
     def parameters(self) -> dict[str, Any]:
-        told = super().parameters() | {"task.finger_closed": self.arm.gripper.closed}
-        return told if self.scale == 1.0 else told | {"task.scale": self.scale}
+        return super().parameters() | {"task.finger_closed": self.arm.gripper.closed}
 
     @property
     def cubes(self) -> int:

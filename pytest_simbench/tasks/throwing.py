@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -118,10 +118,6 @@ class Throwing(Task):
     def scale(self) -> float:
         """All lengths of the scene over those of the study's: 0.4 for the SO-101."""
         return grasping_scale_of(self.robot or panda())
-
-    def parameters(self) -> dict[str, Any]:
-        told = super().parameters()
-        return told if self.scale == 1.0 else told | {"task.scale": self.scale}
 
     @property
     def metrics(self) -> tuple[Metric, ...]:

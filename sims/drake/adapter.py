@@ -46,9 +46,8 @@ from pytest_simbench.simulator import (
 )
 from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
 
-from . import releases
 from .readback import ReadBack
-from .settings import CHOSEN_ON, PROFILES, DrakeSettings
+from .settings import CHOSEN_ON, OLDEST, PROFILES, DrakeSettings
 from .world import World, transform
 
 analysis = lazy_import("pydrake.systems.analysis")
@@ -71,7 +70,7 @@ class Drake(Simulator):
         engine="Drake SAP",
         language="C++",
         tested_version="1.51.1",
-        oldest_version=releases.OLDEST,
+        oldest_version=OLDEST,
         capabilities=Capability.named(
             "window offscreen save_restore exact_restore contact_count contact_forces loops "
             "self_collide joint_wrenches deterministic"

@@ -24,8 +24,7 @@ from pytest_simbench.simulator.links import joined, reduced
 from pytest_simbench.simulator.shapes import mesh_points
 from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
 
-from . import releases
-from .settings import DrakeSettings
+from .settings import DrakeSettings, without_sampled_ports
 
 eigen = lazy_import("pydrake.common.eigen_geometry")
 geometry = lazy_import("pydrake.geometry")
@@ -91,7 +90,7 @@ class World:
     def _options(self) -> Any:
         s = self.settings
         return plants.MultibodyPlantConfig(
-            **releases.without_sampled_ports(plants.MultibodyPlantConfig),
+            **without_sampled_ports(plants.MultibodyPlantConfig),
             time_step=s.timestep,
             contact_model=s.contact_model,
             discrete_contact_approximation=s.approximation,

@@ -34,14 +34,17 @@ from pytest_simbench.simulator import (
 
 from ..mujoco.bounces import BOUNCES, direct
 from .engine import (
+    OLDEST,
     array_of,
+    centre_of_mass,
+    contact_parameters,
     forget_worlds,
     numbers,
+    of_collider,
     start_engine,
     tensors_in,
 )
 from .readback import ReadBack
-from .releases import OLDEST, centre_of_mass, contact_parameters, of_collider
 from .settings import CHOSEN_ON, PROFILES, GenesisSettings
 from .world import (
     LEAST_FRICTION,

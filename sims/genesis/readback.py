@@ -18,8 +18,7 @@ from pytest_simbench.simulator.shapes import (
 )
 
 from ..mujoco.bounces import bounce
-from .engine import array_of, numbers
-from .releases import centre_of_mass, of_collider
+from .engine import array_of, centre_of_mass, numbers, of_collider
 
 genesis = lazy_import("genesis")
 

@@ -39,7 +39,7 @@ from pytest_simbench.simulator import (
 from pytest_simbench.simulator.links import link_poses
 
 from . import stage as usd
-from .readback import read_back, wrenches
+from .readback import ReadBack, wrenches
 from .session import Session
 from .settings import CHOSEN_ON, PROFILES, OvPhysXSettings
 
@@ -240,8 +240,7 @@ class OvPhysX(Simulator):
         return wrenches(buffer[0, order].astype(float), self.prepared, self.joint_state()[0])
 
     def read_back(self) -> dict[str, Any]:
-        places = {} if self._steps else self._placed
-        return read_back(self.session, self.scene, self.prepared, self._unit, places)
+        return ReadBack(self).all()
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
         if not usd.reports_contacts(self.scene):
