@@ -84,9 +84,7 @@ class ReadBack(readback.ReadBack):
         """Pose, shapes and surface of a body."""
         shapes = _colliding(body)
         position, turn = place.translation(), place.quaternion().wxyz()
-        found = {
-            f"{prefix}/pose": np.concatenate([position, turn]),
-        }
+        found = {f"{prefix}/pose": np.concatenate([position, turn])}
         boxes = [self._reach(shape, place) for shape in shapes if _is_box(shape)]
         rounds = [_round(shape, place) for shape in shapes if _is_round(shape)]
         others = (shape for shape in shapes if not (_is_box(shape) or _is_round(shape)))

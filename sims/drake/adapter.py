@@ -219,10 +219,8 @@ class Drake(Simulator):
             yield names[pair.id_B], names[pair.id_A], wrench
         for k in range(results.num_hydroelastic_contacts()):
             info = results.hydroelastic_contact_info(k)
-            surface, spatial = (
-                info.contact_surface(),
-                info.F_Ac_W(),
-            )  # on the first, at the centroid
+            surface = info.contact_surface()
+            spatial = info.F_Ac_W()  # on the first, at the centroid
             force = np.asarray(spatial.translational())
             torque = spatial.rotational() + np.cross(surface.centroid(), force)
             yield names[surface.id_M()], names[surface.id_N()], np.concatenate([force, torque])

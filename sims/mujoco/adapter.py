@@ -28,7 +28,6 @@ from pytest_simbench.simulator import (
     lazy_import,
 )
 
-from . import releases
 from .bounces import BOUNCES
 from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack, contact_forces, joint_wrenches
@@ -51,7 +50,7 @@ class MuJoCo(Simulator):
         engine="MuJoCo",
         language="C, C++",
         tested_version="4.0.0",
-        oldest_version=releases.OLDEST,
+        oldest_version="3.2.4",  # before it `MjSpec` tells Python no lists of geoms and joints
         capabilities=Capability.named(
             "window offscreen save_restore exact_restore contact_count contact_forces loops "
             "self_collide joint_wrenches deterministic"

@@ -22,7 +22,6 @@ from pytest_simbench.scene import (
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, heavy, lazy_import
 from pytest_simbench.simulator.links import reduced
 
-from . import releases
 from .bounces import direct
 from .settings import MuJoCoSettings
 
@@ -33,13 +32,6 @@ ROBOT, WORLD, LED = 1, 2, 4
 bodies touch what they can move."""
 
 LINK_COLOUR, GROUND_COLOUR = (0.9, 0.9, 0.9, 1.0), (0.5, 0.5, 0.5, 1.0)
-
-_INTEGRATORS = {
-    "Euler": "mjINT_EULER",
-    "RK4": "mjINT_RK4",
-    "implicit": "mjINT_IMPLICIT",
-    "implicitfast": "mjINT_IMPLICITFAST",
-}
 
 
 def build(scene: Scene, prepared: PreparedRobot | None, settings: MuJoCoSettings) -> Any:
@@ -77,14 +69,15 @@ def _equip(spec: Any, prepared: PreparedRobot, settings: MuJoCoSettings) -> None
     for pair in robot.gripper.couplings:
         _couple_fingers(spec, *pair)
     close_loops(spec, reduced(prepared))
-    if robot.self_collide:
-        part_joined(spec, prepared)
+    for moved in prepared.joints if robot.self_collide else ():
+        # MuJoCo parts what one joint joins by itself, but where one link is fixed in the world.
+        spec.add_exclude(bodyname1=moved.parent, bodyname2=moved.child)
 
 
 def _set_options(spec: Any, scene: Scene, settings: MuJoCoSettings) -> None:
     option = spec.option
     option.timestep = settings.timestep
-    option.integrator = getattr(mujoco.mjtIntegrator, _INTEGRATORS[settings.integrator])
+    option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
     option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
     option.impratio = settings.impratio
     option.noslip_iterations = settings.noslip_iterations
@@ -185,7 +178,14 @@ def _add_drive(spec: Any, joint: Joint) -> None:
     )
     drive.gainprm[0] = joint.stiffness
     drive.biasprm[1], drive.biasprm[2] = -joint.stiffness, -joint.damping
-    releases.joint(spec, joint.name).armature = joint.armature
+    _joint(spec, joint.name).armature = joint.armature
+
+
+def _joint(spec: Any, name: str) -> Any:
+    """The joint of that name."""
+    if hasattr(spec, "joint"):
+        return spec.joint(name)
+    return next(joint for joint in spec.joints if joint.name == name)  # before 3.3.0
 
 
 def _couple_fingers(spec: Any, first: str, second: str) -> None:
@@ -195,7 +195,7 @@ def _couple_fingers(spec: Any, first: str, second: str) -> None:
         objtype=mujoco.mjtObj.mjOBJ_JOINT,
         name1=second,
         name2=first,
-        data=releases.equality_data(mujoco, [0.0, 1.0]),
+        data=[0.0, 1.0, *[0.0] * (mujoco.mjNEQDATA - 2)],
         solref=[2 * spec.option.timestep, 1.0],
     )
 
@@ -249,10 +249,3 @@ def leave_out(model: Any, first: Sequence[int]) -> None:
     """
     light = np.delete(model.dof_M0, [dof + k for dof in first for k in range(6)])
     model.stat.meaninertia = light.mean() if len(light) else 1.0
-
-
-def part_joined(spec: Any, prepared: PreparedRobot) -> None:
-    """Have links that one joint joins pass through each other. MuJoCo does so by itself, but where
-    one of them is fixed in the world."""
-    for joint in prepared.joints:
-        spec.add_exclude(bodyname1=joint.parent, bodyname2=joint.child)

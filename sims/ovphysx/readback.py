@@ -18,21 +18,10 @@ from .usd_text import turn_from_x
 
 _FRICTIONS = ("staticFriction", "dynamicFriction")
 _ATTRIBUTES = (
-    "position",
-    "orientation",
-    "mass",
-    "inverseMass",
-    "inertia",
-    "centerOfMassPosition",
-    "disableGravity",
-    "disableSimulation",
-    "restitution",
-    "restOffset",
-    "shapeCount",
-    "linearVelocity",
-    "angularVelocity",
-    *_FRICTIONS,
-)
+    "position", "orientation", "mass", "inverseMass", "inertia", "centerOfMassPosition",
+    "disableGravity", "disableSimulation", "restitution", "restOffset", "shapeCount",
+    "linearVelocity", "angularVelocity", *_FRICTIONS,
+)  # fmt: skip
 _JOINT = {
     "jointLimit": ("limits", 1),
     "jointMaxForce": ("effort_limit", 0),

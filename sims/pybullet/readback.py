@@ -6,12 +6,11 @@ and led back to the frames of the description here.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose, rotation_matrix
+from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.simulator import heavy, lazy_import, readback
 from pytest_simbench.simulator.shapes import (
     box_corners,
@@ -22,7 +21,7 @@ from pytest_simbench.simulator.shapes import (
     round_reach,
 )
 
-from .world import points
+from .world import points, pose_of
 
 pybullet = lazy_import("pybullet")
 
@@ -87,9 +86,8 @@ class ReadBack(readback.ReadBack):
         """Pose, shapes and surface of a body or link."""
         dynamics, inertial = self._dynamics(body, link), self._inertial_frame(body, link)
         boxes, meshes, rounds = self._shapes(body, link)
-        found: dict[str, Any] = {
-            f"{prefix}/pose": (self._centre(body, link) * inertial.inverse()).as_array(),
-        }
+        place = self._centre(body, link) * inertial.inverse()
+        found: dict[str, Any] = {f"{prefix}/pose": place.as_array()}
         corners = ([reach(placed(points, inertial)) for points in kind] for kind in (boxes, meshes))
         outline = [*corners, rounds]
         found |= outlines(prefix, *outline)
@@ -117,13 +115,13 @@ class ReadBack(readback.ReadBack):
         data = pybullet.getCollisionShapeData(body, link, physicsClientId=self.c)
         for k, (_, _, kind, size, _, place, turn) in enumerate(data):
             if kind == pybullet.GEOM_BOX:
-                boxes.append(placed(box_corners(size), _pose(place, turn)))
+                boxes.append(placed(box_corners(size), pose_of(place, turn)))
             elif kind == pybullet.GEOM_SPHERE:
-                rounds.append(round_reach(size[0], 0.0, _pose(place, turn)))
+                rounds.append(round_reach(size[0], 0.0, pose_of(place, turn)))
             elif kind == pybullet.GEOM_CAPSULE:
-                rounds.append(round_reach(size[1], size[0], _pose(place, turn)))
+                rounds.append(round_reach(size[1], size[0], pose_of(place, turn)))
             elif kind == pybullet.GEOM_CYLINDER:
-                rounds.append(cylinder_reach(size[1], size[0], _pose(place, turn)))
+                rounds.append(cylinder_reach(size[1], size[0], pose_of(place, turn)))
             else:  # Bullet's own corners, already in the inertial frame
                 mesh = pybullet.getMeshData(
                     body, link, collisionShapeIndex=k, physicsClientId=self.c
@@ -183,21 +181,15 @@ class ReadBack(readback.ReadBack):
     def _inertial_frame(self, body: int, link: int) -> Pose:
         """In the frame of the body or link."""
         dynamics = self._dynamics(body, link)
-        return _pose(dynamics[3], dynamics[4])
+        return pose_of(dynamics[3], dynamics[4])
 
     def _centre(self, body: int, link: int) -> Pose:
         """The inertial frame in the world."""
         c = self.c
         if link < 0:
-            return _pose(*pybullet.getBasePositionAndOrientation(body, physicsClientId=c))
+            return pose_of(*pybullet.getBasePositionAndOrientation(body, physicsClientId=c))
         state = pybullet.getLinkState(body, link, computeForwardKinematics=1, physicsClientId=c)
-        return _pose(state[0], state[1])
-
-
-def _pose(position: Sequence[float], quaternion: Sequence[float]) -> Pose:
-    """Of Bullet's quaternions, which end with w."""
-    x, y, z, w = quaternion
-    return Pose.from_array([*position, w, x, y, z])
+        return pose_of(state[0], state[1])
 
 
 def wrench(client: int, robot: int, joint: int, subspace: FloatArray) -> FloatArray:
@@ -212,14 +204,10 @@ def wrench(client: int, robot: int, joint: int, subspace: FloatArray) -> FloatAr
     """
     told = pybullet.getJointState(robot, joint, physicsClientId=client)
     state = pybullet.getLinkState(robot, joint, physicsClientId=client)
-    inertial, link = (_turn(quaternion) for quaternion in (state[1], state[5]))
+    inertial, link = (
+        pose_of((0.0, 0.0, 0.0), quaternion).rotation() for quaternion in (state[1], state[5])
+    )
     force = inertial @ told[2][:3] + told[3] * link @ subspace[3:]
     torque = inertial @ told[2][3:] + told[3] * link @ subspace[:3]
     arm = np.subtract(state[0], state[4])
     return np.concatenate([force, torque + np.cross(arm, force)])
-
-
-def _turn(quaternion: tuple[float, ...]) -> FloatArray:
-    """Of Bullet's quaternions, which end with w."""
-    x, y, z, w = quaternion
-    return rotation_matrix(np.array([w, x, y, z]))

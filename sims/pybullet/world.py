@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -170,5 +170,10 @@ def _from_centre(client: int, robot: int, link: int, point: Vector3) -> Any:
 def _inertial(client: int, robot: int, link: int) -> Pose:
     """The inertial frame of a link in the link's frame."""
     dynamics = pybullet.getDynamicsInfo(robot, link, physicsClientId=client)
-    x, y, z, w = dynamics[4]
-    return Pose.from_array([*dynamics[3], w, x, y, z])
+    return pose_of(dynamics[3], dynamics[4])
+
+
+def pose_of(position: Sequence[float], quaternion: Sequence[float]) -> Pose:
+    """Of Bullet's quaternions, which end with w."""
+    x, y, z, w = quaternion
+    return Pose.from_array([*position, w, x, y, z])

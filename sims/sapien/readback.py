@@ -99,9 +99,8 @@ def _compatible(a: Sequence[int], b: Sequence[int]) -> bool:
 def _part(prefix: str, component: Any) -> dict[str, Any]:
     """Pose, shapes and surface of a body or link."""
     shapes = component.collision_shapes
-    found = {
-        f"{prefix}/pose": np.concatenate([component.entity.pose.p, component.entity.pose.q]),
-    }
+    pose = component.entity.pose
+    found = {f"{prefix}/pose": np.concatenate([pose.p, pose.q])}
     boxes = [s for s in shapes if isinstance(s, physx.PhysxCollisionShapeBox)]
     rounds = [s for s in shapes if hasattr(s, "radius")]
     meshes = [s for s in shapes if s not in boxes and s not in rounds]
