@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from pytest_simbench.client.world import World
 from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, stillness, watch
-from pytest_simbench.laws.sticking import BETWEEN, SHARES, WEDGE, boundary, slope_pose
+from pytest_simbench.laws.sticking import SHARES, WEDGE, fan, slope_pose
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Vector3, rotation_matrix
 from pytest_simbench.simulator import Capability
 
@@ -102,9 +102,7 @@ class TippingEdge(
 
     def measure(self, world: World) -> Reading:
         world.wait(self.seconds)
-        turned = [tilt(row) > 0.05 for row in world.bodies]
-        found = boundary([share * EDGE / 2 for share in SHARES], turned)
-        return Reading(found, EDGE / 2, BETWEEN * EDGE / 2)
+        return fan(EDGE / 2, [tilt(row) > 0.05 for row in world.bodies])
 
 
 @dataclass(frozen=True)
@@ -140,8 +138,7 @@ class TippingSlope(
         for start, row in zip(before, world.bodies, strict=True):
             up = float(start[:, 2] @ rotation_matrix(row[3:7])[:, 2])
             turned.append(math.acos(min(1.0, up)) > 0.05)
-        found = boundary([share * critical for share in SHARES], turned)
-        return Reading(found, critical, BETWEEN * critical)
+        return fan(critical, turned)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, rounding, 
 from pytest_simbench.laws.contact import tilt
 from pytest_simbench.laws.drives import STRONG, follow
 from pytest_simbench.laws.mechanisms import Part, mechanism
-from pytest_simbench.laws.sticking import BETWEEN, SHARES, boundary
+from pytest_simbench.laws.sticking import SHARES, fan
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import panda
 from pytest_simbench.scene import (
@@ -226,9 +226,7 @@ class PushTips(
         time = np.array([[0.0], [self.seconds]])
         speed = np.full((2, 1), 0.1)
         follow(world, Trajectory(self.seconds, 0.1 * time, speed, 0 * speed))
-        stands = [tilt(row) < 0.05 for row in world.bodies]
-        found = boundary([share * self.critical for share in SHARES], stands)
-        return Reading(found, self.critical, BETWEEN * self.critical)
+        return fan(self.critical, [tilt(row) < 0.05 for row in world.bodies])
 
 
 SIDE, HEIGHT = 0.2, 0.04

@@ -44,20 +44,22 @@ def slope_pose(slope: float, direction: float) -> Pose:
     return Pose.at(0.0, 0.0, 0.0, yaw=direction) * down
 
 
-def boundary(values: Sequence[float], moved: Sequence[bool]) -> float:
-    """Where rising `values` change from what stays to what moves: in the middle between the two
-    neighbours, at an end where all stay or all move."""
-    stay = len(values) - sum(moved)
-    if 0 < stay < len(values):
-        return (values[stay - 1] + values[stay]) / 2
-    return values[0] if stay == 0 else values[-1]
-
-
 SHARES = (0.92, 0.96, 0.98, 1.02, 1.04, 1.08)
 """Of a critical value: a fan of cases on both sides of it."""
 
 BETWEEN = 0.02
 """Tolerance of a fan: half of the gap in which the critical value lies, as a share of it."""
+
+
+def fan(critical: float, moved: Sequence[bool]) -> Reading:
+    """The value at which a fan of cases, in the order of `SHARES`, changes from what stays to what
+    moves: in the middle between the two neighbours, at an end where all stay or all move."""
+    values = [share * critical for share in SHARES]
+    stay = len(values) - sum(moved)
+    found = values[0] if stay == 0 else values[-1]
+    if 0 < stay < len(values):
+        found = (values[stay - 1] + values[stay]) / 2
+    return Reading(found, critical, BETWEEN * critical)
 
 
 def acceleration(
@@ -104,9 +106,7 @@ class StickAngle(
         steep = math.atan(self.friction)
         pull = GRAVITY * math.cos(steep) * BETWEEN * self.friction
         least = pull * world.time**2 / 4
-        slopes = [share * self.friction for share in SHARES]
-        found = boundary(slopes, [bool(way > least) for way in moved])
-        return Reading(found, self.friction, BETWEEN * self.friction)
+        return fan(self.friction, [bool(way > least) for way in moved])
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,6 @@ from .engine import array_of, centre_of_mass, numbers, of_collider
 
 genesis = lazy_import("genesis")
 
-
 _ROUND = ("SPHERE", "CYLINDER", "CAPSULE")
 
 

@@ -21,7 +21,6 @@ from pytest_simbench.simulator.shapes import (
 
 physx = lazy_import("sapien.physx")
 
-
 LYING = Pose(quaternion=(math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0))
 """Turns the z axis to the x axis, along which SAPIEN's cylinders and capsules lie."""
 

@@ -3,7 +3,7 @@ sides though one finger only follows, and parity faults are caught."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -137,78 +137,14 @@ def advance(simulator: DART, duration: float) -> FloatArray:
     return np.array(states)
 
 
-def surface(shape: Any, friction: float) -> None:
-    shape.getDynamicsAspect().setFrictionCoeff(friction)
-
-
-def heavier(body: Any, factor: float) -> None:
-    inertia = body.getInertia()
-    inertia.setMass(factor * inertia.getMass())
-    body.setInertia(inertia)
-
-
-def turned(body: Any, factor: float) -> None:
-    inertia = body.getInertia()
-    inertia.setMoment(factor * inertia.getMoment())
-    body.setInertia(inertia)
-
-
-def shape_of(s: DART, name: str) -> Any:
-    return s._bodies[name].getShapeNode(0)
-
-
-def joint(s: DART, name: str = "panda_joint4") -> Any:
-    return s._robot.getJoint(name)
-
-
-def link(s: DART, name: str = "panda_link4") -> Any:
-    return s._robot.getBodyNode(name)
-
-
-def uncoupled(s: DART) -> None:
-    import dartpy
-
-    joint(s, "panda_finger_joint2").setActuatorType(dartpy.dynamics.ActuatorType.FORCE)
-
-
-def one_finger_shape(s: DART) -> None:
-    shapes = [x for x in link(s, "panda_leftfinger").getShapeNodes() if x.hasDynamicsAspect()]
-    surface(shapes[-1], 0.3)
-
-
-def moved(s: DART) -> None:
-    q = s._bodies["cube_05"].getSkeleton().getPositions()
-    q[5] += 0.01
-    s._bodies["cube_05"].getSkeleton().setPositions(q)
-
-
-FAULTS: dict[str, Callable[[DART], None]] = {
-    "gravity": lambda s: s.world.setGravity([0.0, 0.0, -9.7]),
-    "timestep": lambda s: s.world.setTimeStep(0.005),
-    "ground/friction": lambda s: surface(s._ground.getShapeNode(0), 0.5),
-    "ground/height": lambda s: s._ground.getShapeNode(0).setRelativeTranslation([0.0, 0.0, 0.01]),
-    "body/cube_05/mass": lambda s: heavier(s._bodies["cube_05"], 10.0),
-    "body/cube_05/inertia": lambda s: turned(s._bodies["cube_05"], 1.2),
-    "body/cube_05/friction": lambda s: surface(shape_of(s, "cube_05"), 0.5),
-    "body/cube_05/pose": moved,
-    "body/table/boxes": lambda s: shape_of(s, "table").getShape().setSize([0.5, 0.5, 0.2]),
-    "joint/panda_joint4/limits": lambda s: joint(s).setPositionUpperLimit(0, 0.5),
-    "joint/panda_joint4/effort_limit": lambda s: joint(s).setForceUpperLimit(0, 174.0),
-    "joint/panda_joint4/initial_position": lambda s: joint(s).setPosition(0, -2.0),
-    "link/panda_link4/mass": lambda s: heavier(link(s), 1.5),
-    "link/panda_link4/inertia": lambda s: turned(link(s), 1.2),
-    "link/panda_leftfinger/friction": one_finger_shape,
-    "gripper/coupled": uncoupled,
-}
-
-
-@pytest.mark.parametrize("quantity", FAULTS)
-def test_fault_is_caught(loaded: DART, quantity: str) -> None:
-    expected = expected_quantities(SCENE, loaded.settings)
-    info = loaded.info
+def test_one_shape_of_several_is_seen(loaded: DART) -> None:
+    """What the kit's worlds and `dart_faults` do not plant: a finger of two frictions."""
+    expected, info = expected_quantities(SCENE, loaded.settings), loaded.info
     check(expected, loaded.read_back(), info.deviations, info.name)
-    FAULTS[quantity](loaded)
-    with pytest.raises(ParityError, match=rf"{quantity}: scene [^;]*, dart "):
+    finger = loaded._robot.getBodyNode("panda_leftfinger")
+    shapes = [shape for shape in finger.getShapeNodes() if shape.hasDynamicsAspect()]
+    shapes[-1].getDynamicsAspect().setFrictionCoeff(0.3)
+    with pytest.raises(ParityError, match=r"link/panda_leftfinger/friction: scene [^;]*, dart "):
         check(expected, loaded.read_back(), info.deviations, info.name)
 
 

@@ -4,7 +4,7 @@ fingers takes nothing of the squeeze, and what a restored world keeps."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -228,75 +228,15 @@ def compare(simulator: SAPIEN) -> None:
     check(expected, simulator.read_back(), simulator.info.deviations, simulator.info.name)
 
 
-def body(name: str, **change: Any) -> Callable[[SAPIEN], None]:
-    def plant(simulator: SAPIEN) -> None:
-        for attribute, value in change.items():
-            setattr(simulator._bodies[name], attribute, value)
-
-    return plant
-
-
-def slippery(shapes: Any) -> None:
-    """One shape, of friction 0.5."""
+def test_one_shape_of_several_is_seen() -> None:
+    """What the kit's worlds and `sapien_faults` do not plant: a finger of two frictions."""
     from sapien import physx
 
-    shapes[-1].physical_material = physx.PhysxMaterial(0.5, 0.5, 0.0)
-
-
-def drive(**change: float) -> Callable[[SAPIEN], None]:
-    def plant(simulator: SAPIEN) -> None:
-        joint = simulator._joints[3]
-        values = {"stiffness": joint.stiffness, "damping": joint.damping}
-        joint.set_drive_properties(**{**values, "force_limit": joint.force_limit, **change})
-
-    return plant
-
-
-def lower(component: Any) -> None:
-    pose = component.entity.pose
-    component.entity.pose = sapien.Pose(pose.p - [0, 0, 0.012], pose.q)
-
-
-def other_start(simulator: SAPIEN) -> None:
-    simulator._robot.set_qpos(simulator._robot.qpos + 0.01)
-
-
-def link(**change: Any) -> Callable[[SAPIEN], None]:
-    def plant(simulator: SAPIEN) -> None:
-        for attribute, value in change.items():
-            setattr(simulator._links["panda_link4"], attribute, value)
-
-    return plant
-
-
-FAULTS: dict[str, Callable[[SAPIEN], None]] = {
-    "timestep": lambda s: setattr(s._system, "timestep", 0.005),
-    "ground/height": lambda s: lower(s._ground),
-    "ground/friction": lambda s: slippery(s._ground.collision_shapes),
-    "body/cube_05/mass": body("cube_05", mass=1.0),
-    "body/cube_05/inertia": body("cube_05", inertia=[1e-4] * 3),
-    "body/cube_05/friction": lambda s: slippery(s._bodies["cube_05"].collision_shapes),
-    "body/table/pose": lambda s: lower(s._bodies["table"]),
-    "joint/panda_joint4/limits": lambda s: s._joints[3].set_limits([[-1.0, 1.0]]),
-    "joint/panda_joint4/effort_limit": drive(force_limit=100.0),
-    "joint/panda_joint4/stiffness": drive(stiffness=4000.0),
-    "joint/panda_joint4/damping": drive(damping=400.0),
-    "joint/panda_joint4/armature": lambda s: s._joints[3].set_armature([0.0]),
-    "joint/panda_joint4/initial_position": other_start,
-    "link/panda_link4/mass": link(mass=5.0),
-    "link/panda_link4/inertia": link(inertia=[0.1, 0.2, 0.2]),
-    "link/panda_leftfinger/friction": lambda s: slippery(
-        s._links["panda_leftfinger"].collision_shapes
-    ),
-}
-
-
-@pytest.mark.parametrize("quantity", FAULTS)
-def test_fault_is_caught(quantity: str) -> None:
     with world(SCENE) as simulator:
         compare(simulator)
-        FAULTS[quantity](simulator)
-        with pytest.raises(ParityError, match=f"{quantity}: scene .*, sapien "):
+        shapes = simulator._links["panda_leftfinger"].collision_shapes
+        shapes[-1].physical_material = physx.PhysxMaterial(0.5, 0.5, 0.0)
+        with pytest.raises(ParityError, match="link/panda_leftfinger/friction: scene .*, sapien "):
             compare(simulator)
 
 
