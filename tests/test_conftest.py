@@ -17,8 +17,8 @@ import pytest
         ),
         ("tests/report/page/test_browser.py::test_it_opens", "browser"),
         (
-            "tests/scene/test_pose.py::test_a_turn[x/y]",
-            "tests/scene/test_pose.py::test_a_turn[x/y]",
+            "tests/scene/test_scene.py::test_a_turn[x/y]",
+            "tests/scene/test_scene.py::test_a_turn[x/y]",
         ),
     ],
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 from dataclasses import dataclass
 
-from pytest_simbench.simulator.program import signal_name
+from pytest_simbench.simulator.external import signal_name
 
 
 @dataclass

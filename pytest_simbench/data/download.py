@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import IO
 
-from pytest_simbench.data.errors import DataError
+from pytest_simbench.data.measured import DataError
 from pytest_simbench.data.sets import DataSet
 
 TIMEOUT = 60.0

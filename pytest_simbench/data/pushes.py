@@ -3,20 +3,16 @@ Leitner, *Quantifying the Reality Gap in Robotic Manipulation Tasks*, ICRA 2019)
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pytest_simbench.data.errors import DataError
-from pytest_simbench.data.tosses import Half
+from pytest_simbench.data.measured import DataError, Half, Measured, Motion, read_motions
 from pytest_simbench.records.paths import whole, write_whole
 from pytest_simbench.scene import FloatArray
-from pytest_simbench.simulator.files import FileError, read_arrays
 
 NAME = "arm_pushes"
 
@@ -32,9 +28,6 @@ MESHES = (
 
 FREE, PUSH = "Single", "CubeExp"
 """How the names of the runs begin in which the arm moves freely, and pushes the cube."""
-
-LARGEST = 256 * 2**20
-"""Of the file of runs [bytes]; the shared one has 7 MB."""
 
 POSE = 7
 
@@ -65,7 +58,7 @@ the recordings hold no commands)."""
 
 
 @dataclass(frozen=True, eq=False)
-class ArmRun:
+class ArmRun(Motion):
     """One run.
 
     Attributes:
@@ -85,6 +78,9 @@ class ArmRun:
         """In its experiment."""
         return int(self.name[-4:])
 
+    def content(self) -> Iterable[bytes | np.ndarray]:
+        return f"{self.name} {len(self.time)}".encode(), self.time, self.hand, self.cube
+
     @property
     def experiment(self) -> str:
         """`FREE` or `PUSH`, or another one of the source's."""
@@ -98,15 +94,13 @@ class ArmRun:
 
 
 @dataclass(frozen=True, eq=False)
-class ArmRuns:
+class ArmRuns(Measured[ArmRun]):
     """Runs in the order of their names, and the arm's description.
 
     Attributes:
-        items: the runs.
         urdf: path of the description.
     """
 
-    items: tuple[ArmRun, ...] = field(repr=False)
     urdf: Path
 
     def of(self, experiment: str, which: Half) -> tuple[ArmRun, ...]:
@@ -116,22 +110,6 @@ class ArmRuns:
         if which == "all":
             return tuple(named)
         return tuple(run for run in named if run.number // 2 % 2 == (which == "held_out"))
-
-    @cached_property
-    def digest(self) -> str:
-        """Of the runs: short, for records."""
-        content = hashlib.sha256()
-        for run in self.items:
-            content.update(f"{run.name} {len(run.time)}".encode())
-            for array in (run.time, run.hand, run.cube):
-                content.update(np.ascontiguousarray(array, "<f8").tobytes())
-        return content.hexdigest()[:12]
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, ArmRuns) and self.digest == other.digest
-
-    def __hash__(self) -> int:
-        return hash(self.digest)
 
 
 def read(folder: Path) -> ArmRuns | None:
@@ -143,14 +121,8 @@ def read(folder: Path) -> ArmRuns | None:
     paths = [folder / FOLDER / name for name in FILES]
     if not all(path.exists() for path in paths):
         return None
-    try:
-        arrays = read_arrays(paths[0], LARGEST)
-        runs = tuple(sorted(_runs(arrays), key=lambda run: run.name))
-    except FileError as error:
-        raise DataError(str(error)) from None
-    except ValueError as error:
-        raise DataError(f"{paths[0]} holds no runs: {error}") from None
-    return ArmRuns(runs, paths[1])
+    runs = sorted(read_motions(paths[0], "runs", _runs), key=lambda run: run.name)
+    return ArmRuns(tuple(runs), paths[1])
 
 
 def _runs(arrays: Mapping[str, np.ndarray]) -> list[ArmRun]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_simbench.data import pushes, tosses
-from pytest_simbench.data.errors import DataError, DataMissing
+from pytest_simbench.data.measured import DataError, DataMissing
 
 VARIABLE = "SIMBENCH_DATA"
 

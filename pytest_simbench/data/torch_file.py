@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.data.errors import DataError
+from pytest_simbench.data.measured import DataError
 from pytest_simbench.scene import FloatArray
 
 MAGIC = 0x1950A86A20F9469CFC6C

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
-from pytest_simbench.data.errors import DataError
+from pytest_simbench.data.measured import DataError, Half, Measured, Motion, read_motions
 from pytest_simbench.data.torch_file import read_tensor
 from pytest_simbench.records.paths import whole
 from pytest_simbench.scene import FloatArray, Pose, Vector3
-from pytest_simbench.simulator.files import FileError, read_arrays
 
 NAME = "cube_tosses"
 
@@ -40,21 +36,14 @@ the task leaves out: not all engines have it."""
 COLUMNS = 13
 """Of a state: position 3, quaternion 4, linear velocity 3, angular velocity 3."""
 
-LARGEST = 256 * 2**20
-"""Of a file [bytes]; the public set has 7 MB."""
-
 FASTEST = 100.0
 """[m], [m/s], [rad/s]. Whatever is larger is no toss of a hand."""
 
 PATTERN = "contactnets_cube_tosses*.npz"
 
-Half = Literal["held_out", "chosen_on", "all"]
-"""Of the tosses: those with an odd number, those with an even one, all. Settings are chosen on the
-even ones and published on the odd ones."""
-
 
 @dataclass(frozen=True, eq=False)
-class Toss:
+class Toss(Motion):
     """One toss.
 
     Attributes:
@@ -65,6 +54,13 @@ class Toss:
 
     index: int
     state: FloatArray
+
+    @property
+    def number(self) -> int:
+        return self.index
+
+    def content(self) -> Iterable[bytes | np.ndarray]:
+        return str((self.index, self.state.shape)).encode(), self.state
 
     @property
     def start(self) -> Pose:
@@ -94,36 +90,15 @@ class Toss:
         return (len(self.state) - 1) / RATE
 
 
-@dataclass(frozen=True, eq=False)
-class Tosses:
-    """Tosses in the order of their numbers. Two sets are equal when their numbers and states are.
-
-    Attributes:
-        items: the tosses.
-    """
-
-    items: tuple[Toss, ...] = field(repr=False)
+class Tosses(Measured[Toss]):
+    """Tosses in the order of their numbers."""
 
     def half(self, which: Half) -> tuple[Toss, ...]:
-        """The tosses that settings were chosen on, or those that were held out, or all."""
+        """The tosses that settings were chosen on, which have even numbers, or those that were held
+        out, or all."""
         if which == "all":
             return self.items
         return tuple(toss for toss in self.items if toss.index % 2 == (which == "held_out"))
-
-    @cached_property
-    def digest(self) -> str:
-        """Of numbers and states: short, for records."""
-        content = hashlib.sha256()
-        for toss in self.items:
-            content.update(str((toss.index, toss.state.shape)).encode())
-            content.update(np.ascontiguousarray(toss.state, "<f8").tobytes())
-        return content.hexdigest()[:12]
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Tosses) and self.digest == other.digest
-
-    def __hash__(self) -> int:
-        return hash(self.digest)
 
 
 def read(folder: Path) -> Tosses | None:
@@ -134,13 +109,7 @@ def read(folder: Path) -> Tosses | None:
     """
     found: dict[int, Toss] = {}
     for path in sorted(folder.glob(PATTERN)):
-        try:
-            arrays = read_arrays(path, LARGEST)
-            found |= {toss.index: toss for toss in _tosses(arrays)}
-        except FileError as error:
-            raise DataError(str(error)) from None
-        except ValueError as error:
-            raise DataError(f"{path} holds no tosses: {error}") from None
+        found |= {toss.index: toss for toss in read_motions(path, "tosses", _tosses)}
     return Tosses(tuple(found[index] for index in sorted(found))) if found else None
 
 

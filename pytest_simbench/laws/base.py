@@ -51,7 +51,9 @@ def stillness(dt: float, scale: float, contacts: int = 1) -> float:
 
 
 class Law(Task):
-    """One law. Subclasses are frozen dataclasses; formula, source and tolerance in the docstring.
+    """One law. Subclasses are frozen dataclasses; formula, source and tolerance in the docstring,
+    and what follows in the head: `class FallSpeed(FreeFall, name="fall_speed", quantity="speed")`.
+    What a head does not say is that of the class above.
 
     A law draws nothing: seed and jitter do not matter, and one repetition is enough of an engine
     that is deterministic.
@@ -61,6 +63,7 @@ class Law(Task):
         quantity: what is measured, for instance "height fallen".
         unit: of it.
         needs: what a simulator must be able to do; others are skipped, with the reason.
+        seconds: how long it is watched, where it is watched once and for a fixed time [s].
     """
 
     study_timeout: ClassVar[float] = 300.0
@@ -71,6 +74,16 @@ class Law(Task):
     quantity: ClassVar[str]
     unit: ClassVar[str]
     needs: ClassVar[tuple[Capability, ...]] = ()
+    seconds: float
+
+    known: ClassVar[list[type[Law]]] = []
+    """Every law: a subclass with a name registers when it is defined."""
+
+    def __init_subclass__(cls, **head: str) -> None:
+        for attribute, value in head.items():
+            setattr(cls, attribute, value)
+        if "name" in head:
+            Law.known.append(cls)
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
@@ -85,9 +98,13 @@ class Law(Task):
     def build(self) -> Scene:
         """The scene."""
 
-    @abstractmethod
     def measure(self, world: World) -> Reading:
-        """Let time pass in a freshly loaded world, and read."""
+        """Let time pass in a freshly loaded world, and read. By default it is watched once."""
+        return self.read(watch(world, self.seconds))
+
+    def read(self, seen: Watched) -> Reading:
+        """Read a motion that was watched for `seconds`, of a law that does not `measure` itself."""
+        raise NotImplementedError
 
     def parameters(self) -> dict[str, Any]:
         """With the phenomenon, so that a repetition that failed says of which one it was."""
@@ -123,6 +140,23 @@ class Watched:
     @property
     def steps(self) -> int:
         return len(self.t)
+
+    @property
+    def end(self) -> float:
+        """The time of the last sample [s]."""
+        return float(self.t[-1])
+
+    def reading(self, value: float, exact: float, late: float, scale: float) -> Reading:
+        """A reading that may be late by one step.
+
+        Args:
+            value: as it was read.
+            exact: as the law says.
+            late: what the value is off for each second that it is late, or its rate.
+            scale: of what all steps round.
+        """
+        allowed = late * self.dt + rounding(scale, self.steps)
+        return Reading(float(value), float(exact), float(allowed))
 
     def at(self, time: float, values: FloatArray) -> Any:
         """One of the columns at a time [s], linear between samples."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 from pytest_simbench.client.world import World
 from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, rounding, watch
@@ -15,14 +14,11 @@ RADIUS = 0.05
 
 
 @dataclass(frozen=True)
-class BounceHeight(Law):
+class BounceHeight(
+    Law, name="bounce_height", phenomenon="impact", quantity="height of the bounce", unit="m"
+):
     """A ball let go at the height h rises again to e^2 h (Newton's coefficient of restitution).
     Tolerance: the impact is late by one step, in its place and in its speed, 2 v dt."""
-
-    name = "bounce_height"
-    phenomenon = "impact"
-    quantity: ClassVar[str] = "height of the bounce"
-    unit: ClassVar[str] = "m"
 
     restitution: float = 0.8
     height: float = 0.5
@@ -46,18 +42,17 @@ class BounceHeight(Law):
 
     def measure(self, world: World) -> Reading:
         seen = watch(world, self.fall * (1 + 2 * self.restitution))
-        allowed = 2 * GRAVITY * self.fall * seen.dt + rounding(1.0, seen.steps)
-        return Reading(self.rises(seen)[0], self.restitution**2 * self.height, allowed)
+        return seen.reading(
+            self.rises(seen)[0], self.restitution**2 * self.height, 2 * GRAVITY * self.fall, 1.0
+        )
 
 
 @dataclass(frozen=True)
-class BounceRatio(BounceHeight):
+class BounceRatio(
+    BounceHeight, name="bounce_ratio", quantity="second bounce over the first", unit=""
+):
     """Each bounce is e^2 times as high as the one before. Tolerance: twice that of a bounce, as a
     share of the first."""
-
-    name = "bounce_ratio"
-    quantity: ClassVar[str] = "second bounce over the first"
-    unit: ClassVar[str] = ""
 
     def measure(self, world: World) -> Reading:
         e = self.restitution
@@ -69,16 +64,13 @@ class BounceRatio(BounceHeight):
 
 
 @dataclass(frozen=True)
-class ElasticChain(Law):
+class ElasticChain(
+    Law, name="elastic_chain", phenomenon="impact", quantity="speed of the last ball", unit="m/s"
+):
     """A ball hits a row of three equal ones, all elastic and without friction: the last one goes on
     with its speed, the others rest (Mariotte; Newton's cradle). The balls stand 1 cm apart, so that
     the impacts come one after the other. Tolerance: what gravity changes within one step, g dt: an
     impact is solved at once, whatever the step."""
-
-    name = "elastic_chain"
-    phenomenon = "impact"
-    quantity: ClassVar[str] = "speed of the last ball"
-    unit: ClassVar[str] = "m/s"
 
     speed: float = 2.0
     seconds: float = 0.3
@@ -98,22 +90,21 @@ class ElasticChain(Law):
         ]
         return Scene(self.name, tuple(balls), ground_friction=0.0, ground_restitution=1.0)
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
-        allowed = GRAVITY * seen.dt + rounding(self.speed, seen.steps)
-        return Reading(float(seen.bodies[-1, -1, 7]), self.speed, allowed)
+    def read(self, seen: Watched) -> Reading:
+        return seen.reading(seen.bodies[-1, -1, 7], self.speed, GRAVITY, self.speed)
 
 
 @dataclass(frozen=True)
-class ObliqueBounce(Law):
+class ObliqueBounce(
+    Law,
+    name="oblique_bounce_slip",
+    phenomenon="impact",
+    quantity="level speed after the bounce",
+    unit="m/s",
+):
     """A ball that hits the ground aslant, without spin, slips all the time when mu is small: its
     level speed loses mu (1 + e) v (Routh, Rigid Dynamics; Coulomb's law for impulses). Tolerance:
     the impact is late by one step, mu (1 + e) g dt."""
-
-    name = "oblique_bounce_slip"
-    phenomenon = "impact"
-    quantity: ClassVar[str] = "level speed after the bounce"
-    unit: ClassVar[str] = "m/s"
 
     friction: float = 0.2
     restitution: float = 0.5
@@ -147,16 +138,13 @@ class ObliqueBounce(Law):
         fall = math.sqrt(2 * self.height / GRAVITY)
         seen = watch(world, fall * (1 + self.restitution))
         share = self.friction * (1 + self.restitution)
-        allowed = share * GRAVITY * seen.dt + rounding(self.level, seen.steps)
-        return Reading(float(seen.bodies[-1, 0, 7]), self.exact, allowed)
+        return seen.reading(seen.bodies[-1, 0, 7], self.exact, share * GRAVITY, self.level)
 
 
 @dataclass(frozen=True)
-class ObliqueBounceStick(ObliqueBounce):
+class ObliqueBounceStick(ObliqueBounce, name="oblique_bounce_stick"):
     """Where mu is large it sticks, and leaves rolling: 5/7 of its level speed is left, whatever mu
     and e. Tolerance as of `ObliqueBounce`."""
-
-    name = "oblique_bounce_stick"
 
     friction: float = 0.8
     level: float = 2.0

@@ -1,4 +1,4 @@
-"""Laws of bodies that rest on each other, and of impacts."""
+"""Laws of bodies that rest on each other, of what they press with, and of impacts."""
 
 from __future__ import annotations
 
@@ -11,22 +11,21 @@ from scipy.integrate import solve_ivp
 
 from pytest_simbench.client.world import World
 from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, stillness, watch
-from pytest_simbench.laws.friction import BETWEEN, SHARES, WEDGE, boundary, slope_pose
+from pytest_simbench.laws.sticking import SHARES, WEDGE, fan, slope_pose
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Vector3, rotation_matrix
+from pytest_simbench.simulator import Capability
 
 EDGE = 0.1
 CUBE: Vector3 = (EDGE,) * 3
 
 
-class _Stack(Law):
+@dataclass(frozen=True)
+class _Stack(Law, phenomenon="stacking", quantity="way of the top cube", unit="m"):
     """Cubes upon each other; how far the top one is from its place."""
-
-    phenomenon = "stacking"
-    quantity: ClassVar[str] = "way of the top cube"
-    unit: ClassVar[str] = "m"
 
     masses: ClassVar[tuple[float, ...]]
     overhangs: ClassVar[tuple[float, ...]] = ()
+
     seconds: float = 1.0
 
     def build(self) -> Scene:
@@ -46,60 +45,49 @@ class _Stack(Law):
 
 
 @dataclass(frozen=True)
-class RestDepth(_Stack):
+class RestDepth(_Stack, name="rest_depth"):
     """A cube put on the ground stays there: it neither sinks nor moves aside. Tolerance: an
     equilibrium, g dt^2."""
 
-    name = "rest_depth"
     masses: ClassVar[tuple[float, ...]] = (1.0,)
 
-    seconds: float = 1.0
-
 
 @dataclass(frozen=True)
-class Tower(_Stack):
+class Tower(_Stack, name="tower"):
     """A tower of five equal cubes stands. Tolerance: g dt^2 for each contact."""
 
-    name = "tower"
     masses: ClassVar[tuple[float, ...]] = (1.0,) * 5
-
-    seconds: float = 1.0
 
 
 @dataclass(frozen=True)
-class HeavyOnTop(_Stack):
+class HeavyOnTop(_Stack, name="heavy_on_top"):
     """Three cubes of 1 kg carry one of 100 kg: masses do not matter to statics. Tolerance as of
     `Tower`. Solvers that iterate converge the slower, the larger the ratio of masses."""
 
-    name = "heavy_on_top"
     masses: ClassVar[tuple[float, ...]] = (1.0, 1.0, 1.0, 100.0)
-
-    seconds: float = 1.0
 
 
 @dataclass(frozen=True)
-class Overhang(_Stack):
+class Overhang(_Stack, name="overhang"):
     """Four cubes, each shifted on the one below by 0.9 of what statics allows, L / 2 (1, 1/2, 1/3)
     from the top (Coffin 1923; Paterson, Zwick, Overhang, 2009): the stack stands. Tolerance as of
     `Tower`."""
 
-    name = "overhang"
     masses: ClassVar[tuple[float, ...]] = (1.0,) * 4
     overhangs: ClassVar[tuple[float, ...]] = tuple(0.9 * EDGE / 2 / k for k in (3, 2, 1))
 
-    seconds: float = 1.0
-
 
 @dataclass(frozen=True)
-class TippingEdge(Law):
+class TippingEdge(
+    Law,
+    name="tipping_edge",
+    phenomenon="stacking",
+    quantity="largest overhang that stands",
+    unit="m",
+):
     """A cube that lies over an edge tips when its centre is beyond it: six cubes, whose overhang is
     0.92 to 1.08 of half their length. One has tipped that is turned by 0.05 rad. Tolerance: half of
     the gap between those on either side, 0.02 of it; no step."""
-
-    name = "tipping_edge"
-    phenomenon = "stacking"
-    quantity: ClassVar[str] = "largest overhang that stands"
-    unit: ClassVar[str] = "m"
 
     seconds: float = 0.8
 
@@ -114,21 +102,20 @@ class TippingEdge(Law):
 
     def measure(self, world: World) -> Reading:
         world.wait(self.seconds)
-        turned = [tilt(row) > 0.05 for row in world.bodies]
-        found = boundary([share * EDGE / 2 for share in SHARES], turned)
-        return Reading(found, EDGE / 2, BETWEEN * EDGE / 2)
+        return fan(EDGE / 2, [tilt(row) > 0.05 for row in world.bodies])
 
 
 @dataclass(frozen=True)
-class TippingSlope(Law):
+class TippingSlope(
+    Law,
+    name="tipping_slope",
+    phenomenon="stacking",
+    quantity="tangent of the steepest slope that holds",
+    unit="",
+):
     """A tall block on a slope tips, and does not slide, when the slope's tangent is above its width
     over its height, and mu is more than that: six slopes. Turned by 0.05 rad it has tipped.
     Tolerance: half of the gap between the slopes on either side; no step."""
-
-    name = "tipping_slope"
-    phenomenon = "stacking"
-    quantity: ClassVar[str] = "tangent of the steepest slope that holds"
-    unit: ClassVar[str] = ""
 
     size: Vector3 = (0.1, 0.1, 0.25)
     seconds: float = 0.8
@@ -151,20 +138,14 @@ class TippingSlope(Law):
         for start, row in zip(before, world.bodies, strict=True):
             up = float(start[:, 2] @ rotation_matrix(row[3:7])[:, 2])
             turned.append(math.acos(min(1.0, up)) > 0.05)
-        found = boundary([share * critical for share in SHARES], turned)
-        return Reading(found, critical, BETWEEN * critical)
+        return fan(critical, turned)
 
 
 @dataclass(frozen=True)
-class Pivot(Law):
+class Pivot(Law, name="pivot", phenomenon="rolling", quantity="angle turned", unit="rad"):
     """A plank that stands on an edge, leaning, turns about that edge: (I + m r^2) x'' = m g r cos
     x, with x the angle of its centre above the edge; friction 1 holds the edge. Against DOP853.
     Tolerance: late by one step and a rate late by one step all the time: |v| dt + |a| t dt."""
-
-    name = "pivot"
-    phenomenon = "rolling"
-    quantity: ClassVar[str] = "angle turned"
-    unit: ClassVar[str] = "rad"
 
     size: Vector3 = (0.4, 0.2, 0.1)
     lean: float = math.radians(60.0)
@@ -194,22 +175,18 @@ class Pivot(Law):
     def measure(self, world: World) -> Reading:
         before = rotation_matrix(world.bodies[0, 3:7])
         seen = watch(world, self.seconds)
-        t = float(seen.t[-1])
+        t = seen.end
         along = before[:, 0] @ rotation_matrix(seen.bodies[-1, 0, 3:7])[:, 0]
         exact, rate, change = self.exact(t)
-        allowed = (rate + change * t) * seen.dt + rounding(1.0, seen.steps)
-        return Reading(math.acos(min(1.0, float(along))), exact, allowed)
+        return seen.reading(math.acos(min(1.0, float(along))), exact, (rate + change * t), 1.0)
 
 
 @dataclass(frozen=True)
-class LandingTime(Law):
+class LandingTime(
+    Law, name="landing_time", phenomenon="impact", quantity="time of the landing", unit="s"
+):
     """A cube let go at the height h lands after sqrt(2 h / g): its speed is the largest then.
     Tolerance: late by one step, and read to one step."""
-
-    name = "landing_time"
-    phenomenon = "impact"
-    quantity: ClassVar[str] = "time of the landing"
-    unit: ClassVar[str] = "s"
 
     height: float = 0.5
 
@@ -224,30 +201,30 @@ class LandingTime(Law):
 
 
 @dataclass(frozen=True)
-class DeadLanding(LandingTime):
+class DeadLanding(LandingTime, name="dead_landing", quantity="rise after the landing", unit="m"):
     """It does not rise again: e = 0 (Newton). Tolerance: the impact is late by one step, so that
     it is pushed out of the ground by v dt."""
-
-    name = "dead_landing"
-    quantity: ClassVar[str] = "rise after the landing"
-    unit: ClassVar[str] = "m"
 
     def measure(self, world: World) -> Reading:
         fall = math.sqrt(2 * self.height / GRAVITY)
         seen = watch(world, 2 * fall)
         landed = seen.bodies[seen.t > 1.1 * fall, 0, 2] - EDGE / 2
         rise = max(0.0, float(landed.max()))
-        return Reading(rise, 0.0, GRAVITY * fall * seen.dt + rounding(1.0, seen.steps))
+        return seen.reading(rise, 0.0, GRAVITY * fall, 1.0)
 
 
-class _Collision(Law):
+@dataclass(frozen=True)
+class _Collision(Law, phenomenon="impact", unit="m/s"):
     """A cube hits another one that is at rest, face on face, on ground without friction."""
 
-    phenomenon = "impact"
-    unit: ClassVar[str] = "m/s"
-
-    speed: float
     masses: ClassVar[tuple[float, float]] = (1.0, 2.0)
+
+    speed: float = 1.0
+
+    @property
+    def common(self) -> float:
+        """Speed of the common centre of mass [m/s]."""
+        return self.speed * self.masses[0] / sum(self.masses)
 
     def build(self) -> Scene:
         at = Pose.at(0.0, 0.0, EDGE / 2)
@@ -258,39 +235,82 @@ class _Collision(Law):
 
 
 @dataclass(frozen=True)
-class DeadCollision(_Collision):
+class DeadCollision(_Collision, name="dead_collision", quantity="speed of the cube that was hit"):
     """With e = 0 both go on with the common speed m1 v / (m1 + m2). Tolerance: what gravity changes
     within one step, g dt: an impact is solved at once, whatever the step."""
 
-    name = "dead_collision"
-    quantity: ClassVar[str] = "speed of the cube that was hit"
-
-    speed: float = 1.0
-
     def measure(self, world: World) -> Reading:
         seen = watch(world, 0.3)
-        exact = self.speed * self.masses[0] / sum(self.masses)
-        allowed = GRAVITY * seen.dt + rounding(1.0, seen.steps)
-        return Reading(float(seen.bodies[-1, 1, 7]), exact, allowed)
+        return seen.reading(seen.bodies[-1, 1, 7], self.common, GRAVITY, 1.0)
 
 
 @dataclass(frozen=True)
-class CollisionMomentum(_Collision):
+class CollisionMomentum(
+    _Collision, name="collision_momentum", quantity="speed of the common centre of mass"
+):
     """Whatever else happens, momentum stays: (m1 v1 + m2 v2) / (m1 + m2) is what it was. Tolerance
     as of `DeadCollision`."""
 
-    name = "collision_momentum"
-    quantity: ClassVar[str] = "speed of the common centre of mass"
-
-    speed: float = 1.0
-
     def measure(self, world: World) -> Reading:
         seen = watch(world, 0.3)
-        exact = self.speed * self.masses[0] / sum(self.masses)
         found = float(seen.bodies[-1, :, 7] @ self.masses) / sum(self.masses)
-        return Reading(found, exact, rounding(2.0, seen.steps))
+        return seen.reading(found, self.common, 0.0, 2.0)
 
 
 def tilt(row: FloatArray) -> float:
     """Of a body's upper face from the horizontal [rad]."""
     return math.acos(min(1.0, max(-1.0, float(rotation_matrix(row[3:7])[2, 2]))))
+
+
+@dataclass(frozen=True)
+class RestForce(Law, name="rest_force", phenomenon="stacking", quantity="force upward", unit="N"):
+    """The ground carries a cube at rest with m g (Newton's first law).
+
+    The force is the mean of a time T after one of settling, step by step. By the law of momentum
+    it is m g and m (v1 - v0) / T. Tolerance: both speeds are late by one step, g dt each:
+    2 m g dt / T.
+    """
+
+    needs: ClassVar[tuple[Capability, ...]] = (Capability.CONTACT_FORCES,)
+
+    carrying: ClassVar[str] = "ground"
+    masses: ClassVar[tuple[float, ...]] = (1.0,)
+    settling: float = 0.3
+    seconds: float = 0.1
+
+    def build(self) -> Scene:
+        bodies = [
+            Box(f"cube {k}", CUBE, Pose.at(0.0, 0.0, EDGE * (k + 0.5)), mass)
+            for k, mass in enumerate(self.masses)
+        ]
+        return Scene(self.name, tuple(bodies))
+
+    @property
+    def carried(self) -> tuple[str, float]:
+        """The body that is pressed upward, and the mass that it carries, its own included [kg]."""
+        return "body/cube 0", sum(self.masses)
+
+    def measure(self, world: World) -> Reading:
+        dt = watch(world, self.settling).dt
+        body, mass = self.carried
+        forces, count = [], max(1, round(self.seconds / dt))
+        for _ in range(count):
+            world.wait(dt)
+            wrench = world.contact_forces().get((body, self.carrying))
+            forces.append(0.0 if wrench is None else float(wrench[2]))
+        weight = mass * GRAVITY
+        allowed = 2 * weight / count + rounding(weight, 1)
+        return Reading(float(np.mean(forces)), weight, allowed)
+
+
+@dataclass(frozen=True)
+class TowerForce(RestForce, name="tower_force"):
+    """In a tower of four equal cubes the lowest carries the other three with 3 m g. Tolerance as of
+    `RestForce`."""
+
+    carrying: ClassVar[str] = "body/cube 0"
+    masses: ClassVar[tuple[float, ...]] = (1.0,) * 4
+
+    @property
+    def carried(self) -> tuple[str, float]:
+        return "body/cube 1", sum(self.masses[1:])

@@ -102,17 +102,15 @@ def passages(plates: int) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class DominoWave(Law):
+class DominoWave(
+    Law, name="domino_wave", phenomenon="mechanisms", quantity="speed of the wave", unit="m/s"
+):
     """In a row of plates hinged at their feet each strikes the next, inelastically, and all that
     fell stay together and push: a train of one degree of freedom between impacts (van Leeuwen, The
     domino effect, Am. J. Phys. 78, 721, 2010, without friction; `passages`). The speed is that from
     where the first plate strikes to where the last one would. Tolerance: each impact is late by
     one step, in its place and in its speed, so each of the passages may take two steps longer."""
 
-    name = "domino_wave"
-    phenomenon = "mechanisms"
-    quantity: ClassVar[str] = "speed of the wave"
-    unit: ClassVar[str] = "m/s"
     needs: ClassVar[tuple[Capability, ...]] = (Capability.SELF_COLLIDE,)
 
     plates: int = 8

@@ -15,9 +15,7 @@ from pytest_simbench.laws.base import (
     Law,
     Reading,
     Watched,
-    rounding,
     stillness,
-    watch,
     watched,
 )
 from pytest_simbench.laws.mechanisms import Part, mechanism
@@ -45,15 +43,10 @@ def held(position: float, seconds: float, velocity: float = 0.0, effort: float =
     return Trajectory(seconds, ends, np.full((2, 1), velocity), np.full((2, 1), effort))
 
 
-class _Driven(Law):
+class _Driven(Law, phenomenon="joints", quantity="angle", unit="rad"):
     """A wheel of 0.5 kg m^2 on a vertical axis, and its drive."""
 
-    phenomenon = "joints"
-    quantity: ClassVar[str] = "angle"
-    unit: ClassVar[str] = "rad"
-
     inertia: ClassVar[float] = 0.5
-    seconds: float
 
     def wheel(
         self, stiffness: float, damping: float, start: float = 0.0, effort: float = STRONG
@@ -67,11 +60,9 @@ class _Driven(Law):
 
 
 @dataclass(frozen=True)
-class StepResponse(_Driven):
+class StepResponse(_Driven, name="step_response"):
     """A critically damped drive that is told to go from x0 to 0 is at x0 (1 + w t) exp(-w t), with
     w^2 = k / I. Tolerance: |v| dt + |a| t dt at the largest, x0 w / e and x0 w^2."""
-
-    name = "step_response"
 
     rate: float = 10.0
     start: float = 0.5
@@ -83,20 +74,17 @@ class StepResponse(_Driven):
 
     def measure(self, world: World) -> Reading:
         seen = follow(world, held(0.0, self.seconds))
-        t = float(seen.t[-1])
+        t = seen.end
         x = self.rate * t
         exact = self.start * (1 + x) * math.exp(-x)
         late = self.start * self.rate * (1 / math.e + x)
-        allowed = late * seen.dt + rounding(self.start, seen.steps)
-        return Reading(float(seen.joints[-1, 0, 0]), exact, allowed)
+        return seen.reading(seen.joints[-1, 0, 0], exact, late, self.start)
 
 
 @dataclass(frozen=True)
-class SpringAndDamper(_Driven):
+class SpringAndDamper(_Driven, name="spring_damper"):
     """A weakly damped one swings: x0 exp(-z w t) (cos(u t) + z w / u sin(u t)), u = w sqrt(1 -
     z^2). Tolerance as of `StepResponse`, with |v| up to x0 w."""
-
-    name = "spring_damper"
 
     rate: float = 10.0
     damping: float = 0.1
@@ -109,20 +97,17 @@ class SpringAndDamper(_Driven):
 
     def measure(self, world: World) -> Reading:
         seen = follow(world, held(0.0, self.seconds))
-        t, w, z = float(seen.t[-1]), self.rate, self.damping
+        t, w, z = seen.end, self.rate, self.damping
         u = w * math.sqrt(1 - z * z)
         exact = self.start * math.exp(-z * w * t)
         exact *= math.cos(u * t) + z * w / u * math.sin(u * t)
-        allowed = self.start * w * (1 + w * t) * seen.dt + rounding(self.start, seen.steps)
-        return Reading(float(seen.joints[-1, 0, 0]), exact, allowed)
+        return seen.reading(seen.joints[-1, 0, 0], exact, self.start * w * (1 + w * t), self.start)
 
 
 @dataclass(frozen=True)
-class EffortLimit(_Driven):
+class EffortLimit(_Driven, name="effort_limit"):
     """A drive told to go far away pushes with its limit and no more: x = (F / I) t^2 / 2.
     Tolerance: (F / I) t dt."""
-
-    name = "effort_limit"
 
     effort: float = 2.0
     seconds: float = 0.5
@@ -132,18 +117,15 @@ class EffortLimit(_Driven):
 
     def measure(self, world: World) -> Reading:
         seen = follow(world, held(5.0, self.seconds))
-        t, pull = float(seen.t[-1]), self.effort / self.inertia
-        allowed = pull * t * seen.dt + rounding(1.0, seen.steps)
-        return Reading(float(seen.joints[-1, 0, 0]), pull * t * t / 2, allowed)
+        t, pull = seen.end, self.effort / self.inertia
+        return seen.reading(seen.joints[-1, 0, 0], pull * t * t / 2, pull * t, 1.0)
 
 
 @dataclass(frozen=True)
-class Tracking(_Driven):
+class Tracking(_Driven, name="tracking"):
     """A drive that is told position and velocity of a steady turn follows it: x = v t (1 - exp(-w
     t)) from rest, critically damped. Tolerance: late by one step, and a set point of the end of
     each step holds from its beginning on: 2 v dt."""
-
-    name = "tracking"
 
     speed: float = 1.0
     rate: float = 10.0
@@ -154,21 +136,15 @@ class Tracking(_Driven):
 
     def measure(self, world: World) -> Reading:
         seen = follow(world, held(self.speed * self.seconds, self.seconds, self.speed))
-        t = float(seen.t[-1])
+        t = seen.end
         exact = self.speed * t * (1 - math.exp(-self.rate * t))
-        allowed = 2 * self.speed * seen.dt + rounding(1.0, seen.steps)
-        return Reading(float(seen.joints[-1, 0, 0]), exact, allowed)
+        return seen.reading(seen.joints[-1, 0, 0], exact, 2 * self.speed, 1.0)
 
 
 @dataclass(frozen=True)
-class Sag(Law):
+class Sag(Law, name="sag", phenomenon="joints", quantity="angle", unit="rad"):
     """A level rod on a spring sags until k x = m g l cos x. Tolerance: what gravity turns it by
     within one step, (g / l) dt^2, and rounding."""
-
-    name = "sag"
-    phenomenon = "joints"
-    quantity: ClassVar[str] = "angle"
-    unit: ClassVar[str] = "rad"
 
     stiffness: float = 50.0
     seconds: float = 2.0
@@ -180,19 +156,16 @@ class Sag(Law):
         )  # fmt: skip
         return Scene(self.name, robot=mechanism(self.name, part))
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         exact = brentq(lambda x: self.stiffness * x - GRAVITY * math.cos(x), 0.0, 1.5)
         allowed = stillness(seen.dt, 1.0)
         return Reading(float(seen.joints[-1, 0, 0]), float(exact), allowed)
 
 
 @dataclass(frozen=True)
-class FeedForward(Sag):
+class FeedForward(Sag, name="feed_forward"):
     """The same rod is told the torque that gravity asks for, m g l: it stays level. Tolerance as
     of `Sag`."""
-
-    name = "feed_forward"
 
     seconds: float = 1.0
 

@@ -7,16 +7,27 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, stillness
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, rounding, stillness
 from pytest_simbench.laws.contact import tilt
 from pytest_simbench.laws.drives import STRONG, follow
-from pytest_simbench.laws.friction import BETWEEN, SHARES, boundary
 from pytest_simbench.laws.mechanisms import Part, mechanism
+from pytest_simbench.laws.sticking import SHARES, fan
 from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import panda
-from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene, Trajectory, Vector3
+from pytest_simbench.scene import (
+    Box,
+    ConvexMesh,
+    FloatArray,
+    Pose,
+    Robot,
+    Scene,
+    Trajectory,
+    Vector3,
+    Wrench,
+)
 
 HELD = 0.05
 """Edge of what is held [m]."""
@@ -28,15 +39,13 @@ SQUEEZE = 5.0
 """Of each finger [N]."""
 
 
-class _Grip(Law):
+class _Grip(Law, phenomenon="grasping"):
     """The Panda holds a cube between its fingers, whose friction is 1; what of it two fingers can
     carry, 2 mu F, is `1 / load` of its weight."""
 
-    phenomenon = "grasping"
-
     load: float
     aside: ClassVar[float] = 0.0
-    seconds: ClassVar[float] = 0.3
+    held_for: ClassVar[float] = 0.3
 
     def robot(self) -> Robot:
         found = panda()
@@ -73,18 +82,14 @@ class _Grip(Law):
         )[0]
         goal[robot.finger_indices] = robot.gripper.closed
         effort[robot.finger_indices] = 0.0
-        return Trajectory.holding(self.seconds, goal, effort)
+        return Trajectory.holding(self.held_for, goal, effort)
 
 
 @dataclass(frozen=True)
-class GripSlips(_Grip):
+class GripSlips(_Grip, name="grip_slips", quantity="acceleration", unit="m/s^2"):
     """Two fingers that press with F carry 2 mu F and no more (Coulomb): a cube of 1.15 times that
     weight slips down with a = g - 2 mu F / m. Tolerance: its speed is late by one step at either
     end of the time T over which it is taken: 2 g dt / T."""
-
-    name = "grip_slips"
-    quantity: ClassVar[str] = "acceleration"
-    unit: ClassVar[str] = "m/s^2"
 
     load: float = 1.15
 
@@ -98,23 +103,19 @@ class GripSlips(_Grip):
 
 
 @dataclass(frozen=True)
-class GripSlipsDiagonally(GripSlips):
+class GripSlipsDiagonally(GripSlips, name="grip_slips_diagonally"):
     """The same when the load pulls at 45 degrees, within the plane of the fingers: a friction
     pyramid holds up to sqrt(2) times as much there."""
 
-    name = "grip_slips_diagonally"
     aside: ClassVar[float] = math.pi / 4
 
 
 @dataclass(frozen=True)
-class GripHolds(_Grip):
+class GripHolds(_Grip, name="grip_holds", quantity="way in the hand in 0.35 s", unit="m"):
     """A cube of 0.8 times what the fingers carry stays where it is in the hand, from 0.15 s on.
     Tolerance: an equilibrium, g dt^2."""
 
-    name = "grip_holds"
-    quantity: ClassVar[str] = "way in the hand in 0.35 s"
-    unit: ClassVar[str] = "m"
-    seconds: ClassVar[float] = 0.5
+    held_for: ClassVar[float] = 0.5
 
     load: float = 0.8
 
@@ -135,16 +136,15 @@ BLOCK: Vector3 = (0.1, 0.1, 0.1)
 BAR: Vector3 = (0.05, 0.3, 0.05)
 
 
-class _Push(Law):
+@dataclass(frozen=True)
+class _Push(Law, phenomenon="pushing", unit="m"):
     """A bar on a slide pushes a block over the ground."""
-
-    phenomenon = "pushing"
-    unit: ClassVar[str] = "m"
 
     friction: ClassVar[float] = 0.4
     speed: ClassVar[float] = 0.05
     stiffness: ClassVar[float] = 500.0
-    seconds: float
+
+    seconds: float = 1.0
 
     def build(self) -> Scene:
         bar = Part(
@@ -163,33 +163,23 @@ class _Push(Law):
 
 
 @dataclass(frozen=True)
-class PushForce(_Push):
+class PushForce(_Push, name="push_force", quantity="lag of the bar"):
     """The bar hangs on a spring that pulls it on: it lags behind by mu m g / k while it pushes a
     block steadily (Coulomb, Hooke). Tolerance: what gravity moves within one step, g dt^2, and the
     bar late by two steps, as of `Tracking`: 2 v dt."""
 
-    name = "push_force"
-    quantity: ClassVar[str] = "lag of the bar"
-
-    seconds: float = 1.0
-
     def measure(self, world: World) -> Reading:
         seen = follow(world, self.push())
-        lag = self.speed * float(seen.t[-1]) - float(seen.joints[-1, 0, 0])
+        lag = self.speed * seen.end - float(seen.joints[-1, 0, 0])
         exact = self.friction * GRAVITY / self.stiffness
         allowed = 2 * self.speed * seen.dt + stillness(seen.dt, 0.1)
         return Reading(lag, exact, allowed)
 
 
 @dataclass(frozen=True)
-class PushStraight(_Push):
+class PushStraight(_Push, name="push_straight", quantity="distance from its place at the bar"):
     """A block that is pushed in its middle stays at the bar: it neither runs ahead, nor turns, nor
     is it entered. Tolerance as of `PushForce`."""
-
-    name = "push_straight"
-    quantity: ClassVar[str] = "distance from its place at the bar"
-
-    seconds: float = 1.0
 
     def measure(self, world: World) -> Reading:
         seen = follow(world, self.push())
@@ -200,17 +190,14 @@ class PushStraight(_Push):
 
 
 @dataclass(frozen=True)
-class PushTips(Law):
+class PushTips(
+    Law, name="push_tips", phenomenon="pushing", quantity="depth at which it tips", unit="m"
+):
     """A block that is pushed at the height h slides when its depth is more than 2 mu h / (1 + mu^2)
     and tips when it is less, all friction alike: the ground pulls with F = mu N, the bar holds its
     back down with mu F, and torques are taken about its front edge. Six depths, pushed by one bar.
     Turned by 0.05 rad it has tipped. Tolerance: half of the gap between the depths on either side;
     no step."""
-
-    name = "push_tips"
-    phenomenon = "pushing"
-    quantity: ClassVar[str] = "depth at which it tips"
-    unit: ClassVar[str] = "m"
 
     friction: float = 0.5
     height: float = 0.2
@@ -239,6 +226,96 @@ class PushTips(Law):
         time = np.array([[0.0], [self.seconds]])
         speed = np.full((2, 1), 0.1)
         follow(world, Trajectory(self.seconds, 0.1 * time, speed, 0 * speed))
-        stands = [tilt(row) < 0.05 for row in world.bodies]
-        found = boundary([share * self.critical for share in SHARES], stands)
-        return Reading(found, self.critical, BETWEEN * self.critical)
+        return fan(self.critical, [tilt(row) < 0.05 for row in world.bodies])
+
+
+SIDE, HEIGHT = 0.2, 0.04
+"""Of the prism: a side of its triangle, and how high it is [m]."""
+
+INSIDE = SIDE / math.sqrt(12)
+"""From the prism's axis to its sides [m]."""
+
+MOMENT = SIDE**2 / 12
+"""Of inertia of 1 kg of it about its axis [kg m^2]."""
+
+FEET: FloatArray = np.array([[-INSIDE, -SIDE / 2], [-INSIDE, SIDE / 2], [2 * INSIDE, 0.0]])
+"""The corners that the prism stands on, from its axis (3, 2) [m]."""
+
+
+@dataclass(frozen=True)
+class PushTurns(Law, name="push_turns", phenomenon="pushing", quantity="angle turned", unit="rad"):
+    """A block that slides is pushed beside its centre, and turns as its limit surface says.
+
+    The friction that the ground can give a sliding body is a surface in the space of force and
+    torque, at the point whose normal is the body's twist (Goyal, Ruina and Papadopoulos, Planar
+    sliding with dry friction, Wear 143 (1991) 307). Of most bodies nobody knows how their weight is
+    spread over the ground. This one is a prism that stands on three corners, so it is known: each
+    is pulled with mu N against its velocity, and what pulls below the centre of mass shifts the
+    weight. The push is `push` times the friction of a straight slide, along x, on a line that is
+    `aside` of the centre. Newton's and Euler's equations are integrated by DOP853 with a relative
+    tolerance of 1e-9. Tolerance: late by one step, w dt, and the rate is late by one step all the
+    time T, T dt times the largest angular acceleration.
+    """
+
+    push: float = 1.2
+    aside: float = 0.02
+    speed: float = 0.3
+    friction: float = 0.4
+    seconds: float = 0.6
+
+    @property
+    def force(self) -> float:
+        """Of the push on a prism of 1 kg [N]."""
+        return self.push * self.friction * GRAVITY
+
+    def build(self) -> Scene:
+        vertices = [(x, y, z) for x, y in FEET.tolist() for z in (-HEIGHT / 2, HEIGHT / 2)]
+        prism = ConvexMesh(
+            "prism",
+            tuple(vertices),
+            Pose.at(0.0, 0.0, HEIGHT / 2),
+            1.0,
+            self.friction,
+            linear_velocity=(self.speed, 0.0, 0.0),
+            wrenches=(
+                Wrench(force=(self.force, 0.0, 0.0), torque=(0.0, 0.0, -self.aside * self.force)),
+            ),
+        )
+        return Scene(self.name, (prism,), ground_friction=self.friction)
+
+    def acceleration(self, angle: float, twist: FloatArray) -> FloatArray:
+        """Of the prism: linear along x and y, and angular, (3,) [m/s^2, rad/s^2].
+
+        Args:
+            angle: that it has turned [rad].
+            twist: velocity along x and y, and rate of turning, (3,) [m/s, rad/s].
+        """
+        cos, sin = math.cos(angle), math.sin(angle)
+        feet = FEET @ np.array([[cos, sin], [-sin, cos]])
+        across = feet @ np.array([[0.0, 1.0], [-1.0, 0.0]])  # each turned by 90 degrees
+        velocities = twist[:2] + twist[2] * across
+        along = velocities / np.linalg.norm(velocities, axis=1, keepdims=True)
+        tips = feet - self.friction * HEIGHT / 2 * along
+        loads = np.linalg.solve(np.vstack([np.ones(3), tips.T]), [GRAVITY, 0.0, 0.0])
+        pulls = -self.friction * loads[:, None] * along
+        x, y = pulls.sum(axis=0)
+        turning = (across * pulls).sum() - self.aside * self.force
+        return np.array([x + self.force, y, turning / MOMENT])
+
+    def exact(self, seconds: float) -> FloatArray:
+        """Angle [rad], rate [rad/s] and angular acceleration [rad/s^2] over a time, (3, 100)."""
+
+        def change(_: float, state: FloatArray) -> FloatArray:
+            return np.concatenate([state[3:], self.acceleration(state[2], state[3:])])
+
+        times, start = np.linspace(0.0, seconds, 100), [0.0, 0.0, 0.0, self.speed, 0.0, 0.0]
+        found = solve_ivp(change, (0.0, seconds), start, "DOP853", times, rtol=1e-9, atol=1e-12).y
+        pulled = [self.acceleration(state[2], state[3:])[2] for state in found.T]
+        return np.array([found[2], found[5], pulled])
+
+    def read(self, seen: Watched) -> Reading:
+        row, time = seen.bodies[-1, 0], seen.end
+        angle, rate, pulled = self.exact(time)
+        allowed = (abs(rate[-1]) + float(np.abs(pulled).max()) * time) * seen.dt
+        found = 2 * math.atan2(float(row[6]), float(row[3]))
+        return Reading(found, float(angle[-1]), float(allowed) + rounding(1.0, seen.steps))

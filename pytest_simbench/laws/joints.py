@@ -1,4 +1,4 @@
-"""Laws of joints that move freely: pendulums and sliders."""
+"""Laws of joints that move freely, pendulums and sliders, and of what a joint transmits."""
 
 from __future__ import annotations
 
@@ -11,28 +11,18 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import (
-    GRAVITY,
-    LONG,
-    Law,
-    Reading,
-    Watched,
-    rounding,
-    watch,
-)
+from pytest_simbench.laws.base import GRAVITY, LONG, Law, Reading, Watched, rounding, watch
 from pytest_simbench.laws.mechanisms import INERTIA_OF_A_POINT, MOUNT, Part, mechanism
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Scene, Vector3
+from pytest_simbench.simulator import Capability
 
 Y: Vector3 = (0.0, 1.0, 0.0)
 
 
-class Passive(Law):
+class Passive(Law, phenomenon="joints"):
     """A mechanism without drives that falls under gravity."""
 
-    phenomenon = "joints"
     gravity: ClassVar[Vector3] = STANDARD_GRAVITY
-
-    seconds: float
 
     def parts(self) -> tuple[Part, ...]:
         raise NotImplementedError
@@ -84,29 +74,21 @@ def model_of(robot: Robot, gravity: Vector3):  # type: ignore[no-untyped-def]  #
     return model
 
 
-class Motion(Passive):
+class Motion(Passive, quantity="largest distance of a joint from its place", unit="rad or m"):
     """Where the joints are after a time, by the equations of motion."""
 
-    quantity: ClassVar[str] = "largest distance of a joint from its place"
-    unit: ClassVar[str] = "rad or m"
-
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
-        t = float(seen.t[-1])
+    def read(self, seen: Watched) -> Reading:
+        t = seen.end
         q, v, a = self.exact(t)
         off = float(np.abs(seen.joints[-1, 0] - q[-1]).max())
         late = float(np.abs(v).max()) + float(np.abs(a).max(axis=1).mean()) * t
-        return Reading(off, 0.0, late * seen.dt + rounding(float(np.abs(q).max()), seen.steps))
+        return seen.reading(off, 0.0, late, float(np.abs(q).max()))
 
 
-class _Energy(Passive):
+class _Energy(Passive, quantity="largest change of the energy", unit="J"):
     """The energy stays what it was."""
 
-    quantity: ClassVar[str] = "largest change of the energy"
-    unit: ClassVar[str] = "J"
-
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         kinetic, potential = self.energy(seen)
         robot = self.build().robot
         assert robot is not None
@@ -116,7 +98,7 @@ class _Energy(Passive):
         off = float(np.abs(kinetic + potential - before[0]).max())
         scale = float(np.ptp(potential))
         late = self.late(np.gradient(potential, seen.dt))
-        return Reading(off, 0.0, late * seen.dt + rounding(scale, seen.steps))
+        return seen.reading(off, 0.0, late, scale)
 
     def late(self, power: FloatArray) -> float:
         """By what the energy may be off for each second of a step [W], from the power of gravity at
@@ -138,14 +120,10 @@ def _period(length: float, angle: float, mass: float, inertia: float) -> float:
 
 
 @dataclass(frozen=True)
-class PendulumPeriod(Passive):
+class PendulumPeriod(Passive, name="pendulum_period", quantity="period", unit="s"):
     """A pendulum that is let go at the angle a swings with the period T = 4 sqrt(I / m g l)
     K(sin^2(a / 2)), K the complete elliptic integral of the first kind (Landau, Lifshitz,
     Mechanics, section 11). Tolerance: late by one step, at each end of the period."""
-
-    name = "pendulum_period"
-    quantity: ClassVar[str] = "period"
-    unit: ClassVar[str] = "s"
 
     length: float = 0.5
     angle: float = 2.0
@@ -158,19 +136,16 @@ class PendulumPeriod(Passive):
     def period(self) -> float:
         return _period(self.length, self.angle, 1.0, INERTIA_OF_A_POINT)
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         found = seen.crossings(seen.joints[:, 0, 0])
         period = float(found[1] - found[0]) if len(found) > 1 else self.seconds
         return Reading(period, self.period, 2 * seen.dt)
 
 
 @dataclass(frozen=True)
-class CompoundPendulum(PendulumPeriod):
+class CompoundPendulum(PendulumPeriod, name="compound_pendulum"):
     """A heavy body on a hinge: its moment of inertia about its centre counts (Huygens, Steiner):
     I = m l^2 + I_c. Tolerance as of `PendulumPeriod`."""
-
-    name = "compound_pendulum"
 
     length: float = 0.2
     angle: float = 0.5
@@ -188,14 +163,12 @@ class CompoundPendulum(PendulumPeriod):
 
 
 @dataclass(frozen=True)
-class TwoPendulums(Passive):
+class TwoPendulums(
+    Passive, name="two_pendulums", quantity="larger error of the two periods", unit="s"
+):
     """Two pendulums that hang on one fixed mount do not know of each other (Newton: what cannot
     move transmits no motion): each swings with its own period, that of `PendulumPeriod`, whatever
     the other's length, mass and swing. Tolerance as there."""
-
-    name = "two_pendulums"
-    quantity: ClassVar[str] = "larger error of the two periods"
-    unit: ClassVar[str] = "s"
 
     lengths: tuple[float, float] = (0.5, 0.2)
     angles: tuple[float, float] = (1.0, -1.5)
@@ -219,8 +192,7 @@ class TwoPendulums(Passive):
             )
         return tuple(made)
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         errors = []
         for k, (length, angle, mass) in enumerate(
             zip(self.lengths, self.angles, self.masses, strict=True)
@@ -232,13 +204,11 @@ class TwoPendulums(Passive):
 
 
 @dataclass(frozen=True)
-class PendulumEnergy(_Energy):
+class PendulumEnergy(_Energy, name="pendulum_energy"):
     """The energy of a pendulum that swings by 1.5 rad stays what it was. Tolerance: the potential
     energy is late by one step against the kinetic one, P dt with P the largest power; a symplectic
     method of the first order is off by half of that, and does not drift (Hairer, Lubich, Wanner,
     Geometric Numerical Integration, IX.8)."""
-
-    name = "pendulum_energy"
 
     seconds: float = 6.0
 
@@ -247,12 +217,11 @@ class PendulumEnergy(_Energy):
 
 
 @dataclass(frozen=True)
-class PendulumEnergyDrift(PendulumEnergy):
+class PendulumEnergyDrift(PendulumEnergy, name="pendulum_energy_drift"):
     """Over 100 periods the energy of that pendulum stays what it was, too. Tolerance as of
     `PendulumEnergy`, whatever the number of periods: what a symplectic method is off by swings with
     the pendulum and does not add up. Only rounding does. The protocol `smoke` takes 4 periods."""
 
-    name = "pendulum_energy_drift"
     study_timeout: ClassVar[float] = LONG
 
     seconds: float = 100 * _period(0.1, 1.5, 1.0, INERTIA_OF_A_POINT)
@@ -262,11 +231,9 @@ class PendulumEnergyDrift(PendulumEnergy):
 
 
 @dataclass(frozen=True)
-class DoublePendulum(Motion):
+class DoublePendulum(Motion, name="double_pendulum"):
     """Two pendulums, one hung on the other (Lagrange), against the equations of motion. Tolerance:
     late by one step, and a velocity that is late by one step all the time: |v| dt + |a| t dt."""
-
-    name = "double_pendulum"
 
     seconds: float = 1.0
 
@@ -277,13 +244,11 @@ class DoublePendulum(Motion):
 
 
 @dataclass(frozen=True)
-class DoublePendulumEnergy(_Energy):
+class DoublePendulumEnergy(_Energy, name="double_pendulum_energy"):
     """The energy of a double pendulum stays what it was. Tolerance: the power is late by one step
     all the time, the step times the sum of its changes. Its mass matrix changes with its position,
     so that semi-implicit Euler is not symplectic, and the bound of `PendulumEnergy` does not
     hold."""
-
-    name = "double_pendulum_energy"
 
     seconds: float = 2.0
 
@@ -295,12 +260,10 @@ class DoublePendulumEnergy(_Energy):
 
 
 @dataclass(frozen=True)
-class SwingingSlider(Motion):
+class SwingingSlider(Motion, name="swinging_slider"):
     """A mass slides without friction along a rod that swings: Coriolis force, centrifugal force and
     gravity, r'' = r q'^2 + g cos q, (I + m r^2) q'' = -m g r sin q - 2 m r r' q'. Tolerance as of
     `DoublePendulum`."""
-
-    name = "swinging_slider"
 
     seconds: float = 0.6
 
@@ -310,11 +273,10 @@ class SwingingSlider(Motion):
 
 
 @dataclass(frozen=True)
-class SphericalPendulum(Motion):
+class SphericalPendulum(Motion, name="spherical_pendulum"):
     """A bob on two crossed hinges that moves out of their planes: gyroscopic terms of three
     dimensions, against the equations of motion. Tolerance as of `DoublePendulum`."""
 
-    name = "spherical_pendulum"
     gravity: ClassVar[Vector3] = (3.0, 4.0, -8.0)
 
     seconds: float = 1.0
@@ -322,3 +284,92 @@ class SphericalPendulum(Motion):
     def parts(self) -> tuple[Part, ...]:
         bob = Part("across", Y, centre=(0.0, 0.1, -0.5), start=0.3, inertia=(0.02, 0.04, 0.03))
         return Part("along", (1.0, 0.0, 0.0), start=0.8), bob
+
+
+LOOKS = 20
+"""How often the joint is asked, at even times."""
+
+MASS = 2.0
+"""Of the bob [kg]."""
+
+
+@dataclass(frozen=True)
+class _Loaded(Passive, phenomenon="mechanisms"):
+    """A pendulum whose bob hangs aside of its plane: its hinge carries a force, and a torque
+    across its axis."""
+
+    needs: ClassVar[tuple[Capability, ...]] = (Capability.JOINT_WRENCHES,)
+
+    length: ClassVar[float] = 0.5
+    aside: ClassVar[float] = 0.3
+    angle: ClassVar[float] = 2.0
+
+    seconds: float = 1.2
+
+    def parts(self) -> tuple[Part, ...]:
+        centre = (0.0, self.aside, -self.length)
+        return (Part("swing", Y, centre=centre, mass=MASS, start=self.angle),)
+
+    @property
+    def slow(self) -> float:
+        """m g l / I about the hinge [1/s^2]."""
+        return MASS * GRAVITY * self.length / (MASS * self.length**2 + INERTIA_OF_A_POINT)
+
+    def carried(self, angle: float) -> FloatArray:
+        """The hinge's wrench on the rod at an angle [rad] while it swings, (6,).
+
+        Newton: F = m (a - g) with the bob's acceleration, along and across the rod; the speed of
+        the swing is that of energy conservation. Of the torque about the hinge, the part about its
+        axis is 0, and that across it is the bob's way aside times F.
+        """
+        bend = -self.slow * math.sin(angle)
+        inward = np.array([math.sin(angle), 0.0, math.cos(angle)])
+        onward = np.array([-math.cos(angle), 0.0, math.sin(angle)])
+        acceleration = self.length * (self.rate(angle) ** 2 * inward + bend * onward)
+        force = MASS * (acceleration + np.array([0.0, 0.0, GRAVITY]))
+        torque = np.cross([0.0, self.aside, 0.0], force)
+        return np.concatenate([force, torque])
+
+    def rate(self, angle: float) -> float:
+        """Of the swing at an angle, by energy conservation [rad/s], (its size)."""
+        fallen = math.cos(angle) - math.cos(self.angle)
+        return math.sqrt(max(0.0, 2 * self.slow * fallen))
+
+    def compare(self, world: World, which: slice) -> Reading:
+        """The largest error of force or torque, and by how much they change in a step."""
+        errors = []
+        for _ in range(LOOKS):
+            dt = watch(world, self.seconds / LOOKS).dt
+            told = world.joint_wrenches()[0] - self.carried(float(world.joints[0, 0]))
+            errors.append(float(np.linalg.norm(told[which])))
+        angles = np.linspace(-self.angle, self.angle, 401)
+        right = np.array([self.carried(angle)[which] for angle in angles])
+        bend = np.linalg.norm(np.gradient(right, angles, axis=0), axis=1)
+        fastest = max(a * self.rate(angle) for a, angle in zip(bend, angles, strict=True))
+        scale = float(np.linalg.norm(right, axis=1).max())
+        return Reading(max(errors), 0.0, 2 * float(fastest) * dt + rounding(scale, 1))
+
+
+@dataclass(frozen=True)
+class PendulumForce(
+    _Loaded, name="pendulum_force", quantity="largest error of the hinge's force", unit="N"
+):
+    """The hinge of a pendulum carries F = m (a - g): along the rod m g cos q + m l w^2, and across
+    it what an inertia about the bob's centre asks for (Newton; Huygens, Horologium oscillatorium,
+    1673). Tolerance: what is told is of the last step, whose begin is one step ago, and the speed
+    was late by one then: two steps, 2 dt times the largest |dF/dt| of the swing."""
+
+    def measure(self, world: World) -> Reading:
+        return self.compare(world, slice(0, 3))
+
+
+@dataclass(frozen=True)
+class PendulumTorque(
+    _Loaded, name="pendulum_torque", quantity="largest error of the hinge's torque", unit="N m"
+):
+    """The hinge of a pendulum whose bob hangs aside of its plane carries a torque across its axis,
+    the bob's way aside times the force, and none about it (Euler's second law). Tolerance as of
+    `PendulumForce`, of the torque."""
+
+    def measure(self, world: World) -> Reading:
+        return self.compare(world, slice(3, 6))

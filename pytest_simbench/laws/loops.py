@@ -10,13 +10,12 @@ from typing import ClassVar
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import Reading, rounding, watch
+from pytest_simbench.laws.base import Reading, Watched, rounding
 from pytest_simbench.laws.joints import Motion, Passive, Y, model_of
 from pytest_simbench.laws.mechanisms import MOUNT, Part, mechanism
 from pytest_simbench.scene import Closure, FloatArray, Scene, Vector3
 from pytest_simbench.simulator import Capability, PreparedRobot
-from pytest_simbench.simulator.loops import ends, reduced
+from pytest_simbench.simulator.links import ends, reduced
 
 CRANK, COUPLER, ROCKER, GROUND = 0.25, 0.5, 0.4, 0.5
 """Lengths of the four bars [m]. Shortest and longest together are shorter than the others, so the
@@ -33,14 +32,14 @@ H = 1e-4
 a part in 1e12, which the integrator below does not see."""
 
 
-class _FourBar(Passive):
+@dataclass(frozen=True)
+class _FourBar(Passive, phenomenon="mechanisms"):
     """Three rods: a crank and a rocker that hang on the mount, GROUND apart, and a coupler that is
     hinged to the crank and held at the rocker's end. It is let go at a crank angle."""
 
-    phenomenon = "mechanisms"
     needs: ClassVar[tuple[Capability, ...]] = (Capability.LOOPS,)
 
-    crank: float
+    crank: float = 1.2
 
     def build(self) -> Scene:
         hinge = Closure("coupler link", "rocker link", (COUPLER, 0.0, 0.0), (0.0, 0.0, -ROCKER))
@@ -116,21 +115,17 @@ def slope(crank: float) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class FourBarClosure(_FourBar):
+class FourBarClosure(
+    _FourBar, name="four_bar_closure", quantity="largest opening of the loop", unit="mm"
+):
     """A loop stays closed: in a four-bar linkage that swings, the coupler's end is where the
     rocker's is (Freudenstein, Approximate synthesis of four-bar linkages, 1955: the loop equation).
     Tolerance: one end is late by one step, the speed of the crank's end times dt; rounding of one
     step, since what holds the loop also restores it."""
 
-    name = "four_bar_closure"
-    quantity: ClassVar[str] = "largest opening of the loop"
-    unit: ClassVar[str] = "mm"
-
-    crank: float = 1.2
     seconds: float = 2.0
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         robot = self.build().robot
         assert robot is not None
         prepared = PreparedRobot(robot)
@@ -144,14 +139,11 @@ class FourBarClosure(_FourBar):
 
 
 @dataclass(frozen=True)
-class FourBarSwing(_FourBar, Motion):
+class FourBarSwing(_FourBar, Motion, name="four_bar_swing"):
     """A four-bar linkage that is let go swings as its one degree of freedom has it: Lagrange's
     equation of the crank's angle, coupler and rocker by the loop equation. Tolerance as of
     `DoublePendulum`."""
 
-    name = "four_bar_swing"
-
-    crank: float = 1.2
     seconds: float = 1.0
 
 

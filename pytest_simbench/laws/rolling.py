@@ -1,4 +1,5 @@
-"""Laws of round bodies: what rolls, and what slips before it rolls."""
+"""Laws of what rolls: round bodies, which may slip first, and a wheel without a rim. And of meshes:
+one beside the box that it is."""
 
 from __future__ import annotations
 
@@ -6,12 +7,14 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, watch
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, rounding, watch
 from pytest_simbench.laws.free import WEIGHTLESS
-from pytest_simbench.laws.friction import acceleration, tilted
 from pytest_simbench.laws.spinning import FreeTop
-from pytest_simbench.scene import Body, Cylinder, Pose, Scene, Sphere
+from pytest_simbench.laws.sticking import acceleration, tilted
+from pytest_simbench.scene import Body, Box, ConvexMesh, Cylinder, Pose, Scene, Sphere, Vector3
 
 RADIUS = 0.05
 ON_ITS_SIDE = Pose((0.0, 0.0, RADIUS), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0))
@@ -19,15 +22,12 @@ ON_ITS_SIDE = Pose((0.0, 0.0, RADIUS), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0
 
 
 @dataclass(frozen=True)
-class RollingSphere(Law):
+class RollingSphere(
+    Law, name="rolling_sphere", phenomenon="rolling", quantity="acceleration", unit="m/s^2"
+):
     """Down a slope a sphere rolls without slipping with a = 5/7 g sin a, where mu is more than 2/7
     of the slope (I = 2/5 m r^2). Tolerance: its speed is late by one step at either end of the time
     T over which it is taken, under the largest of the forces: 2 g sin a dt / T."""
-
-    name = "rolling_sphere"
-    phenomenon = "rolling"
-    quantity: ClassVar[str] = "acceleration"
-    unit: ClassVar[str] = "m/s^2"
 
     share: ClassVar[float] = 5 / 7
     slope: float = 0.3
@@ -45,17 +45,15 @@ class RollingSphere(Law):
             ground_friction=self.friction,
         )
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         pull = GRAVITY * math.sin(math.atan(self.slope))
         return acceleration(seen.dt, seen.t, seen.bodies[:, 0, 7], 0.2, self.share * pull, pull)
 
 
 @dataclass(frozen=True)
-class RollingCylinder(RollingSphere):
+class RollingCylinder(RollingSphere, name="rolling_cylinder"):
     """A cylinder rolls with a = 2/3 g sin a (I = m r^2 / 2). Tolerance as of `RollingSphere`."""
 
-    name = "rolling_cylinder"
     share: ClassVar[float] = 2 / 3
 
     def body(self) -> Body:
@@ -63,15 +61,10 @@ class RollingCylinder(RollingSphere):
 
 
 @dataclass(frozen=True)
-class SlipToRoll(Law):
+class SlipToRoll(Law, name="slip_to_roll", phenomenon="rolling", quantity="speed", unit="m/s"):
     """A sphere that is pushed off with v0 and w0 slips until it rolls, with (5 v0 + 2 w0 r) / 7,
     whatever mu (angular momentum about the ground; Coriolis, Billard, 1835). Tolerance: its speed
     is late by one step, mu g dt."""
-
-    name = "slip_to_roll"
-    phenomenon = "rolling"
-    quantity: ClassVar[str] = "speed"
-    unit: ClassVar[str] = "m/s"
 
     speed: float = 1.0
     spin: float = 0.0
@@ -90,31 +83,134 @@ class SlipToRoll(Law):
         )
         return Scene(self.name, (ball,), ground_friction=self.friction)
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         exact = (5 * self.speed + 2 * self.spin * RADIUS) / 7
-        allowed = self.friction * GRAVITY * seen.dt + rounding(1.0, seen.steps)
-        return Reading(float(seen.bodies[-1, 0, 7]), exact, allowed)
+        return seen.reading(seen.bodies[-1, 0, 7], exact, self.friction * GRAVITY, 1.0)
 
 
 @dataclass(frozen=True)
-class SpinToRoll(SlipToRoll):
+class SpinToRoll(SlipToRoll, name="spin_to_roll"):
     """A sphere that only spins about a level axis runs off: the same with v0 = 0. Tolerance
     as of `SlipToRoll`."""
-
-    name = "spin_to_roll"
 
     speed: float = 0.0
     spin: float = 40.0
 
 
 @dataclass(frozen=True)
-class FreeCylinder(FreeTop):
+class FreeCylinder(FreeTop, name="free_cylinder"):
     """The same for a cylinder (I1 = m (3 r^2 + l^2) / 12, I3 = m r^2 / 2).
     Tolerance as of `FreeTop`."""
-
-    name = "free_cylinder"
 
     def build(self) -> Scene:
         body = Cylinder("rod", 0.05, 0.4, Pose.at(0.0, 0.0, 2.0), 1.0, angular_velocity=self.omega)
         return Scene(self.name, (body,), gravity=WEIGHTLESS)
+
+
+@dataclass(frozen=True)
+class RimlessWheel(
+    Law,
+    name="rimless_wheel",
+    phenomenon="rolling",
+    quantity="angular speed above the next edge",
+    unit="rad/s",
+):
+    """A regular prism of n sides rolls on its edges: a step of a wheel without a rim.
+
+    It turns about an edge (r to the axis, J about it) until the next edge strikes, 2 pi / n
+    further. That one is where all impulses act, so angular momentum about it stays, and of the
+    speed there is left k = (J + m r^2 cos(2 pi / n)) / (J + m r^2) (McGeer, Passive dynamic
+    walking, Int. J. Robotics Research 9 (1990) 62). Before and after it energy stays, with a = m g
+    r / (J + m r^2): w0^2 + 2 a (cos x0 - cos x) = w^2, x from the vertical. J = m r^2 (2 + cos(2 pi
+    / n)) / 6 of a regular polygon. Measured where the axis is above the new edge. Friction 1 holds
+    the edges, and w^2 r stays below g cos x, so that none lifts off.
+
+    Tolerance: each of the two falls is late by one step, a dt, and its rate one step late all the
+    time, a w T dt; the impact is late by one step, a dt; an error of the speed before is k of it
+    after, and grows by w / w_top until the top.
+    """
+
+    sides: int = 8
+    radius: float = 0.2
+    width: float = 0.2
+    lean: float = 0.1
+    speed: float = 4.5
+
+    def build(self) -> Scene:
+        turns = 2 * np.pi * np.arange(self.sides) / self.sides
+        vertices = tuple(
+            (float(self.radius * np.sin(turn)), y, float(-self.radius * np.cos(turn)))
+            for turn in turns
+            for y in (-self.width / 2, self.width / 2)
+        )
+        x, z = self.radius * math.sin(self.lean), self.radius * math.cos(self.lean)
+        half = self.lean / 2
+        wheel = ConvexMesh(
+            "wheel",
+            vertices,
+            Pose((x, 0.0, z), (math.cos(half), 0.0, math.sin(half), 0.0)),
+            1.0,
+            linear_velocity=(self.speed * z, 0.0, -self.speed * x),
+            angular_velocity=(0.0, self.speed, 0.0),
+        )
+        return Scene(self.name, (wheel,))
+
+    def exact(self) -> tuple[float, float, float]:
+        """Angular speed above the next edge, and just before and after the impact [rad/s]."""
+        step = 2 * math.pi / self.sides
+        own = (2 + math.cos(step)) / 6  # of J, in m r^2
+        fall = 2 * self.pull
+        before = math.sqrt(self.speed**2 + fall * (math.cos(self.lean) - math.cos(step / 2)))
+        after = before * (own + math.cos(step)) / (own + 1)
+        return math.sqrt(after**2 - fall * (1 - math.cos(step / 2))), before, after
+
+    @property
+    def pull(self) -> float:
+        """a, the largest angular acceleration [rad/s^2]."""
+        return GRAVITY / self.radius / ((2 + math.cos(2 * math.pi / self.sides)) / 6 + 1)
+
+    def measure(self, world: World) -> Reading:
+        step = 2 * math.pi / self.sides
+        top, before, after = self.exact()
+        first, second = (step / 2 - self.lean) / self.speed, step / 2 / top  # at most [s]
+        seen = watch(world, first + second + 0.1)
+        halves = np.arctan2(seen.bodies[:, 0, 5], seen.bodies[:, 0, 3])
+        angles = np.unwrap(2 * halves, period=2 * math.pi)
+        reached = seen.crossings(angles, step)
+        found = float(seen.at(reached[0], seen.bodies[:, 0, 11])) if len(reached) else 0.0
+        late, rate = self.pull * seen.dt, self.pull * before * seen.dt
+        off = (after / before) * (late + rate * first) + late
+        allowed = (after / top) * off + late + rate * second + rounding(before, seen.steps)
+        return Reading(found, top, allowed)
+
+
+@dataclass(frozen=True)
+class MeshTwin(
+    Law,
+    name="mesh_twin",
+    phenomenon="sliding",
+    quantity="distance of the mesh from where the box is",
+    unit="m",
+):
+    """A box, and a mesh with its corners beside it, fall, land flat, slide and stop alike: it is
+    one body. Each is thrown from the height h with the speed v. Tolerance: each may land and stop
+    late by one step, 2 v dt each."""
+
+    size: Vector3 = (0.2, 0.2, 0.05)
+    height: float = 0.01
+    speed: float = 1.0
+    friction: float = 0.5
+    seconds: float = 0.4
+
+    def build(self) -> Scene:
+        x, y, z = (edge / 2 for edge in self.size)
+        corners = tuple((a, b, c) for a in (-x, x) for b in (-y, y) for c in (-z, z))
+        thrown = Pose.at(0.0, 0.0, z + self.height), 1.0, self.friction
+        box = Box("box", self.size, *thrown, linear_velocity=(self.speed, 0.0, 0.0))
+        mesh = ConvexMesh("mesh", corners, *thrown, linear_velocity=(self.speed, 0.0, 0.0))
+        beside = mesh.moved_to(mesh.pose.translated(y=3 * self.size[1]))
+        return Scene(self.name, (box, beside), ground_friction=self.friction)
+
+    def read(self, seen: Watched) -> Reading:
+        apart = seen.bodies[-1, 1, :3] - seen.bodies[-1, 0, :3] - [0.0, 3 * self.size[1], 0.0]
+        return seen.reading(float(np.linalg.norm(apart)), 0.0, 4 * self.speed, 1.0)

@@ -1,31 +1,24 @@
-"""Laws of sliding: how friction moves and stops what slides."""
+"""Laws of sliding: how friction moves and stops what slides, or lies on a belt."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, watch
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, rounding, watch
 from pytest_simbench.laws.drives import follow
-from pytest_simbench.laws.friction import SLAB, SLAB_AT, acceleration, slab_on
-from pytest_simbench.laws.sticking import Carried
-from pytest_simbench.scene import Box, Scene
+from pytest_simbench.laws.sticking import SLAB, SLAB_AT, Carried, acceleration, slab_on
+from pytest_simbench.scene import Body, Box, Pose, Scene, Sphere
 
 
 @dataclass(frozen=True)
-class SlideX(Law):
+class SlideX(Law, name="slide_x", phenomenon="sliding", quantity="acceleration", unit="m/s^2"):
     """Down a slope steeper than mu a slab accelerates by g (sin a - mu cos a) (Coulomb). Tolerance:
     the speed is late by one step at either end of the time T over which it is taken, under the
     largest of the forces: 2 g sin a dt / T."""
-
-    name = "slide_x"
-    phenomenon = "sliding"
-    quantity: ClassVar[str] = "acceleration"
-    unit: ClassVar[str] = "m/s^2"
 
     direction: float = 0.0
     slope: float = 0.75
@@ -35,8 +28,7 @@ class SlideX(Law):
     def build(self) -> Scene:
         return slab_on(self.name, self.slope, self.direction, self.friction)
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         angle = math.atan(self.slope)
         along = seen.bodies[:, 0, 7:9] @ [math.cos(self.direction), math.sin(self.direction)]
         exact = GRAVITY * (math.sin(angle) - self.friction * math.cos(angle))
@@ -44,50 +36,41 @@ class SlideX(Law):
 
 
 @dataclass(frozen=True)
-class SlideY(SlideX):
+class SlideY(SlideX, name="slide_y"):
     """The same in the direction y."""
 
-    name = "slide_y"
     direction: float = math.pi / 2
 
 
 @dataclass(frozen=True)
-class SlideDiagonal(SlideX):
+class SlideDiagonal(SlideX, name="slide_diagonal"):
     """The same along a diagonal, where a friction pyramid differs most from the cone."""
 
-    name = "slide_diagonal"
     direction: float = math.pi / 4
 
 
 @dataclass(frozen=True)
-class SlideStraight(SlideX):
+class SlideStraight(SlideX, name="slide_straight", quantity="angle aside", unit="deg"):
     """A slab slides straight down, at 22.5 degrees to the axes too: friction is against the motion
     (a pyramid's is not, and the slab veers). Tolerance: the speed aside is late by one step, as an
     angle: g sin a dt / v."""
 
-    name = "slide_straight"
-    quantity: ClassVar[str] = "angle aside"
-    unit: ClassVar[str] = "deg"
     direction: float = math.pi / 8
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         x, y = seen.bodies[-1, 0, 7:9]
         off = math.degrees(math.atan2(y, x) - self.direction)
         angle = math.atan(self.slope)
-        exact = GRAVITY * (math.sin(angle) - self.friction * math.cos(angle)) * float(seen.t[-1])
+        exact = GRAVITY * (math.sin(angle) - self.friction * math.cos(angle)) * seen.end
         late = GRAVITY * math.sin(angle) * seen.dt + rounding(1.0, seen.steps)
         return Reading(off, 0.0, math.degrees(late / exact))
 
 
 @dataclass(frozen=True)
-class StoppingDistance(Law):
+class StoppingDistance(
+    Law, name="stopping_distance", phenomenon="sliding", quantity="way", unit="m"
+):
     """A slab that is given the speed v slides v^2 / (2 mu g). Tolerance: v dt."""
-
-    name = "stopping_distance"
-    phenomenon = "sliding"
-    quantity: ClassVar[str] = "way"
-    unit: ClassVar[str] = "m"
 
     direction: float = 0.0
     speed: float = 2.0
@@ -106,26 +89,20 @@ class StoppingDistance(Law):
         exact = self.speed**2 / (2 * self.friction * GRAVITY)
         seen = watch(world, 1.5 * self.speed / (self.friction * GRAVITY))
         way = float(np.hypot(*seen.bodies[-1, 0, :2]))
-        return Reading(way, exact, self.speed * seen.dt + rounding(1.0, seen.steps))
+        return seen.reading(way, exact, self.speed, 1.0)
 
 
 @dataclass(frozen=True)
-class StoppingDistanceDiagonal(StoppingDistance):
+class StoppingDistanceDiagonal(StoppingDistance, name="stopping_distance_oblique"):
     """The same at 30 degrees to an axis. Tolerance as of `StoppingDistance`."""
 
-    name = "stopping_distance_oblique"
     direction: float = math.pi / 6
 
 
 @dataclass(frozen=True)
-class Glide(Law):
+class Glide(Law, name="glide", phenomenon="sliding", quantity="speed", unit="m/s"):
     """On ground without friction a slab keeps its speed (Newton's first law). Tolerance: rounding,
     for every consistent method keeps a constant."""
-
-    name = "glide"
-    phenomenon = "sliding"
-    quantity: ClassVar[str] = "speed"
-    unit: ClassVar[str] = "m/s"
 
     speed: float = 1.0
     seconds: float = 1.0
@@ -134,23 +111,17 @@ class Glide(Law):
         slab = Box("slab", SLAB, SLAB_AT, 1.0, 0.0, linear_velocity=(self.speed, 0.0, 0.0))
         return Scene(self.name, (slab,), ground_friction=0.0)
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         return Reading(
             float(seen.bodies[-1, 0, 7]), self.speed, rounding(2 * self.speed, seen.steps)
         )
 
 
 @dataclass(frozen=True)
-class Belt(Carried):
+class Belt(Carried, name="belt", phenomenon="sliding", quantity="acceleration", unit="m/s^2"):
     """On one that starts faster than mu g the box slips, and friction alone moves it: it goes with
     a = mu g. Tolerance: its speed is late by one step at either end of the time T over which it is
     taken: 2 mu g dt / T."""
-
-    name = "belt"
-    phenomenon = "sliding"
-    quantity: ClassVar[str] = "acceleration"
-    unit: ClassVar[str] = "m/s^2"
 
     acceleration: float = 8.0
     seconds: float = 0.4
@@ -159,3 +130,56 @@ class Belt(Carried):
         seen = follow(world, self.ride())
         return acceleration(seen.dt, seen.t, seen.bodies[:, 0, 7], 0.1, self.friction * GRAVITY,
                              self.friction * GRAVITY)  # fmt: skip
+
+
+BALL = 0.05
+"""Radius of the ball on the belt [m]."""
+
+TOP = 0.5
+"""Height of the belt's upper side [m]."""
+
+
+@dataclass(frozen=True)
+class BeltSpeed(Law, name="belt_speed", phenomenon="sliding", quantity="way", unit="m"):
+    """A box laid on a running belt slips until it has the belt's speed: a distance x = v^2 / (2 mu
+    g) from where it was laid (Coulomb's friction does the work of the kinetic energy), and goes on
+    with the belt from v / (mu g) on. Its place is read when it goes with the belt. Tolerance: its
+    speed is late by one step all the time, v dt."""
+
+    speed: float = 0.8
+    friction: float = 0.4
+    seconds: float = 0.6
+
+    def body(self) -> Body:
+        return Box("box", (0.1, 0.1, 0.05), Pose.at(0.0, 0.0, TOP + 0.025), 0.5, self.friction)
+
+    def build(self) -> Scene:
+        belt = Box(
+            "belt",
+            (4.0, 0.4, 0.1),
+            Pose.at(0.0, 0.0, TOP - 0.05),
+            friction=self.friction,
+            linear_velocity=(self.speed, 0.0, 0.0),
+            prescribed=True,
+        )
+        return Scene(self.name, (belt, self.body()), ground_friction=self.friction)
+
+    def read(self, seen: Watched) -> Reading:
+        t, slips = seen.end, self.speed / (self.friction * GRAVITY)
+        exact = self.speed * (t - slips / 2)
+        return seen.reading(seen.bodies[-1, 1, 0], exact, self.speed, 1.0)
+
+
+@dataclass(frozen=True)
+class BallOnBelt(
+    BeltSpeed, name="ball_on_belt", phenomenon="rolling", quantity="speed", unit="m/s"
+):
+    """A ball laid on a running belt comes to roll on it with 2/7 of the belt's speed: friction
+    gives it m v and turns it back by 2/5 m r^2 w = m v r until v + w r is that of the belt.
+    Tolerance: its speed is late by one step, mu g dt."""
+
+    def body(self) -> Body:
+        return Sphere("ball", BALL, Pose.at(0.0, 0.0, TOP + BALL), 0.5, self.friction)
+
+    def read(self, seen: Watched) -> Reading:
+        return seen.reading(seen.bodies[-1, 1, 7], 2 / 7 * self.speed, self.friction * GRAVITY, 1.0)

@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import LONG, Law, Reading, Watched, rounding, watch
+from pytest_simbench.laws.base import LONG, Law, Reading, Watched, rounding
 from pytest_simbench.laws.free import FREE, WEIGHTLESS, rotation_of
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Vector3
 
 
 @dataclass(frozen=True)
-class Spin(Law):
+class Spin(Law, name="spin", phenomenon=FREE, quantity="angular velocity", unit="rad/s"):
     """A body that nobody touches keeps spinning about a principal axis: w is constant (Euler).
     Tolerance: rounding, for every consistent method keeps a constant."""
-
-    name = "spin"
-    phenomenon = FREE
-    quantity: ClassVar[str] = "angular velocity"
-    unit: ClassVar[str] = "rad/s"
 
     spin: float = 5.0
     seconds: float = 1.0
@@ -38,24 +32,20 @@ class Spin(Law):
         )
         return Scene(self.name, (body,), gravity=WEIGHTLESS)
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         return Reading(
             float(seen.bodies[-1, 0, 12]), self.spin, rounding(2 * self.spin, seen.steps)
         )
 
 
 @dataclass(frozen=True)
-class FreeTop(Law):
+class FreeTop(
+    Law, name="free_top", phenomenon=FREE, quantity="angle from the attitude", unit="rad"
+):
     """A symmetric body turns about its own axis while the axis turns about the constant angular
     momentum L, at |L| / I1 (Landau, Lifshitz, Mechanics, section 33): the angle between its
     attitude and that after t is 0. Tolerance: its angular velocity w is late by one step all the
     time, |dw/dt| t dt, and the turn by one, |w| dt."""
-
-    name = "free_top"
-    phenomenon = FREE
-    quantity: ClassVar[str] = "angle from the attitude"
-    unit: ClassVar[str] = "rad"
 
     size: Vector3 = (0.1, 0.1, 0.4)
     omega: Vector3 = (2.0, 0.0, 6.0)
@@ -73,9 +63,8 @@ class FreeTop(Law):
         turn = Rotation.from_rotvec(momentum / moments[0] * t)
         return turn * Rotation.from_rotvec([0.0, 0.0, axial * t])
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
-        t = float(seen.t[-1])
+    def read(self, seen: Watched) -> Reading:
+        t = seen.end
         off = (rotation_of(seen.bodies[-1, 0, 3:7]) * self.attitude(t).inv()).magnitude()
         moments = self.build().bodies[0].inertia()
         momentum = moments * self.omega
@@ -84,16 +73,12 @@ class FreeTop(Law):
         return Reading(float(off), 0.0, allowed + rounding(1.0, seen.steps))
 
 
-class _Tumble(Law):
+class _Tumble(Law, phenomenon=FREE):
     """A body that turns about its middle principal axis, almost: it turns over again and again
     (Dzhanibekov; Poinsot 1834)."""
 
-    phenomenon = FREE
-
     size: ClassVar[Vector3] = (0.3, 0.2, 0.05)
     omega: ClassVar[Vector3] = (0.05, 6.0, 0.05)
-
-    seconds: float
 
     def build(self) -> Scene:
         body = Box("body", self.size, Pose.at(0.0, 0.0, 2.0), 1.0, angular_velocity=self.omega)
@@ -129,18 +114,13 @@ class _Tumble(Law):
 
 
 @dataclass(frozen=True)
-class TumbleEnergy(_Tumble):
+class TumbleEnergy(_Tumble, name="tumble_energy", quantity="change of the energy", unit="%"):
     """A body that turns over keeps its rotational energy, w I w / 2, wherever it stands. Tolerance:
     twice what the angular velocity is off by, as a share: the step times the sum of |d2w/dt2|."""
 
-    name = "tumble_energy"
-    quantity: ClassVar[str] = "change of the energy"
-    unit: ClassVar[str] = "%"
-
     seconds: float = 4.0
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         rows = seen.bodies[:, 0]
         omega = rotation_of(rows[:, 3:7]).inv().apply(rows[:, 10:])
         start = float(self.inertia @ np.square(self.omega)) / 2
@@ -150,18 +130,15 @@ class TumbleEnergy(_Tumble):
 
 
 @dataclass(frozen=True)
-class TumbleMomentum(_Tumble):
+class TumbleMomentum(
+    _Tumble, name="tumble_momentum", quantity="change of the angular momentum", unit="%"
+):
     """It keeps its angular momentum L too, in size and direction. Tolerance: as a share of |L|,
     what the angular velocity is off by, and the turn within one step, |w| dt."""
 
-    name = "tumble_momentum"
-    quantity: ClassVar[str] = "change of the angular momentum"
-    unit: ClassVar[str] = "%"
-
     seconds: float = 4.0
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         start = self.inertia * self.omega
         rows = seen.bodies[:, 0]
         turn = rotation_of(rows[:, 3:7])
@@ -172,6 +149,7 @@ class TumbleMomentum(_Tumble):
         return Reading(100 * worst, 0.0, 100 * allowed)
 
 
+@dataclass(frozen=True)
 class _TumbleDrift(_Tumble):
     """The same for a minute, three times slower: 6 turns over. A first-order method adds to energy
     and momentum in each step, and does not take it back: at 6 rad/s it may lose all that there is
@@ -179,6 +157,11 @@ class _TumbleDrift(_Tumble):
 
     omega: ClassVar[Vector3] = (2 / 120, 2.0, 2 / 120)
     study_timeout: ClassVar[float] = LONG
+
+    seconds: float = 60.0
+
+    def smoke(self) -> Self:
+        return replace(self, seconds=3.0)
 
     def rates(self) -> tuple[FloatArray, FloatArray]:
         """Angular velocity and acceleration in the body's frame, exactly, at even times, (n, 3)."""
@@ -193,23 +176,15 @@ class _TumbleDrift(_Tumble):
 
 
 @dataclass(frozen=True)
-class TumbleEnergyDrift(_TumbleDrift):
+class TumbleEnergyDrift(
+    _TumbleDrift, name="tumble_energy_drift", quantity="change of the energy", unit="%"
+):
     """A body that turns over for a minute keeps its rotational energy E = w I w / 2 (Euler's
     equations I w' = I w x w: w I w' = 0). Tolerance: explicit Euler adds w' I w' dt^2 / 2 to it in
     each step, implicit Euler takes as much away; late by one step is twice that, dt times the sum
     of w' I w' over the time, as a share of E. The protocol `smoke` takes 3 s."""
 
-    name = "tumble_energy_drift"
-    quantity: ClassVar[str] = "change of the energy"
-    unit: ClassVar[str] = "%"
-
-    seconds: float = 60.0
-
-    def smoke(self) -> TumbleEnergyDrift:
-        return replace(self, seconds=3.0)
-
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         start = float(self.inertia @ np.square(self.omega)) / 2
         found = np.square(self.spun(seen)) @ self.inertia / 2
         _, rate = self.rates()
@@ -219,23 +194,18 @@ class TumbleEnergyDrift(_TumbleDrift):
 
 
 @dataclass(frozen=True)
-class TumbleMomentumDrift(_TumbleDrift):
+class TumbleMomentumDrift(
+    _TumbleDrift,
+    name="tumble_momentum_drift",
+    quantity="change of the angular momentum's size",
+    unit="%",
+):
     """It keeps the size of its angular momentum I w (Euler: I w (I w)' = 0). Tolerance: explicit
     Euler adds |I w'|^2 dt^2 to its square in each step, implicit Euler takes as much away, a half
     of that to its size; late by one step is twice that, dt times the sum of |I w'|^2 over the time,
     as a share of |I w|^2. The protocol `smoke` takes 3 s."""
 
-    name = "tumble_momentum_drift"
-    quantity: ClassVar[str] = "change of the angular momentum's size"
-    unit: ClassVar[str] = "%"
-
-    seconds: float = 60.0
-
-    def smoke(self) -> TumbleMomentumDrift:
-        return replace(self, seconds=3.0)
-
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         start = float(np.linalg.norm(self.inertia * self.omega))
         found = np.linalg.norm(self.inertia * self.spun(seen), axis=1)
         _, rate = self.rates()

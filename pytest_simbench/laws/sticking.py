@@ -1,39 +1,89 @@
-"""Laws of sticking: what friction holds."""
+"""Laws of sticking: what friction holds. And what all laws of friction share: slabs on slopes, fans
+of cases around a critical value."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, stillness, watch
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, stillness, watch
 from pytest_simbench.laws.drives import STRONG, follow
-from pytest_simbench.laws.friction import (
-    BETWEEN,
-    SHARES,
-    SLAB,
-    WEDGE,
-    boundary,
-    slab_on,
-    slope_pose,
-)
 from pytest_simbench.laws.mechanisms import Part, mechanism
-from pytest_simbench.scene import Box, Pose, Scene, Trajectory
+from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Trajectory, Vector3
+
+SLAB: Vector3 = (0.1, 0.1, 0.02)
+SLAB_AT = Pose.at(0.0, 0.0, SLAB[2] / 2)
+WEDGE: Vector3 = (0.3, 0.3, 0.05)
+
+
+def tilted(slope: float, direction: float) -> Vector3:
+    """Gravity that makes the ground a slope [tangent], down towards `direction` [rad]."""
+    angle = math.atan(slope)
+    pull = GRAVITY * math.sin(angle)
+    return (
+        pull * math.cos(direction),
+        pull * math.sin(direction),
+        -GRAVITY * math.cos(angle),
+    )
+
+
+def slab_on(name: str, slope: float, direction: float, friction: float) -> Scene:
+    """A slab of 1 kg at rest on such a slope, with one friction for both."""
+    slab = Box("slab", SLAB, SLAB_AT, 1.0, friction)
+    return Scene(name, (slab,), gravity=tilted(slope, direction), ground_friction=friction)
+
+
+def slope_pose(slope: float, direction: float) -> Pose:
+    """A turn that tilts a level plane so that it goes down towards `direction` [rad]."""
+    half = math.atan(slope) / 2
+    down = Pose(quaternion=(math.cos(half), 0.0, math.sin(half), 0.0))
+    return Pose.at(0.0, 0.0, 0.0, yaw=direction) * down
+
+
+SHARES = (0.92, 0.96, 0.98, 1.02, 1.04, 1.08)
+"""Of a critical value: a fan of cases on both sides of it."""
+
+BETWEEN = 0.02
+"""Tolerance of a fan: half of the gap in which the critical value lies, as a share of it."""
+
+
+def fan(critical: float, moved: Sequence[bool]) -> Reading:
+    """The value at which a fan of cases, in the order of `SHARES`, changes from what stays to what
+    moves: in the middle between the two neighbours, at an end where all stay or all move."""
+    values = [share * critical for share in SHARES]
+    stay = len(values) - sum(moved)
+    found = values[0] if stay == 0 else values[-1]
+    if 0 < stay < len(values):
+        found = (values[stay - 1] + values[stay]) / 2
+    return Reading(found, critical, BETWEEN * critical)
+
+
+def acceleration(
+    dt: float, t: FloatArray, speed: FloatArray, begin: float, exact: float, force: float
+) -> Reading:
+    """The slope of a speed [m/s] from `begin` [s] to the end; `force`: the largest one, for each
+    kg [m/s^2]."""
+    used = t > begin
+    found = float(np.polyfit(t[used], speed[used], 1)[0])
+    span = float(t[-1]) - begin
+    return Reading(found, exact, 2 * force * dt / span + rounding(1.0, len(t)))
 
 
 @dataclass(frozen=True)
-class StickAngle(Law):
+class StickAngle(
+    Law,
+    name="stick_angle_x",
+    phenomenon="sticking",
+    quantity="tangent of the steepest slope that holds",
+    unit="",
+):
     """A slab on a slope stays up to the angle atan mu and slides above it (Coulomb; Amontons): six
     slopes, from 0.92 to 1.08 mu. It slides where it has gone half as far as the least steep one
     that must. Tolerance: half of the gap between the slopes on either side, 0.02 mu; no step."""
-
-    name = "stick_angle_x"
-    phenomenon = "sticking"
-    quantity: ClassVar[str] = "tangent of the steepest slope that holds"
-    unit: ClassVar[str] = ""
 
     direction: float = 0.0
     friction: float = 0.5
@@ -56,37 +106,28 @@ class StickAngle(Law):
         steep = math.atan(self.friction)
         pull = GRAVITY * math.cos(steep) * BETWEEN * self.friction
         least = pull * world.time**2 / 4
-        slopes = [share * self.friction for share in SHARES]
-        found = boundary(slopes, [bool(way > least) for way in moved])
-        return Reading(found, self.friction, BETWEEN * self.friction)
+        return fan(self.friction, [bool(way > least) for way in moved])
 
 
 @dataclass(frozen=True)
-class StickAngleAcross(StickAngle):
+class StickAngleAcross(StickAngle, name="stick_angle_y"):
     """The same in the direction y."""
 
-    name = "stick_angle_y"
     direction: float = math.pi / 2
 
 
 @dataclass(frozen=True)
-class StickAngleDiagonal(StickAngle):
+class StickAngleDiagonal(StickAngle, name="stick_angle_diagonal"):
     """The same along a diagonal, where a friction pyramid holds up to sqrt(2) mu, or only up to
     mu / sqrt(2)."""
 
-    name = "stick_angle_diagonal"
     direction: float = math.pi / 4
 
 
 @dataclass(frozen=True)
-class Creep(Law):
+class Creep(Law, name="creep", phenomenon="sticking", quantity="way in 1 s", unit="m"):
     """A slab on a slope of 0.8 mu stays where it is. Tolerance: an equilibrium, g dt^2; it is
     looked at from 0.2 s on."""
-
-    name = "creep"
-    phenomenon = "sticking"
-    quantity: ClassVar[str] = "way in 1 s"
-    unit: ClassVar[str] = "m"
 
     friction: float = 0.5
     share: float = 0.8
@@ -103,15 +144,10 @@ class Creep(Law):
 
 
 @dataclass(frozen=True)
-class Carried(Law):
+class Carried(Law, name="carried", phenomenon="sticking", quantity="way on the carriage", unit="m"):
     """A box on a carriage that starts with less than mu g goes with it: it stays where it lies on
     the carriage. Tolerance: an equilibrium in the carriage's frame, g dt^2, and the carriage's
     motion late by one step, a dt^2."""
-
-    name = "carried"
-    phenomenon = "sticking"
-    quantity: ClassVar[str] = "way on the carriage"
-    unit: ClassVar[str] = "m"
 
     friction: float = 0.5
     acceleration: float = 2.0

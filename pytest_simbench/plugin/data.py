@@ -52,7 +52,7 @@ def read_or_skip(config: pytest.Config, name: str) -> Any:
 def download(config: pytest.Config) -> int:
     """`--sim-download`: bring data sets from their public sources."""
     from pytest_simbench.data.download import download as bring
-    from pytest_simbench.data.errors import DataError
+    from pytest_simbench.data.measured import DataError
     from pytest_simbench.data.sets import data_set
 
     with options.refusing(DataError):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_simbench.scene import FloatArray, Pose, Robot, Vector3
+from pytest_simbench.scene.wire import Wire
 from pytest_simbench.simulator.mesh_check import HEADER, TRIANGLE
-from pytest_simbench.simulator.urdf import PreparedRobot
+from pytest_simbench.simulator.urdf import MovingJoint, PreparedRobot
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +44,7 @@ class Mesh:
 
 
 @dataclass(frozen=True)
-class Part:
+class Part(Wire):
     """One shape of a link, at `pose` in its frame: a box of edge lengths `size` [m], or a mesh by
     its place in `Figure.meshes`."""
 
@@ -54,26 +55,13 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Hinge:
-    """A moving joint: its child hangs at `origin` in the parent's frame, moved along or about
-    `axis`, a unit vector in the child's frame."""
-
-    name: str
-    kind: str
-    parent: str
-    child: str
-    origin: Pose
-    axis: Vector3
-
-
-@dataclass(frozen=True)
 class Figure:
     """A robot to be drawn.
 
     Attributes:
         name: of the robot.
         root: the link that is fixed in the world, its frame the world's.
-        hinges: the moving joints, parents first.
+        hinges: the moving joints, parents first; their axes are unit vectors.
         parts: shapes of all links.
         meshes: that the parts name.
         urdf: the reduced robot as text, without its meshes: their paths do not travel.
@@ -81,7 +69,7 @@ class Figure:
 
     name: str
     root: str
-    hinges: Sequence[Hinge]
+    hinges: Sequence[MovingJoint]
     parts: Sequence[Part]
     meshes: Sequence[Mesh]
     urdf: str
@@ -100,10 +88,7 @@ class Figure:
         return cls(
             robot.name,
             prepared.root,
-            [
-                Hinge(j.name, j.kind, j.parent, j.child, j.origin, _unit(j.axis))
-                for j in prepared.joints
-            ],
+            [replace(joint, axis=_unit(joint.axis)) for joint in prepared.joints],
             [
                 Part(name, s.pose, s.size, None if s.mesh is None else paths.index(s.mesh))
                 for name, s in shapes
@@ -138,21 +123,16 @@ class Figure:
         return {
             "name": self.name,
             "root": self.root,
-            "hinges": [{**h.__dict__, "origin": h.origin.to_wire()} for h in self.hinges],
-            "parts": [{**p.__dict__, "pose": p.pose.to_wire()} for p in self.parts],
+            "hinges": [hinge.to_wire() for hinge in self.hinges],
+            "parts": [part.to_wire() for part in self.parts],
             "urdf": self.urdf,
         }
 
     @classmethod
     def from_wire(cls, data: Mapping[str, Any], meshes: Sequence[Mesh]) -> Figure:
-        hinges = [
-            Hinge(**{**h, "origin": Pose.from_wire(h["origin"]), "axis": _unit(h["axis"])})
-            for h in data["hinges"]
-        ]
-        parts = [
-            Part(**{**p, "pose": Pose.from_wire(p["pose"]), "size": p["size"] and tuple(p["size"])})
-            for p in data["parts"]
-        ]
+        joints = map(MovingJoint.from_wire, data["hinges"])
+        hinges = [replace(joint, axis=_unit(joint.axis)) for joint in joints]
+        parts = [Part.from_wire(part) for part in data["parts"]]
         found = cls(data["name"], data["root"], hinges, parts, meshes, data["urdf"])
         found._check()
         return found
@@ -175,7 +155,7 @@ class Figure:
                 raise ValueError(f"a shape of {part.link!r} has no mesh")
 
 
-def relative(hinge: Hinge, positions: FloatArray) -> FloatArray:
+def relative(hinge: MovingJoint, positions: FloatArray) -> FloatArray:
     """Poses of a joint's child in its parent's frame, (n, 7), at positions (n,) [rad or m]."""
     axis = np.asarray(hinge.axis)
     moved = np.tile(Pose().as_array(), (len(positions), 1))

@@ -22,12 +22,13 @@ from pytest_simbench.robot.adapting import (
     bound_joints,
     free_frames,
     lock_joints,
+    mounted,
+    pairs_not_checked,
 )
 from pytest_simbench.robot.collision import PlanningScene
 from pytest_simbench.robot.errors import RobotError
 from pytest_simbench.robot.hulls import AXES, Cuts, with_hulls
 from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.mounting import mounted, pairs_not_checked
 from pytest_simbench.robot.table import Table
 from pytest_simbench.scene import Gripper, Joint, MotionLimits, Pose, Robot, Scene, SceneError
 from pytest_simbench.simulator import DescriptionError
@@ -35,8 +36,7 @@ from pytest_simbench.simulator.files import FileError, read_file
 from pytest_simbench.simulator.mesh_check import PACKAGE
 from pytest_simbench.simulator.robot_files import content, content_of, description_xml, keep
 from pytest_simbench.simulator.urdf import pose_of_rpy
-from pytest_simbench.simulator.urdf_check import MOVING, Description
-from pytest_simbench.simulator.xml_file import read_xml
+from pytest_simbench.simulator.urdf_check import MOVING, Description, read_xml
 
 ARMS = Path(__file__).with_name("arms")
 """Files of the built-in arms."""

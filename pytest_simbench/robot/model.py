@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from pytest_simbench.scene import Body, Box, FloatArray, MotionLimits, Pose, Robot
 from pytest_simbench.simulator import DescriptionError
-from pytest_simbench.simulator.robot_check import check_robot
+from pytest_simbench.simulator.links import check_robot
 
 
 class RobotModel:

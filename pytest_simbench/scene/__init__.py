@@ -1,14 +1,13 @@
 """The declarative world: bodies, robot, gravity, friction, gains; frozen, in SI units."""
 
 from pytest_simbench.scene.bodies import Box, Capsule, ConvexMesh, Cylinder, Sphere, penetration
-from pytest_simbench.scene.body import Body, Solid
+from pytest_simbench.scene.body import Body, Solid, Wrench
 from pytest_simbench.scene.checks import SceneError
 from pytest_simbench.scene.polytope import Polytope, principal
 from pytest_simbench.scene.pose import FloatArray, Pose, Quaternion, Vector3, rotation_matrix
 from pytest_simbench.scene.robot import Closure, Gripper, Joint, MotionLimits, Robot
 from pytest_simbench.scene.scene import STANDARD_GRAVITY, Scene
 from pytest_simbench.scene.trajectory import Trajectory
-from pytest_simbench.scene.wrench import Wrench
 
 __all__ = [
     "STANDARD_GRAVITY",

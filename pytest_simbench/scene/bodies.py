@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
 
 import numpy as np
 
@@ -56,10 +55,6 @@ class Box(Body, kind="box"):
         depth = share * float(half.min())
         return Hull(half - depth), depth
 
-    def to_wire(self) -> dict[str, Any]:
-        data = super().to_wire()
-        return {"name": data.pop("name"), "size": list(self.size), **data}
-
 
 @dataclass(frozen=True)
 class Sphere(Body, kind="sphere"):
@@ -98,9 +93,6 @@ class Sphere(Body, kind="sphere"):
     def core(self, share: float) -> tuple[Hull, float]:
         return Hull(np.zeros(3)), self.radius
 
-    def to_wire(self) -> dict[str, Any]:
-        return {"kind": "sphere", "radius": self.radius, **super().to_wire()}
-
 
 @dataclass(frozen=True)
 class _Tube(Body):
@@ -118,10 +110,6 @@ class _Tube(Body):
         super().__post_init__()
         check_number(self.radius, f"the radius [m] of {self.name!r}", 0.0, above=True)
         check_number(self.length, f"the length [m] of {self.name!r}", 0.0, above=True)
-
-    def to_wire(self) -> dict[str, Any]:
-        kind = type(self).__name__.lower()
-        return {"kind": kind, "radius": self.radius, "length": self.length, **super().to_wire()}
 
 
 class Cylinder(_Tube, kind="cylinder"):
@@ -259,10 +247,6 @@ class ConvexMesh(Body, kind="convex_mesh"):
 
     def core(self, share: float) -> tuple[Corners, float]:
         return Corners(np.array(self.vertices)), 0.0
-
-    def to_wire(self) -> dict[str, Any]:
-        vertices = [list(vertex) for vertex in self.vertices]
-        return {"kind": "convex_mesh", "vertices": vertices, **super().to_wire()}
 
 
 def penetration(a: Body, b: Body, share: float = 0.1) -> float:

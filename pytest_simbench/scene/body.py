@@ -1,14 +1,17 @@
-"""What all rigid bodies have: where they are, what they are made of, how they start to move."""
+"""What all rigid bodies have: where they are, what they are made of, how they start to move, and
+which forces act on them."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self, cast
 
 import numpy as np
 
 from pytest_simbench.scene.checks import (
+    LARGEST,
     SceneError,
     check_name,
     check_number,
@@ -17,7 +20,46 @@ from pytest_simbench.scene.checks import (
 )
 from pytest_simbench.scene.overlap import Core
 from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
-from pytest_simbench.scene.wrench import Wrench
+from pytest_simbench.scene.wire import Wire
+
+NONE: Vector3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wrench(Wire):
+    """A force and a torque on a free body, both constant, in the world frame.
+
+    Attributes:
+        force: at the body's centre of mass [N].
+        torque: about it [N m].
+        start, end: simulated times between which they act [s]; the world is loaded at 0.
+
+    Raises:
+        SceneError: a number that is none, or an end that is not after the start.
+    """
+
+    force: Vector3 = NONE
+    torque: Vector3 = NONE
+    start: float = 0.0
+    end: float = LARGEST
+
+    def __post_init__(self) -> None:
+        check_numbers(self.force, 3, "the force [N] of a wrench")
+        check_numbers(self.torque, 3, "the torque [N m] of a wrench")
+        check_number(self.start, "the start [s] of a wrench", 0.0)
+        check_number(self.end, "the end [s] of a wrench", 0.0)
+        if self.end <= self.start:
+            raise SceneError(f"a wrench starts at {self.start} s and ends at {self.end} s")
+
+    def mean(self, begin: float, end: float) -> FloatArray:
+        """Force and torque between two times [s], in the mean, (6,) [N, N m].
+
+        A time step in which a wrench starts or ends has its share: whatever the step, a wrench
+        gives a body the momentum force times (end - start).
+        """
+        share = max(0.0, min(end, self.end) - max(begin, self.start)) / (end - begin)
+        return share * np.array([*self.force, *self.torque])
+
 
 Colour = tuple[float, float, float, float]
 
@@ -44,7 +86,7 @@ class Solid:
     mesh: tuple[tuple[Vector3, ...], tuple[tuple[int, int, int], ...]] = ((), ())
 
 
-class _Placed(ABC):
+class _Placed(Wire, ABC):
     """The fields that all kinds of bodies have and give by position, after those of their kind."""
 
     name: str
@@ -91,6 +133,11 @@ class Body(_Placed):
     moments: Vector3 | None = None
     prescribed: bool = False
     wrenches: tuple[Wrench, ...] = ()
+
+    optional = (
+        "linear_velocity", "angular_velocity", "restitution", "linear_damping", "angular_damping",
+        "moments", "prescribed", "wrenches",
+    )  # fmt: skip
 
     kinds: ClassVar[dict[str, type[Body]]] = {}
     """Every kind of body, by what `to_wire` calls it."""
@@ -192,40 +239,12 @@ class Body(_Placed):
         return self.changed(pose=pose)
 
     def to_wire(self) -> dict[str, Any]:
-        """As plain data; what is as by default is left out, but for what a box always had."""
-        data = {
-            "name": self.name,
-            "pose": self.pose.to_wire(),
-            "mass": self.mass,
-            "friction": self.friction,
-            "colour": list(self.colour),
-        }
-        if self.linear_velocity != STILL:
-            data["linear_velocity"] = list(self.linear_velocity)
-        if self.angular_velocity != STILL:
-            data["angular_velocity"] = list(self.angular_velocity)
-        for name in ("restitution", "linear_damping", "angular_damping"):
-            if getattr(self, name):
-                data[name] = getattr(self, name)
-        if self.moments is not None:
-            data["moments"] = list(self.moments)
-        if self.prescribed:
-            data["prescribed"] = True
-        if self.wrenches:
-            data["wrenches"] = [wrench.to_wire() for wrench in self.wrenches]
-        return data
+        """With its kind; a box names none, as before there were other bodies."""
+        return ({} if self.kind == "box" else {"kind": self.kind}) | super().to_wire()
 
     @classmethod
-    def from_wire(cls, data: dict[str, Any]) -> Body:
+    def from_wire(cls, data: Mapping[str, Any]) -> Self:
         """The body of `to_wire`, of its own kind."""
-        values: dict[str, Any] = {name: _frozen(value) for name, value in data.items()}
-        values["pose"] = Pose.from_wire(data["pose"])
-        values["wrenches"] = tuple(map(Wrench.from_wire, data.get("wrenches", ())))
-        kind: Any = cls.kinds[values.pop("kind", "box")]
-        made: Body = kind(**values)
-        return made
-
-
-def _frozen(value: Any) -> Any:
-    """The value, its lists as tuples."""
-    return tuple(map(_frozen, value)) if isinstance(value, list) else value
+        told = dict(data)
+        kind: Any = cls.kinds[told.pop("kind", "box")]
+        return cast("Self", super(Body, kind).from_wire(told))

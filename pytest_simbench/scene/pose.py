@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from pytest_simbench.scene.wire import Wire
 
 FloatArray = NDArray[np.float64]
 Vector3 = tuple[float, float, float]
@@ -55,7 +56,7 @@ def quaternion_product(a: Sequence[float], b: Sequence[float]) -> Quaternion:
 
 
 @dataclass(frozen=True)
-class Pose:
+class Pose(Wire):
     """A rigid transform from a body's frame to the world's (or a parent's).
 
     Attributes:
@@ -121,10 +122,3 @@ class Pose:
         A cube lying on any of its six faces has tilt 0.
         """
         return float(math.acos(min(1.0, float(np.abs(self.rotation()[2]).max()))))
-
-    def to_wire(self) -> dict[str, Any]:
-        return {"position": list(self.position), "quaternion": list(self.quaternion)}
-
-    @classmethod
-    def from_wire(cls, data: dict[str, Any]) -> Pose:
-        return cls(tuple(data["position"]), tuple(data["quaternion"]))

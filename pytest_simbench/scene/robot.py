@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -17,10 +16,11 @@ from pytest_simbench.scene.checks import (
     check_pose,
 )
 from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
+from pytest_simbench.scene.wire import Wire
 
 
 @dataclass(frozen=True)
-class Joint:
+class Joint(Wire):
     """One driven joint and its controller: tau = clip(k (q* - q) + d (v* - v) + tau_ff, +-limit).
 
     Attributes:
@@ -46,12 +46,9 @@ class Joint:
             check_number(getattr(self, quantity), what, 0.0, STIFFEST)
         check_number(self.initial_position, f"the initial position of joint {self.name!r}")
 
-    def to_wire(self) -> dict[str, Any]:
-        return dict(self.__dict__)
-
 
 @dataclass(frozen=True)
-class Gripper:
+class Gripper(Wire):
     """A gripper; without joints, a hand that only touches.
 
     Its fingers are coupled mechanically: they always stand equally far from the middle. Without
@@ -83,16 +80,9 @@ class Gripper:
         """Pairs of joints that stand at equal positions: the first one, and each other."""
         return tuple((self.joints[0], other) for other in self.joints[1:])
 
-    def to_wire(self) -> dict[str, Any]:
-        return {**self.__dict__, "joints": list(self.joints)}
-
-    @classmethod
-    def from_wire(cls, data: dict[str, Any]) -> Gripper:
-        return cls(**{**data, "joints": tuple(data["joints"])})
-
 
 @dataclass(frozen=True)
-class Closure:
+class Closure(Wire):
     """What closes a loop of links, which no tree of joints has: a point of one link is held at a
     point of another, and both turn freely about it (a ball and its socket).
 
@@ -116,15 +106,6 @@ class Closure:
             raise SceneError(f"a closure holds link {self.first!r} at itself")
         for point in (self.first_point, self.second_point):
             check_numbers(point, 3, f"a point [m] of the closure of {self.first!r}")
-
-    def to_wire(self) -> dict[str, Any]:
-        points = {"first_point": self.first_point, "second_point": self.second_point}
-        return {**vars(self), **{key: list(point) for key, point in points.items()}}
-
-    @classmethod
-    def from_wire(cls, data: dict[str, Any]) -> Closure:
-        points = {key: tuple(data[key]) for key in ("first_point", "second_point")}
-        return cls(**{**data, **points})
 
 
 @dataclass(frozen=True)
@@ -162,12 +143,8 @@ class MotionLimits:
         return np.array(getattr(self, what), dtype=float)
 
 
-ON_THIS_SIDE = ("limits", "swing", "stand")
-"""What simulators are not told of a robot."""
-
-
 @dataclass(frozen=True)
-class Robot:
+class Robot(Wire):
     """A fixed-base arm with a gripper.
 
     Attributes:
@@ -191,6 +168,9 @@ class Robot:
         self_collide: whether its links collide with each other (SDF's word); two that one joint
             joins never do. Only for engines with the capability `self_collide`.
     """
+
+    optional = ("closures", "self_collide")
+    unwritten = ("limits", "swing", "stand")
 
     name: str
     urdf: str
@@ -251,31 +231,3 @@ class Robot:
     def column(self, attribute: str) -> FloatArray:
         """One attribute of all joints, (n_joints,): `robot.column("effort_limit")`."""
         return np.array([getattr(joint, attribute) for joint in self.joints], dtype=float)
-
-    def to_wire(self) -> dict[str, Any]:
-        """As plain data; a robot without loops, or whose links pass through each other, names
-        neither, as before robots could have them."""
-        told = {key: value for key, value in self.__dict__.items() if key not in ON_THIS_SIDE}
-        closures = [closure.to_wire() for closure in told.pop("closures")]
-        colliding = {"self_collide": True} if told.pop("self_collide") else {}
-        return {
-            **told,
-            **({"closures": closures} if closures else {}),
-            **colliding,
-            "packages": dict(self.packages),
-            "joints": [joint.to_wire() for joint in self.joints],
-            "gripper": self.gripper.to_wire(),
-            "base": self.base.to_wire(),
-        }
-
-    @classmethod
-    def from_wire(cls, data: dict[str, Any]) -> Robot:
-        return cls(
-            **{
-                **data,
-                "joints": tuple(Joint(**joint) for joint in data["joints"]),
-                "gripper": Gripper.from_wire(data["gripper"]),
-                "base": Pose.from_wire(data["base"]),
-                "closures": tuple(map(Closure.from_wire, data.get("closures", ()))),
-            }
-        )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import Any
 
 from pytest_simbench.scene.bodies import penetration
 from pytest_simbench.scene.body import Body
@@ -17,6 +16,7 @@ from pytest_simbench.scene.checks import (
 )
 from pytest_simbench.scene.pose import Pose, Vector3
 from pytest_simbench.scene.robot import Robot
+from pytest_simbench.scene.wire import Wire
 
 STANDARD_GRAVITY: Vector3 = (0.0, 0.0, -9.80665)
 """Standard acceleration of free fall [m/s^2] (ISO 80000-3)."""
@@ -29,7 +29,7 @@ OVERLAP_TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True)
-class Scene:
+class Scene(Wire):
     """Bodies, robot and gravity above an endless ground plane at z = 0.
 
     Attributes:
@@ -46,6 +46,8 @@ class Scene:
         SceneError: two bodies share a name or overlap, one has the name of what is in every
             scene, a free one is outside the room, or a number is none.
     """
+
+    optional = ("ground_restitution",)
 
     name: str
     bodies: tuple[Body, ...] = ()
@@ -142,29 +144,3 @@ class Scene:
 
     def with_pose(self, name: str, pose: Pose) -> Scene:
         return self.with_body(self.body(name).moved_to(pose))
-
-    def to_wire(self) -> dict[str, Any]:
-        """The scene as nested dicts, lists, strings and numbers; a ground that does not bounce is
-        not named, as in scenes written before one could."""
-        bouncing = {"ground_restitution": self.ground_restitution}
-        return {
-            "name": self.name,
-            "bodies": [body.to_wire() for body in self.bodies],
-            "robot": None if self.robot is None else self.robot.to_wire(),
-            "gravity": list(self.gravity),
-            "ground_friction": self.ground_friction,
-            "room": list(self.room),
-            **(bouncing if self.ground_restitution else {}),
-        }
-
-    @classmethod
-    def from_wire(cls, data: dict[str, Any]) -> Scene:
-        return cls(
-            name=data["name"],
-            bodies=tuple(Body.from_wire(body) for body in data["bodies"]),
-            robot=None if data["robot"] is None else Robot.from_wire(data["robot"]),
-            gravity=tuple(data["gravity"]),
-            ground_friction=data["ground_friction"],
-            room=tuple(data.get("room", ROOM)),  # examples written before there was one
-            ground_restitution=data.get("ground_restitution", 0.0),
-        )

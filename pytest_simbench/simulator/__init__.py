@@ -1,7 +1,7 @@
 """What an adapter implements, its settings, capabilities and report of the world it built."""
 
 from pytest_simbench.records.choices import Seen
-from pytest_simbench.simulator.base import Simulator
+from pytest_simbench.simulator.base import Simulator, chosen_on, heavy, lazy_import
 from pytest_simbench.simulator.errors import (
     DescriptionError,
     DivergedError,
@@ -14,9 +14,7 @@ from pytest_simbench.simulator.errors import (
     UnavailableError,
 )
 from pytest_simbench.simulator.info import FOLLOWER, Capability, Deviation, SimulatorInfo
-from pytest_simbench.simulator.lazy import lazy_import
 from pytest_simbench.simulator.parity import one_value
-from pytest_simbench.simulator.prescribed import heavy
 from pytest_simbench.simulator.settings import Settings
 from pytest_simbench.simulator.urdf import PreparedRobot
 
@@ -38,6 +36,7 @@ __all__ = [
     "SimulatorInfo",
     "StateError",
     "UnavailableError",
+    "chosen_on",
     "heavy",
     "lazy_import",
     "one_value",

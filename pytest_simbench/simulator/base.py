@@ -2,18 +2,69 @@
 
 from __future__ import annotations
 
+import importlib
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
+from types import ModuleType
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pytest_simbench.records.choices import Seen
-from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.scene import FloatArray, Scene, Vector3
 from pytest_simbench.simulator.errors import NotSupportedError
 from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.settings import Settings
+
+TIMES = 1e4
+"""What strikes a heavy body moves it by this part of its own change of velocity, for one step. With
+more, solvers lose digits: in one engine a cube of 0.2 kg jitters at 20 mm/s on a belt of 1e7 kg."""
+
+
+def heavy(scene: Scene) -> float:
+    """Mass [kg] and moments of inertia [kg m^2] of what stands for a body that moves as prescribed,
+    where an engine knows none: many times those of any other body.
+
+    Such an engine gets a free body that nothing moves: so heavy that what touches it hardly changes
+    its velocity, alike about all axes so that it turns steadily, and without weight.
+    `Simulator.lead` gives it its state before each step.
+    """
+    return TIMES * max([1.0, *(body.mass for body in scene.bodies)])
+
+
+EYE: Vector3 = (2.0, -2.1, 1.35)
+"""Of the camera, in the world [m]: the same for every engine, so that pictures can be compared. The
+robot stands on the left, what it throws comes nearer on the right."""
+
+LOOK_AT: Vector3 = (0.6, 0.0, 0.5)
+"""The middle of the picture, in the world [m]; z is up."""
+
+FIELD_OF_VIEW = math.radians(40.0)
+"""Vertical [rad]."""
+
+
+def chosen_on(*tuned: Seen, real: tuple[Seen, ...] = ()) -> Mapping[str, tuple[Seen, ...]]:
+    """What the settings of an adapter were chosen on, by profile: `tuned` on seeds, `real` on these
+    and on each third toss of those that are not held out, and on what else is named."""
+    return {"tuned": tuned, "real": (*tuned, Seen.motions("cube_tosses", 0, 564, 6), *real)}
+
+
+class _LazyModule(ModuleType):
+    def __getattr__(self, attribute: str) -> Any:
+        if attribute.startswith("__"):
+            raise AttributeError(attribute)
+        return getattr(importlib.import_module(self.__name__), attribute)
+
+
+def lazy_import(name: str) -> Any:
+    """Stand-in for the module `name`, which is imported when its first attribute is read.
+
+    An adapter's facts and settings can so be read where its engine is not installed. Missing
+    submodules are imported by naming them: `lazy_import("engine.viewer")`.
+    """
+    return _LazyModule(name)
 
 
 class Simulator(ABC):
@@ -29,7 +80,7 @@ class Simulator(ABC):
     bodies are always given in the order of `scene.free_bodies`, joints in the order of
     `scene.robot.joints`. Joint drives obey the law in `scene.Joint`; where the engine has a native
     drive, it is used. Links of the robot collide with each other only where
-    the robot has `self_collide` (`simulator.self_collision`), everything else does.
+    the robot has `self_collide` (`simulator.links`), everything else does.
 
     Attributes:
         info: facts about the engine, its capabilities and its deviations.
@@ -43,6 +94,8 @@ class Simulator(ABC):
     info: ClassVar[SimulatorInfo]
     profiles: ClassVar[Mapping[str, Settings]]
     chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {}
+
+    _steps: int = 0
 
     def __init__(self, settings: Settings, *, gui: bool = False) -> None:
         self.settings = settings
@@ -93,9 +146,10 @@ class Simulator(ABC):
         """Advance the world by one time step."""
 
     @property
-    @abstractmethod
     def time(self) -> float:
-        """Simulated time since `load` [s]."""
+        """Simulated time since `load` [s]; that of the steps that the adapter counts in `_steps`,
+        unless it tells another one."""
+        return self._steps * self.settings.timestep
 
     @abstractmethod
     def body_state(self) -> FloatArray:
@@ -140,8 +194,7 @@ class Simulator(ABC):
         raise self._missing("joint wrenches")
 
     def render(self, width: int, height: int) -> NDArray[np.uint8]:
-        """A picture of the world without a window, (height, width, 3), RGB; from where
-        `simulator.view` says, so that those of two engines can be compared."""
+        """A picture of the world without a window, (height, width, 3), RGB, from `EYE`."""
         raise self._missing("offscreen picture")
 
     def refresh_window(self) -> None:  # noqa: B027 - a window may draw itself

@@ -32,6 +32,15 @@ class Capability(StrEnum):
     DETERMINISTIC = "deterministic"
     GPU = "gpu"
 
+    @classmethod
+    def named(cls, names: str) -> frozenset[Capability]:
+        """Those of the names, separated by blanks.
+
+        Raises:
+            ValueError: there is no such capability.
+        """
+        return frozenset(map(cls, names.split()))
+
 
 MEASURED_ON = "panda"
 """The robot on which the sizes of declared deviations were measured."""

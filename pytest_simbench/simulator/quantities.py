@@ -48,9 +48,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.scene import Box, ConvexMesh, FloatArray, Robot, Scene
-from pytest_simbench.simulator.kinematics import link_poses, motion_subspace
-from pytest_simbench.simulator.loops import reduced
-from pytest_simbench.simulator.self_collision import links_collide
+from pytest_simbench.simulator.links import link_poses, links_collide, motion_subspace, reduced
 from pytest_simbench.simulator.settings import Settings
 from pytest_simbench.simulator.shapes import DIRECTIONS, outlines, reach, shape_points
 from pytest_simbench.simulator.urdf import ROOT, PreparedRobot

@@ -21,8 +21,7 @@ from typing import Any
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator.files import FileError, read_file
 from pytest_simbench.simulator.mesh_check import LARGEST_MESH
-from pytest_simbench.simulator.urdf_check import Description
-from pytest_simbench.simulator.xml_file import LARGEST_FILE
+from pytest_simbench.simulator.urdf_check import LARGEST_FILE, Description
 
 CONTENT = "content"
 """Key under which a robot's wire form carries its description."""

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.scene import FloatArray, Pose, Robot, Vector3
+from pytest_simbench.scene.wire import Wire
 from pytest_simbench.simulator.errors import DescriptionError
 from pytest_simbench.simulator.urdf_check import Description
 
@@ -62,7 +63,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class MovingJoint:
+class MovingJoint(Wire):
     """A revolute or prismatic joint between two links of the reduced robot."""
 
     name: str

@@ -12,14 +12,14 @@ import math
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Mapping
 from typing import NoReturn
+from xml.parsers import expat
 
 import numpy as np
 
 from pytest_simbench.scene.checks import LARGEST, UNIT_TOLERANCE, SceneError, check_name
 from pytest_simbench.simulator.errors import DescriptionError
-from pytest_simbench.simulator.files import FileError
+from pytest_simbench.simulator.files import FileError, read_file
 from pytest_simbench.simulator.mesh_check import check_mesh, mesh_path
-from pytest_simbench.simulator.xml_file import read_xml
 
 MOST_LINKS = 300
 
@@ -308,3 +308,58 @@ def _plain_float(text: str) -> float:
     if "_" in text:
         raise ValueError(text)
     return float(text)
+
+
+LARGEST_FILE = 16 * 2**20
+"""Of a URDF or SRDF file [bytes]; the largest in example-robot-data have 0.3 MB."""
+
+MOST_ELEMENTS = 100_000
+
+
+def read_xml(path: str, what: str, lines: dict[ET.Element, int] | None = None) -> ET.Element:
+    """The root element of an XML file without a document type, which could define entities.
+
+    Args:
+        path: of the file.
+        what: the file is, for messages.
+        lines: takes the line of each element.
+
+    Raises:
+        DescriptionError: no file, too large, or no such XML.
+    """
+    try:
+        data = read_file(path, LARGEST_FILE, what)
+    except FileError as error:
+        raise DescriptionError(str(error)) from None
+    builder, parser = ET.TreeBuilder(), expat.ParserCreate()
+    count = 0
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal count
+        count += 1
+        if count > MOST_ELEMENTS:
+            raise DescriptionError(f"{path} has more than {MOST_ELEMENTS} elements")
+        element = builder.start(tag, attributes)
+        if lines is not None:
+            lines[element] = parser.CurrentLineNumber
+
+    def refuse(*_: object) -> None:
+        raise DescriptionError(
+            f"{path}, line {parser.CurrentLineNumber}: {what} has a document type (<!DOCTYPE>), "
+            "which may define entities; leave it out"
+        )
+
+    handlers: dict[str, Callable[..., object]] = {
+        "StartElementHandler": start,
+        "EndElementHandler": builder.end,
+        "CharacterDataHandler": builder.data,
+        "StartDoctypeDeclHandler": refuse,
+        "EntityDeclHandler": refuse,
+    }
+    for name, handler in handlers.items():
+        setattr(parser, name, handler)
+    try:
+        parser.Parse(data, True)
+    except (expat.ExpatError, ValueError, LookupError) as error:
+        raise DescriptionError(f"{what} {path} is not valid XML: {error}") from None
+    return builder.close()

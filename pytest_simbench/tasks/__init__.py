@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pytest_simbench.tasks.arm_following import ArmFollowing, CorrectedArmFollowing
     from pytest_simbench.tasks.arm_pushing import ArmPushing
-    from pytest_simbench.tasks.base import Jitter, Outcome, Task
-    from pytest_simbench.tasks.moments import Moment
+    from pytest_simbench.tasks.base import Jitter, Moment, Outcome, Task
     from pytest_simbench.tasks.pushing import CurvePushing, Pushing
     from pytest_simbench.tasks.stacking import Stacking
     from pytest_simbench.tasks.throwing import Throwing
@@ -25,8 +24,7 @@ __all__ = [
 _MODULES = {
     "arm_following": ("ArmFollowing", "CorrectedArmFollowing"),
     "arm_pushing": ("ArmPushing",),
-    "base": ("Jitter", "Outcome", "Task"),
-    "moments": ("Moment",),
+    "base": ("Jitter", "Moment", "Outcome", "Task"),
     "pushing": ("CurvePushing", "Pushing"),
     "stacking": ("Stacking",),
     "throwing": ("Throwing",),

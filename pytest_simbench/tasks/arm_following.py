@@ -9,35 +9,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from scipy.signal import medfilt
 
 from pytest_simbench.client.world import World
-from pytest_simbench.data import pushes
-from pytest_simbench.data.pushes import COMMANDS, FREE, PUSH, ArmRun, ArmRuns, Command
-from pytest_simbench.data.tosses import Half
+from pytest_simbench.data.pushes import COMMANDS, FREE, PUSH, ArmRun, Command
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene, Trajectory
+from pytest_simbench.scene import FloatArray, Pose, Robot, Scene, Trajectory
 from pytest_simbench.tasks.arm_pushing import (
-    BLUE,
     CUBE,
-    CUBE_MASS,
     CUBE_SIZE,
-    FINGER_ANGLE,
-    FRICTION,
     JOINTS,
-    MARKER_ASIDE,
-    arm,
-    calibrated,
+    MicoTask,
     marker,
     yaw,
 )
-from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task
+from pytest_simbench.tasks.base import Count, Jitter, Outcome
 
 CONTROL_PERIOD, GAIN, FASTEST = 0.05, 10.0, math.radians(30.0)
 """Of the source's control law: each period [s] a joint's velocity becomes the gain [1/s] times what
@@ -78,7 +70,7 @@ SMALLEST = 2
 
 
 @dataclass(frozen=True)
-class ArmFollowing(Task):
+class ArmFollowing(MicoTask):
     """Give the simulated arm the commands of the real one.
 
     The control law runs on its own reference, as if the drives followed it: the joints are sent
@@ -86,26 +78,15 @@ class ArmFollowing(Task):
     is fed forward.
 
     Attributes:
-        runs: the real ones.
-        half: which of them.
-        finger_angle, friction: as of `ArmPushing`.
-        marker_aside: as of `ArmPushing`.
         most: how many of the runs; None: all.
     """
 
     name: ClassVar[str] = "arm_following"
-    study_timeout: ClassVar[float] = 300.0
-    shares_worker: ClassVar[bool] = True
     references: ClassVar[Mapping[str, float]] = {"hand_error": 0.0, "rest_error": 0.0}
     commands: ClassVar[Mapping[str, tuple[Command, ...]]] = COMMANDS
     initial: ClassVar[Mapping[str, tuple[float, ...]]] = dict.fromkeys(COMMANDS, (0.0,) * 6)
     """Joints before the first command, by experiment [degrees]."""
 
-    runs: ArmRuns
-    half: Half = "held_out"
-    finger_angle: float = FINGER_ANGLE
-    marker_aside: float = MARKER_ASIDE
-    friction: float = FRICTION
     most: int | None = None
 
     @property
@@ -124,33 +105,15 @@ class ArmFollowing(Task):
         both = (self.runs.of(experiment, self.half) for experiment in (FREE, PUSH))
         return tuple(run for pair in zip(*both, strict=False) for run in pair)[: self.most]
 
-    @property
-    def repetitions(self) -> int:
-        return len(self.chosen)
-
-    def run(self, seed: int) -> ArmRun:
-        """The one of a seed."""
-        return self.chosen[seed % len(self.chosen)]
-
-    def sample(self, seed: int) -> tuple[str, int]:
-        return pushes.NAME, self.run(seed).number
-
     def smoke(self) -> ArmFollowing:
         return replace(self, most=SMALLEST)
-
-    def parameters(self) -> dict[str, Any]:
-        """The runs by their digest, and on which ones fingers, friction and marker were found."""
-        told = {f"task.{item.name}": getattr(self, item.name) for item in fields(self)}
-        return {**told, "task.runs": self.runs.digest, "task.calibrated_on": calibrated(self.runs)}
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         run = self.run(seed)
         at = np.median(run.cube[:QUIET], axis=0)
         lying = Pose.at(float(at[0]), float(at[1]), CUBE_SIZE / 2, yaw=yaw(at))
-        box = Box(CUBE, (CUBE_SIZE,) * 3, lying, CUBE_MASS, self.friction, BLUE)
         start = np.radians(self.initial[run.experiment])
-        robot = replace(self._arm(start), friction=self.friction)
-        return Scene("arm following", (box,), robot, ground_friction=self.friction)
+        return self.with_cube("arm following", lying, start)
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         run = self.run(seed)
@@ -164,7 +127,7 @@ class ArmFollowing(Task):
         world.mark("end")
         assert motion is not None  # a log was asked for
         joints = motion.joints[:, 0]
-        model = RobotModel(self._arm(trajectory.position[0]))
+        model = RobotModel(self.arm(trajectory.position[0]))
         at = np.stack([np.interp(time, motion.time, column) for column in joints.T], axis=1)
         off = np.linalg.norm(hands(model, at) - real, axis=1)
         behind = joints[-1] - trajectory.position[-1]
@@ -194,15 +157,12 @@ class ArmFollowing(Task):
     def seen(self, run: ArmRun) -> tuple[FloatArray, FloatArray]:
         """Times since the first command [s], (n,), and where the real hand, the origin of link 6,
         was, (n, 3) [m]."""
-        model_arm = self._arm(np.zeros(len(JOINTS)))
+        model_arm = self.arm(np.zeros(len(JOINTS)))
         back = (Pose.at(self.marker_aside, 0.0, 0.0) * marker(self.runs, model_arm)).inverse()
         since = run.time - run.time[0] - started(run, model_arm)
         rows = np.flatnonzero(since >= 0)[:: round(COMPARED / TICK)]
         real = [(Pose.from_array(run.hand[row]) * back).position for row in rows]
         return since[rows], np.array(real)
-
-    def _arm(self, start: FloatArray) -> Robot:
-        return arm(self.runs.urdf, self.finger_angle, tuple(map(float, start)))
 
 
 @dataclass(frozen=True)

@@ -20,17 +20,17 @@ from scipy.signal import savgol_filter
 
 from pytest_simbench.client.world import World
 from pytest_simbench.data import pushes
-from pytest_simbench.data.errors import DataError
+from pytest_simbench.data.measured import DataError, Half
 from pytest_simbench.data.pushes import PUSH, ArmRun, ArmRuns
-from pytest_simbench.data.tosses import Half
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.robot.adapting import bound_joints, lock_joints
+from pytest_simbench.robot.kinematics import track
 from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.tracking import track
 from pytest_simbench.scene import Box, FloatArray, Gripper, Joint, Pose, Robot, Scene, Trajectory
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.robot_files import keep
-from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task
+from pytest_simbench.tasks.base import Count, Jitter, Outcome
+from pytest_simbench.tasks.measured import MeasuredTask
 
 CUBE_SIZE, CUBE_MASS = 0.075, 0.0884
 """[m], [kg] (the source)."""
@@ -79,8 +79,8 @@ class Course(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ArmPushing(Task):
-    """Push a cube with the measured motion of a hand.
+class MicoTask(MeasuredTask):
+    """A task of the Kinova Mico2 and a cube, against the runs of the real ones.
 
     What the source does not tell was calibrated on the runs that are not held out: angle of the
     fingers, friction, and where the marker body sits across the hand (docs/reality.md).
@@ -94,15 +94,40 @@ class ArmPushing(Task):
         friction: Coulomb coefficient of table, cube and hand.
     """
 
-    name: ClassVar[str] = "arm_pushing"
-    study_timeout: ClassVar[float] = 300.0
-    shares_worker: ClassVar[bool] = True
+    data: ClassVar[str] = pushes.NAME
 
     runs: ArmRuns
     half: Half = "held_out"
     finger_angle: float = FINGER_ANGLE
     marker_aside: float = MARKER_ASIDE
     friction: float = FRICTION
+
+    def run(self, seed: int) -> ArmRun:
+        """The one of a seed."""
+        run: ArmRun = self.chosen[self.place(seed)]  # type: ignore[assignment]
+        return run
+
+    def parameters(self) -> dict[str, Any]:
+        """The runs by their digest, and on which ones fingers, friction and marker were found."""
+        told = {f"task.{item.name}": getattr(self, item.name) for item in fields(self)}
+        return {**told, "task.runs": self.runs.digest, "task.calibrated_on": calibrated(self.runs)}
+
+    def with_cube(self, name: str, cube: Pose, start: FloatArray) -> Scene:
+        """The scene of that name: the cube at a pose, the arm's joints at `start`, (6,) [rad]."""
+        box = Box(CUBE, (CUBE_SIZE,) * 3, cube, CUBE_MASS, self.friction, BLUE)
+        robot = replace(self.arm(start), friction=self.friction)
+        return Scene(name, (box,), robot, ground_friction=self.friction)
+
+    def arm(self, start: FloatArray) -> Robot:
+        """The arm, its joints at `start`, (6,) [rad]."""
+        return arm(self.runs.urdf, self.finger_angle, tuple(map(float, start)))
+
+
+@dataclass(frozen=True)
+class ArmPushing(MicoTask):
+    """Push a cube with the measured motion of a hand."""
+
+    name: ClassVar[str] = "arm_pushing"
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
@@ -123,33 +148,15 @@ class ArmPushing(Task):
         return self.runs.of(PUSH, self.half)
 
     @property
-    def repetitions(self) -> int:
-        return len(self.chosen)
-
-    @property
     def references(self) -> Mapping[str, float]:  # type: ignore[override]
         """The real ones' mean."""
         real = [run.displacement for run in self.chosen]
         return {"displacement": float(np.mean(real)), "displacement_error": 0.0,
                 "turn_error": 0.0, "way_error": 0.0}  # fmt: skip
 
-    def run(self, seed: int) -> ArmRun:
-        """The one of a seed."""
-        return self.chosen[seed % len(self.chosen)]
-
-    def sample(self, seed: int) -> tuple[str, int]:
-        return pushes.NAME, self.run(seed).number
-
-    def parameters(self) -> dict[str, Any]:
-        """The runs by their digest, and on which ones fingers, friction and marker were found."""
-        told = {f"task.{item.name}": getattr(self, item.name) for item in fields(self)}
-        return {**told, "task.runs": self.runs.digest, "task.calibrated_on": calibrated(self.runs)}
-
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         course = self._course(seed)
-        box = Box(CUBE, (CUBE_SIZE,) * 3, course.start, CUBE_MASS, self.friction, BLUE)
-        robot = replace(self._arm(course.path[0]), friction=self.friction)
-        return Scene("arm pushing", (box,), robot, ground_friction=self.friction)
+        return self.with_cube("arm pushing", course.start, course.path[0])
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         course = self._course(seed)
@@ -165,20 +172,17 @@ class ArmPushing(Task):
         off = float(np.abs(motion.joints[-1, 0] - course.path[-1]).max())
         return Outcome(metrics, {"run": self.run(seed).name, **details, "hand_error": off})
 
-    def _arm(self, start: FloatArray) -> Robot:
-        return arm(self.runs.urdf, self.finger_angle, tuple(map(float, start)))
-
     def _course(self, seed: int) -> Course:
-        return course(self.run(seed), self._arm(np.zeros(6)), self.marker(), self.marker_aside)
+        return course(self.run(seed), self.arm(np.zeros(6)), self.marker(), self.marker_aside)
 
     def marker(self) -> Pose:
         """Of the marker body on link 6: the mean over the runs that are not held out."""
-        return marker(self.runs, self._arm(np.zeros(6)))
+        return marker(self.runs, self.arm(np.zeros(6)))
 
     def _trajectory(self, path: FloatArray, gravity: FloatArray) -> Trajectory:
         velocity = np.gradient(path, TICK, axis=0)
         acceleration = np.gradient(velocity, TICK, axis=0)
-        model = RobotModel(self._arm(path[0]))
+        model = RobotModel(self.arm(path[0]))
         effort = model.inverse_dynamics(gravity, path, velocity, acceleration)
         return Trajectory(TICK, path, velocity, effort)
 

@@ -9,12 +9,12 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from pytest_simbench.client.tape import Tape
 from pytest_simbench.client.world import World
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.readings import Reading
 from pytest_simbench.robot.errors import RobotError
 from pytest_simbench.scene import Box, Pose, Robot, Scene, Vector3
-from pytest_simbench.tasks.moments import Moment
 
 CUBE_SIZE = 0.05
 """Edge of every cube [m] (the study)."""
@@ -110,6 +110,11 @@ class Task(ABC):
         held against, if it is."""
         return None
 
+    @property
+    def scale(self) -> float:
+        """All lengths of the scene over those for an arm of full size, as the study's."""
+        return 1.0
+
     def smoke(self) -> Task:
         """The smallest version of the task that still exercises every part of it."""
         return self
@@ -145,7 +150,8 @@ class Task(ABC):
         is a part of the record by itself."""
         told = asdict(self)  # type: ignore[call-overload]
         told.pop(ROBOT, None)
-        return dict(_flat("task", told))
+        scaled = {} if self.scale == 1.0 else {"task.scale": self.scale}
+        return {**dict(_flat("task", told)), **scaled}
 
     @abstractmethod
     def scene(self, seed: int, jitter: Jitter) -> Scene:
@@ -207,3 +213,23 @@ class Randomness(NamedTuple):
     def of(cls, seed: int) -> Randomness:
         """Those of a repetition's seed."""
         return cls(*map(np.random.default_rng, np.random.SeedSequence(seed).spawn(3)))
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A moment of a task.
+
+    Attributes:
+        name: for tables.
+        phase: of the task.
+        operation: number of the operation in that phase before which it is, from 0.
+    """
+
+    name: str
+    phase: str
+    operation: int = 0
+
+    def place(self, tape: Tape) -> int | None:
+        """Number of the operation of a tape before which it is; None: there is none."""
+        numbers = [k for k, operation in enumerate(tape) if operation.phase == self.phase]
+        return numbers[self.operation] if self.operation < len(numbers) else None

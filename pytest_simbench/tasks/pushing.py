@@ -1,8 +1,8 @@
 """A third task, not of the study: push a block with the closed hand, along a line or round a curve.
 
 The hand moves slowly, so theory says where the block goes: it stays at rest against the hand, on a
-line always, and on a curve that is not too sharp (`sliding`). What a simulator adds to that
-(creep along the hand, a turn, a lead, a tilt) is its error.
+line always, and on a curve that is not too sharp (`smallest_turning_radius`). What a simulator adds
+to that (creep along the hand, a turn, a lead, a tilt) is its error.
 """
 
 from __future__ import annotations
@@ -11,9 +11,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from scipy.optimize import brentq
 
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.records.metrics import Metric
@@ -25,10 +26,8 @@ from pytest_simbench.robot.panda import panda
 from pytest_simbench.robot.scale import scale_of
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene, Vector3
 from pytest_simbench.tasks.arm import Arm
-from pytest_simbench.tasks.base import Count, Jitter, Outcome, Randomness, Task, distance
+from pytest_simbench.tasks.base import Count, Jitter, Moment, Outcome, Randomness, Task, distance
 from pytest_simbench.tasks.manipulator import APPROACH
-from pytest_simbench.tasks.moments import Moment
-from pytest_simbench.tasks.sliding import smallest_turning_radius
 
 BLOCK_SIZE = (0.10, 0.10, 0.05)
 """[m]. It slides before it tips wherever the hand touches it: mu times its height is a quarter of
@@ -113,10 +112,6 @@ class Pushing(Task):
     def begin(self) -> Pose:
         """Of the block."""
         return Pose.at(*(self.scale * part for part in START.position))
-
-    def parameters(self) -> dict[str, Any]:
-        told = super().parameters()
-        return told if self.scale == 1.0 else told | {"task.scale": self.scale}
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
@@ -268,3 +263,41 @@ def _tilt(pose: Pose) -> float:
     """Of the block's top from the horizontal [rad], up to pi: a block on its side is no upright
     one, as a cube would be."""
     return math.acos(float(np.clip(pose.rotation()[2, 2], -1.0, 1.0)))
+
+
+def lever(points: FloatArray, radius: float) -> float:
+    """How far beside the centre the pushing force must act, in a curve of the centre along the
+    block's heading [m].
+
+    Args:
+        points: that bear equal shares of the load, x along the heading, from the centre [m],
+            (n, 2).
+        radius: of the curve [m].
+    """
+    x, y = points.T
+    velocity = np.stack([1.0 - y / radius, x / radius])
+    resisting = velocity / np.linalg.norm(velocity, axis=0)
+    torque = x * resisting[1] - y * resisting[0]
+    return float(torque.sum() / resisting[0].sum())
+
+
+def smallest_turning_radius(length: float, width: float, contact: float) -> float:
+    """The sharpest curve on which a block that stands on its corners stays at rest against the hand
+    that pushes it [m].
+
+    A flat pusher keeps a block at rest against itself as long as the force that the motion needs
+    acts within their contact (Lynch and Mason, Stable Pushing, 1996). Friction under the block
+    decides where that is: each point that bears it resists with mu times its load against its own
+    velocity (Coulomb; Goyal, Ruina, Papadopoulos, Planar sliding with dry friction, 1991). How the
+    load is spread does not matter for mu, but for the lever. It is greatest where the corners bear
+    all, as they do in engines.
+
+    Args:
+        length, width: edges of the block on the plane, along and across its heading [m].
+        contact: width of the face that pushes, at the block's middle [m].
+    """
+    corners = np.array([[x, y] for x in (-length / 2, length / 2) for y in (-width / 2, width / 2)])
+    farthest = length**2 / contact  # from where on the lever is (length / 2)^2 / radius
+    return float(
+        brentq(lambda r: lever(corners, r) - contact / 2, 0.51 * width, 10 * farthest + width)
+    )

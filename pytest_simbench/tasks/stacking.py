@@ -33,8 +33,7 @@ from pytest_simbench.tasks.base import (
     distance,
     scaled,
 )
-from pytest_simbench.tasks.manipulator import Manipulator
-from pytest_simbench.tasks.reach import cannot_handle
+from pytest_simbench.tasks.manipulator import Manipulator, cannot_handle
 
 TABLE_TOP = 0.30
 """Height of the table top [m] (study code, Webots)."""
@@ -119,8 +118,7 @@ class Stacking(Task):
         return grasping_scale_of(self.robot or panda())
 
     def parameters(self) -> dict[str, Any]:
-        told = super().parameters() | {"task.finger_closed": self.arm.gripper.closed}
-        return told if self.scale == 1.0 else told | {"task.scale": self.scale}
+        return super().parameters() | {"task.finger_closed": self.arm.gripper.closed}
 
     @property
     def cubes(self) -> int:

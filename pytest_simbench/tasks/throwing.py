@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -40,17 +40,15 @@ from pytest_simbench.tasks.base import (
     STUDY_TOLERANCE,
     Count,
     Jitter,
+    Moment,
     Outcome,
     Randomness,
     Task,
     cube,
     scaled,
 )
-from pytest_simbench.tasks.impact import impact
-from pytest_simbench.tasks.manipulator import Manipulator
-from pytest_simbench.tasks.moments import Moment
-from pytest_simbench.tasks.reach import cannot_handle
-from pytest_simbench.tasks.throw_analysis import Thrown
+from pytest_simbench.tasks.manipulator import Manipulator, cannot_handle
+from pytest_simbench.tasks.throw_analysis import Thrown, impact
 
 PROJECTILE = Pose.at(0.5, 0.0, CUBE_SIZE / 2)
 """The cube to be thrown lies on the ground (study code)."""
@@ -120,10 +118,6 @@ class Throwing(Task):
     def scale(self) -> float:
         """All lengths of the scene over those of the study's: 0.4 for the SO-101."""
         return grasping_scale_of(self.robot or panda())
-
-    def parameters(self) -> dict[str, Any]:
-        told = super().parameters()
-        return told if self.scale == 1.0 else told | {"task.scale": self.scale}
 
     @property
     def metrics(self) -> tuple[Metric, ...]:

@@ -16,10 +16,12 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.data import tosses as cube
-from pytest_simbench.data.tosses import Half, Toss, Tosses
+from pytest_simbench.data.measured import Half
+from pytest_simbench.data.tosses import Toss, Tosses
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, FloatArray, Scene
-from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task
+from pytest_simbench.tasks.base import Count, Jitter, Outcome
+from pytest_simbench.tasks.measured import MeasuredTask
 
 SMALLEST = 5
 """Tosses of the smallest version."""
@@ -30,11 +32,11 @@ CUBE = "cube"
 
 
 @dataclass(frozen=True)
-class Tossing(Task):
+class Tossing(MeasuredTask):
     """Toss a cube as it was really tossed.
 
-    Its start is not disturbed: there is one truth for one start. Lengths and velocities are taken
-    as the source has them, though all its lengths read 2 % short (docs/reality.md).
+    Lengths and velocities are taken as the source has them, though all its lengths read 2 % short
+    (docs/reality.md).
 
     Attributes:
         tosses: the real ones.
@@ -44,8 +46,7 @@ class Tossing(Task):
     """
 
     name: ClassVar[str] = "tossing"
-    study_timeout: ClassVar[float] = 300.0
-    shares_worker: ClassVar[bool] = True
+    data: ClassVar[str] = cube.NAME
     references: ClassVar[Mapping[str, float]] = {"position_error": 0.0, "rotation_error": 0.0}
 
     tosses: Tosses
@@ -68,17 +69,9 @@ class Tossing(Task):
         """The tosses that repetitions go through, in the order of their numbers."""
         return self.tosses.half(self.half)[: self.most]
 
-    @property
-    def repetitions(self) -> int:
-        """Each toss once."""
-        return len(self.chosen)
-
     def toss(self, seed: int) -> Toss:
-        """The one of a seed: consecutive seeds go through all of them before one comes again."""
-        return self.chosen[seed % len(self.chosen)]
-
-    def sample(self, seed: int) -> tuple[str, int]:
-        return cube.NAME, self.toss(seed).index
+        """The one of a seed."""
+        return self.chosen[self.place(seed)]
 
     def smoke(self) -> Tossing:
         return replace(self, most=SMALLEST)

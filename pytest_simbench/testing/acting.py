@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pytest_simbench.laws.driven import BeltSpeed
-from pytest_simbench.laws.wrenches import AxialForce, AxialTorque
+from pytest_simbench.laws.free import AxialForce, AxialTorque
+from pytest_simbench.laws.sliding import BeltSpeed
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes

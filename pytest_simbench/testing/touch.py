@@ -9,7 +9,7 @@ import numpy as np
 
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot
 from pytest_simbench.simulator import PreparedRobot
-from pytest_simbench.simulator.kinematics import link_poses
+from pytest_simbench.simulator.links import link_poses
 from pytest_simbench.simulator.shapes import DIRECTIONS, placed, shape_points
 from pytest_simbench.testing.scenes import MASS, at_random, lifted
 

@@ -26,13 +26,11 @@ from pytest_simbench import __version__
 from pytest_simbench.scene import Scene, Trajectory
 from pytest_simbench.simulator import Simulator, SimulatorError, SimulatorInfo
 from pytest_simbench.simulator.info import alternatives, importable
-from pytest_simbench.simulator.loops import check_loops
+from pytest_simbench.simulator.links import check_loops, check_names, check_self_collision
 from pytest_simbench.simulator.memory import remembering
 from pytest_simbench.simulator.parity import check
 from pytest_simbench.simulator.quantities import expected_quantities
-from pytest_simbench.simulator.robot_check import check_names
 from pytest_simbench.simulator.robot_files import received
-from pytest_simbench.simulator.self_collision import check_self_collision
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.worker.acting import Acting
 from pytest_simbench.worker.state import (

@@ -22,7 +22,7 @@ from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.scene.plausibility import implausible
 from pytest_simbench.simulator import DivergedError, ParityError, Simulator
-from pytest_simbench.simulator.kinematics import link_poses
+from pytest_simbench.simulator.links import link_poses
 from pytest_simbench.simulator.parity import Lasting
 from pytest_simbench.simulator.shapes import DIRECTIONS, OUTLINES
 from pytest_simbench.simulator.urdf import PreparedRobot

@@ -32,7 +32,7 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
-from pytest_simbench.simulator.loops import ends, reduced
+from pytest_simbench.simulator.links import ends, reduced
 
 from .bodies import ONE_CONTACT_ON_A_PLANE, add_body, add_ground, set_surface
 from .readback import ReadBack
@@ -58,17 +58,9 @@ class DART(Simulator):
         language="C++",
         tested_version="6.20.0",
         oldest_version="6.20.0",  # older ones have neither the detector nor the solver of `tuned`
-        capabilities=frozenset(
-            {
-                Capability.WINDOW,
-                Capability.SAVE_RESTORE,
-                Capability.CONTACT_COUNT,
-                Capability.CONTACT_FORCES,
-                Capability.LOOPS,
-                Capability.SELF_COLLIDE,
-                Capability.JOINT_WRENCHES,
-                Capability.DETERMINISTIC,
-            }
+        capabilities=Capability.named(
+            "window save_restore contact_count contact_forces loops self_collide "
+            "joint_wrenches deterministic"
         ),
         deviations=(
             Deviation("joint/*/armature", "DART has no rotor inertia"),
@@ -197,9 +189,7 @@ class DART(Simulator):
         self.command(initial, 0 * initial, 0 * initial)
 
     def read_back(self) -> dict[str, Any]:
-        return ReadBack(
-            self.world, self._ground, self._bodies, self._robot, self.scene, self.prepared
-        ).all()
+        return ReadBack(self).all()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         # Servo motors find the effort themselves, so there is nothing to feed forward.

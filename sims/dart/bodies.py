@@ -16,7 +16,6 @@ from pytest_simbench.simulator.shapes import write_obj
 
 dartpy = lazy_import("dartpy")
 
-
 SLAB = (100.0, 100.0, 1.0)
 """Edges of a ground that is a box [m]; no room of a scene goes so far."""
 

@@ -6,14 +6,12 @@ with a collision detector (FCL, exact) that the world does not use.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose, Scene
-from pytest_simbench.simulator import PreparedRobot, lazy_import, one_value
-from pytest_simbench.simulator.quantities import touches
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.simulator import lazy_import, one_value, readback
 from pytest_simbench.simulator.shapes import (
     DIRECTIONS,
     box_corners,
@@ -29,63 +27,44 @@ _PROBE, _AWAY = 2.0, 3.0
 """Edge of the box that measures, and how far from a mesh's origin its face stands [m]."""
 
 
-class ReadBack:
-    """Reads the quantities of `simulator.quantities` that DART tells.
+class ReadBack(readback.ReadBack):
+    """Reads the quantities of `simulator.quantities` that DART tells."""
 
-    Args:
-        world: of DART.
-        ground: its body.
-        bodies: DART's body of each box.
-        robot: the skeleton, or None.
-        scene, prepared: names of what was built; no value is taken from them.
-    """
-
-    def __init__(
-        self,
-        world: Any,
-        ground: Any,
-        bodies: Mapping[str, Any],
-        robot: Any,
-        scene: Scene,
-        prepared: PreparedRobot | None,
-    ) -> None:
-        self.world, self.ground, self.bodies, self.robot = world, ground, bodies, robot
-        self.scene, self.prepared = scene, prepared
+    def __init__(self, simulator: Any) -> None:
+        super().__init__(simulator)
+        self.ground, self.bodies = simulator._ground, simulator._bodies
+        self.made, self.robot = simulator.world, simulator._robot
         self.detector = dartpy.collision.FCLCollisionDetector()
         self.probe = dartpy.dynamics.SimpleFrame(dartpy.dynamics.Frame.World(), "probe")
         self.probe.setShape(dartpy.dynamics.BoxShape(np.full(3, _PROBE)))
 
-    def all(self) -> dict[str, Any]:
-        """Every quantity that DART tells, by its name."""
+    def world(self) -> dict[str, Any]:
         plane = self.ground.getShapeNode(0)
         surface = plane.getDynamicsAspect()
         top = plane.getShape().getSize()[2] / 2 if _is_box(plane) else plane.getShape().getOffset()
-        height = top + plane.getWorldTransform().translation()[2]
-        reported: dict[str, Any] = {
-            "gravity": self.world.getGravity(),
-            "timestep": self.world.getTimeStep(),
+        return {
+            "gravity": self.made.getGravity(),
+            "timestep": self.made.getTimeStep(),
             "ground/friction": surface.getFrictionCoeff(),
             "ground/restitution": surface.getRestitutionCoeff() ** 2,
-            "ground/height": height,
+            "ground/height": top + plane.getWorldTransform().translation()[2],
         }
-        for name, body in self.bodies.items():
-            reported |= self._box(f"body/{name}", body)
-        if self.prepared is not None:
-            for name in self.prepared.links:
-                body = self.robot.getBodyNode(name)
-                reported |= self._part(f"link/{name}", body, body.getWorldTransform())
-            for link in self.prepared.moving_links:
-                body = self.robot.getBodyNode(link.name)
-                reported |= _inertial(f"link/{link.name}", body)
-            for name in self.prepared.robot.joint_names:
-                reported |= _joint(f"joint/{name}", self.robot.getJoint(name))
-            others = map(self.robot.getJoint, self.prepared.robot.gripper.joints[1:])
-            mimic = dartpy.dynamics.ActuatorType.MIMIC
-            reported["gripper/coupled"] = float(all(j.getActuatorType() == mimic for j in others))
-        return reported | touches(self.scene, self.prepared, self._can_touch)
 
-    def _box(self, prefix: str, body: Any) -> dict[str, Any]:
-        """A box; its frame is its body's."""
+    def link(self, prefix: str, name: str) -> dict[str, Any]:
+        body = self.robot.getBodyNode(name)
+        found = self._part(prefix, body, body.getWorldTransform())
+        return found if name == self.prepared.root else found | _inertial(prefix, body)
+
+    def joint(self, prefix: str, name: str) -> dict[str, Any]:
+        return _joint(prefix, self.robot.getJoint(name))
+
+    def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
+        mimic = dartpy.dynamics.ActuatorType.MIMIC
+        return all(self.robot.getJoint(other).getActuatorType() == mimic for _, other in pairs)
+
+    def body(self, prefix: str, name: str) -> dict[str, Any]:
+        """A body; its frame is that of DART's."""
+        body = self.bodies[name]
         joint = body.getParentJoint()
         found = self._part(prefix, body, body.getWorldTransform())
         mobile = body.getSkeleton().isMobile() and joint.getNumDofs() == 6
@@ -105,9 +84,7 @@ class ReadBack:
         """Pose, shapes and surface of a body."""
         shapes = _colliding(body)
         position, turn = place.translation(), place.quaternion().wxyz()
-        found = {
-            f"{prefix}/pose": np.concatenate([position, turn]),
-        }
+        found = {f"{prefix}/pose": np.concatenate([position, turn])}
         boxes = [self._reach(shape, place) for shape in shapes if _is_box(shape)]
         rounds = [_round(shape, place) for shape in shapes if _is_round(shape)]
         others = (shape for shape in shapes if not (_is_box(shape) or _is_round(shape)))
@@ -138,7 +115,7 @@ class ReadBack:
             reaches.append(_AWAY - group.distance(option))
         return np.array(reaches) + directions @ (centre - place.translation())
 
-    def _can_touch(self, a: str, b: str) -> bool:
+    def can_touch(self, a: str, b: str) -> bool:
         first, second = self._body(a), self._body(b)
         if not (first.isCollidable() and second.isCollidable()):
             return False

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from pytest_simbench.simulator import Seen, Settings
+from pytest_simbench.simulator import Seen, Settings, chosen_on
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,4 @@ PROFILES: Mapping[str, Settings] = {
     "real": TUNED,
 }
 
-SEEDS = (Seen.seeds("throwing", 100, 100), Seen.seeds("stacking", 100, 100))
-
-CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
-    "tuned": SEEDS,
-    "real": (*SEEDS, Seen.motions("cube_tosses", 0, 564, 6)),
-}
+CHOSEN_ON = chosen_on(Seen.seeds("throwing", 100, 100), Seen.seeds("stacking", 100, 100))

@@ -44,11 +44,10 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
-from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
+from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
 
-from . import releases
 from .readback import ReadBack
-from .settings import CHOSEN_ON, PROFILES, DrakeSettings
+from .settings import CHOSEN_ON, OLDEST, PROFILES, DrakeSettings
 from .world import World, transform
 
 analysis = lazy_import("pydrake.systems.analysis")
@@ -71,20 +70,10 @@ class Drake(Simulator):
         engine="Drake SAP",
         language="C++",
         tested_version="1.51.1",
-        oldest_version=releases.OLDEST,
-        capabilities=frozenset(
-            {
-                Capability.WINDOW,
-                Capability.OFFSCREEN,
-                Capability.SAVE_RESTORE,
-                Capability.EXACT_RESTORE,
-                Capability.CONTACT_COUNT,
-                Capability.CONTACT_FORCES,
-                Capability.LOOPS,
-                Capability.SELF_COLLIDE,
-                Capability.JOINT_WRENCHES,
-                Capability.DETERMINISTIC,
-            }
+        oldest_version=OLDEST,
+        capabilities=Capability.named(
+            "window offscreen save_restore exact_restore contact_count contact_forces loops "
+            "self_collide joint_wrenches deterministic"
         ),
         deviations=(
             Deviation(
@@ -172,7 +161,7 @@ class Drake(Simulator):
         self._commanded = (initial, rest, rest)
 
     def read_back(self) -> dict[str, Any]:
-        return ReadBack(self.world, self.context).all()
+        return ReadBack(self).all()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self._commanded = (position, velocity, effort)
@@ -230,10 +219,8 @@ class Drake(Simulator):
             yield names[pair.id_B], names[pair.id_A], wrench
         for k in range(results.num_hydroelastic_contacts()):
             info = results.hydroelastic_contact_info(k)
-            surface, spatial = (
-                info.contact_surface(),
-                info.F_Ac_W(),
-            )  # on the first, at the centroid
+            surface = info.contact_surface()
+            spatial = info.F_Ac_W()  # on the first, at the centroid
             force = np.asarray(spatial.translational())
             torque = spatial.rotational() + np.cross(surface.centroid(), force)
             yield names[surface.id_M()], names[surface.id_N()], np.concatenate([force, torque])

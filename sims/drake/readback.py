@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.scene import FloatArray, Pose
-from pytest_simbench.simulator import PreparedRobot, heavy, lazy_import, one_value
-from pytest_simbench.simulator.quantities import touches
+from pytest_simbench.simulator import heavy, lazy_import, one_value, readback
 from pytest_simbench.simulator.shapes import (
     box_corners,
     cylinder_reach,
@@ -27,56 +26,77 @@ math = lazy_import("pydrake.math")
 trees = lazy_import("pydrake.multibody.tree")
 
 
-class ReadBack:
-    """Reads the quantities of `simulator.quantities` from plant, shapes and `context`."""
+class ReadBack(readback.ReadBack):
+    """Reads the quantities of `simulator.quantities` from plant, shapes and context."""
 
-    def __init__(self, world: World, context: Any) -> None:
-        self.world = world
-        self.context = context
-        shapes = world.plant.get_geometry_query_input_port().Eval(context)
+    def __init__(self, simulator: Any) -> None:
+        super().__init__(simulator.world)
+        self.made: World = simulator.world
+        self.plant, self.context = simulator.plant, simulator.context
+        shapes = self.plant.get_geometry_query_input_port().Eval(self.context)
         self.inspector = shapes.inspector()
 
-    def all(self) -> dict[str, Any]:
-        """Every quantity by its name."""
-        world = self.world
-        ground = self.inspector.GetPoseInFrame(world.shapes["ground"][0])
-        reported: dict[str, Any] = {
-            "gravity": world.plant.gravity_field().gravity_vector(),
-            "timestep": world.plant.time_step(),
+    def world(self) -> dict[str, Any]:
+        ground = self.inspector.GetPoseInFrame(self.made.shapes["ground"][0])
+        return {
+            "gravity": self.plant.gravity_field().gravity_vector(),
+            "timestep": self.plant.time_step(),
             "ground/height": ground.translation()[2],
             "ground/friction": self._friction("ground"),
         }
-        for name, body in world.bodies.items():
-            reported |= self._box(name, body)
-        if world.prepared is not None:
-            reported |= self._robot(world.prepared)
-        return reported | touches(world.scene, world.prepared, self._can_touch)
 
-    def _box(self, name: str, body: Any) -> dict[str, Any]:
-        """A box; a fixed one is a shape of the world, whose frame is the shape's own."""
-        world, prefix = self.world, f"body/{name}"
-        free = body.index() != world.plant.world_body().index()
+    def body(self, prefix: str, name: str) -> dict[str, Any]:
+        """A body; a fixed one is a shape of the world, whose frame is the shape's own."""
+        body = self.made.bodies[name]
+        free = body.index() != self.plant.world_body().index()
         frame = math.RigidTransform()
         if not free:
-            frame = self.inspector.GetPoseInFrame(world.shapes[name][0])
-        found = self._part(prefix, name, world.plant.EvalBodyPoseInWorld(self.context, body), frame)
-        light = body.default_mass() < heavy(world.scene)  # else it moves as prescribed
+            frame = self.inspector.GetPoseInFrame(self.made.shapes[name][0])
+        pose = self.plant.EvalBodyPoseInWorld(self.context, body)
+        found = self._part(prefix, name, pose, frame)
+        light = body.default_mass() < heavy(self.scene)  # else it moves as prescribed
         found[f"{prefix}/dynamic"] = float(free and light and not body.is_locked(self.context))
         if free and light:
             found |= self._inertial(prefix, body)
-            speed = world.plant.EvalBodySpatialVelocityInWorld(self.context, body)
+            speed = self.plant.EvalBodySpatialVelocityInWorld(self.context, body)
             found[f"{prefix}/velocity"] = [*speed.translational(), *speed.rotational()]
-            joint = world.floating_joint(body)
+            joint = self.made.floating_joint(body)
             found[f"{prefix}/damping"] = [
                 joint.default_translational_damping() / found[f"{prefix}/mass"],
                 joint.default_angular_damping() / np.max(found[f"{prefix}/inertia"]),
             ]
         return found
 
+    def link(self, prefix: str, name: str) -> dict[str, Any]:
+        body = self.made.links[name]
+        pose = self.plant.EvalBodyPoseInWorld(self.context, body)
+        found = self._part(prefix, name, pose, math.RigidTransform())
+        return found if name == self.prepared.root else found | self._inertial(prefix, body)
+
+    def joint(self, prefix: str, name: str) -> dict[str, Any]:
+        joint, drive = self.made.joints[name], self.made.drives[name]
+        gains = drive.get_controller_gains()
+        return {
+            f"{prefix}/axis": _axis(joint),
+            f"{prefix}/limits": [
+                joint.position_lower_limits()[0],
+                joint.position_upper_limits()[0],
+            ],
+            f"{prefix}/effort_limit": drive.effort_limit(),
+            f"{prefix}/stiffness": gains.p,
+            f"{prefix}/damping": gains.d + joint.GetDampingVector(self.context)[0],
+            f"{prefix}/armature": drive.calc_reflected_inertia(self.context),
+            f"{prefix}/initial_position": joint.GetOnePosition(self.context),
+        }
+
+    def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
+        active = self.plant.GetConstraintActiveStatus
+        return all(active(self.context, made) for made in self.made.couplings)
+
     def _part(self, prefix: str, owner: str, pose: Any, frame: Any) -> dict[str, Any]:
         """Pose, shapes and surface of what is in `frame` of a body at `pose` in the world."""
         place = pose @ frame
-        shapes = self.world.shapes.get(owner, [])
+        shapes = self.made.shapes.get(owner, [])
         found: dict[str, Any] = {
             f"{prefix}/pose": [*place.translation(), *place.rotation().ToQuaternion().wxyz()],
         }
@@ -117,7 +137,7 @@ class ReadBack:
         inertia = body.CalcSpatialInertiaInBodyFrame(self.context)
         com = inertia.get_com()
         central = inertia.Shift(com).CalcRotationalInertia()
-        enabled = self.world.plant.gravity_field().is_enabled(body.model_instance())
+        enabled = self.plant.gravity_field().is_enabled(body.model_instance())
         return {
             f"{prefix}/mass": inertia.get_mass(),
             f"{prefix}/com": com,
@@ -128,17 +148,17 @@ class ReadBack:
     def _friction(self, name: str) -> Any:
         """The one friction coefficient of all shapes of a body; all of them if they differ."""
         values = []
-        for made in self.world.shapes[name]:
+        for made in self.made.shapes[name]:
             surface = self.inspector.GetProximityProperties(made)
             friction = surface.GetProperty("material", "coulomb_friction")
             values += [friction.static_friction(), friction.dynamic_friction()]
         return one_value(values)
 
     def _margin(self, name: str) -> Any:
-        surfaces = (self.inspector.GetProximityProperties(m) for m in self.world.shapes[name])
+        surfaces = (self.inspector.GetProximityProperties(m) for m in self.made.shapes[name])
         return one_value([s.GetPropertyOrDefault("hydroelastic", "margin", 0.0) for s in surfaces])
 
-    def _can_touch(self, a: str, b: str) -> bool:
+    def can_touch(self, a: str, b: str) -> bool:
         """Whether the main shapes of two can collide; of two links, whether any can."""
         pairs = [(x, y) for x in self._shapes(a) for y in self._shapes(b)]
         found = (not self.inspector.CollisionFiltered(x, y) for x, y in pairs)
@@ -146,32 +166,10 @@ class ReadBack:
 
     def _shapes(self, name: str) -> Sequence[Any]:
         """All but the spheres in corners, which do not collide with each other."""
-        made = self.world.shapes.get(name.partition("/")[2] or name, [])
+        made = self.made.shapes.get(name.partition("/")[2] or name, [])
         if len(made) == 1:
             return made
         return [m for m in made if not isinstance(self.inspector.GetShape(m), geometry.Sphere)]
-
-    def _robot(self, prepared: PreparedRobot) -> dict[str, Any]:
-        world, context = self.world, self.context
-        coupled = [world.plant.GetConstraintActiveStatus(context, c) for c in world.couplings]
-        reported: dict[str, Any] = {"gripper/coupled": float(all(coupled))}
-        for name in prepared.robot.joint_names:
-            joint, drive = world.joints[name], world.drives[name]
-            gains = drive.get_controller_gains()
-            limits = [joint.position_lower_limits()[0], joint.position_upper_limits()[0]]
-            reported[f"joint/{name}/axis"] = _axis(joint)
-            reported[f"joint/{name}/limits"] = limits
-            reported[f"joint/{name}/effort_limit"] = drive.effort_limit()
-            reported[f"joint/{name}/stiffness"] = gains.p
-            reported[f"joint/{name}/damping"] = gains.d + joint.GetDampingVector(context)[0]
-            reported[f"joint/{name}/armature"] = drive.calc_reflected_inertia(context)
-            reported[f"joint/{name}/initial_position"] = joint.GetOnePosition(context)
-        for name in prepared.links:
-            pose = world.plant.EvalBodyPoseInWorld(context, world.links[name])
-            reported |= self._part(f"link/{name}", name, pose, math.RigidTransform())
-        for link in prepared.moving_links:
-            reported |= self._inertial(f"link/{link.name}", world.links[link.name])
-        return reported
 
 
 def _merged(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -18,18 +20,11 @@ from pytest_simbench.scene import (
     Sphere,
 )
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, heavy, lazy_import
-from pytest_simbench.simulator.loops import reduced
-from pytest_simbench.simulator.self_collision import joined
+from pytest_simbench.simulator.links import joined, reduced
 from pytest_simbench.simulator.shapes import mesh_points
-from pytest_simbench.simulator.urdf import Link, Shape
+from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
 
-from . import releases
-from .settings import DrakeSettings
-from .shapes import (
-    corner_centres,
-    fitting_radius,
-    pad_centres,
-)
+from .settings import DrakeSettings, without_sampled_ports
 
 eigen = lazy_import("pydrake.common.eigen_geometry")
 geometry = lazy_import("pydrake.geometry")
@@ -95,7 +90,7 @@ class World:
     def _options(self) -> Any:
         s = self.settings
         return plants.MultibodyPlantConfig(
-            **releases.without_sampled_ports(plants.MultibodyPlantConfig),
+            **without_sampled_ports(plants.MultibodyPlantConfig),
             time_step=s.timestep,
             contact_model=s.contact_model,
             discrete_contact_approximation=s.approximation,
@@ -301,3 +296,32 @@ def _robot_shape(shape: Shape, label: str) -> Any:
     if shape.size is not None:
         return geometry.Box(*shape.size)
     return geometry.Convex(points=mesh_points(shape.mesh or "").T, label=label)
+
+
+def corner_centres(size: Sequence[float], radius: float) -> FloatArray:
+    """Centres (8, 3) [m] of spheres that touch three faces each of a box of `size`, from within."""
+    return np.array(list(product((-1.0, 1.0), repeat=3))) * (np.asarray(size) / 2 - radius)
+
+
+def fitting_radius(size: Sequence[float], radius: float) -> float:
+    """`radius`, or what fits twice along the box's shortest edge [m]."""
+    return min(radius, min(size) / 4)
+
+
+def pad_centres(prepared: PreparedRobot, finger: MovingJoint, radius: float) -> FloatArray:
+    """Centres (n, 3) [m] of spheres behind the corners of a finger's gripping face.
+
+    The finger's joint opens along its axis, so its gripping face is that of its boxes which lies
+    farthest against the axis. The centres are in the link's frame.
+    """
+    boxes = [s for s in prepared.links[finger.child].shapes if s.size is not None]
+    if not boxes:
+        return np.empty((0, 3))
+    centres = np.vstack(
+        [
+            corner_centres(box.size or (), radius) @ box.pose.rotation().T + box.pose.position
+            for box in boxes
+        ]
+    )
+    depth = centres @ np.asarray(finger.axis)
+    return np.asarray(centres[depth < depth.min() + 1e-5])

@@ -24,7 +24,7 @@ from pytest_simbench.scene import (
     Sphere,
 )
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot
-from pytest_simbench.simulator.kinematics import link_poses
+from pytest_simbench.simulator.links import link_poses
 from pytest_simbench.simulator.shapes import write_obj
 from pytest_simbench.simulator.urdf import MovingJoint, Shape
 

@@ -15,7 +15,7 @@ import time
 from pathlib import Path
 
 from pytest_simbench.simulator import SimulatorError, UnavailableError
-from pytest_simbench.simulator.program import Program
+from pytest_simbench.simulator.external import Program
 
 PROGRAM = "gz"
 """Gazebo's command line; it takes its parts from where it is installed."""

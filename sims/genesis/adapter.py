@@ -34,14 +34,17 @@ from pytest_simbench.simulator import (
 
 from ..mujoco.bounces import BOUNCES, direct
 from .engine import (
+    OLDEST,
     array_of,
+    centre_of_mass,
+    contact_parameters,
     forget_worlds,
     numbers,
+    of_collider,
     start_engine,
     tensors_in,
 )
 from .readback import ReadBack
-from .releases import OLDEST, centre_of_mass, contact_parameters, of_collider
 from .settings import CHOSEN_ON, PROFILES, GenesisSettings
 from .world import (
     LEAST_FRICTION,
@@ -71,18 +74,9 @@ class Genesis(Simulator):
         engine="Genesis",
         tested_version="1.2.3",
         oldest_version=OLDEST,
-        capabilities=frozenset(
-            {
-                Capability.WINDOW,
-                Capability.OFFSCREEN,
-                Capability.SAVE_RESTORE,
-                Capability.EXACT_RESTORE,
-                Capability.CONTACT_COUNT,
-                Capability.CONTACT_FORCES,
-                Capability.LOOPS,
-                Capability.SELF_COLLIDE,
-                Capability.DETERMINISTIC,
-            }
+        capabilities=Capability.named(
+            "window offscreen save_restore exact_restore contact_count contact_forces loops "
+            "self_collide deterministic"
         ),
         deviations=(
             Deviation("link/*/damping", "Genesis has no damping of links"),
@@ -215,15 +209,7 @@ class Genesis(Simulator):
         self.command(initial, np.zeros(len(dofs)), np.zeros(len(dofs)))
 
     def read_back(self) -> dict[str, Any]:
-        return ReadBack(
-            self.solver,
-            self.settings.substeps,
-            self._ground,
-            self._boxes,
-            self._robot,
-            self.scene,
-            self.prepared,
-        ).all()
+        return ReadBack(self).all()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self.solver.control_dofs_position_velocity(
@@ -245,10 +231,6 @@ class Genesis(Simulator):
     def step(self) -> None:
         self.world.step(update_visualizer=False)
         self._steps += 1
-
-    @property
-    def time(self) -> float:
-        return self._steps * self.settings.timestep
 
     def body_state(self) -> FloatArray:
         state = np.empty((len(self._free), 13))

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose, Scene, rotation_matrix
-from pytest_simbench.simulator import PreparedRobot, heavy, lazy_import, one_value
-from pytest_simbench.simulator.quantities import touches
+from pytest_simbench.scene import FloatArray, Pose, rotation_matrix
+from pytest_simbench.simulator import heavy, lazy_import, one_value, readback
 from pytest_simbench.simulator.shapes import (
     box_corners,
     cylinder_reach,
@@ -19,86 +18,59 @@ from pytest_simbench.simulator.shapes import (
 )
 
 from ..mujoco.bounces import bounce
-from .engine import array_of, numbers
-from .releases import centre_of_mass, of_collider
+from .engine import array_of, centre_of_mass, numbers, of_collider
 
 genesis = lazy_import("genesis")
-
 
 _ROUND = ("SPHERE", "CYLINDER", "CAPSULE")
 
 
-class ReadBack:
-    """Reads the quantities of `simulator.quantities`.
+class ReadBack(readback.ReadBack):
+    """Reads the quantities of `simulator.quantities` that Genesis tells."""
 
-    Args:
-        solver: Genesis' rigid solver.
-        substeps: of a time step.
-        ground: entity of the plane.
-        boxes: entity of each body.
-        robot: entity of the robot, or None.
-        scene, prepared: names of what was built; no value is taken from them.
-    """
-
-    def __init__(
-        self,
-        solver: Any,
-        substeps: int,
-        ground: Any,
-        boxes: Mapping[str, Any],
-        robot: Any,
-        scene: Scene,
-        prepared: PreparedRobot | None,
-    ) -> None:
-        self.solver, self.substeps, self.ground = solver, substeps, ground
-        self.boxes, self.robot = boxes, robot
-        self.scene, self.prepared = scene, prepared
-        self.info = solver.dyn_info
+    def __init__(self, simulator: Any) -> None:
+        super().__init__(simulator)
+        self.solver = solver = simulator.solver
+        self.substeps = simulator.settings.substeps
+        self.ground, self.boxes = simulator._ground, simulator._boxes
+        self.robot, self.info = simulator._robot, solver.dyn_info
         self._arrays: dict[str, Any] = {}
         self._pairs = array_of(of_collider(solver.collider, "collider_info").collision_pair_idx)
 
-    def all(self) -> dict[str, Any]:
-        """Every quantity that Genesis tells, by its name."""
+    def world(self) -> dict[str, Any]:
         rigid, ground = self.solver.rigid_info, self._shapes(self.ground.links[0])
-        reported: dict[str, Any] = {
+        return {
             "gravity": array_of(rigid.gravity).reshape(3),
             "timestep": array_of(rigid.substep_dt).item() * self.substeps,
             "ground/height": numbers(self.solver.get_geoms_pos(ground))[0, 2],
             "ground/friction": self._friction(ground),
             "ground/restitution": self._restitution(ground),
         }
-        links = [entity.links[0] for entity in self.boxes.values()]
-        for name, link, pose in zip(self.boxes, links, self._poses(links), strict=True):
-            prefix = f"body/{name}"
-            reported |= self._part(prefix, link, pose)
-            led = self._array("links", "inertial_mass")[link.idx] >= heavy(self.scene)
-            reported[f"{prefix}/dynamic"] = float(self._is_free(link) and not led)
-            if link.n_dofs and not led:
-                reported |= self._inertial(prefix, link)
-                reported[f"{prefix}/damping"] = self._damping(link)
-                reported[f"{prefix}/velocity"] = self._velocity(link)
-        if self.prepared is not None:
-            reported |= self._robot(self.prepared)
-        return reported | touches(self.scene, self.prepared, self._can_touch)
 
-    def _robot(self, prepared: PreparedRobot) -> dict[str, Any]:
-        coupled = float(all(map(self._coupled, prepared.robot.gripper.couplings)))
-        found: dict[str, Any] = {"gripper/coupled": coupled}
-        links = [self.robot.get_link(name) for name in prepared.links]
-        for name, link, pose in zip(prepared.links, links, self._poses(links), strict=True):
-            found |= self._part(f"link/{name}", link, pose)
-            if name != prepared.root:
-                found |= self._inertial(f"link/{name}", link)
-        for name in prepared.robot.joint_names:
-            found |= self._joint(f"joint/{name}", self.robot.get_joint(name))
-        return found | self._closures()
+    def body(self, prefix: str, name: str) -> dict[str, Any]:
+        link = self.boxes[name].links[0]
+        found = self._part(prefix, link)
+        led = self._array("links", "inertial_mass")[link.idx] >= heavy(self.scene)
+        found[f"{prefix}/dynamic"] = float(self._is_free(link) and not led)
+        if link.n_dofs and not led:
+            found |= self._inertial(prefix, link)
+            found[f"{prefix}/damping"] = self._damping(link)
+            found[f"{prefix}/velocity"] = self._velocity(link)
+        return found
 
-    def _closures(self) -> dict[str, FloatArray]:
-        """The two points of each loop, in the frames of their links."""
+    def link(self, prefix: str, name: str) -> dict[str, Any]:
+        link = self.robot.get_link(name)
+        found = self._part(prefix, link)
+        return found if name == self.prepared.root else found | self._inertial(prefix, link)
+
+    def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
+        return all(map(self._coupled, pairs))
+
+    def closures(self) -> list[FloatArray]:
         _, _, kinds = self._equalities()
         loops = np.flatnonzero(kinds == genesis.EQUALITY_TYPE.CONNECT)
         data = self._array("equalities", "eq_data")[loops, 0]
-        return {f"closure/{k}/points": row[:6].reshape(2, 3) for k, row in enumerate(data)}
+        return [row[:6].reshape(2, 3) for row in data]
 
     def _array(self, group: str, name: str) -> Any:
         """A tensor of the solver's description, read once."""
@@ -112,21 +84,15 @@ class ReadBack:
         found: list[int] = np.flatnonzero(self._array("geoms", "link_idx") == link.idx).tolist()
         return found
 
-    def _poses(self, links: Sequence[Any]) -> FloatArray:
-        """Positions and quaternions of links in the world, (n, 7)."""
-        if not links:
-            return np.empty((0, 7))
-        at = [link.idx for link in links]
-        quaternions = numbers(self.solver.get_links_quat(at))
-        return np.hstack([numbers(self.solver.get_links_pos(at)), quaternions])
-
-    def _part(self, prefix: str, link: Any, pose: FloatArray) -> dict[str, Any]:
+    def _part(self, prefix: str, link: Any) -> dict[str, Any]:
         """Pose, shapes and surface of a body or link."""
         shapes, kinds = self._shapes(link), self._array("geoms", "type")
         boxes = [shape for shape in shapes if kinds[shape] == genesis.GEOM_TYPE.BOX]
         rounds = [shape for shape in shapes if genesis.GEOM_TYPE(kinds[shape]).name in _ROUND]
         meshes = [shape for shape in shapes if shape not in boxes and shape not in rounds]
-        found = {f"{prefix}/pose": pose}
+        place = numbers(self.solver.get_links_pos([link.idx]))[0]
+        turn = numbers(self.solver.get_links_quat([link.idx]))[0]
+        found = {f"{prefix}/pose": np.concatenate([place, turn])}
         found |= outlines(prefix, *(map(self._reach, kind) for kind in (boxes, meshes, rounds)))
         if shapes:
             found[f"{prefix}/friction"] = self._friction(shapes)
@@ -206,7 +172,7 @@ class ReadBack:
             for a, b, kind in zip(*self._equalities(), strict=True)
         )
 
-    def _can_touch(self, a: str, b: str) -> bool:
+    def can_touch(self, a: str, b: str) -> bool:
         links = a.startswith("link/") and b.startswith("link/")
         first, second = self._shapes(self._link(a)), self._shapes(self._link(b))
         found = np.maximum(self._pairs[np.ix_(first, second)], self._pairs[np.ix_(second, first)].T)
@@ -218,7 +184,8 @@ class ReadBack:
             return self.ground.links[0]
         return self.boxes[rest].links[0] if kind == "body" else self.robot.get_link(rest)
 
-    def _joint(self, prefix: str, joint: Any) -> dict[str, Any]:
+    def joint(self, prefix: str, name: str) -> dict[str, Any]:
+        joint = self.robot.get_joint(name)
         dof = joint.dof_start
         of = {
             name: self._array("dofs", name)[dof]

@@ -12,9 +12,9 @@ import numpy as np
 
 from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, Scene, Sphere
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, lazy_import
-from pytest_simbench.simulator.loops import reduced
+from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
+from pytest_simbench.simulator.links import reduced
 from pytest_simbench.simulator.shapes import write_obj
-from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
 
 from .settings import GenesisSettings
 

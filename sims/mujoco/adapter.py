@@ -28,14 +28,11 @@ from pytest_simbench.simulator import (
     lazy_import,
 )
 
-from . import releases
 from .bounces import BOUNCES
-from .heavy import leave_out
 from .pictures import DISABLED, camera, renderer
-from .readback import Numbers, ReadBack
+from .readback import Numbers, ReadBack, contact_forces, joint_wrenches
 from .settings import CHOSEN_ON, PROFILES, MuJoCoSettings
-from .touching import contact_forces, joint_wrenches
-from .world import build
+from .world import build, leave_out
 
 mujoco = lazy_import("mujoco")
 
@@ -53,20 +50,10 @@ class MuJoCo(Simulator):
         engine="MuJoCo",
         language="C, C++",
         tested_version="4.0.0",
-        oldest_version=releases.OLDEST,
-        capabilities=frozenset(
-            {
-                Capability.WINDOW,
-                Capability.OFFSCREEN,
-                Capability.SAVE_RESTORE,
-                Capability.EXACT_RESTORE,
-                Capability.CONTACT_COUNT,
-                Capability.CONTACT_FORCES,
-                Capability.LOOPS,
-                Capability.SELF_COLLIDE,
-                Capability.JOINT_WRENCHES,
-                Capability.DETERMINISTIC,
-            }
+        oldest_version="3.2.4",  # before it `MjSpec` tells Python no lists of geoms and joints
+        capabilities=Capability.named(
+            "window offscreen save_restore exact_restore contact_count contact_forces loops "
+            "self_collide joint_wrenches deterministic"
         ),
         deviations=(
             Deviation("", "contacts are soft by design: cubes sink in and creep a little"),
@@ -116,7 +103,7 @@ class MuJoCo(Simulator):
             self._open_window()
 
     def read_back(self) -> dict[str, Any]:
-        return ReadBack(self.model, self.data, self.scene, self.prepared, self._numbers()).all()
+        return ReadBack(self, self.model, self.data, self._numbers()).all()
 
     def _numbers(self) -> Numbers:
         model, prepared = self.model, self.prepared

@@ -10,13 +10,12 @@ from __future__ import annotations
 import importlib
 import math
 import os
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
-
-from .releases import gl_context
+from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
 
 DISABLED = {"MUJOCO_GL": "disabled"}
 """The environment of a headless import."""
@@ -41,3 +40,11 @@ def camera(mujoco: Any) -> Any:
     found.azimuth = math.degrees(math.atan2(y, x))
     found.elevation = math.degrees(math.asin(z / found.distance))
     return found
+
+
+def gl_context() -> ModuleType:
+    """The module that loads the OpenGL driver; from 3.10 on it is below `rendering`."""
+    try:
+        return importlib.import_module("mujoco.rendering.classic.gl_context")
+    except ModuleNotFoundError:
+        return importlib.import_module("mujoco.gl_context")

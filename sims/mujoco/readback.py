@@ -1,16 +1,16 @@
-"""What MuJoCo says that it built, for the parity check; MuJoCo's adapter and Newton's share it."""
+"""What MuJoCo says that it built, for the parity check, and the forces of its contacts and joints;
+MuJoCo's adapter and Newton's share it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose, Scene
-from pytest_simbench.simulator import PreparedRobot, heavy, lazy_import, one_value
-from pytest_simbench.simulator.quantities import touches
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.simulator import heavy, lazy_import, one_value, readback
 from pytest_simbench.simulator.shapes import (
     box_corners,
     cylinder_reach,
@@ -20,7 +20,7 @@ from pytest_simbench.simulator.shapes import (
 )
 
 from .bounces import bounce
-from .loops import closed
+from .world import closed
 
 mujoco = lazy_import("mujoco")
 
@@ -42,16 +42,12 @@ class Numbers:
     joints: Mapping[str, int]
 
 
-class ReadBack:
-    """Reads the quantities of `simulator.quantities` from a model and the state of `data`.
+class ReadBack(readback.ReadBack):
+    """Reads the quantities of `simulator.quantities` from a model and the state of `data`."""
 
-    The scene and the robot give names, never values.
-    """
-
-    def __init__(
-        self, model: Any, data: Any, scene: Scene, prepared: PreparedRobot | None, at: Numbers
-    ) -> None:
-        self.model, self.scene, self.prepared, self.at = model, scene, prepared, at
+    def __init__(self, simulator: Any, model: Any, data: Any, at: Numbers) -> None:
+        super().__init__(simulator)
+        self.model, self.at = model, at
         self.off = {name for name in _OFF if _flag(model.opt.disableflags, f"mjDSBL_{name}")}
         self.overridden = _flag(model.opt.enableflags, "mjENBL_OVERRIDE")
         held = not self.off & {"CONSTRAINT", "EQUALITY"}
@@ -62,31 +58,26 @@ class ReadBack:
         mujoco.mj_comPos(model, self.data)
         mujoco.mj_comVel(model, self.data)
 
-    def all(self) -> dict[str, Any]:
-        """Every quantity by its name."""
-        model, at = self.model, self.at
-        reported: dict[str, Any] = {
-            "gravity": np.zeros(3) if "GRAVITY" in self.off else model.opt.gravity,
-            "timestep": model.opt.timestep,
-            "ground/height": self.data.geom_xpos[at.ground, 2],
-            "ground/friction": self._friction([at.ground]),
-            "ground/restitution": self._restitution([at.ground]),
+    def world(self) -> dict[str, Any]:
+        ground = self.at.ground
+        return {
+            "gravity": np.zeros(3) if "GRAVITY" in self.off else self.model.opt.gravity,
+            "timestep": self.model.opt.timestep,
+            "ground/height": self.data.geom_xpos[ground, 2],
+            "ground/friction": self._friction([ground]),
+            "ground/restitution": self._restitution([ground]),
         }
-        for name, geom in at.boxes.items():
-            reported |= self._box(f"body/{name}", geom)
-        for name, body in at.links.items():
-            reported |= self._link(f"link/{name}", body)
-        for name, joint in at.joints.items():
-            reported |= self._joint(f"joint/{name}", joint)
-        if self.prepared is not None:
-            couplings = self.prepared.robot.gripper.couplings
-            reported["gripper/coupled"] = float(all(map(self._coupled, couplings)))
-            reported |= closed(model, self.active)
-        return reported | touches(self.scene, self.prepared, self._can_touch)
 
-    def _box(self, prefix: str, geom: int) -> dict[str, Any]:
-        """A box, whose frame is its shape's: a fixed one may have no body of its own."""
-        model, body = self.model, int(self.model.geom_bodyid[geom])
+    def closures(self) -> list[FloatArray]:
+        return closed(self.model, self.active)
+
+    def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
+        return all(map(self._coupled, pairs))
+
+    def body(self, prefix: str, name: str) -> dict[str, Any]:
+        """A body, whose frame is its shape's: a fixed one may have no body of its own."""
+        model, geom = self.model, self.at.boxes[name]
+        body = int(model.geom_bodyid[geom])
         place, turn = self._frame(geom)
         light = self.model.body_mass[body] < heavy(self.scene)  # else it moves as prescribed
         free = light and self._can_move(body)
@@ -115,7 +106,8 @@ class ReadBack:
         turn = turn @ own.reshape(3, 3).T
         return place - turn @ model.mesh_pos[mesh], turn
 
-    def _link(self, prefix: str, body: int) -> dict[str, Any]:
+    def link(self, prefix: str, name: str) -> dict[str, Any]:
+        body = self.at.links[name]
         place, turn = self.data.xpos[body], self.data.xmat[body].reshape(3, 3)
         geoms = np.flatnonzero(self.model.geom_bodyid == body).tolist()
         found = self._surface(prefix, geoms, place, turn)
@@ -222,11 +214,8 @@ class ReadBack:
         ends = {*model.eq_obj1id[held], *model.eq_obj2id[held]}
         return bool(model.body_dofnum[body] == 6 and body not in ends)
 
-    def _can_touch(self, a: str, b: str) -> bool:
-        """Whether every shape of the one can collide with every shape of the other.
-
-        Of two links: whether any can, which none shall.
-        """
+    def can_touch(self, a: str, b: str) -> bool:
+        """Of two links whether any shapes can, which none shall; else whether all can."""
         model = self.model
         first, second = self._geoms(a), self._geoms(b)
         if not (first and second):
@@ -248,8 +237,9 @@ class ReadBack:
             return [self.at.boxes[rest]]
         return np.flatnonzero(self.model.geom_bodyid == self.at.links[rest]).tolist()
 
-    def _joint(self, prefix: str, joint: int) -> dict[str, Any]:
-        model, dof = self.model, self.model.jnt_dofadr[joint]
+    def joint(self, prefix: str, name: str) -> dict[str, Any]:
+        model, joint = self.model, self.at.joints[name]
+        dof = model.jnt_dofadr[joint]
         axis, still = model.jnt_axis[joint], np.zeros(3)
         turning = [axis, np.cross(model.jnt_pos[joint], axis)]
         slides = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE
@@ -306,3 +296,29 @@ def _flag(flags: int, name: str) -> bool:
     """Whether one of MuJoCo's switches, on or off, is set."""
     kind = mujoco.mjtEnableBit if name.startswith("mjENBL") else mujoco.mjtDisableBit
     return bool(flags & getattr(kind, name))
+
+
+def contact_forces(model: Any, data: Any, at: Numbers) -> Iterator[tuple[str, str, FloatArray]]:
+    """Both names of each contact, and the wrench on the first about the world's origin."""
+    names = {at.ground: "ground"} | {geom: f"body/{name}" for name, geom in at.boxes.items()}
+    links = {body: f"link/{name}" for name, body in at.links.items()}
+    local = np.empty(6)
+    for k in range(data.ncon):
+        contact = data.contact[k]
+        first, second = (
+            names.get(geom) or links[int(model.geom_bodyid[geom])]
+            for geom in (int(contact.geom1), int(contact.geom2))
+        )
+        mujoco.mj_contactForce(model, data, k, local)  # on the second, in the contact's frame
+        frame = np.reshape(contact.frame, (3, 3))  # its axes are rows
+        force, torque = local[:3] @ frame, local[3:] @ frame
+        yield second, first, np.concatenate([force, torque + np.cross(contact.pos, force)])
+
+
+def joint_wrenches(model: Any, data: Any, at: Numbers) -> FloatArray:
+    """Of the driven joints, on the links below about their origins, (n_joints, 6)."""
+    mujoco.mj_rnePostConstraint(model, data)
+    bodies = model.jnt_bodyid[list(at.joints.values())]
+    torque, force = np.hsplit(data.cfrc_int[bodies], 2)
+    centres = data.subtree_com[model.body_rootid[bodies]]  # which MuJoCo's torques are about
+    return np.hstack([force, torque + np.cross(centres - data.xpos[bodies], force)])

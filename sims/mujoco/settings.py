@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from pytest_simbench.simulator import Seen, Settings
+from pytest_simbench.simulator import Seen, Settings, chosen_on
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,4 @@ PROFILES: Mapping[str, Settings] = {
     "real": replace(TUNED, solref=(0.004, 2.0)),
 }
 
-SEEDS = (Seen.seeds("throwing", 1, 1), Seen.seeds("stacking", 1, 1))
-
-CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
-    "tuned": SEEDS,
-    "real": (*SEEDS, Seen.motions("cube_tosses", 0, 564, 6)),
-}
+CHOSEN_ON = chosen_on(Seen.seeds("throwing", 1, 1), Seen.seeds("stacking", 1, 1))

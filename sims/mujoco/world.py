@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,19 +11,18 @@ from pytest_simbench.scene import (
     Body,
     Box,
     Capsule,
+    Closure,
     ConvexMesh,
     Cylinder,
+    FloatArray,
     Joint,
     Scene,
     Sphere,
 )
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, heavy, lazy_import
-from pytest_simbench.simulator.loops import reduced
+from pytest_simbench.simulator.links import reduced
 
-from . import releases
 from .bounces import direct
-from .loops import close_loops
-from .self_collision import part_joined
 from .settings import MuJoCoSettings
 
 mujoco = lazy_import("mujoco")
@@ -33,13 +32,6 @@ ROBOT, WORLD, LED = 1, 2, 4
 bodies touch what they can move."""
 
 LINK_COLOUR, GROUND_COLOUR = (0.9, 0.9, 0.9, 1.0), (0.5, 0.5, 0.5, 1.0)
-
-_INTEGRATORS = {
-    "Euler": "mjINT_EULER",
-    "RK4": "mjINT_RK4",
-    "implicit": "mjINT_IMPLICIT",
-    "implicitfast": "mjINT_IMPLICITFAST",
-}
 
 
 def build(scene: Scene, prepared: PreparedRobot | None, settings: MuJoCoSettings) -> Any:
@@ -77,14 +69,15 @@ def _equip(spec: Any, prepared: PreparedRobot, settings: MuJoCoSettings) -> None
     for pair in robot.gripper.couplings:
         _couple_fingers(spec, *pair)
     close_loops(spec, reduced(prepared))
-    if robot.self_collide:
-        part_joined(spec, prepared)
+    for moved in prepared.joints if robot.self_collide else ():
+        # MuJoCo parts what one joint joins by itself, but where one link is fixed in the world.
+        spec.add_exclude(bodyname1=moved.parent, bodyname2=moved.child)
 
 
 def _set_options(spec: Any, scene: Scene, settings: MuJoCoSettings) -> None:
     option = spec.option
     option.timestep = settings.timestep
-    option.integrator = getattr(mujoco.mjtIntegrator, _INTEGRATORS[settings.integrator])
+    option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
     option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
     option.impratio = settings.impratio
     option.noslip_iterations = settings.noslip_iterations
@@ -185,7 +178,14 @@ def _add_drive(spec: Any, joint: Joint) -> None:
     )
     drive.gainprm[0] = joint.stiffness
     drive.biasprm[1], drive.biasprm[2] = -joint.stiffness, -joint.damping
-    releases.joint(spec, joint.name).armature = joint.armature
+    _joint(spec, joint.name).armature = joint.armature
+
+
+def _joint(spec: Any, name: str) -> Any:
+    """The joint of that name."""
+    if hasattr(spec, "joint"):
+        return spec.joint(name)
+    return next(joint for joint in spec.joints if joint.name == name)  # before 3.3.0
 
 
 def _couple_fingers(spec: Any, first: str, second: str) -> None:
@@ -195,6 +195,57 @@ def _couple_fingers(spec: Any, first: str, second: str) -> None:
         objtype=mujoco.mjtObj.mjOBJ_JOINT,
         name1=second,
         name2=first,
-        data=releases.equality_data(mujoco, [0.0, 1.0]),
+        data=[0.0, 1.0, *[0.0] * (mujoco.mjNEQDATA - 2)],
         solref=[2 * spec.option.timestep, 1.0],
     )
+
+
+def close_loops(spec: Any, closures: Iterable[Closure]) -> None:
+    """Hold the points together, as stiffly as the step allows.
+
+    MuJoCo's `connect` takes the point of the first link, and finds that of the second at the
+    model's own zero posture, where the loop is open. So two sites are held together.
+    """
+    for k, closure in enumerate(closures):
+        names = []
+        for link, point in (
+            (closure.first, closure.first_point),
+            (closure.second, closure.second_point),
+        ):
+            names.append(f"closure {k} {link}")
+            spec.body(link).add_site(name=names[-1], pos=point)
+        spec.add_equality(
+            name=f"closure {k}",
+            type=mujoco.mjtEq.mjEQ_CONNECT,
+            objtype=mujoco.mjtObj.mjOBJ_SITE,
+            name1=names[0],
+            name2=names[1],
+            solref=[2 * spec.option.timestep, 1.0],
+        )
+
+
+def closed(model: Any, active: Any) -> list[FloatArray]:
+    """The points of each active closure, held by two sites or, as with Newton, by two bodies with a
+    point each."""
+    loops = np.flatnonzero((model.eq_type == mujoco.mjtEq.mjEQ_CONNECT) & active)
+    return [_points(model, number) for number in loops.tolist()]
+
+
+def _points(model: Any, number: int) -> FloatArray:
+    """What a closure holds together, (2, 3), each in the frame of its link [m]."""
+    if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
+        sites = [model.eq_obj1id[number], model.eq_obj2id[number]]
+        return np.array(model.site_pos[sites])
+    return np.array(model.eq_data[number, :6]).reshape(2, 3)
+
+
+def leave_out(model: Any, first: Sequence[int]) -> None:
+    """Have the solver stop where it would without these bodies: its tolerance is relative to the
+    mean inertia of all degrees of freedom.
+
+    Args:
+        model: of MuJoCo.
+        first: degree of freedom of each heavy body.
+    """
+    light = np.delete(model.dof_M0, [dof + k for dof in first for k in range(6)])
+    model.stat.meaninertia = light.mean() if len(light) else 1.0

@@ -33,10 +33,9 @@ from pytest_simbench.simulator import (
 )
 
 from ..mujoco.bounces import BOUNCES, direct
-from ..mujoco.heavy import leave_out
 from ..mujoco.pictures import DISABLED, camera, renderer
-from ..mujoco.readback import Numbers, ReadBack
-from ..mujoco.touching import contact_forces, joint_wrenches
+from ..mujoco.readback import Numbers, ReadBack, contact_forces, joint_wrenches
+from ..mujoco.world import leave_out
 from .settings import CHOSEN_ON, PROFILES, NewtonSettings
 from .world import build_model, make_solver, names
 
@@ -62,19 +61,9 @@ class Newton(Simulator):
         language="Python (Warp), C",
         tested_version="1.8.0",
         oldest_version="1.8.0",  # older ones have no `newton.solvers.mujoco`: no actuators
-        capabilities=frozenset(
-            {
-                Capability.WINDOW,
-                Capability.OFFSCREEN,
-                Capability.SAVE_RESTORE,
-                Capability.EXACT_RESTORE,
-                Capability.CONTACT_COUNT,
-                Capability.CONTACT_FORCES,
-                Capability.JOINT_WRENCHES,
-                Capability.LOOPS,
-                Capability.SELF_COLLIDE,
-                Capability.DETERMINISTIC,
-            }
+        capabilities=Capability.named(
+            "window offscreen save_restore exact_restore contact_count contact_forces "
+            "joint_wrenches loops self_collide deterministic"
         ),
         deviations=(
             Deviation("", "contacts are soft by design: cubes sink in and creep a little"),
@@ -197,7 +186,7 @@ class Newton(Simulator):
     def read_back(self) -> dict[str, Any]:
         """From MuJoCo's model, which is what is stepped."""
         model, data = self.solver.mj_model, self.solver.mj_data
-        return ReadBack(model, data, self.scene, self.prepared, self._numbers()).all()
+        return ReadBack(self, model, data, self._numbers()).all()
 
     def _numbers(self) -> Numbers:
         prepared = self.prepared
@@ -243,10 +232,6 @@ class Newton(Simulator):
         self.solver.step(before, after, self._control, None, timestep)
         self._states = [after, before]
         self._steps += 1
-
-    @property
-    def time(self) -> float:
-        return self._steps * self.settings.timestep
 
     def body_state(self) -> FloatArray:
         state = self._states[0]

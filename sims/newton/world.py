@@ -18,7 +18,7 @@ from pytest_simbench.scene import (
     Sphere,
 )
 from pytest_simbench.simulator import PreparedRobot, heavy, lazy_import
-from pytest_simbench.simulator.loops import reduced
+from pytest_simbench.simulator.links import reduced
 
 from .settings import NewtonSettings
 

@@ -26,8 +26,7 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
-from pytest_simbench.simulator.loops import reduced
-from pytest_simbench.simulator.self_collision import joined
+from pytest_simbench.simulator.links import joined, reduced
 
 from . import world as build
 from .axes import Axis
@@ -82,16 +81,9 @@ class ODE(Simulator):
         engine="ODE",
         language="C++",
         tested_version="1.2.0.dev15",
-        capabilities=frozenset(
-            {
-                Capability.SAVE_RESTORE,
-                Capability.CONTACT_COUNT,
-                Capability.CONTACT_FORCES,
-                Capability.LOOPS,
-                Capability.SELF_COLLIDE,
-                Capability.JOINT_WRENCHES,
-                Capability.DETERMINISTIC,
-            }
+        capabilities=Capability.named(
+            "save_restore contact_count contact_forces loops self_collide joint_wrenches "
+            "deterministic"
         ),
         deviations=(
             Deviation("joint/*/friction", "ODE's joints have no friction"),
@@ -163,19 +155,7 @@ class ODE(Simulator):
         self._drives = Drives(self.world, robot, self._axes, s.timestep, s.drive, s.position_gain)
 
     def read_back(self) -> dict[str, Any]:
-        return ReadBack(
-            self.world,
-            self.settings.timestep,
-            self._ground,
-            self._bodies,
-            self._links,
-            self._axes,
-            self._closures,
-            self._drives,
-            self.contacts,
-            self.scene,
-            self.prepared,
-        ).all()
+        return ReadBack(self).all()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         if self._drives is not None:
@@ -204,10 +184,6 @@ class ODE(Simulator):
         self.contacts.make()
         self._advance(self.settings.timestep)
         self._steps += 1
-
-    @property
-    def time(self) -> float:
-        return self._steps * self.settings.timestep
 
     def body_state(self) -> FloatArray:
         state = np.empty((len(self._free), 13))

@@ -5,14 +5,12 @@ ODE tells no corners of a mesh, so each is measured: a plane is moved towards it
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose, Scene
-from pytest_simbench.simulator import PreparedRobot, lazy_import
-from pytest_simbench.simulator.quantities import touches
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.simulator import lazy_import, readback
 from pytest_simbench.simulator.shapes import (
     DIRECTIONS,
     box_corners,
@@ -24,8 +22,7 @@ from pytest_simbench.simulator.shapes import (
 )
 
 from .axes import Axis
-from .contacts import Contacts, Part
-from .drives import Drives
+from .contacts import Part
 from .library import (
     HI_STOP,
     LO_STOP,
@@ -41,68 +38,47 @@ from .library import (
 ode = lazy_import("ode")
 
 
-class ReadBack:
-    """Reads the quantities of `simulator.quantities` that ODE tells.
+class ReadBack(readback.ReadBack):
+    """Reads the quantities of `simulator.quantities` that ODE tells."""
 
-    Args:
-        world: of ODE.
-        timestep: that the world is stepped with [s].
-        ground, bodies, links: the parts of the world.
-        axes: its joints.
-        closures: what closes loops.
-        drives: the motors, or None.
-        contacts: whose joints hold nothing.
-        scene, prepared: names of what was built; no value is taken from them.
-    """
-
-    def __init__(
-        self,
-        world: Any,
-        timestep: float,
-        ground: Part,
-        bodies: Mapping[str, Part],
-        links: Mapping[str, Part],
-        axes: Mapping[str, Axis],
-        closures: Sequence[Any],
-        drives: Drives | None,
-        contacts: Contacts,
-        scene: Scene,
-        prepared: PreparedRobot | None,
-    ) -> None:
-        self.world, self.timestep, self.ground = world, timestep, ground
-        self.bodies, self.links, self.axes, self.drives = bodies, links, axes, drives
-        self.contacts = contacts
-        self.scene, self.prepared, self.closures = scene, prepared, closures
+    def __init__(self, simulator: Any) -> None:
+        super().__init__(simulator)
+        self.made, self.timestep = simulator.world, simulator.settings.timestep
+        self.ground, self.bodies, self.links = (
+            simulator._ground, simulator._bodies, simulator._links,
+        )  # fmt: skip
+        self.axes, self.drives = simulator._axes, simulator._drives
+        self.contacts, self.loops = simulator.contacts, simulator._closures
         self.probe = ode.GeomPlane(None, (0.0, 0.0, 1.0), 0.0)
 
-    def all(self) -> dict[str, Any]:
-        """Every quantity that ODE tells, by its name."""
+    def world(self) -> dict[str, Any]:
         (_, _, up), height = self.ground.geoms[0].getParams()
-        reported: dict[str, Any] = {
-            "gravity": self.world.getGravity(),
+        return {
+            "gravity": self.made.getGravity(),
             "timestep": self.timestep,
             "ground/friction": self.ground.surface.friction,
             "ground/restitution": self.ground.surface.bounce,
             "ground/height": height / up,
         }
-        for name, part in self.bodies.items():
-            reported |= self._part(f"body/{name}", part)
-            if part.body is not None and not part.body.isKinematic():
-                velocity = [*part.body.getLinearVel(), *part.body.getAngularVel()]
-                reported[f"body/{name}/velocity"] = velocity
-            free = part.body is not None and not part.body.isKinematic()
-            held = free and part.body.getNumJoints() > self.contacts.on(part.body)
-            reported[f"body/{name}/dynamic"] = float(free and not held)
-        for name, part in self.links.items():
-            reported |= self._part(f"link/{name}", part)
-        if self.prepared is not None and self.drives is not None:
-            for name, axis in self.axes.items():
-                reported |= self._joint(f"joint/{name}", name, axis, self.drives)
-            for k, joint in enumerate(self.closures):
-                reported[f"closure/{k}/points"] = self._points(joint)
-            pinion, couplings = self.drives.pinion, self.prepared.robot.gripper.couplings
-            reported["gripper/coupled"] = float(pinion.holds if pinion else not couplings)
-        return reported | touches(self.scene, self.prepared, self._can_touch)
+
+    def body(self, prefix: str, name: str) -> dict[str, Any]:
+        part = self.bodies[name]
+        found = self._part(prefix, part)
+        free = part.body is not None and not part.body.isKinematic()
+        if free:
+            found[f"{prefix}/velocity"] = [*part.body.getLinearVel(), *part.body.getAngularVel()]
+        held = free and part.body.getNumJoints() > self.contacts.on(part.body)
+        found[f"{prefix}/dynamic"] = float(free and not held)
+        return found
+
+    def link(self, prefix: str, name: str) -> dict[str, Any]:
+        return self._part(prefix, self.links[name])
+
+    def closures(self) -> list[FloatArray]:
+        return [self._points(joint) for joint in self.loops]
+
+    def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
+        return bool(self.drives.pinion.holds if self.drives.pinion else not pairs)
 
     def _part(self, prefix: str, part: Part) -> dict[str, Any]:
         """Pose, shapes, surface and inertia of a body or link."""
@@ -170,7 +146,8 @@ class ReadBack:
             reaches.append(offset - origin @ direction)
         return np.array(reaches)
 
-    def _joint(self, prefix: str, name: str, axis: Axis, drives: Drives) -> dict[str, Any]:
+    def joint(self, prefix: str, name: str) -> dict[str, Any]:
+        axis, drives = self.axes[name], self.drives
         joint = axis.joint
         limits = np.array([axis.stops.getParam(LO_STOP), axis.stops.getParam(HI_STOP)])
         resistance = 1 / joint.getParam(SOFTNESS)
@@ -194,7 +171,7 @@ class ReadBack:
     def _child(self, axis: Axis) -> Part:
         return next(part for part in self.links.values() if part.body is axis.child)
 
-    def _can_touch(self, a: str, b: str) -> bool:
+    def can_touch(self, a: str, b: str) -> bool:
         one, other = self._named(a), self._named(b)
         if frozenset((id(one.surface), id(other.surface))) in self.contacts.apart:
             return False

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from pytest_simbench.simulator import Seen, Settings
+from pytest_simbench.simulator import Seen, Settings, chosen_on
 
 from .drives import Drive
 
@@ -63,9 +63,4 @@ PROFILES: Mapping[str, Settings] = {
     "real": replace(TUNED, timestep=0.001, contact_cfm=1e-3, friction="slip"),
 }
 
-SEEDS = (Seen.seeds("throwing", 100, 101), Seen.seeds("stacking", 100, 100))
-
-CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
-    "tuned": SEEDS,
-    "real": (*SEEDS, Seen.motions("cube_tosses", 0, 564, 6)),
-}
+CHOSEN_ON = chosen_on(Seen.seeds("throwing", 100, 101), Seen.seeds("stacking", 100, 100))

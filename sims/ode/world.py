@@ -26,8 +26,7 @@ from pytest_simbench.scene import (
     Sphere,
 )
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, lazy_import
-from pytest_simbench.simulator.kinematics import link_poses, motion_subspace
-from pytest_simbench.simulator.loops import ends
+from pytest_simbench.simulator.links import ends, link_poses, motion_subspace
 from pytest_simbench.simulator.mesh_check import TRIANGLE
 from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
 

@@ -36,11 +36,10 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
-from pytest_simbench.simulator.kinematics import link_poses
+from pytest_simbench.simulator.links import link_poses
 
 from . import stage as usd
-from .loads import wrenches
-from .readback import read_back
+from .readback import ReadBack, wrenches
 from .session import Session
 from .settings import CHOSEN_ON, PROFILES, OvPhysXSettings
 
@@ -63,15 +62,8 @@ class OvPhysX(Simulator):
         language="C++",
         tested_version="0.7.0.74035321",
         oldest_version="0.7.0.74035321",  # older ones tell no joint before the first step
-        capabilities=frozenset(
-            {
-                Capability.DETERMINISTIC,
-                Capability.SAVE_RESTORE,
-                Capability.CONTACT_FORCES,
-                Capability.LOOPS,
-                Capability.SELF_COLLIDE,
-                Capability.JOINT_WRENCHES,
-            }
+        capabilities=Capability.named(
+            "deterministic save_restore contact_forces loops self_collide joint_wrenches"
         ),
         deviations=(
             Deviation(
@@ -207,10 +199,6 @@ class OvPhysX(Simulator):
             names = self._binding("ARTICULATION_DOF_POSITION")[0].dof_names
             self._columns = [names.index(path.rpartition("/")[2]) for path in self._joints]
 
-    @property
-    def time(self) -> float:
-        return self._steps * self.settings.timestep
-
     def body_state(self) -> FloatArray:
         state = np.empty((len(self._free), 13))
         if not self._free:
@@ -252,8 +240,7 @@ class OvPhysX(Simulator):
         return wrenches(buffer[0, order].astype(float), self.prepared, self.joint_state()[0])
 
     def read_back(self) -> dict[str, Any]:
-        places = {} if self._steps else self._placed
-        return read_back(self.session, self.scene, self.prepared, self._unit, places)
+        return ReadBack(self).all()
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
         if not usd.reports_contacts(self.scene):

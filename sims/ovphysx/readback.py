@@ -7,87 +7,95 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import Box, ConvexMesh, FloatArray, Pose, Scene
-from pytest_simbench.simulator import PreparedRobot, one_value
+from pytest_simbench.scene import Box, ConvexMesh, FloatArray, Pose
+from pytest_simbench.simulator import PreparedRobot, one_value, readback
+from pytest_simbench.simulator.links import link_poses
 from pytest_simbench.simulator.shapes import box_corners, outlines, reach
 
 from . import stage as usd
 from .session import Session
+from .usd_text import turn_from_x
 
 _FRICTIONS = ("staticFriction", "dynamicFriction")
 _ATTRIBUTES = (
-    "position",
-    "orientation",
-    "mass",
-    "inverseMass",
-    "inertia",
-    "centerOfMassPosition",
-    "disableGravity",
-    "disableSimulation",
-    "restitution",
-    "restOffset",
-    "shapeCount",
-    "linearVelocity",
-    "angularVelocity",
-    *_FRICTIONS,
-)
+    "position", "orientation", "mass", "inverseMass", "inertia", "centerOfMassPosition",
+    "disableGravity", "disableSimulation", "restitution", "restOffset", "shapeCount",
+    "linearVelocity", "angularVelocity", *_FRICTIONS,
+)  # fmt: skip
+_JOINT = {
+    "jointLimit": ("limits", 1),
+    "jointMaxForce": ("effort_limit", 0),
+    "jointStiffness": ("stiffness", -1),
+    "jointDamping": ("damping", -1),
+    "jointArmature": ("armature", 0),
+    "jointPosition": ("initial_position", 1),
+}
+"""Of a joint: the quantity that an attribute is, and the power of the session's unit in it."""
+
+_PASSIVE = ("jointStaticFriction", "jointDynamicFriction", "jointViscousFriction")
 _Values = Mapping[str, Mapping[str, FloatArray]]
 
 
-def read_back(
-    session: Session,
-    scene: Scene,
-    prepared: PreparedRobot | None,
-    units: FloatArray,
-    places: Mapping[str, Pose],
-) -> dict[str, Any]:
-    """Every quantity that PhysX can tell.
+class ReadBack(readback.ReadBack):
+    """Reads the quantities of `simulator.quantities` that PhysX tells.
 
-    Args:
-        session: to be asked.
-        scene: the names of what was built; no value is taken from it.
-        prepared: the names of the robot's joints and links.
-        units: of the sessions' joint positions, (n_joints,) [rad or m].
-        places: where the stage put the links, until the first step: PhysX's scene queries find
-            them there. Empty from then on: the queries find them where they are.
+    Until the first step PhysX's scene queries find the links where the stage put them (`places`);
+    from then on, where they are.
     """
-    reported: dict[str, Any] = {"ground/height": session.height(usd.GROUND)}
-    values = session.read("RIGID_BODY", *_ATTRIBUTES)
-    for index, box in enumerate(scene.bodies):
-        path, prefix = usd.body_path(index), f"body/{box.name}"
-        pose = _pose(values, path)
-        shape = f"{path}/shape"
+
+    def __init__(self, simulator: Any) -> None:
+        super().__init__(simulator)
+        self.session, self.units = simulator.session, simulator._unit
+        self.places = {} if simulator._steps else simulator._placed
+        self.bodies = self.session.read("RIGID_BODY", *_ATTRIBUTES)
+        if self.prepared is not None:
+            self.links = self.session.read("ARTICULATION_LINK", *_ATTRIBUTES)
+            self.joints = self.session.read("ARTICULATION_JOINT", *_JOINT, *_PASSIVE)
+            self.axes = _axes(self.session, self.prepared)
+
+    def world(self) -> dict[str, Any]:
+        return {"ground/height": self.session.height(usd.GROUND)}
+
+    def body(self, prefix: str, name: str) -> dict[str, Any]:
+        box, values = self.scene.body(name), self.bodies
+        path = usd.body_path(self.scene.bodies.index(box))
+        pose, shape = _pose(values, path), f"{path}/shape"
         if isinstance(box, Box):  # rays tell the size of a box more exactly
-            outline = outlines(prefix, [reach(box_corners(session.size(shape, pose)))], [])
+            outline = outlines(prefix, [reach(box_corners(self.session.size(shape, pose)))], [])
         else:
-            swept = [session.reach(shape, pose, Pose())]
+            swept = [self.session.reach(shape, pose, Pose())]
             mesh = isinstance(box, ConvexMesh)
             outline = outlines(prefix, [], swept if mesh else [], [] if mesh else swept)
-        reported |= _part(values, path, prefix) | outline
+        found = _part(values, path, prefix) | outline
         if box.mass:
-            reported |= _inertial(values, path, prefix)
+            found |= _inertial(values, path, prefix)
             velocity = [values[name][path] for name in ("linearVelocity", "angularVelocity")]
-            reported[f"{prefix}/velocity"] = np.concatenate(velocity)
-    if prepared is not None:
-        reported |= _links(session, prepared, places)
-        reported |= _joints(session, prepared, units)
-    return reported
+            found[f"{prefix}/velocity"] = np.concatenate(velocity)
+        return found
 
-
-def _links(session: Session, prepared: PreparedRobot, places: Mapping[str, Pose]) -> dict[str, Any]:
-    values = session.read("ARTICULATION_LINK", *_ATTRIBUTES)
-    reported: dict[str, Any] = {}
-    for index, (name, link) in enumerate(prepared.links.items()):
-        path, prefix = usd.link_path(index), f"link/{name}"
+    def link(self, prefix: str, name: str) -> dict[str, Any]:
+        path, values = usd.link_path(list(self.prepared.links).index(name)), self.links
         kinds: tuple[list[FloatArray], list[FloatArray]] = ([], [])
-        place = places[name] if places else _pose(values, path)
-        for k, shape in enumerate(link.shapes[: int(values["shapeCount"][path])]):
-            found = session.reach(f"{path}/shape_{k}", place, shape.pose)
+        place = self.places[name] if self.places else _pose(values, path)
+        shapes = self.prepared.links[name].shapes[: int(values["shapeCount"][path])]
+        for k, shape in enumerate(shapes):
+            found = self.session.reach(f"{path}/shape_{k}", place, shape.pose)
             kinds[shape.size is None].append(found)
-        reported |= _part(values, path, prefix) | outlines(prefix, *kinds)
-        if name != prepared.root:
-            reported |= _inertial(values, path, prefix)
-    return reported
+        part = _part(values, path, prefix) | outlines(prefix, *kinds)
+        return part if name == self.prepared.root else part | _inertial(values, path, prefix)
+
+    def joint(self, prefix: str, name: str) -> dict[str, Any]:
+        number, values = self.prepared.robot.joint_names.index(name), self.joints
+        path, unit = usd.joint_path(number), self.units[number]
+        found = {
+            f"{prefix}/{quantity}": values[attribute][path][0] * unit**power
+            for attribute, (quantity, power) in _JOINT.items()
+        }
+        found[f"{prefix}/friction"] = sum(abs(values[kind][path][0]) for kind in _PASSIVE)
+        return found | {f"{prefix}/axis": self.axes[path]}
+
+    def touches(self) -> dict[str, Any]:
+        return {}
 
 
 def _part(values: _Values, path: str, prefix: str) -> dict[str, Any]:
@@ -109,29 +117,6 @@ def _inertial(values: _Values, path: str, prefix: str) -> dict[str, Any]:
         f"{prefix}/inertia": values["inertia"][path].reshape(3, 3),
         f"{prefix}/gravity": float(moved),
     }
-
-
-def _joints(session: Session, prepared: PreparedRobot, units: FloatArray) -> dict[str, Any]:
-    ones = np.ones_like(units)
-    attributes = {
-        "jointLimit": ("limits", units),
-        "jointMaxForce": ("effort_limit", ones),
-        "jointStiffness": ("stiffness", 1 / units),
-        "jointDamping": ("damping", 1 / units),
-        "jointArmature": ("armature", ones),
-        "jointPosition": ("initial_position", units),
-    }
-    passive = ("jointStaticFriction", "jointDynamicFriction", "jointViscousFriction")
-    values = session.read("ARTICULATION_JOINT", *attributes, *passive)
-    axes = _axes(session, prepared)
-    found: dict[str, Any] = {}
-    for i, name in enumerate(prepared.robot.joint_names):
-        path, prefix = usd.joint_path(i), f"joint/{name}"
-        for attribute, (quantity, scale) in attributes.items():
-            found[f"{prefix}/{quantity}"] = values[attribute][path][0] * scale[i]
-        found[f"{prefix}/friction"] = sum(abs(values[kind][path][0]) for kind in passive)
-        found[f"{prefix}/axis"] = axes[path]
-    return found
 
 
 def _axes(session: Session, prepared: PreparedRobot) -> dict[str, FloatArray]:
@@ -169,3 +154,24 @@ def _each_shape(values: _Values, attribute: str, path: str) -> FloatArray:
     """An attribute of all shapes of a prim."""
     count = int(values["shapeCount"][path])
     return np.atleast_1d(values[attribute][path])[:count]
+
+
+def wrenches(told: FloatArray, prepared: PreparedRobot, positions: FloatArray) -> FloatArray:
+    """Of the driven joints, on the links below about their origins, in the world, (n_joints, 6).
+
+    Args:
+        told: by PhysX of each link by its number in `prepared.links`, (n_links, 6), in the axes of
+            the frame of the joint above it, whose x is the joint's axis.
+        prepared: whose joints they are.
+        positions: of the joints, (n_joints,).
+    """
+    names = prepared.robot.joint_names
+    poses = link_poses(prepared, dict(zip(names, positions, strict=True)))
+    numbers = {name: k for k, name in enumerate(prepared.links)}
+    joints = {joint.name: joint for joint in prepared.joints}
+    rows = []
+    for joint in (joints[name] for name in names):
+        axes = Pose(quaternion=turn_from_x(np.asarray(joint.axis)))
+        turn = (poses[joint.child] * axes).rotation()
+        rows.append((told[numbers[joint.child]].reshape(2, 3) @ turn.T).ravel())
+    return np.array(rows).reshape(-1, 6)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from pytest_simbench.simulator import Seen, Settings
+from pytest_simbench.simulator import Seen, Settings, chosen_on
 
 
 @dataclass(frozen=True)
@@ -68,9 +68,6 @@ PROFILES: Mapping[str, Settings] = {
     "real": replace(TUNED, timestep=0.001, max_depenetration_velocity=0.1),  # docs/reality.md
 }
 
-SEEDS = (Seen.seeds("throwing", 100, 119),)
-
-CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
-    "tuned": SEEDS,
-    "real": (*SEEDS, Seen.motions("cube_tosses", 0, 564, 6), Seen.motions("arm_pushes", 1, 33, 4)),
-}
+CHOSEN_ON = chosen_on(
+    Seen.seeds("throwing", 100, 119), real=(Seen.motions("arm_pushes", 1, 33, 4),)
+)

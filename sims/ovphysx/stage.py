@@ -28,7 +28,7 @@ from pytest_simbench.scene import (
     Sphere,
 )
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot
-from pytest_simbench.simulator.loops import reduced
+from pytest_simbench.simulator.links import reduced
 from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
 
 from . import usd_text as usd

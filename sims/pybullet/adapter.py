@@ -30,17 +30,13 @@ from pytest_simbench.simulator import (
     heavy,
     lazy_import,
 )
-from pytest_simbench.simulator.kinematics import motion_subspace
-from pytest_simbench.simulator.loops import reduced
-from pytest_simbench.simulator.self_collision import joined
-from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
+from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
+from pytest_simbench.simulator.links import joined, motion_subspace, reduced
 
 from .anchors import Anchors
-from .loads import wrench
-from .loops import close_loop
-from .readback import ReadBack
+from .readback import ReadBack, wrench
 from .settings import CHOSEN_ON, PROFILES, PyBulletSettings
-from .world import ROBOT, WORLD, add_body, set_surface
+from .world import ROBOT, WORLD, add_body, close_loop, set_surface
 
 pybullet = lazy_import("pybullet")
 
@@ -60,19 +56,9 @@ class PyBullet(Simulator):
         tested_version="3.2.7",
         oldest_version="3.2.2",  # before 3.2.6 there are no wheels for Python 3.11
         companions={"3.2.2": ("numpy<2",), "3.2.7": ("numpy",)},  # what it was compiled for
-        capabilities=frozenset(
-            {
-                Capability.WINDOW,
-                Capability.OFFSCREEN,
-                Capability.SAVE_RESTORE,
-                Capability.EXACT_RESTORE,
-                Capability.CONTACT_COUNT,
-                Capability.CONTACT_FORCES,
-                Capability.LOOPS,
-                Capability.SELF_COLLIDE,
-                Capability.JOINT_WRENCHES,
-                Capability.DETERMINISTIC,
-            }
+        capabilities=Capability.named(
+            "window offscreen save_restore exact_restore contact_count contact_forces loops "
+            "self_collide joint_wrenches deterministic"
         ),
         deviations=(
             Deviation("joint/*/armature", "Bullet has no rotor inertia"),
@@ -234,18 +220,7 @@ class PyBullet(Simulator):
         return made
 
     def read_back(self) -> dict[str, Any]:
-        return ReadBack(
-            self.client,
-            self._ground,
-            heavy(self.scene),
-            self._bodies,
-            self._robot,
-            self._links,
-            self._joints,
-            self._couplings,
-            self._closures,
-            self.prepared,
-        ).all()
+        return ReadBack(self).all()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self._commanded = (position, velocity, effort)
@@ -282,10 +257,6 @@ class PyBullet(Simulator):
         else:
             self._anchors.step(self._steps)
         self._steps += 1
-
-    @property
-    def time(self) -> float:
-        return self._steps * self.settings.timestep
 
     def body_state(self) -> FloatArray:
         c = self.client

@@ -6,13 +6,12 @@ and led back to the frames of the description here.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose, Robot
-from pytest_simbench.simulator import PreparedRobot, lazy_import
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.simulator import heavy, lazy_import, readback
 from pytest_simbench.simulator.shapes import (
     box_corners,
     cylinder_reach,
@@ -22,92 +21,73 @@ from pytest_simbench.simulator.shapes import (
     round_reach,
 )
 
-from .loops import points
+from .world import points, pose_of
 
 pybullet = lazy_import("pybullet")
 
 
-class ReadBack:
-    """Reads the quantities of `simulator.quantities` that Bullet tells.
+class ReadBack(readback.ReadBack):
+    """Reads the quantities of `simulator.quantities` that Bullet tells."""
 
-    Args:
-        client: of PyBullet.
-        ground: its body.
-        heavy: mass from which on a body is one that moves as prescribed [kg].
-        bodies: body of each box.
-        robot: body of the robot.
-        links: number of each link; -1 is the base.
-        joints: numbers of the driven joints.
-        couplings, closures: constraints between the fingers, and of loops.
-        prepared: names of links and joints; no value is taken from it.
-    """
+    def __init__(self, simulator: Any) -> None:
+        super().__init__(simulator)
+        self.c, self.ground, self.bodies = simulator.client, simulator._ground, simulator._bodies
+        self.robot, self.links, self.joints = simulator._robot, simulator._links, simulator._joints
+        self.couplings, self.loops = simulator._couplings, simulator._closures
+        self.held = self._held()
 
-    def __init__(
-        self,
-        client: int,
-        ground: int,
-        heavy: float,
-        bodies: Mapping[str, int],
-        robot: int,
-        links: Mapping[str, int],
-        joints: Sequence[int],
-        couplings: Sequence[int],
-        closures: Sequence[int],
-        prepared: PreparedRobot | None,
-    ) -> None:
-        self.c, self.ground, self.heavy, self.bodies = client, ground, heavy, bodies
-        self.robot, self.links, self.joints = robot, links, joints
-        self.couplings, self.closures, self.prepared = couplings, closures, prepared
-
-    def all(self) -> dict[str, Any]:
-        """Every quantity that Bullet tells, by its name."""
+    def world(self) -> dict[str, Any]:
         engine = pybullet.getPhysicsEngineParameters(physicsClientId=self.c)
         ground = self._dynamics(self.ground)
         place, _ = pybullet.getBasePositionAndOrientation(self.ground, physicsClientId=self.c)
-        reported: dict[str, Any] = {
+        return {
             "gravity": [engine[f"gravityAcceleration{axis}"] for axis in "XYZ"],
             "timestep": engine["fixedTimeStep"],
             "ground/height": place[2],
             "ground/friction": ground[1] ** 2,
             "ground/restitution": ground[5] ** 2,
         }
-        held = self._held()
-        for name, body in self.bodies.items():
-            free = 0 < self._dynamics(body)[0] < self.heavy  # else fixed, or it moves as prescribed
-            reported |= self._part(f"body/{name}", body, -1)
-            if free:
-                reported |= self._inertial(f"body/{name}", body, -1)
-                velocity = pybullet.getBaseVelocity(body, physicsClientId=self.c)
-                reported[f"body/{name}/velocity"] = np.concatenate(velocity)
-            reported[f"body/{name}/dynamic"] = float(free and body not in held)
-        if self.prepared is not None:
-            reported |= self._robot_quantities(self.prepared.robot)
-        return reported
 
-    def _robot_quantities(self, robot: Robot) -> dict[str, Any]:
-        found: dict[str, Any] = {"gripper/coupled": self._coupled(robot)}
-        for k, closure in enumerate(self.closures):
-            found[f"closure/{k}/points"] = points(self.c, closure)
-        for name, link in self.links.items():
-            found |= self._part(f"link/{name}", self.robot, link)
-            if link >= 0:
-                found |= self._inertial(f"link/{name}", self.robot, link)
-        for name, joint in zip(robot.joint_names, self.joints, strict=True):
-            info = pybullet.getJointInfo(self.robot, joint, physicsClientId=self.c)
-            state = pybullet.getJointState(self.robot, joint, physicsClientId=self.c)
-            found[f"joint/{name}/limits"] = info[8:10]
-            found[f"joint/{name}/friction"] = info[6] + info[7]  # a motor has no damping besides
-            found[f"joint/{name}/initial_position"] = state[0]
-            found[f"joint/{name}/axis"] = self._axis(joint)
+    def body(self, prefix: str, name: str) -> dict[str, Any]:
+        body = self.bodies[name]
+        # else fixed, or it moves as prescribed
+        free = 0 < self._dynamics(body)[0] < heavy(self.scene)
+        found = self._part(prefix, body, -1)
+        if free:
+            found |= self._inertial(prefix, body, -1)
+            velocity = pybullet.getBaseVelocity(body, physicsClientId=self.c)
+            found[f"{prefix}/velocity"] = np.concatenate(velocity)
+        found[f"{prefix}/dynamic"] = float(free and body not in self.held)
         return found
+
+    def link(self, prefix: str, name: str) -> dict[str, Any]:
+        link = self.links[name]
+        found = self._part(prefix, self.robot, link)
+        return found | self._inertial(prefix, self.robot, link) if link >= 0 else found
+
+    def joint(self, prefix: str, name: str) -> dict[str, Any]:
+        joint = self.joints[self.prepared.robot.joint_names.index(name)]
+        info = pybullet.getJointInfo(self.robot, joint, physicsClientId=self.c)
+        state = pybullet.getJointState(self.robot, joint, physicsClientId=self.c)
+        return {
+            f"{prefix}/limits": info[8:10],
+            f"{prefix}/friction": info[6] + info[7],  # a motor has no damping besides
+            f"{prefix}/initial_position": state[0],
+            f"{prefix}/axis": self._axis(joint),
+        }
+
+    def closures(self) -> list[FloatArray]:
+        return [points(self.c, closure) for closure in self.loops]
+
+    def touches(self) -> dict[str, Any]:
+        return {}
 
     def _part(self, prefix: str, body: int, link: int) -> dict[str, Any]:
         """Pose, shapes and surface of a body or link."""
         dynamics, inertial = self._dynamics(body, link), self._inertial_frame(body, link)
         boxes, meshes, rounds = self._shapes(body, link)
-        found: dict[str, Any] = {
-            f"{prefix}/pose": (self._centre(body, link) * inertial.inverse()).as_array(),
-        }
+        place = self._centre(body, link) * inertial.inverse()
+        found: dict[str, Any] = {f"{prefix}/pose": place.as_array()}
         corners = ([reach(placed(points, inertial)) for points in kind] for kind in (boxes, meshes))
         outline = [*corners, rounds]
         found |= outlines(prefix, *outline)
@@ -135,13 +115,13 @@ class ReadBack:
         data = pybullet.getCollisionShapeData(body, link, physicsClientId=self.c)
         for k, (_, _, kind, size, _, place, turn) in enumerate(data):
             if kind == pybullet.GEOM_BOX:
-                boxes.append(placed(box_corners(size), _pose(place, turn)))
+                boxes.append(placed(box_corners(size), pose_of(place, turn)))
             elif kind == pybullet.GEOM_SPHERE:
-                rounds.append(round_reach(size[0], 0.0, _pose(place, turn)))
+                rounds.append(round_reach(size[0], 0.0, pose_of(place, turn)))
             elif kind == pybullet.GEOM_CAPSULE:
-                rounds.append(round_reach(size[1], size[0], _pose(place, turn)))
+                rounds.append(round_reach(size[1], size[0], pose_of(place, turn)))
             elif kind == pybullet.GEOM_CYLINDER:
-                rounds.append(cylinder_reach(size[1], size[0], _pose(place, turn)))
+                rounds.append(cylinder_reach(size[1], size[0], pose_of(place, turn)))
             else:  # Bullet's own corners, already in the inertial frame
                 mesh = pybullet.getMeshData(
                     body, link, collisionShapeIndex=k, physicsClientId=self.c
@@ -176,16 +156,15 @@ class ReadBack:
             [turn @ np.array(angular)[:, column], turn @ np.array(linear)[:, column]]
         )
 
-    def _coupled(self, robot: Robot) -> float:
+    def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
         """Whether the constraints are gears between the fingers."""
         found = set()
         for constraint in self.couplings:
             info = pybullet.getConstraintInfo(constraint, physicsClientId=self.c)
             if info[0] == info[2] == self.robot and info[4] == pybullet.JOINT_GEAR:
                 found.add(frozenset((info[1], info[3])))
-        joints = dict(zip(robot.joint_names, self.joints, strict=True))
-        wanted = {frozenset(joints[name] for name in pair) for pair in robot.gripper.couplings}
-        return float(found == wanted)
+        joints = dict(zip(self.prepared.robot.joint_names, self.joints, strict=True))
+        return found == {frozenset(joints[name] for name in pair) for pair in pairs}
 
     def _held(self) -> set[int]:
         """Bodies that a constraint holds."""
@@ -202,18 +181,33 @@ class ReadBack:
     def _inertial_frame(self, body: int, link: int) -> Pose:
         """In the frame of the body or link."""
         dynamics = self._dynamics(body, link)
-        return _pose(dynamics[3], dynamics[4])
+        return pose_of(dynamics[3], dynamics[4])
 
     def _centre(self, body: int, link: int) -> Pose:
         """The inertial frame in the world."""
         c = self.c
         if link < 0:
-            return _pose(*pybullet.getBasePositionAndOrientation(body, physicsClientId=c))
+            return pose_of(*pybullet.getBasePositionAndOrientation(body, physicsClientId=c))
         state = pybullet.getLinkState(body, link, computeForwardKinematics=1, physicsClientId=c)
-        return _pose(state[0], state[1])
+        return pose_of(state[0], state[1])
 
 
-def _pose(position: Sequence[float], quaternion: Sequence[float]) -> Pose:
-    """Of Bullet's quaternions, which end with w."""
-    x, y, z, w = quaternion
-    return Pose.from_array([*position, w, x, y, z])
+def wrench(client: int, robot: int, joint: int, subspace: FloatArray) -> FloatArray:
+    """On a joint's child about the origin of its frame, in the world, (6,).
+
+    Bullet's sensor tells it about the child's centre of mass, in the axes of its inertial frame,
+    and without the motor.
+
+    Args:
+        client, robot, joint: Bullet's numbers.
+        subspace: of the joint, `simulator.links.motion_subspace`.
+    """
+    told = pybullet.getJointState(robot, joint, physicsClientId=client)
+    state = pybullet.getLinkState(robot, joint, physicsClientId=client)
+    inertial, link = (
+        pose_of((0.0, 0.0, 0.0), quaternion).rotation() for quaternion in (state[1], state[5])
+    )
+    force = inertial @ told[2][:3] + told[3] * link @ subspace[3:]
+    torque = inertial @ told[2][3:] + told[3] * link @ subspace[:3]
+    arm = np.subtract(state[0], state[4])
+    return np.concatenate([force, torque + np.cross(arm, force)])

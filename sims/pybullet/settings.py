@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from pytest_simbench.simulator import Seen, Settings
+from pytest_simbench.simulator import Seen, Settings, chosen_on
 
 
 @dataclass(frozen=True)
@@ -60,9 +60,4 @@ PROFILES: Mapping[str, Settings] = {
     "real": replace(TUNED, timestep=0.001, contact_erp=0.08),
 }
 
-SEEDS = (Seen.seeds("throwing", 2022, 2041), Seen.seeds("stacking", 2024, 2024))
-
-CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
-    "tuned": SEEDS,
-    "real": (*SEEDS, Seen.motions("cube_tosses", 0, 564, 6)),
-}
+CHOSEN_ON = chosen_on(Seen.seeds("throwing", 2022, 2041), Seen.seeds("stacking", 2024, 2024))

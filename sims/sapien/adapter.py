@@ -29,7 +29,7 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
-from pytest_simbench.simulator.loops import reduced
+from pytest_simbench.simulator.links import reduced
 
 from .bodies import ROBOT, WORLD, add_body, add_ground
 from .drawing import Drawing
@@ -59,18 +59,9 @@ class SAPIEN(Simulator):
         tested_version="3.0.3",
         oldest_version="3.0.0",
         companions={"3.0.0": ("numpy", "setuptools<81")},  # pkg_resources
-        capabilities=frozenset(
-            {
-                Capability.WINDOW,
-                Capability.OFFSCREEN,
-                Capability.SAVE_RESTORE,
-                Capability.CONTACT_COUNT,
-                Capability.CONTACT_FORCES,
-                Capability.LOOPS,
-                Capability.SELF_COLLIDE,
-                Capability.JOINT_WRENCHES,
-                Capability.DETERMINISTIC,
-            }
+        capabilities=Capability.named(
+            "window offscreen save_restore contact_count contact_forces loops self_collide "
+            "joint_wrenches deterministic"
         ),
         deviations=(
             Deviation("gripper/coupled", "SAPIEN does not report its tendons"),
@@ -205,18 +196,7 @@ class SAPIEN(Simulator):
         return made
 
     def read_back(self) -> dict[str, Any]:
-        positions = self.joint_state()[0]
-        return ReadBack(
-            self._system,
-            self._ground,
-            self._bodies,
-            self._links,
-            self._joints,
-            positions,
-            self._closures,
-            self.scene,
-            self.prepared,
-        ).all()
+        return ReadBack(self).all()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         for set_target, target in zip(
@@ -238,10 +218,6 @@ class SAPIEN(Simulator):
     def step(self) -> None:
         self._system.step()
         self._steps += 1
-
-    @property
-    def time(self) -> float:
-        return self._steps * self.settings.timestep
 
     def body_state(self) -> FloatArray:
         # All in one call; body by body it takes ten times as long, a third of the stepping.

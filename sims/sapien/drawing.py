@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pytest_simbench.scene import Pose, Scene, Solid
 from pytest_simbench.simulator import PreparedRobot, UnavailableError, lazy_import
-from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
+from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
 
 sapien = lazy_import("sapien")
 rendering = lazy_import("sapien.render")

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose, Scene
-from pytest_simbench.simulator import PreparedRobot, lazy_import, one_value
-from pytest_simbench.simulator.quantities import touches
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.simulator import lazy_import, one_value, readback
 from pytest_simbench.simulator.shapes import (
     box_corners,
     cylinder_reach,
@@ -22,72 +21,54 @@ from pytest_simbench.simulator.shapes import (
 
 physx = lazy_import("sapien.physx")
 
-
 LYING = Pose(quaternion=(math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0))
 """Turns the z axis to the x axis, along which SAPIEN's cylinders and capsules lie."""
 
 
-class ReadBack:
-    """Reads the quantities of `simulator.quantities` that SAPIEN tells.
+class ReadBack(readback.ReadBack):
+    """Reads the quantities of `simulator.quantities` that SAPIEN tells."""
 
-    Args:
-        system: of PhysX.
-        ground: its component.
-        bodies, links: components by the scene's names.
-        joints: of the driven joints.
-        positions: of those joints [rad or m].
-        closures: what closes loops.
-        scene, prepared: names of what was built; no value is taken from them.
-    """
+    def __init__(self, simulator: Any) -> None:
+        super().__init__(simulator)
+        self.system, self.ground = simulator._system, simulator._ground
+        self.bodies, self.links = simulator._bodies, simulator._links
+        self.made = simulator._closures
+        names = () if self.prepared is None else self.prepared.robot.joint_names
+        states = zip(simulator._joints, simulator.joint_state()[0], strict=True)
+        self.joints = dict(zip(names, states, strict=True))
 
-    def __init__(
-        self,
-        system: Any,
-        ground: Any,
-        bodies: Mapping[str, Any],
-        links: Mapping[str, Any],
-        joints: Sequence[Any],
-        positions: Sequence[float],
-        closures: Sequence[Any],
-        scene: Scene,
-        prepared: PreparedRobot | None,
-    ) -> None:
-        self.system, self.ground, self.bodies, self.links = system, ground, bodies, links
-        self.joints, self.positions = joints, positions
-        self.scene, self.prepared, self.closures = scene, prepared, closures
-
-    def all(self) -> dict[str, Any]:
-        """Every quantity that SAPIEN tells, by its name."""
+    def world(self) -> dict[str, Any]:
         plane = self.ground.entity.pose * self.ground.collision_shapes[0].local_pose
-        reported: dict[str, Any] = {
+        return {
             "gravity": self.system.config.gravity,
             "timestep": self.system.timestep,
             "ground/height": plane.p[2],
             "ground/friction": _friction(self.ground),
             "ground/restitution": _restitution(self.ground),
         }
-        for name, body in self.bodies.items():
-            reported |= _part(f"body/{name}", body)
-            static = isinstance(body, physx.PhysxRigidStaticComponent)
-            reported[f"body/{name}/dynamic"] = float(not static and _free(body))
-            if not (static or body.kinematic):
-                reported |= _inertial(f"body/{name}", body)
-                velocity = np.concatenate([body.linear_velocity, body.angular_velocity])
-                reported[f"body/{name}/velocity"] = velocity
-        for k, closure in enumerate(self.closures):
-            points = closure.pose_in_parent.p, closure.pose_in_child.p
-            reported[f"closure/{k}/points"] = np.array(points)
-        if self.prepared is not None:
-            for name in self.prepared.links:
-                reported |= _part(f"link/{name}", self.links[name])
-            for link in self.prepared.moving_links:
-                reported |= _inertial(f"link/{link.name}", self.links[link.name])
-            names = self.prepared.robot.joint_names
-            for name, joint, at in zip(names, self.joints, self.positions, strict=True):
-                reported |= _joint(f"joint/{name}", joint, at)
-        return reported | touches(self.scene, self.prepared, self._can_touch)
 
-    def _can_touch(self, a: str, b: str) -> bool:
+    def body(self, prefix: str, name: str) -> dict[str, Any]:
+        body = self.bodies[name]
+        found = _part(prefix, body)
+        static = isinstance(body, physx.PhysxRigidStaticComponent)
+        found[f"{prefix}/dynamic"] = float(not static and _free(body))
+        if not (static or body.kinematic):
+            found |= _inertial(prefix, body)
+            velocity = np.concatenate([body.linear_velocity, body.angular_velocity])
+            found[f"{prefix}/velocity"] = velocity
+        return found
+
+    def link(self, prefix: str, name: str) -> dict[str, Any]:
+        link = self.links[name]
+        return _part(prefix, link) | (_inertial(prefix, link) if link.parent is not None else {})
+
+    def joint(self, prefix: str, name: str) -> dict[str, Any]:
+        return _joint(prefix, *self.joints[name])
+
+    def closures(self) -> list[FloatArray]:
+        return [np.array([made.pose_in_parent.p, made.pose_in_child.p]) for made in self.made]
+
+    def can_touch(self, a: str, b: str) -> bool:
         """By PhysX's filter as SAPIEN sets it: groups of 0, 1 name classes, of 2 exceptions."""
         links = a.startswith("link/") and b.startswith("link/")
         if links and self._joined(a, b):
@@ -117,9 +98,8 @@ def _compatible(a: Sequence[int], b: Sequence[int]) -> bool:
 def _part(prefix: str, component: Any) -> dict[str, Any]:
     """Pose, shapes and surface of a body or link."""
     shapes = component.collision_shapes
-    found = {
-        f"{prefix}/pose": np.concatenate([component.entity.pose.p, component.entity.pose.q]),
-    }
+    pose = component.entity.pose
+    found = {f"{prefix}/pose": np.concatenate([pose.p, pose.q])}
     boxes = [s for s in shapes if isinstance(s, physx.PhysxCollisionShapeBox)]
     rounds = [s for s in shapes if hasattr(s, "radius")]
     meshes = [s for s in shapes if s not in boxes and s not in rounds]

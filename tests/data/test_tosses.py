@@ -1,7 +1,9 @@
-"""The tosses: what is read is what was measured, in world axes; broken files are one sentence."""
+"""The tosses, and tensors in files of torch's first format."""
 
 from __future__ import annotations
 
+import os
+import pickle
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,7 +12,8 @@ import numpy as np
 import pytest
 
 from pytest_simbench.data import DataError, Toss, Tosses, tosses
-from tests.data.samples import falling
+from pytest_simbench.data.torch_file import MAGIC, VERSION, read_tensor
+from tests.data.samples import falling, torch_file
 
 
 @pytest.fixture
@@ -87,3 +90,28 @@ def test_a_file_that_is_cut_off_is_one_sentence(folder: Path, share: float) -> N
     path.write_bytes(content[: int(share * len(content))])
     with pytest.raises(DataError, match="contactnets_cube_tosses_a.npz holds no arrays"):
         tosses.read(folder)
+
+
+ROWS = np.arange(24.0).reshape(1, 4, 6)
+
+
+@pytest.mark.parametrize(("kind", "order"), [("Double", "C"), ("Double", "F"), ("Float", "C")])
+def test_a_tensor_is_what_torch_wrote(kind: str, order: Any) -> None:
+    assert (read_tensor(torch_file(ROWS, kind, order), "x.pt") == ROWS).all()
+
+
+@pytest.mark.parametrize("size", [0, 10, 100, 300, -8, -1])
+def test_a_file_that_is_cut_off_is_none(size: int) -> None:
+    with pytest.raises(DataError, match=r"^x\.pt is no tensor as torch wrote them: "):
+        read_tensor(torch_file(ROWS)[:size], "x.pt")
+
+
+def test_nothing_that_a_file_asks_for_is_run(capfd: pytest.CaptureFixture[str]) -> None:
+    class Malicious:
+        def __reduce__(self) -> tuple[Any, ...]:
+            return os.system, ("echo run",)
+
+    parts = [MAGIC, VERSION, {}, Malicious(), []]
+    with pytest.raises(DataError, match=r"it asks for posix\.system"):
+        read_tensor(b"".join(pickle.dumps(part, 2) for part in parts), "x.pt")
+    assert capfd.readouterr().out == ""

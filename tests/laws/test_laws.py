@@ -13,9 +13,11 @@ import pytest
 from pytest_simbench.client.environments import missing
 from pytest_simbench.laws import LAWS, Law, Reading
 from pytest_simbench.laws.base import Watched
+from pytest_simbench.laws.mechanisms import MOUNT, Part, mechanism
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
 from pytest_simbench.records.phenomena import PHENOMENA, PHENOMENON
 from pytest_simbench.scene import Scene
+from pytest_simbench.simulator import PreparedRobot
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks.base import Jitter, Outcome
 from pytest_simbench.testing.subject import Subject
@@ -113,3 +115,18 @@ def test_a_reading_is_an_error_and_its_ratio_to_the_tolerance() -> None:
 def test_what_cannot_be_read_is_an_error(numbers: tuple[float, float, float]) -> None:
     with pytest.raises(ValueError, match="nothing can be read"):
         Reading(*numbers)
+
+
+Y = (0.0, 1.0, 0.0)
+
+
+def test_parts_hang_on_the_one_before_or_on_a_named_one() -> None:
+    parts = Part("a", Y), Part("b", Y), Part("c", Y, on="a"), Part("d", Y, on=MOUNT)
+    joints = PreparedRobot(mechanism("tree", *parts)).joints
+    above = {joint.name: joint.parent for joint in joints}
+    assert above == {"a": "base", "b": "a link", "c": "a link", "d": "base"}
+
+
+def test_a_part_that_hangs_on_none_there_is_is_refused() -> None:
+    with pytest.raises(ValueError, match="'a' hangs on 'b'; choose from mount"):
+        mechanism("tree", Part("a", Y, on="b"), Part("b", Y))

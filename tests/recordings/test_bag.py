@@ -82,7 +82,7 @@ def test_links_stand_where_the_model_has_them(tmp_path: Path) -> None:
     """Along /tf from the root, as a viewer goes, against the adapters' own forward kinematics."""
     from pytest_simbench.robot.panda import panda
     from pytest_simbench.scene import Pose
-    from pytest_simbench.simulator.kinematics import link_poses
+    from pytest_simbench.simulator.links import link_poses
     from pytest_simbench.simulator.urdf import PreparedRobot
 
     kept = trace()

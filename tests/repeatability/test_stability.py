@@ -13,7 +13,7 @@ from pytest_simbench.measure.results import InconclusiveWarning
 from pytest_simbench.repeatability.episode import Episode, Episodes
 from pytest_simbench.repeatability.perturbation import Perturbation
 from pytest_simbench.repeatability.stability import Sensitivity, Stability, sensitivity, stability
-from pytest_simbench.tasks.moments import Moment
+from pytest_simbench.tasks.base import Moment
 from tests.repeatability.scripted import Scripted, episode, motion, operation
 from tests.repeatability.test_scripted import ALL, Perturbed, shift, toppling
 

@@ -1,11 +1,17 @@
-"""Scenes reject what cannot exist, and travel unchanged."""
+"""Scenes, poses and trajectories: what they hold, and how they cross."""
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from pytest_simbench.robot.panda import panda
-from pytest_simbench.scene import Box, Pose, Scene, SceneError
+from pytest_simbench.scene import Box, Pose, Scene, SceneError, Trajectory
+from pytest_simbench.scene.pose import quaternion_of
 
 
 def box(name: str, x: float, **more: float) -> Box:
@@ -48,3 +54,122 @@ def test_a_ground_that_bounces_crosses_and_another_is_not_named() -> None:
     assert "ground_restitution" not in Scene("s").to_wire()
     with pytest.raises(SceneError, match="the ground's restitution in scene 's' is 2"):
         Scene("s", ground_restitution=2.0)
+
+
+numbers = st.floats(-10, 10, allow_nan=False)
+
+
+@st.composite
+def poses(draw: st.DrawFn) -> Pose:
+    quaternion = np.array([draw(st.floats(-1, 1)) for _ in range(4)])
+    if np.linalg.norm(quaternion) < 0.1:
+        quaternion = np.array([1.0, 0.0, 0.0, 0.0])
+    quaternion /= np.linalg.norm(quaternion)
+    return Pose.from_array([draw(numbers), draw(numbers), draw(numbers), *quaternion])
+
+
+@given(poses(), poses())
+def test_composition_multiplies_matrices(a: Pose, b: Pose) -> None:
+    assert np.allclose((a * b).matrix(), a.matrix() @ b.matrix(), atol=1e-9)
+
+
+@given(poses())
+def test_inverse_undoes(a: Pose) -> None:
+    assert np.allclose((a * a.inverse()).matrix(), np.eye(4), atol=1e-9)
+
+
+@given(poses())
+def test_a_pose_travels_unchanged(a: Pose) -> None:
+    assert Pose.from_wire(a.to_wire()) == a
+    assert Pose.from_array(a.as_array()) == a
+
+
+@given(st.floats(-math.pi + 1e-6, math.pi - 1e-6))
+def test_yaw_is_read_back(yaw: float) -> None:
+    assert Pose.at(0, 0, 0, yaw=yaw).yaw == pytest.approx(yaw, abs=1e-9)
+
+
+@given(st.floats(0, math.radians(44)), st.integers(0, 3))
+def test_tilt_is_the_angle_to_the_nearest_face(tilt: float, quarter: int) -> None:
+    angle = tilt + quarter * math.pi / 2
+    pose = Pose(quaternion=(math.cos(angle / 2), math.sin(angle / 2), 0.0, 0.0))
+    assert pose.tilt() == pytest.approx(tilt, abs=1e-6)
+
+
+@given(poses())
+def test_the_quaternion_of_a_matrix_undoes_it(a: Pose) -> None:
+    found = Pose(quaternion=tuple(quaternion_of(a.rotation())))
+    assert np.allclose(found.rotation(), a.rotation(), atol=1e-9)
+
+
+TIMESTEPS = st.sampled_from([0.0005, 0.001, 0.002, 1 / 240, 0.004, 0.01])
+
+
+@given(st.integers(2, 50), TIMESTEPS)
+def test_a_linear_motion_stays_linear_and_each_array_itself(rows: int, timestep: float) -> None:
+    ramp = np.linspace(0.0, 1.0, rows)[:, None] * np.ones(3)
+    trajectory = Trajectory(0.004, ramp, 2 * ramp, -3 * ramp)
+    resampled = trajectory.resampled(timestep)
+    steps = len(resampled.position)
+    share = np.minimum(np.arange(1, steps + 1) * timestep / trajectory.duration, 1.0)[:, None]
+    assert np.allclose(resampled.position, share, atol=1e-9)
+    assert np.allclose(resampled.velocity, 2 * share, atol=1e-9)
+    assert np.allclose(resampled.effort, -3 * share, atol=1e-9)
+    assert resampled.tick == timestep
+
+
+def test_one_set_point_is_held_at_rest() -> None:
+    goal, effort = np.array([0.1, -0.2]), np.array([3.0, 4.0])
+    held = Trajectory.holding(0.004, goal, effort)
+    assert (held.tick, held.duration) == (0.004, 0.004)
+    assert held.position.tolist() == [goal.tolist()] * 2
+    assert held.velocity.tolist() == [[0.0, 0.0]] * 2
+    assert held.effort.tolist() == [effort.tolist()] * 2
+    assert Trajectory.holding(0.004, goal).effort.tolist() == [[0.0, 0.0]] * 2
+
+
+@given(st.integers(2, 50), TIMESTEPS)
+def test_it_ends_within_half_a_step_of_its_end(rows: int, timestep: float) -> None:
+    """No step is left out or added, but that there is always one."""
+    flat = np.zeros((rows, 1))
+    trajectory = Trajectory(0.004, flat, flat, flat)
+    late = len(trajectory.resampled(timestep).position) * timestep - trajectory.duration
+    assert late <= timestep / 2 + 1e-12 or trajectory.duration < timestep / 2
+    assert late >= -timestep / 2 - 1e-12
+
+
+@pytest.mark.parametrize(
+    ("timestep", "expected"),
+    [
+        (0.004, [1.0, 4.0, 9.0]),  # at the rows: row 0, the start, is not commanded again
+        (0.002, [0.5, 1.0, 2.5, 4.0, 6.5, 9.0]),  # between them, straight
+        (0.008, [4.0, 9.0]),  # beyond the end, the end
+        (0.1, [9.0]),
+    ],
+)
+def test_a_bent_motion_is_sampled_straight_between_its_rows(
+    timestep: float, expected: list[float]
+) -> None:
+    rows = np.array([[0.0], [1.0], [4.0], [9.0]])
+    found = Trajectory(0.004, rows, rows, rows).resampled(timestep)
+    assert found.position.ravel().tolist() == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("tick", "shape", "value", "said"),
+    [
+        (0.0, (3, 2), 0.0, "the tick .* is 0.0"),
+        (math.nan, (3, 2), 0.0, "the tick .* is nan"),
+        (0.1, (3,), 0.0, r"a trajectory of the shapes \(3,\), \(3, 2\), \(3, 2\)"),
+        (0.1, (2, 2), 0.0, "a trajectory of the shapes"),
+        (0.1, (0, 2), 0.0, "a trajectory of the shapes"),
+        (0.1, (3, 2), math.nan, "a trajectory holds a number that is not finite"),
+        (0.1, (3, 2), math.inf, "a trajectory holds a number that is not finite"),
+    ],
+)
+def test_a_motion_that_is_none(
+    tick: float, shape: tuple[int, ...], value: float, said: str
+) -> None:
+    rows = np.zeros((3, 2))
+    with pytest.raises(SceneError, match=said):
+        Trajectory(tick, np.full(shape, value), rows, rows)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pytest_simbench.scene import FloatArray
-from pytest_simbench.simulator.view import EYE, FIELD_OF_VIEW, LOOK_AT
+from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
 
 WIDTH, HEIGHT = 320, 240
 RED = (0.9, 0.05, 0.05, 1.0)

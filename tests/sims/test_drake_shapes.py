@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from pytest_simbench.sims.drake.shapes import (
+from pytest_simbench.sims.drake.world import (
     corner_centres,
     fitting_radius,
     pad_centres,

@@ -3,17 +3,13 @@ not report, and parity faults of links that the common tests do not plant."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 from pytest_simbench.sims.pybullet.adapter import PyBullet
 
 from pytest_simbench.scene import Box, Pose, Scene
-from pytest_simbench.simulator import ParityError
-from pytest_simbench.simulator.parity import check
-from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.tasks import Jitter, Throwing
 from pytest_simbench.testing import scenes
 
@@ -48,43 +44,6 @@ def test_motors_keep_the_effort_limits(loaded: PyBullet) -> None:
         largest = np.maximum(largest, [abs(state[3]) for state in states])
     assert (largest <= limits * (1 + 1e-9)).all()
     np.testing.assert_allclose(largest[:7], limits[:7], rtol=1e-6)
-
-
-def link_inertia(s: Any) -> None:
-    import pybullet
-
-    was = pybullet.getDynamicsInfo(s._robot, 3, physicsClientId=s.client)[2]
-    scaled = [1.2 * moment for moment in was]
-    pybullet.changeDynamics(s._robot, 3, localInertiaDiagonal=scaled, physicsClientId=s.client)
-
-
-def ground_friction(s: Any) -> None:
-    import pybullet
-
-    pybullet.changeDynamics(s._ground, -1, lateralFriction=0.5, physicsClientId=s.client)
-
-
-def initial_position(s: Any) -> None:
-    import pybullet
-
-    pybullet.resetJointState(s._robot, s._joints[3], -2.0, physicsClientId=s.client)
-
-
-FAULTS: dict[str, Callable[[Any], None]] = {
-    "link/panda_link4/inertia": link_inertia,
-    "ground/friction": ground_friction,
-    "joint/panda_joint4/initial_position": initial_position,
-}
-
-
-@pytest.mark.parametrize("quantity", FAULTS)
-def test_fault_is_caught(loaded: PyBullet, quantity: str) -> None:
-    expected = expected_quantities(SCENE, loaded.settings)
-    info = loaded.info
-    check(expected, loaded.read_back(), info.deviations, info.name)
-    FAULTS[quantity](loaded)
-    with pytest.raises(ParityError, match=f"{quantity}: scene .*, pybullet "):
-        check(expected, loaded.read_back(), info.deviations, info.name)
 
 
 def test_default_is_what_the_engine_does_by_itself() -> None:

@@ -18,7 +18,7 @@ import pytest
 from pytest_simbench.client.errors import EngineFailed, WorkerExited
 from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.simulator import SimulatorError
-from pytest_simbench.simulator.program import Program
+from pytest_simbench.simulator.external import Program
 from pytest_simbench.testing import ConformanceTest, conformance_checks
 from tests.sims.worlds import Worlds
 from tests.simulator.outside import Outside
@@ -35,7 +35,7 @@ PARENTED = 'sleep 600 & trap "" TERM; echo "two of us"; wait'
 OWNER = """
 import sys, time
 from pathlib import Path
-from pytest_simbench.simulator.program import Program
+from pytest_simbench.simulator.external import Program
 folder = Path(sys.argv[1])
 folder.mkdir()
 program = Program("It", ["/bin/sh", "-c", sys.argv[2]], folder)

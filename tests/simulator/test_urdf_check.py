@@ -19,8 +19,8 @@ from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.robot.panda import panda
 from pytest_simbench.scene import Box, Gripper, Joint, Pose, Robot, Scene, SceneError
 from pytest_simbench.simulator import DescriptionError, PreparedRobot
+from pytest_simbench.simulator.links import check_names, check_robot
 from pytest_simbench.simulator.mesh_check import LARGEST_MESH, TRIANGLE
-from pytest_simbench.simulator.robot_check import check_names, check_robot
 from tests.hostile import assert_harmless_terminal
 
 SOUND = """<robot name="arm">

@@ -1,0 +1,90 @@
+"""What only MuJoCo's adapter has to show: bounces, forces of contacts, pictures without driver."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
+
+from pytest_simbench.scene import Pose, Scene
+from pytest_simbench.simulator.registry import adapter
+from pytest_simbench.testing import scenes
+from sims.mujoco.bounces import LARGEST, damping_ratio, direct, restitution_of
+
+
+def left(stiffness: float, damping: float) -> float:
+    """Share of its speed with which a mass leaves such a contact: at the end of their force."""
+    x, v, dt = 0.0, 1.0, 1e-6
+    while stiffness * x + damping * v > 0:
+        v -= (stiffness * x + damping * v) * dt
+        x += v * dt
+    return -v
+
+
+@pytest.mark.parametrize("restitution", [0.25, 0.6, 0.95])
+def test_a_contact_leaves_what_it_is_made_for(restitution: float) -> None:
+    stiffness, damping = direct(restitution, 0.002)
+    assert left(-stiffness, -damping) == pytest.approx(restitution, abs=1e-3)
+    assert restitution_of(damping_ratio(restitution)) == pytest.approx(restitution)
+
+
+def test_all_and_nothing() -> None:
+    assert restitution_of(0.0) == 1.0
+    assert damping_ratio(1.0) == pytest.approx(0.0, abs=1e-12)
+    assert restitution_of(1.0) == restitution_of(LARGEST) == 0.0
+    assert restitution_of(damping_ratio(0.1)) == pytest.approx(0.2079, abs=1e-3)
+
+
+def test_what_brakes_a_spin_is_told() -> None:
+    """Euler's law about the vertical: of 0.02 s of a cube that spins on the ground."""
+    cube = replace(scenes.cube("cube", Pose.at(0, 0, 0.025)), angular_velocity=(0.0, 0.0, 20.0))
+    simulator = MuJoCo(MuJoCo.profiles["tuned"])
+    simulator.load(Scene("spin", (cube,)))
+    spins, torques = [], []
+    for _ in range(20):
+        simulator.step()
+        spins.append(simulator.body_state()[0, 12])
+        torques.append(sum(wrench[5] for *_, wrench in simulator.contact_forces()))
+    simulator.close()
+    braked = cube.inertia()[2] * (spins[-1] - spins[0])
+    assert braked < 0
+    told = sum(torques[1:]) * MuJoCo.profiles["tuned"].timestep
+    assert told == pytest.approx(braked, rel=1e-6)
+
+
+CODE = """
+from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
+
+def driver():
+    with open("/proc/self/maps") as maps:
+        return any(name in line for line in maps for name in ("libEGL", "libGL", "libOSMesa"))
+
+simulator = MuJoCo(MuJoCo.profiles["tuned"])
+simulator.load(Scene("one", (Box("cube", (0.05, 0.05, 0.05), Pose.at(0.5, 0, 0.5), mass=0.1),)))
+simulator.step()
+before = driver()
+picture = simulator.render(64, 48)
+print(before, driver(), picture.shape, len(set(picture.reshape(-1).tolist())) > 1)
+"""
+
+
+def test_the_driver_comes_with_the_first_picture() -> None:
+    environment = {k: v for k, v in os.environ.items() if k not in ("MUJOCO_GL", "DISPLAY")}
+    found = subprocess.run(
+        [sys.executable, "-c", CODE],
+        env={**environment, **MuJoCo.info.environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert found.stdout.strip() == "False True (48, 64, 3) True", found.stderr
+
+
+@pytest.mark.parametrize("name", ["mujoco", "newton"])
+def test_both_adapters_import_it_without(name: str) -> None:
+    assert adapter(name).info.environment["MUJOCO_GL"] == "disabled"
