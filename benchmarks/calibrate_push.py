@@ -3,7 +3,7 @@
 python benchmarks/calibrate_push.py push SIMULATOR...   fingers, friction and marker of ArmPushing
 python benchmarks/calibrate_push.py follow              what the arm makes of its commands
 
-Needs the data set arm_pushes (`pytest --sim-download arm_pushes`, or $SIMBENCH_DATA). The held-out
+Needs the data set arm_pushes (`simbench download arm_pushes`, or $SIMBENCH_DATA). The held-out
 runs are never looked at.
 
 `push` finds one set of values for all the simulators given, with their profile `real`: the least

@@ -3,7 +3,7 @@
 python benchmarks/choose_real.py SIMULATOR...                         its grid, best first
 python benchmarks/choose_real.py --friction 0.16,0.18 SIMULATOR...    frictions, with `real`
 
-Needs the data set cube_tosses (`pytest --sim-download cube_tosses`, or $SIMBENCH_DATA). Each
+Needs the data set cube_tosses (`simbench download cube_tosses`, or $SIMBENCH_DATA). Each
 candidate is the profile `tuned` with a few settings changed. It is simulated from the start of each
 even toss; the odd ones are never looked at. What is printed is the mean over the tosses of the
 position error [% of the edge] and the rotation error [degrees].

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import pytest
 
-from pytest_simbench.plugin.values import ANY_NUMBER, BadValue, shown
+from pytest_simbench.cli.values import ANY_NUMBER, BadValue, shown
 
 if TYPE_CHECKING:
     from pytest_simbench.experiment.experiment import Experiment

@@ -36,7 +36,7 @@ def pool(config: pytest.Config) -> Pool:
         given = f"--sim-cluster={options.value(config, 'sim_cluster')}"
         for name in HERE_ONLY:
             if options.value(config, name):
-                flag = options.option(name).flag
+                flag = options.option(name).sure
                 raise pytest.UsageError(
                     f"{given}: {flag} is for simulators on this machine; leave out one of them"
                 )

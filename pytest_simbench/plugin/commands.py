@@ -1,138 +1,124 @@
-"""Options that do their work and exit: `--sims`, `--robots`; and where the others are."""
+"""The options of release 0.1 that do their work and exit. They are commands now, `simbench merge`
+for `--sim-merge`; for one release they still work, and name the command.
+
+Imported at plugin load: standard library and pytest only.
+"""
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Iterator
-from importlib.metadata import version
+import argparse
+import shlex
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 
-from pytest_simbench.client.environments import interpreter, outside
-from pytest_simbench.ground.text import for_terminal
-from pytest_simbench.plugin import options, recording, spellings
-from pytest_simbench.plugin.bisect import bisect
-from pytest_simbench.plugin.data import download
-from pytest_simbench.plugin.environments import install, list_environments, uninstall
-from pytest_simbench.plugin.merge import merge_runs, report_runs
-from pytest_simbench.plugin.selection import Selection
-from pytest_simbench.plugin.session import session_of
-from pytest_simbench.scene import Robot
-from pytest_simbench.simulator.info import SimulatorInfo
-from pytest_simbench.simulator.registry import adapter, known, problem, registered, registry
+from pytest_simbench.plugin import options
 
 
-def run_command(config: pytest.Config) -> int:
-    """Do what the first such option on the command line asks for; the exit code.
+@dataclass(frozen=True)
+class Command:
+    """What an old option stands for.
 
-    Raises:
-        pytest.UsageError: what is wrong with the input; one sentence.
+    Attributes:
+        flag: the option.
+        name: of the command.
+        values: how many values the option takes, as argparse has it; 0 for none.
+        carried: options of a run that were for the option too, by what the command calls them.
     """
-    options.values(config)
-    recording.check(config)
-    actions = (
-        install, uninstall, list_environments, download, bisect, merge_runs, report_runs, _list,
-        _robots,
-    )  # fmt: skip
-    commands = dict(zip(options.COMMANDS, actions, strict=True))
-    name = next(name for name in commands if options.given(config, name))
-    try:
-        return commands[name](config)
-    except KeyboardInterrupt:
-        print(f"\n{options.option(name).flag}: interrupted; nothing that it read was changed")
-        return int(pytest.ExitCode.INTERRUPTED)
+
+    flag: str
+    name: str
+    values: int | str = 0
+    carried: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def dest(self) -> str:
+        """What argparse calls its values."""
+        return f"simbench_command{self.flag}"
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """What argparse is told of it."""
+        taken = (
+            {"action": "extend", "nargs": self.values} if self.values else {"action": "store_true"}
+        )
+        return {"dest": self.dest, "default": None, "help": argparse.SUPPRESS, **taken}
 
 
-def _list(config: pytest.Config) -> int:
-    """`--sims`: the known simulators, what is here, what each can do and where it deviates."""
-    for line in [*_simulators(session_of(config).selection), *spellings.foreign(config)]:
-        print(for_terminal(line))
-    return 0
+_RUNS = {"sim_output": "--output", "sim_badge": "--badge", "sim_record": "--record"}
+
+COMMANDS = (
+    Command("--sim-install", "install", 1),
+    Command("--sim-uninstall", "uninstall", 1),
+    Command("--sim-environments", "environments"),
+    Command("--sim-download", "download", 1, {"sim_data": "--data"}),
+    Command("--sim-bisect", "bisect", 2),
+    Command("--sim-merge", "merge", "+", _RUNS),
+    Command("--sim-report", "report", "+", _RUNS),
+    Command("--sims", "list", 0, {"sim_cluster": "--cluster"}),
+    Command("--sim-list", "list", 0, {"sim_cluster": "--cluster"}),
+    Command("--robots", "robots"),
+    Command("--sim-robots", "robots"),
+)
+"""The first one that is given counts."""
 
 
-def _robots(config: pytest.Config) -> int:
-    """`--robots`: the known robots, and the one that `--robot` names; 1 when one is broken."""
-    from pytest_simbench.robot.errors import RobotError
-    from pytest_simbench.robot.registry import known, known_robot
-
-    chosen = session_of(config).selection.robots.values()
-    broken = False
-    for name in known():
-        try:
-            print(for_terminal(_robot_line(known_robot(name))))
-        except RobotError as error:
-            broken = True
-            print(for_terminal(f"{name}: BROKEN: {error}"))
-    for robot in chosen:
-        if robot is not None and robot.name not in known():
-            print(for_terminal(_robot_line(robot)))
-    return int(broken)
+def asked(config: pytest.Config) -> Command | None:
+    """The first of the old options that is on the command line."""
+    given = (found for found in COMMANDS if getattr(config.option, found.dest, None))
+    return next(given, None)
 
 
-def _robot_line(robot: Robot) -> str:
-    """Name, size and hand of a robot, and what it cannot do."""
-    from pytest_simbench.robot.model import RobotModel
-    from pytest_simbench.tasks import Pushing, Stacking, Throwing
+def run_command(config: pytest.Config, command: Command) -> int:
+    """Do what an old option asks for, by the command; the exit code, as pytest has it."""
+    from pytest_simbench.cli.main import BAD_INPUT, INTERRUPTED, main
+    from pytest_simbench.plugin import registration
 
-    arm, fingers = len(robot.arm_joints), len(robot.gripper.joints)
-    many = "one jaw that opens" if fingers == 1 else f"{fingers} fingers that open"
-    hand = f"{many} to {robot.gripper.opened:g} {RobotModel(robot).finger_unit}"
-    x, y, z = robot.base.position
-    line = (
-        f"{robot.name}: {arm} arm joints, {hand if fingers else 'a hand that only touches'}, "
-        f"base at ({x:g}, {y:g}, {z:g})"
+    values = getattr(config.option, command.dest)
+    if command.name == "bisect":
+        return _bisect(config, *values)
+    words = [command.name, *([] if values is True else values)]
+    if command.name == "robots" and options.value(config, "sim_robot") not in (None, "all"):
+        words.append(options.value(config, "sim_robot"))
+    for name, own in command.carried.items():
+        if (value := options.value(config, name)) is not None:
+            words += [own, value]
+    if command.name == "list" or (command.carried is _RUNS and config.get_verbosity() > 0):
+        words.append("-v")
+    _announce(command.flag, words)
+    status = main(words)
+    if command.name == "list":
+        print("\n".join(registration.taken_names(config)))
+    return {BAD_INPUT: pytest.ExitCode.USAGE_ERROR, INTERRUPTED: pytest.ExitCode.INTERRUPTED}.get(
+        status, status
     )
-    tasks = (task(robot=robot) for task in (Stacking, Throwing, Pushing))
-    return "".join([line, *(f"\n    no {t.name}: {p}" for t in tasks if (p := t.problem()))])
 
 
-def _here(selection: Selection, name: str) -> str:
-    """Where a simulator is and which version."""
-    info = adapter(name).info
-    if name in selection.pythons or name in selection.specs:
-        return f"in {selection.pythons.get(name) or selection.specs[name]}"
-    other = outside(info) if interpreter(info) else None
-    try:
-        found = other.version() if other else version(info.distribution)
-    except Exception:  # not there, or metadata that nobody can read
-        found = None
-    place = other.place if other else "installed"
-    if not found:  # no Python package tells it: the engine does, when it runs
-        return f"version not known before it runs, {place}"
-    return f"version {found}{'' if info.tested(found) else ', UNTESTED'}, {place}"
+def _announce(flag: str, words: list[str]) -> None:
+    command = shlex.join(["simbench", *words])
+    print(f"{flag} will go with the next release; write: {command}", file=sys.stderr)
 
 
-def _size(info: SimulatorInfo) -> str:
-    size = "" if info.install_size_mb is None else f"{info.install_size_mb} MB on disk; "
-    start = "compiles at first use" if info.costly_start else "nothing to compile"
-    return size + start
+def _bisect(config: pytest.Config, span: str, metric: str) -> int:
+    """The one that `simbench bisect` itself asks for: which folder it is, the options say."""
+    from pathlib import Path
 
+    from pytest_simbench.cli import main, values
+    from pytest_simbench.cli.bisect import bisect
+    from pytest_simbench.plugin.history import folder_of
+    from pytest_simbench.simulator.errors import SimulatorError
 
-def _simulators(selection: Selection) -> Iterator[str]:
-    """Lines: the table of capabilities, then a paragraph for each registered simulator, also for
-    those whose adapter is broken."""
-    from pytest_simbench.report.capabilities import capability_table
-
-    width = shutil.get_terminal_size((160, 24)).columns
-    yield capability_table([adapter(name).info for name in registered()], width)
-    yield ""
-    for name in known():
-        broken = problem(name)
-        if broken:
-            yield f"{name}: BROKEN: {broken}"
-            yield ""
-            continue
-        cls = adapter(name)
-        info = cls.info
-        missing = selection.missing(name)
-        yield f"{name}: {info.title} ({info.licence}), engine {info.engine}"
-        yield f"    {'NOT HERE: ' + missing if missing else _here(selection, name)}"
-        yield f"    tested with version {info.tested_range}; {_size(info)}"
-        yield f"    modes: {', '.join(info.modes)}; profiles: {', '.join(cls.profiles)}"
-        yield f"    can: {', '.join(sorted(info.capabilities))}"
-        for deviation in info.deviations:
-            what = f"{deviation.quantity}: " if deviation.quantity else ""
-            yield f"    deviates: {what}{deviation.reason}"
-        yield ""
-    for sentence in registry().unreadable:
-        yield f"BROKEN: {sentence}"
+    words = list(config.invocation_params.args)
+    place = words.index("--sim-bisect")
+    rest = [w for w in [*words[:place], *words[place + 3 :]] if not w.startswith("--sim-output=")]
+    if not config.pluginmanager.is_registered(main):
+        _announce("--sim-bisect", ["bisect", span, metric, *rest])
+    with options.refusing((values.BadInput, SimulatorError), "simbench bisect"):
+        wanted, metric = values.span(span), values.metric(metric)
+        given = options.value(config, "sim_output")
+        here = config.invocation_params.dir
+        folder = Path(here, given) if given else folder_of(config, wanted.name)
+        return bisect(wanted, metric, folder, rest)

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench.plugin import ahead, arguments, benchmark, cluster, data, options, recording
+from pytest_simbench.plugin import arguments, benchmark, cluster, data, options, prefetch, recording
+from pytest_simbench.plugin.registration import is_conftest
 from pytest_simbench.plugin.session import REPEATED, session_of
-from pytest_simbench.plugin.spellings import is_conftest
 
 if TYPE_CHECKING:
     from pytest_simbench.client.display import Displays
@@ -194,7 +194,7 @@ def repeat(
     from pytest_simbench.plugin.repeat_fixture import RepeatFixture
 
     run = session_of(request.config).run
-    run.expected = lambda: ahead.expected(request.config, request.session.items, case_of)
+    run.expected = lambda: prefetch.expected(request.config, request.session.items, case_of)
     repeat = RepeatFixture(request.node, simbench_case, run)
     done: list[Task] = []
 

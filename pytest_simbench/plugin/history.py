@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench import __version__
+from pytest_simbench.cli.values import Releases
 from pytest_simbench.client.package_index import newest_of_minors, releases
 from pytest_simbench.ground.host import host
 from pytest_simbench.ground.names import digest
 from pytest_simbench.plugin import options
-from pytest_simbench.plugin.values import Releases
 from pytest_simbench.simulator.registry import adapter
 
 FOLDER = ".simbench/history"

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.cli.values import Auto
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.executor import ExecutorError
 from pytest_simbench.experiment.experiment import Experiment
@@ -64,7 +65,7 @@ class RepeatFixture:
             return self._up_to(number, experiment, found)
 
         metrics = experiment.task.metrics
-        if isinstance(wanted, options.Auto):
+        if isinstance(wanted, Auto):
             plan = Plan.up_to(wanted.limit)
             first = up_to(plan.looks[0])
             result: ResultSet = SequentialResultSet(first, metrics, plan, up_to)

@@ -14,6 +14,8 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.cli import runs
+from pytest_simbench.cli.runs import RUNS
 from pytest_simbench.client.display import Displays
 from pytest_simbench.cluster.executor import ClusterExecutor
 from pytest_simbench.experiment.ahead import AheadExecutor
@@ -25,7 +27,6 @@ from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.plugin import cluster, options, recording, thresholds
 from pytest_simbench.plugin.compare import Comparison
 from pytest_simbench.plugin.history import elsewhere, folder_of
-from pytest_simbench.plugin.merge import publish
 from pytest_simbench.plugin.resume import Resumed, folder_to_resume
 from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import Threshold
@@ -45,9 +46,6 @@ from pytest_simbench.report.progress import Progress
 from pytest_simbench.report.tables import render_run
 from pytest_simbench.tasks.base import Task
 
-RUNS = ".simbench"
-"""Where runs without an `--sim-output` lie, in pytest's root folder."""
-
 
 class Run:
     """One pytest invocation, or one xdist worker's share of it.
@@ -59,7 +57,7 @@ class Run:
         mistake: in what was typed, found when the tests had ended; one sentence.
         resumed: the interrupted run that this one completes, if it does.
         page: to look at, once the whole report is written.
-        expected: what later tests will ask for, see `ahead`; set before the first one asks.
+        expected: what later tests will ask for, see `prefetch`; set before the first one asks.
     """
 
     def __init__(self, config: pytest.Config) -> None:
@@ -78,13 +76,13 @@ class Run:
         self._progress: Progress | None = None
         self.resumed: Resumed | None = None
         kept = options.value(config, "sim_history") is not None and self.folder.holds_run
-        if config.getoption("sim_resume") is not None or kept:
+        if options.given(config, "sim_resume") or kept:
             self.resumed = Resumed(self.folder)
 
     def _choose_path(self) -> Path:
         if self._shared_by is not None and "simbench_folder" in self._shared_by:
             return Path(self._shared_by["simbench_folder"])
-        if self.config.getoption("sim_resume") is not None:
+        if options.given(self.config, "sim_resume"):
             folder = folder_to_resume(self.config)
             if folder is not None:
                 return folder
@@ -291,7 +289,8 @@ class Run:
         if not self.reading.records and not (self.folder.path / NAME).is_file():
             return
         path, records = self.folder.path, self.reading.records
-        recorded = recording.record(self.config, path, path, records, self.progress)
+        asked = options.value(self.config, recording.RECORD)
+        recorded = runs.recordings(path, path, records, self.progress) if asked else []
         found, looks = comparison.found if comparison else None, self._looks()
         written = write_report(self.folder, self.reading, found, looks)
         unsaved = self.folder.flush()
@@ -321,7 +320,9 @@ class Run:
         baseline, report = found or ("", None)
         outcome = Outcome(passed, baseline, report, looks)
         problems.append(write_outcome(self.folder.path, outcome))
-        problems.append(publish(self.config, self.reading.records, passed))
+        problems.append(
+            runs.badge(options.value(self.config, "sim_badge"), self.reading.records, passed)
+        )
         problems += recorded
         if written.complete and not unsaved:
             self.page = self.folder.path / PAGE_NAME

@@ -50,7 +50,7 @@ def refused(what: str) -> Iterator[list[WorkerError]]:
 
 @check()
 def imports_without_engine(subject: Subject) -> None:
-    """The adapter's module imports where the engine is not installed, or not loaded: `--sims` reads
+    """The adapter's module imports where the engine is not installed, or not loaded: `simbench list` reads
     its facts. The engine is the packages in `info.modules`; in the adapter's own package it is just
     the modules that stand there by name."""
     module, _, name = subject.adapter.partition(":")

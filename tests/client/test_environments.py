@@ -38,7 +38,7 @@ def info(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SimulatorI
         distribution="six",
         modules=("no_such_module_here",),
         requirements=("six==1.16.0",),
-        install="pytest --sim-install sixth",
+        install="simbench install sixth",
         caches={"SIXTH_CACHE": "kernels"},
     )
 
@@ -125,7 +125,7 @@ def test_a_release_lives_in_its_own_even_where_the_engine_is_installed_here(
     info: SimulatorInfo,
 ) -> None:
     release = adapter("mujoco==3.3.7").info
-    assert "not there yet: pytest --sim-install mujoco==3.3.7" in str(missing(release))
+    assert "not there yet: simbench install mujoco==3.3.7" in str(missing(release))
     assert Environment.of(release).folder.name == "mujoco==3.3.7"
     assert missing(adapter("mujoco").info) is None
 
@@ -140,7 +140,7 @@ def test_one_that_does_not_install_stays_half_made(info: SimulatorInfo) -> None:
     info = replace(info, requirements=("./no/such/package",))
     with pytest.raises(SimulatorError, match="only half installed"):
         Environment.of(info).create()
-    assert "half installed: pytest --sim-install sixth" in str(missing(info))
+    assert "half installed: simbench install sixth" in str(missing(info))
 
 
 def test_an_engine_of_this_environment_has_none(info: SimulatorInfo) -> None:
@@ -149,7 +149,7 @@ def test_an_engine_of_this_environment_has_none(info: SimulatorInfo) -> None:
 
 
 def test_absent(info: SimulatorInfo) -> None:
-    assert "not there yet: pytest --sim-install sixth" in str(missing(info))
+    assert "not there yet: simbench install sixth" in str(missing(info))
 
 
 def test_cut_off_while_installing(info: SimulatorInfo) -> None:

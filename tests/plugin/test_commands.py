@@ -30,7 +30,7 @@ def test_sims_says_what_mends_an_absent_one(
     monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path))
     text = pytester.runpytest_subprocess("--sims").stdout.str()
     for name in own:
-        assert f"not there yet: pytest --sim-install {name}" in text
+        assert f"not there yet: simbench install {name}" in text
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,7 @@ def test_a_set_is_read_from_the_folder_and_each_toss_is_a_repetition(
 @pytest.mark.parametrize(
     ("content", "name", "outcome", "sentence"),
     [
-        (None, "cube_tosses", "skipped", "*is not in *: pytest --sim-download cube_tosses*"),
+        (None, "cube_tosses", "skipped", "*is not in *: simbench download cube_tosses*"),
         (b"x", "cube_tosses", "failed", "*contactnets_cube_tosses_1.npz holds no arrays*"),
         (None, "nosuch", "failed", "*no data set 'nosuch'; choose from cube_tosses*"),
     ],

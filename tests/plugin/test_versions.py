@@ -76,7 +76,7 @@ def test_versions_side_by_side(pytester: pytest.Pytester, release: str) -> None:
     [
         (["--sim=mujoco==abc d"], "'abc d' is no version; write mujoco==3.3.7"),
         (["--sim=nosuch==1.0"], "unknown simulator 'nosuch==1.0'; choose from "),
-        (["--sim=mujoco==3.3.7"], "not there yet: pytest --sim-install mujoco==3.3.7"),
+        (["--sim=mujoco==3.3.7"], "not there yet: simbench install mujoco==3.3.7"),
         (["--sim=mujoco@"], "give a path"),
         (["--sim=mujoco@./nowhere"], "there is no such file"),
         (["--sim=mujoco@a b=python"], "a label has letters"),

@@ -32,7 +32,7 @@ def expected(
         case_of: gives the case of a test of a variant that changes no settings.
     """
     alone = not hasattr(config, "workerinput") and not cluster.asked(config)
-    again = config.getoption("sim_resume") is not None
+    again = options.given(config, "sim_resume")
     if not alone or again or options.value(config, "sim_jobs") < 2:
         return []
     return [experiment for item in items for experiment in _of(item, case_of)]
