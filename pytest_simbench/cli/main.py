@@ -104,6 +104,12 @@ def parser() -> Parser:
     return top
 
 
+def described() -> list[tuple[str, str]]:
+    """Each command and what it does, for the page of options."""
+    (commands,) = (a for a in parser()._actions if isinstance(a, argparse._SubParsersAction))
+    return [(action.dest, action.help or "") for action in commands._choices_actions]
+
+
 def _kept(type_: Callable[[str], Any]) -> Callable[[str], str]:
     """A check by a type that leaves the text as it is."""
 

@@ -75,7 +75,6 @@ def asked(config: pytest.Config) -> Command | None:
 def run_command(config: pytest.Config, command: Command) -> int:
     """Do what an old option asks for, by the command; the exit code, as pytest has it."""
     from pytest_simbench.cli.main import BAD_INPUT, INTERRUPTED, main
-    from pytest_simbench.plugin import registration
 
     values = getattr(config.option, command.dest)
     if command.name == "bisect":
@@ -91,7 +90,7 @@ def run_command(config: pytest.Config, command: Command) -> int:
     _announce(command.flag, words)
     status = main(words)
     if command.name == "list":
-        print("\n".join(registration.taken_names(config)))
+        print("\n".join(options.taken_names(config)))
     return {BAD_INPUT: pytest.ExitCode.USAGE_ERROR, INTERRUPTED: pytest.ExitCode.INTERRUPTED}.get(
         status, status
     )

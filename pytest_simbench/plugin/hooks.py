@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from pytest_simbench.plugin import commands, registration, sanitise
+from pytest_simbench.plugin import commands, options, registration, sanitise
 from pytest_simbench.plugin.session import REPEATED, fixtures_of, session_of
 
 MARKS = (
@@ -93,7 +93,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_report_collectionfinish(config: pytest.Config, items: list[pytest.Item]) -> list[str]:
     """Which of our options go by another name here, where there are tests of simulators."""
     ours = any("sim_case" in fixtures_of(item) for item in items)
-    return registration.taken_names(config) if ours else []
+    return options.taken_names(config) if ours else []
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

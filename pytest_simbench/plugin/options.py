@@ -256,3 +256,15 @@ def repetitions(config: pytest.Config) -> int | Auto | None:
 def mentioned(config: pytest.Config, names: Sequence[str]) -> bool:
     """Whether one of these options is on the command line or in the ini file."""
     return any(given(config, name) or _ini(config, option(name))[1] is not None for name in names)
+
+
+def taken_names(config: pytest.Config) -> list[str]:
+    """What of our names on the command line belongs to others here, and how to write it; one
+    sentence each."""
+    ours = config.stash.get(FLAGS, {})
+    return [
+        f"{item.flag} belongs to another plugin or to a conftest here"
+        + (f": write {ours[item.name]} for this one's" if item.name in ours else "")
+        for item in OPTIONS
+        if ours.get(item.name) != item.flag
+    ]

@@ -46,18 +46,6 @@ def is_conftest(plugin: object) -> bool:
     return os.path.basename(getattr(plugin, "__file__", None) or "") == "conftest.py"
 
 
-def taken_names(config: pytest.Config) -> list[str]:
-    """What of our names on the command line belongs to others here, and how to write it; one
-    sentence each."""
-    ours = config.stash.get(FLAGS, {})
-    return [
-        f"{item.flag} belongs to another plugin or to a conftest here"
-        + (f": write {ours[item.name]} for this one's" if item.name in ours else "")
-        for item in OPTIONS
-        if ours.get(item.name) != item.flag
-    ]
-
-
 def without_ours(args: Sequence[str]) -> list[str]:
     """A command line without our options and their values.
 

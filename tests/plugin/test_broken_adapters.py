@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.command import simbench
+
 GOOD = """
 from dataclasses import replace
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
@@ -77,7 +79,7 @@ def test_broken_adapters_end_no_other(pytester: pytest.Pytester, site: Path) -> 
         name: f"the adapter of {name} ({value}, of broken-sims 1.0) {BROKEN[value]}"
         for name, value in names.items()
     }
-    result = pytester.runpytest_subprocess("--sims")
+    result = simbench(pytester, "list", "-v")
     assert result.ret == 0
     result.stdout.fnmatch_lines([f"{name}: BROKEN: {text}" for name, text in said.items()])
     result.stdout.fnmatch_lines(["good: Good (*", "mujoco: MuJoCo (*"])
@@ -115,7 +117,7 @@ def test_two_distributions_of_one_name(pytester: pytest.Pytester, site: Path) ->
         result = pytester.runpytest_subprocess(*arguments)
         assert result.ret == pytest.ExitCode.USAGE_ERROR
         assert sorted(result.stderr.str().split()) == sorted(f"ERROR: {sentence}".split())
-    result = pytester.runpytest_subprocess("--sims")
+    result = simbench(pytester, "list", "-v")
     result.stdout.fnmatch_lines(["good: BROKEN: good is registered by *"])
     pytester.runpytest_subprocess("--sim=mujoco", "--reps=1").assert_outcomes(passed=1)
 
@@ -136,7 +138,7 @@ def test_the_same_adapter_twice_is_no_clash(pytester: pytest.Pytester, site: Pat
 @pytest.mark.parametrize(("entries", "metadata"), [("= x:Y", True), ("x = y", False)])
 def test_odd_metadata(pytester: pytest.Pytester, site: Path, entries: str, metadata: bool) -> None:
     distribution(site, "malformed", entries, metadata)
-    result = pytester.runpytest_subprocess("--sims")
+    result = simbench(pytester, "list", "-v")
     assert result.ret == 0
     result.stdout.fnmatch_lines(["*BROKEN: *malformed*"])
     pytester.runpytest_subprocess("--sim=mujoco", "--reps=1").assert_outcomes(passed=1)

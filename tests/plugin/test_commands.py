@@ -1,52 +1,62 @@
-"""`pytest --sims`, `--sim-install`, and engines of an untested version."""
+"""Old options that are commands now, and engines of an untested version."""
 
 from __future__ import annotations
 
 import sys
-from importlib.metadata import version
-from pathlib import Path
 
 import pytest
 
+from pytest_simbench.cli import main
+from pytest_simbench.plugin import commands
 from pytest_simbench.report.capabilities import capability_markdown
 from pytest_simbench.simulator.registry import adapter, registered
 
 
-def test_sims_lists_a_table_and_what_is_here(pytester: pytest.Pytester) -> None:
-    result = pytester.runpytest_subprocess("--sims")
-    assert result.ret == 0
-    text = result.stdout.str()
-    for name in registered():
-        assert f"\n{name}: " in text
-    result.stdout.fnmatch_lines(
-        ["simulator *", "mujoco *Apache-2.0*", f"    version {version('mujoco')}*, installed"]
-    )
-
-
-def test_sims_says_what_mends_an_absent_one(
-    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    own = [name for name in registered() if adapter(name).info.requirements]
-    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path))
-    text = pytester.runpytest_subprocess("--sims").stdout.str()
-    for name in own:
-        assert f"not there yet: simbench install {name}" in text
+def old(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, *words: str) -> list[str]:
+    """What the command is asked for by an old option."""
+    given: list[list[str]] = []
+    monkeypatch.setattr(main, "main", lambda words: given.append(words) or 0)
+    config = pytester.parseconfig(*words)
+    command = commands.asked(config)
+    assert command is not None
+    assert commands.run_command(config, command) == 0
+    return given[0]
 
 
 @pytest.mark.parametrize(
-    ("name", "message"),
+    ("words", "command"),
     [
-        ("nosuch", "*unknown simulator*nosuch*mujoco*"),
-        ("mujoco", "*mujoco needs no environment of its own*"),
+        ("--sims", "list -v"),
+        ("--sim-list --sim=mujoco", "list -v"),
+        ("--robots", "robots"),
+        ("--sim-robots --robot=ur5", "robots ur5"),
+        ("--sim-install genesis,newton --sim-install x", "install genesis,newton x"),
+        ("--sim-uninstall=genesis", "uninstall genesis"),
+        ("--sim-environments", "environments"),
+        ("--sim-download=cube_tosses --sim-data=d", "download cube_tosses --data d"),
+        ("--sim-merge a b --sim-merge c --sim-output=d", "merge a b c --output d"),
+        ("-v --sim-report a --sim-badge=b --sim-record=mcap",
+         "report a --badge b --record mcap -v"),
     ],
-)
-def test_wrong_installs_are_one_sentence(
-    pytester: pytest.Pytester, name: str, message: str
+)  # fmt: skip
+def test_an_old_option_is_a_command(
+    pytester: pytest.Pytester,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    words: str,
+    command: str,
 ) -> None:
-    result = pytester.runpytest_subprocess("--sim-install", name)
-    assert result.ret == 4
-    result.stderr.fnmatch_lines([message])
-    assert "Traceback" not in result.stderr.str() + result.stdout.str()
+    assert old(pytester, monkeypatch, *words.split()) == command.split()
+    assert f"will go with the next release; write: simbench {command}\n" in capsys.readouterr().err
+
+
+def test_an_old_option_that_cannot_be(pytester: pytest.Pytester) -> None:
+    result = pytester.runpytest_subprocess("--sim-merge", "none")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(
+        ["--sim-merge will go with the next release; write: simbench merge none",
+         "simbench merge: none: cannot read records from *"]
+    )  # fmt: skip
 
 
 def test_an_untested_version_runs_and_is_named(pytester: pytest.Pytester) -> None:
@@ -84,7 +94,8 @@ def test_falling(repeat):
     result.stdout.fnmatch_lines(["*UNTESTED VERSION: mujoco * is here, the*"])
     result = pytester.run(
         sys.executable, "-c",
-        "import sys, pytest; sys.path.insert(0, '.'); sys.exit(pytest.main(['--sims']))",
+        "import sys; sys.path.insert(0, '.'); from pytest_simbench.cli.main import main; "
+        "main(['list', '-v'])",
     )  # fmt: skip
     result.stdout.fnmatch_lines(
         ["newer: *", "*UNTESTED*", "unlisted: *", "    version not known before it runs, installed"]

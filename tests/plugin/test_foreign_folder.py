@@ -11,6 +11,7 @@ import pytest
 from pytest_simbench.recordings.film import Film
 from pytest_simbench.records.folder import TASKS, RunFolder
 from pytest_simbench.report.files import write_report
+from tests.cli.command import simbench
 from tests.records.build import record
 
 pytest.importorskip("av", reason="videos need the extra 'video'")
@@ -48,7 +49,7 @@ def test_links_in_a_run_folder_are_not_followed(
     before = content(elsewhere)
     resumed = pytester.runpytest_subprocess("--sim=mujoco", "--reps=2", "--sim-resume=o", *KEEP)
     resumed.assert_outcomes(passed=1)
-    reported = pytester.runpytest_subprocess("--sim-report=o", "--sim-record=mcap")
+    reported = simbench(pytester, "report", "o", "--record=mcap")
     assert content(elsewhere) == before
     assert len((run / "records.jsonl").read_text().splitlines()) == 2
     assert not (run / "report.html").is_symlink()

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.command import simbench
+
 SUITE = Path(__file__).resolve().parents[2] / "suites" / "test_physics.py"
 
 
@@ -36,6 +38,6 @@ def test_a_broken_law_is_a_finding_and_no_failure_unless_asked_for(
     law = records[-1]["notes"]["reading"]
     assert law["exact"] == pytest.approx(0.1925, abs=1e-4)
     assert records[-1]["metrics"]["ratio"] == pytest.approx(law["exact"] / law["tolerance"], 0.01)
-    again = pytester.runpytest_subprocess("--sim-report", "out")
+    again = simbench(pytester, "report", "out")
     assert again.ret == 0
     again.stdout.fnmatch_lines(["for joints: mujoco, which keeps 1 of 1 laws."])

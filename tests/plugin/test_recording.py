@@ -10,6 +10,7 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from pytest_simbench.recordings.trace import Trace
+from tests.cli.command import simbench
 
 TEST = """
     import pytest
@@ -62,13 +63,13 @@ def test_a_kept_run_is_recorded_later(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(TEST)
     pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=o", "--sim-trace=on")
     assert not (pytester.path / "o" / "recordings").exists()
-    result = pytester.runpytest_subprocess("--sim-report=o", "--sim-record=mcap")
+    result = simbench(pytester, "report", "o", "--record=mcap")
     assert result.ret == 0
     result.stdout.fnmatch_lines(["2 recordings: o/recordings"])
     (first, _) = sorted((pytester.path / "o" / "recordings").iterdir())
     written = (first / "metadata.yaml").stat().st_mtime_ns
     (sorted((pytester.path / "o" / "traces").iterdir())[1]).write_text("no trace")
-    result = pytester.runpytest_subprocess("--sim-report=o", "--sim-record=mcap")
+    result = simbench(pytester, "report", "o", "--record=mcap")
     result.stdout.fnmatch_lines(["no recording: *holds no arrays*", "1 recording: o/recordings"])
     assert (first / "metadata.yaml").stat().st_mtime_ns == written
 
@@ -76,7 +77,7 @@ def test_a_kept_run_is_recorded_later(pytester: pytest.Pytester) -> None:
 def test_a_run_without_traces_says_so(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(TEST)
     pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=o", "--sim-trace=off")
-    result = pytester.runpytest_subprocess("--sim-report=o", "--sim-record=mcap")
+    result = simbench(pytester, "report", "o", "--record=mcap")
     result.stdout.fnmatch_lines(["no recordings: the run has no traces; see --sim-trace"])
 
 
@@ -137,5 +138,5 @@ def test_pictures_and_videos_are_taken_beside_what_is_measured(pytester: pytest.
     assert [name.partition("_mujoco")[0] for name in videos] == ["test_again", "test_falling"]
     assert all(f'href="videos/{name}"' in page for name in videos)
     (folder / "falling_pictures.png").unlink()
-    pytester.runpytest_subprocess("--sim-report=o")
+    simbench(pytester, "report", "o")
     assert (folder / "falling_pictures.png").exists()

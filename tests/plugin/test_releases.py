@@ -8,6 +8,7 @@ import os
 
 import pytest
 
+from tests.cli.command import simbench
 from tests.plugin.planted import plant
 
 
@@ -37,8 +38,8 @@ def test_history_bisection_and_gate(pytester: pytest.Pytester) -> None:
     assert recorded() == 20
     assert list(folder.glob("planted_falling_history*.png"))
 
-    result = pytester.runpytest_subprocess(  # what the history has recorded is not run again
-        "--sim-bisect", "planted:1.2..1.5", "landed", "--reps=5", "test_planted.py"
+    result = simbench(  # what the history has recorded is not run again
+        pytester, "bisect", "planted:1.2..1.5", "landed", "--reps=5", "test_planted.py"
     )
     assert result.ret == 0
     result.stdout.fnmatch_lines(
@@ -80,7 +81,10 @@ def test_a_worker_with_another_release_than_its_name_says(pytester: pytest.Pytes
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--sim-bisect", "planted:1.0..1.9", "landed"], "no planted-engine 1.9 for Python *"),
+        (
+            ["--sim-bisect", "planted:1.0..1.9", "landed"],
+            "simbench bisect: no planted-engine 1.9 for Python *",
+        ),
         (["--sim=planted==1.2", "--sim-baseline=planted==1.2"], "*no other version of planted*"),
         (["--sim-history=ode:3"], "--sim-history: ode comes with packages of the system*"),
     ],

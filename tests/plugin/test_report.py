@@ -8,6 +8,8 @@ import re
 
 import pytest
 
+from tests.cli.command import simbench
+
 TEST = """
     from tests.tiny import Falling
 
@@ -29,31 +31,20 @@ def test_file(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(test_it=TEST)
 
 
-@pytest.mark.parametrize(
-    ("what", "options", "message"),
-    [
-        ("run.write_report", (), "Exit: interrupted while the report was made; the records are "
-         "kept in */o, and pytest --sim-report */o makes the report"),
-        ("merge.summaries_of", ("--sim-report=o",), "--sim-report: interrupted; nothing that it "
-         "read was changed"),
-    ],
-)  # fmt: skip
-def test_an_interrupted_report_is_one_sentence(
-    pytester: pytest.Pytester, what: str, options: tuple[str, ...], message: str
-) -> None:
-    assert not options or run(pytester).ret == 0
+def test_an_interrupted_report_is_one_sentence(pytester: pytest.Pytester) -> None:
     pytester.makeconftest(
-        f"""
+        """
         import signal
-        from pytest_simbench.plugin import merge, run
-        {what} = lambda *given: signal.raise_signal(signal.SIGINT)
+        from pytest_simbench.plugin import run
+        run.write_report = lambda *given: signal.raise_signal(signal.SIGINT)
         """
     )
-    result = pytester.runpytest_subprocess(*options) if options else run(pytester)
+    result = run(pytester)
     assert result.ret == pytest.ExitCode.INTERRUPTED
-    result_text = f"{result.stdout.str()}\n{result.stderr.str()}"
-    assert "Traceback" not in result_text
-    assert fnmatch.filter(result_text.splitlines(), message)
+    assert "Traceback" not in f"{result.stdout.str()}\n{result.stderr.str()}"
+    lines = [*result.stdout.lines, *result.stderr.lines]
+    message = "interrupted while the report was made; the records are kept in */o, and simbench "
+    assert fnmatch.filter(lines, f"Exit: {message}report */o makes the report")
     assert len((pytester.path / "o" / "records.jsonl").read_text().splitlines()) == 5
 
 
@@ -141,7 +132,7 @@ def test_a_kept_run_shows_how_it_ended(pytester: pytest.Pytester) -> None:
     (pytester.path / "base").rename(pytester.path / "elsewhere")
     kept = (pytester.path / "o" / "report.html").read_bytes()
     (pytester.path / "o" / "report.html").unlink()
-    result = pytester.runpytest_subprocess("--sim-report=o", "--sim-badge=badge.json")
+    result = simbench(pytester, "report", "o", "--badge=badge.json")
     assert result.ret == 0
     assert (pytester.path / "o" / "report.html").read_bytes() == kept
     result.stdout.fnmatch_lines([f"baseline: {pytester.path / 'base'}", "*landed*", "report: o/*"])
@@ -155,13 +146,13 @@ def test_the_badge_of_merged_runs_is_that_of_all(pytester: pytest.Pytester) -> N
         "--sim=mujoco", "--reps=5", "--sim-output=second", "--sim-seed=3000"
     ).assert_outcomes(failed=1)
     badge = pytester.path / "badge.json"
-    for command in (["--sim-merge", "o", "second", "--sim-output=whole"], ["--sim-report=whole"]):
-        result = pytester.runpytest_subprocess("--sim-badge=badge.json", *command)
+    for command in (["merge", "o", "second", "--output=whole"], ["report", "whole"]):
+        result = simbench(pytester, *command, "--badge=badge.json")
         assert result.ret == 0
         assert json.loads(badge.read_text())["color"] == "red"
         badge.unlink()
     (pytester.path / "o" / "outcome.json").unlink()
-    pytester.runpytest_subprocess("--sim-report", "o", "--sim-badge=badge.json")
+    simbench(pytester, "report", "o", "--badge=badge.json")
     assert json.loads(badge.read_text())["message"] == "mujoco: 5 repetitions, not judged"
 
 

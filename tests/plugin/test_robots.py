@@ -1,4 +1,4 @@
-"""`--robot` and `--robots`: ids, records, baselines, and what a robot or a task cannot do."""
+"""`--robot`: ids, records, baselines, and what a robot or a task cannot do."""
 
 from __future__ import annotations
 
@@ -197,21 +197,5 @@ def test_a_robot_that_is_none(pytester: pytest.Pytester, value: str, message: st
 
 
 def test_a_robot_that_is_not_named(pytester: pytest.Pytester) -> None:
-    message = "*--robot='': give a name (pytest --robots), a robot file, or all"
+    message = "*--robot='': give a name (simbench robots), a robot file, or all"
     run(pytester, "--robot=", ret=4).stderr.fnmatch_lines([message])
-
-
-def test_the_list_of_robots(pytester: pytest.Pytester) -> None:
-    path = small_arm(pytester.path)
-    result = run(pytester, "--robots", f"--robot={path}")
-    result.stdout.fnmatch_lines(
-        [
-            "panda: 7 arm joints, 2 fingers that open to 0.035 m, base at (0, 0, 0)",
-            "so101: 5 arm joints, one jaw that opens to 1 rad, base at (0, 0, 0)",
-            "ur5: 6 arm joints, 2 fingers*",
-            "small: 3 arm joints, 2 fingers that open to 0.04 m, base at (0.1, 0, 0.2)",
-            "    no stacking: robot 'small' cannot handle a cube at (0.12, -0.18, 0.20): it is *",
-            "    no throwing: robot 'small' has no swing for the throw: write one into its file*",
-            "    no pushing: robot 'small' cannot push the block: unreachable: *",
-        ]
-    )

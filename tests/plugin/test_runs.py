@@ -271,12 +271,6 @@ def test_plugin_load_is_light(pytester: pytest.Pytester) -> None:
     pytester.runpytest_subprocess(*plugins).assert_outcomes(passed=1)
 
 
-def test_sims_lists_and_exits(pytester: pytest.Pytester) -> None:
-    result = pytester.runpytest_subprocess("--sims")
-    assert result.ret == 0
-    result.stdout.fnmatch_lines(["mujoco: MuJoCo (Apache-2.0)*", "*deviates: *", "pybullet: *"])
-
-
 def test_gui_without_any_display_is_a_skip(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.laws import LAWS
+from tests.cli.command import simbench
 
 ADAPTER = '''
 """A third party's simulator: MuJoCo with a coarser step, under its own name."""
@@ -59,4 +60,4 @@ def test_third_party_simulator_runs_all_suites(
         ("elsewhere", "throwing", "ok"),
     ]
     assert {r["settings"]["timestep"] for r in kept} == {0.002}
-    assert "elsewhere: Elsewhere" in pytester.runpytest_subprocess("--sims").stdout.str()
+    assert "elsewhere: Elsewhere" in simbench(pytester, "list", "-v").stdout.str()

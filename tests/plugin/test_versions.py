@@ -105,13 +105,3 @@ def test_a_build_without_a_label_is_called_by_its_version(
     name = release.replace("==", "@")
     assert selection.simulators == (name,)
     assert selection.pythons == {name: str(python)}
-
-
-def test_the_environments_that_are_there(pytester: pytest.Pytester, release: str) -> None:
-    result = pytester.runpytest_subprocess("--sim-environments")
-    assert result.ret == 0
-    result.stdout.fnmatch_lines([f"{release}: 0 MB, MuJoCo *", "0 MB in *"])
-    for code, line in ((0, f"{release}: removed, 0 MB"), (4, "*choose from none is there")):
-        result = pytester.runpytest_subprocess("--sim-uninstall", release)
-        assert result.ret == code
-        (result.stdout if code == 0 else result.stderr).fnmatch_lines([line])
