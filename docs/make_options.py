@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from pytest_simbench.cli.main import described
+from pytest_simbench.cli.main import COMMANDS
 from pytest_simbench.plugin import fixtures, repeatability
-from pytest_simbench.plugin.commands import COMMANDS
 from pytest_simbench.plugin.hooks import MARKS
+from pytest_simbench.plugin.old_options import OLD_OPTIONS
 from pytest_simbench.plugin.options import OPTIONS, Option
 
 PAGE = Path(__file__).with_name("options.md")
@@ -95,8 +95,8 @@ def option_row(option: Option) -> tuple[str, str, str, str]:
 
 def command_rows() -> Iterable[tuple[str, str, str]]:
     """The cells of each command."""
-    for name, text in described():
-        old = [command.flag for command in COMMANDS if command.name == name]
+    for name, text in ((c.name, c.help) for c in COMMANDS):
+        old = [option.flag for option in OLD_OPTIONS if option.name == name]
         yield f"simbench {name}", text, ", ".join(f"`{flag}`" for flag in old)
 
 

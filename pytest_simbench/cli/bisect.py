@@ -88,6 +88,13 @@ def bisect(wanted: Span, metric_name: str, folder: Path, arguments: Sequence[str
     return 0
 
 
+def start(span: Span, metric: str, arguments: Sequence[str]) -> int:
+    """Have the plugin of pytest call `bisect` for these tests and options; pytest's exit code."""
+    releases = f"{span.name}:{span.good}..{span.bad}"
+    own = [sys.modules[__name__]]  # tells the plugin who asks
+    return int(pytest.main([*arguments, "--sim-bisect", releases, metric], plugins=own))
+
+
 def _releases(wanted: Span) -> list[str]:
     """The releases from the good one to the bad one.
 

@@ -7,20 +7,19 @@ ours.
 
 from __future__ import annotations
 
-import argparse
 import os
 import shutil
 import stat
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.ground.text import for_terminal
-from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.records.folder import RECORDS, TASKS, Reading, RunFolder
 from pytest_simbench.records.merging import Merged, MergeError, merge, merge_tasks
 from pytest_simbench.records.paths import FolderError, new_name, opened, whole
@@ -28,7 +27,7 @@ from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.report import history, repeatability, sweep
 from pytest_simbench.report.brief import render_brief
 from pytest_simbench.report.changes import render_terminal
-from pytest_simbench.report.claims import Claims, claims_of
+from pytest_simbench.report.claims import claims_of
 from pytest_simbench.report.claims import lines as lines_of
 from pytest_simbench.report.files import (
     Written,
@@ -45,7 +44,6 @@ from pytest_simbench.report.outcome import Outcome
 from pytest_simbench.report.page import PAGE_NAME
 from pytest_simbench.report.progress import Progress
 from pytest_simbench.report.recorded import FOLDER, write_bags
-from pytest_simbench.report.summary import TaskSummary
 from pytest_simbench.report.tables import render_run
 
 RUNS = ".simbench"
@@ -68,19 +66,14 @@ class Wanted:
     Attributes:
         output: folder to write to; None for the one of a single run, or a new one.
         badge: file to write a badge into.
-        record: whether recordings of their motions are written.
+        record: `mcap` for recordings of their motions.
         verbose: whether whole tables are printed.
     """
 
     output: str | None = None
     badge: str | None = None
-    record: bool = False
+    record: str | None = None
     verbose: bool = False
-
-    @classmethod
-    def of(cls, given: argparse.Namespace) -> Wanted:
-        """What a command line says."""
-        return cls(given.output, given.badge, bool(given.record), given.verbose)
 
 
 @dataclass(frozen=True)
@@ -121,10 +114,16 @@ class Runs:
             files.add(file)
         return cls(folders, readings)
 
-    def outcomes(self) -> tuple[list[Outcome], list[str]]:
-        """How each ended, and what is wrong with what says so."""
+    def outcome(self) -> tuple[Outcome, list[str]]:
+        """How they ended together, and what is wrong with what says so. Whether the tests passed
+        is not known where one run does not know, and a comparison is that of one run alone."""
         found = [Outcome.read(folder.path) for folder in self.folders.values()]
-        return [outcome for outcome, _ in found], [problem for _, problem in found if problem]
+        outcomes, wrong = [outcome for outcome, _ in found], [text for _, text in found if text]
+        if len(outcomes) == 1:
+            return outcomes[0], wrong
+        passed = [outcome.passed for outcome in outcomes]
+        together = False if False in passed else None if None in passed else True
+        return Outcome(together, looks=max(outcome.looks for outcome in outcomes)), wrong
 
     def merged(self) -> tuple[list[Merged], Reading]:
         """Their records as those of one run: with where each comes from, and to be shown.
@@ -140,39 +139,33 @@ class Runs:
         return records, Reading(records=tuple(item.record for item in records), tasks=tasks)
 
 
-def together(passed: Sequence[bool | None]) -> bool | None:
-    """Whether the tests of several runs passed; None where one does not know."""
-    if False in passed:
-        return False
-    return None if None in passed else True
+def merge_runs(runs: Sequence[str], **wanted: Any) -> int:
+    """Merge runs, print the result, and return the exit code.
 
-
-def merge_runs(names: Sequence[str], wanted: Wanted) -> int:
-    """Merge the runs, print the result, and return the exit code.
+    Args:
+        runs: their folders.
+        wanted: see `Wanted`.
 
     Raises:
         BadInput: a run that cannot be read, runs that are not parts of one, or a folder that
             already holds a run or cannot be written to.
     """
-    runs = Runs.named(names)
-    records, whole = runs.merged()
-    folder = _locked(wanted.output)
+    found, asked = Runs.named(runs), Wanted(**wanted)
+    records, reading = found.merged()
+    folder = _locked(asked.output)
     try:
-        for task in whole.tasks.values():
+        for task in reading.tasks.values():
             folder.describe(task)
-        refused = _copy(records, runs.folders, folder)
+        refused = _copy(records, found.folders, folder)
         unsaved = folder.flush()
-        outcomes, wrong = runs.outcomes()
-        looks = max(outcome.looks for outcome in outcomes)
-        written = write_report(folder, looks=looks)
-        problems = [*runs.problems, *refused, *unsaved, *written.problems]
-        kept = [item.record for item in records]
-        if wanted.record:
-            problems += recordings(folder.path, folder.path, kept)
-        passed = together([outcome.passed for outcome in outcomes])
-        problems += [*wrong, write_outcome(folder.path, Outcome(passed, looks=looks))]
-        problems.append(badge(wanted.badge, kept, passed))
-        _print(wanted, written.summaries, written.sweeps, problems, written.claims)
+        outcome, wrong = found.outcome()
+        written = write_report(folder, looks=outcome.looks)
+        problems = [*found.problems, *refused, *unsaved, *written.problems, *wrong]
+        ended = Outcome(outcome.passed, looks=outcome.looks)
+        problems.append(write_outcome(folder.path, ended))
+        kept = reading.records
+        problems += _extras(asked, folder.path, folder.path, kept, outcome)
+        _print(asked, written, problems)
         if written.complete and not unsaved:
             print(where(folder.path / PAGE_NAME, Path.cwd()))
     finally:
@@ -180,61 +173,105 @@ def merge_runs(names: Sequence[str], wanted: Wanted) -> int:
     return 0
 
 
-def report_runs(names: Sequence[str], wanted: Wanted) -> int:
+def report_runs(runs: Sequence[str], **wanted: Any) -> int:
     """Show runs again: print the tables, write the report, and return the exit code.
 
     One run's report is written into its folder, or into the one that is wanted; that of several,
     which are merged for it, into the one that is wanted alone.
 
+    Args:
+        runs: their folders.
+        wanted: see `Wanted`.
+
     Raises:
         BadInput: a run that cannot be read, or runs that are not parts of one.
     """
-    runs = Runs.named(names)
-    target = _target(wanted.output, list(runs.folders.values()))
-    (first, folder), *others = runs.folders.items()
-    whole = runs.merged()[1] if others else runs.readings[first]
-    outcomes, wrong = runs.outcomes()
-    looks = max(outcome.looks for outcome in outcomes)
-    summaries, written = summaries_of(whole, looks), Written()
-    histories, sweeps = history.of_run(whole), sweep.of_run(whole)
-    tables, problems = ([], []) if others else repeatability.write_tables(folder.path, target)
-    if not (whole.records or tables or problems):
+    found, asked = Runs.named(runs), Wanted(**wanted)
+    target = _target(asked.output, list(found.folders.values()))
+    (first, folder), *others = found.folders.items()
+    run = None if others else folder.path
+    reading = found.merged()[1] if others else found.readings[first]
+    outcome, wrong = found.outcome()
+    tables, untold = ([], []) if run is None else repeatability.write_tables(run, target)
+    if not (reading.records or tables or untold):
         raise BadInput(f"{first}: it holds no repetition")
-    compared = None if others else outcomes[0].compared
-    claims = claims_of(whole, compared[1] if compared else None)
+    compared = outcome.compared
+    shown = Written(
+        summaries=tuple(summaries_of(reading, outcome.looks)),
+        histories=tuple(history.of_run(reading)),
+        sweeps=tuple(sweep.of_run(reading)),
+        claims=claims_of(reading, compared[1] if compared else None),
+    )
+    problems = [*found.problems, *wrong]
     if target is not None:
         written = write_files(
             target,
-            summaries,
-            in_order(whole.records),
+            shown.summaries,
+            in_order(reading.records),
             True,
             compared,
-            None if others else folder.path,
-            histories,
-            sweeps,
-            claims,
+            run,
+            shown.histories,
+            shown.sweeps,
+            shown.claims,
         )
-    passed = together([outcome.passed for outcome in outcomes])
-    told = [*runs.problems, *written.problems, *wrong, badge(wanted.badge, whole.records, passed)]
-    if wanted.record and target is not None and not others:
-        told += recordings(folder.path, target, whole.records)
-    elif wanted.record:
-        told.append("no recordings: join the runs with simbench merge first")
-    _print(wanted, summaries, sweeps, told, claims)
+        shown = replace(shown, problems=written.problems, complete=written.complete)
+    problems += [*shown.problems, *_extras(asked, run, target, reading.records, outcome)]
+    _print(asked, shown, problems)
     width = shutil.get_terminal_size().columns
-    for line in history.lines(histories, width):
-        print(for_terminal(line))
     if compared is not None:
         name, report = compared
         text = render_terminal(report, width, bool(report.changes))
         print(for_terminal(f"\nbaseline: {name}\n{text}"))
-    if tables or problems:
+    if tables or untold:
         print(f"\n{repeatability.render_terminal(tables, width)}")
-        for problem in problems:
-            print(for_terminal(problem))
-    if target is not None and written.complete:
+        print(*map(for_terminal, untold), sep="\n")
+    if target is not None and shown.complete:
         print(where(target / PAGE_NAME, Path.cwd()))
-    return 0 if written.complete else 1
+    return 0 if shown.complete else 1
+
+
+def sections(written: Written, width: int, verbose: bool) -> Iterator[tuple[str, str]]:
+    """What the terminal shows of a result: titles, and the text below each.
+
+    Args:
+        written: the result.
+        width: of the terminal, in columns.
+        verbose: for whole tables.
+    """
+    if written.summaries or written.sweeps:
+        claims = [lines_of(written.claims, width), ""] if written.claims else []
+        table = (render_run if verbose else render_brief)(written.summaries, width)
+        yield "simulator comparison", "\n".join([*claims, table])
+    if written.sweeps:
+        told = (sweep.whole if verbose else sweep.brief)(written.sweeps, width)
+        yield sweep.TITLE, for_terminal("\n".join(told))
+    if written.histories:
+        yield "history", for_terminal("\n".join(history.lines(written.histories, width)))
+
+
+def _print(asked: Wanted, written: Written, problems: Iterable[str]) -> None:
+    width = shutil.get_terminal_size().columns
+    for number, (title, text) in enumerate(sections(written, width, asked.verbose)):
+        print(f"\n{title}\n{text}" if number else text)
+    for problem in filter(None, problems):
+        print(for_terminal(problem))
+
+
+def _extras(
+    asked: Wanted,
+    run: Path | None,
+    target: Path | None,
+    records: Sequence[Record],
+    outcome: Outcome,
+) -> list[str]:
+    """Write badge and recordings where they are wanted; lines for the terminal."""
+    told = [badge(asked.badge, records, outcome.passed)]
+    if asked.record and run is not None and target is not None:
+        told += recordings(run, target, records)
+    elif asked.record:
+        told.append("no recordings: join the runs with simbench merge first")
+    return told
 
 
 def badge(file: str | None, records: Sequence[Record], passed: bool | None) -> str:
@@ -283,24 +320,6 @@ def _target(output: str | None, folders: list[RunFolder]) -> Path | None:
     if RunFolder(target).holds_run and not own:
         raise BadInput(f"{target} holds another run; give another --output")
     return target
-
-
-def _print(
-    wanted: Wanted,
-    summaries: Sequence[TaskSummary],
-    sweeps: Sequence[Swept],
-    problems: list[str],
-    claims: Claims | None,
-) -> None:
-    width = shutil.get_terminal_size().columns
-    if claims:
-        print(lines_of(claims, width) + "\n")
-    print((render_run if wanted.verbose else render_brief)(summaries, width))
-    if sweeps:
-        told = (sweep.whole if wanted.verbose else sweep.brief)(sweeps, width)
-        print("\n".join([f"\n{sweep.TITLE}", *map(for_terminal, told)]))
-    for problem in filter(None, problems):
-        print(for_terminal(problem))
 
 
 def _locked(output: str | None) -> RunFolder:

@@ -153,34 +153,31 @@ def choice(*words: str) -> Callable[[str], str]:
     return choose
 
 
-def _word(text: str, whole: str) -> str:
-    word = text.strip()
-    if not word:
-        raise BadValue(whole, "a name in it is empty" if whole.strip() else "give a name")
-    if len(word) > LONGEST_WORD or not word.isprintable():
-        raise BadValue(whole, f"a name has at most {LONGEST_WORD} printable characters")
-    return word
-
-
-def words(text: str) -> list[str]:
-    """Names, separated by commas."""
-    return [_word(part, text) for part in text.split(",")]
+def word(text: str) -> str:
+    """A name."""
+    if not text.strip():
+        raise BadValue(text, "give a name")
+    if len(text.strip()) > LONGEST_WORD or not text.isprintable():
+        raise BadValue(text, f"a name has at most {LONGEST_WORD} printable characters")
+    return text.strip()
 
 
 def profiles(text: str) -> tuple[str, ...]:
     """Names, separated by commas, each once."""
-    return tuple(dict.fromkeys(words(text)))
+    return tuple(dict.fromkeys(map(word, text.split(","))))
+
+
+def simulator(text: str) -> str:
+    """The name of a simulator; behind an @ stands the path of an interpreter."""
+    name, at, path = text.strip().partition("@")
+    if not text.isprintable():
+        raise BadValue(text, "give printable characters")
+    return word(name) + at + (file(path) if at else "")
 
 
 def simulators(text: str) -> list[str]:
-    """Names of simulators, separated by commas; behind an @ stands the path of an interpreter."""
-    found = []
-    for part in text.split(","):
-        name, at, path = part.strip().partition("@")
-        found.append(_word(name, text) + at + (file(path) if at else ""))
-        if not part.isprintable():
-            raise BadValue(text, "an interpreter's path has printable characters")
-    return found
+    """Names of simulators, separated by commas."""
+    return [simulator(part) for part in text.split(",")]
 
 
 def file(text: str, form: str = "a path") -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from pytest_simbench.plugin import commands, options, registration, sanitise
+from pytest_simbench.plugin import old_options, options, registration, sanitise
 from pytest_simbench.plugin.session import REPEATED, fixtures_of, session_of
 
 MARKS = (
@@ -72,8 +72,8 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 
 def pytest_cmdline_main(config: pytest.Config) -> int | None:
-    command = commands.asked(config)
-    return None if command is None else commands.run_command(config, command)
+    old = old_options.asked(config)
+    return None if old is None else old_options.run_command(config, old)
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from pytest_simbench.cli.values import flag
-from pytest_simbench.plugin.commands import COMMANDS
+from pytest_simbench.plugin.old_options import OLD_OPTIONS
 from pytest_simbench.plugin.options import FLAGS, INI, OPTIONS, Option
 
 
@@ -23,7 +23,7 @@ def register(parser: pytest.Parser, config: pytest.Config) -> None:
     """Add all options and ini twins whose names nobody has."""
     group = parser.getgroup("simbench", "comparison of robot simulators (all: docs/options.md)")
     names = [name for item in OPTIONS for name in (item.flag, item.long) if name]
-    free = _free(parser, [*names, *(command.flag for command in COMMANDS)])
+    free = _free(parser, [*names, *(command.flag for command in OLD_OPTIONS)])
     flags: dict[str, str] = {}
     ini: set[str] = set()
     for item in OPTIONS:
@@ -35,7 +35,7 @@ def register(parser: pytest.Parser, config: pytest.Config) -> None:
             if _is_free_ini(config, name):
                 parser.addini(name, f"as {item.flag}", type=item.ini or None, default=None)
                 ini.add(name)
-    for command in COMMANDS:
+    for command in OLD_OPTIONS:
         if command.flag in free:
             group.addoption(command.flag, **command.arguments)
     config.stash[FLAGS], config.stash[INI] = flags, frozenset(ini)
@@ -55,7 +55,7 @@ def without_ours(args: Sequence[str]) -> list[str]:
     ours = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
     for item in OPTIONS:
         ours.add_argument(*filter(None, (item.flag, item.long)), **_arguments(item))
-    for command in COMMANDS:
+    for command in OLD_OPTIONS:
         ours.add_argument(command.flag, **command.arguments)
     try:
         found, rest = ours.parse_known_args([*args])

@@ -34,16 +34,12 @@ from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import NAME
-from pytest_simbench.report import markdown, sweep
-from pytest_simbench.report.brief import render_brief
-from pytest_simbench.report.claims import lines as lines_of
+from pytest_simbench.report import markdown
 from pytest_simbench.report.files import write_outcome, write_report
 from pytest_simbench.report.github import append_summary
-from pytest_simbench.report.history import lines
 from pytest_simbench.report.outcome import Outcome
 from pytest_simbench.report.page import PAGE_NAME
 from pytest_simbench.report.progress import Progress
-from pytest_simbench.report.tables import render_run
 from pytest_simbench.tasks.base import Task
 
 
@@ -289,45 +285,33 @@ class Run:
         if not self.reading.records and not (self.folder.path / NAME).is_file():
             return
         path, records = self.folder.path, self.reading.records
-        asked = options.value(self.config, recording.RECORD)
-        recorded = runs.recordings(path, path, records, self.progress) if asked else []
+        recorded: list[str] = []
+        if options.value(self.config, recording.RECORD):
+            recorded = runs.recordings(path, path, records, self.progress)
         found, looks = comparison.found if comparison else None, self._looks()
         written = write_report(self.folder, self.reading, found, looks)
         unsaved = self.folder.flush()
         problems = [*self._problems, *self.reading.problems, *self.reading.refused]
-        problems += [*written.problems, cluster.lost(self.reading.records)]
+        problems += [*written.problems, cluster.lost(records)]
         if written.summaries or written.sweeps:
             changes = comparison.markdown() if comparison else ""
             page = markdown.render_run(
                 written.summaries, sweeps=written.sweeps, claims=written.claims
             )
             problems.append(append_summary("\n".join([changes, page])))
-            reporter.write_sep("=", "simulator comparison")
-            if written.claims:
-                reporter.write_line(lines_of(written.claims, reporter._tw.fullwidth) + "\n")
-            verbose = self.config.get_verbosity() > 0
-            show = render_run if verbose else render_brief
-            reporter.write_line(show(written.summaries, reporter._tw.fullwidth))
-        if written.sweeps:
-            reporter.write_sep("=", sweep.TITLE)
-            tell = sweep.whole if verbose else sweep.brief
-            for line in tell(written.sweeps, reporter._tw.fullwidth):
-                reporter.write_line(for_terminal(line))
-        if written.histories:
-            reporter.write_sep("=", "history")
-            for line in lines(written.histories, reporter._tw.fullwidth):
-                reporter.write_line(for_terminal(line))
+        verbose = self.config.get_verbosity() > 0
+        for title, text in runs.sections(written, reporter._tw.fullwidth, verbose):
+            reporter.write_sep("=", title)
+            reporter.write_line(text)
         baseline, report = found or ("", None)
         outcome = Outcome(passed, baseline, report, looks)
-        problems.append(write_outcome(self.folder.path, outcome))
-        problems.append(
-            runs.badge(options.value(self.config, "sim_badge"), self.reading.records, passed)
-        )
+        problems.append(write_outcome(path, outcome))
+        problems.append(runs.badge(options.value(self.config, "sim_badge"), records, passed))
         problems += recorded
         if written.complete and not unsaved:
-            self.page = self.folder.path / PAGE_NAME
+            self.page = path / PAGE_NAME
         else:
-            problems.insert(0, f"\nwhat could be written is in {self.folder.path}")
+            problems.insert(0, f"\nwhat could be written is in {path}")
         for line in [*map(for_terminal, filter(None, problems)), *unsaved]:
             reporter.write_line(line)
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench import __version__
-from pytest_simbench.plugin.commands import COMMANDS
+from pytest_simbench.plugin.old_options import OLD_OPTIONS
 from pytest_simbench.plugin.options import OPTIONS
 
 FLAGS = [flag for o in OPTIONS for flag in (o.flag, o.long) if flag]
-FLAGS += [command.flag for command in COMMANDS]
+FLAGS += [command.flag for command in OLD_OPTIONS]
 INI = [name for option in OPTIONS for name in option.ini_names]
 
 OWN = """

@@ -15,7 +15,7 @@ import pytest
 import pytest_simbench.robot.registry  # noqa: F401 - or pytester imports it again
 from pytest_simbench.cli.values import Auto, BadValue, flag
 from pytest_simbench.plugin import options, registration
-from pytest_simbench.plugin.commands import COMMANDS
+from pytest_simbench.plugin.old_options import OLD_OPTIONS
 from pytest_simbench.plugin.options import OPTIONS, Option
 from pytest_simbench.plugin.selection import select
 
@@ -200,7 +200,7 @@ def test_help_shows_an_option_once_and_no_old_one(pytester: pytest.Pytester) -> 
         assert (f" {option.flag}" in shown.partition("[pytest] ")[0]) is not option.rare
         assert (" ".join(option.help.split()) in shown) is not option.rare
         assert all(f" {name} (" in shown for name in option.ini_names)
-    old = {*(o.long for o in OPTIONS if o.long), *(c.flag for c in COMMANDS)}
+    old = {*(o.long for o in OPTIONS if o.long), *(c.flag for c in OLD_OPTIONS)}
     assert [name for name in old if re.search(rf"{name}[ =]", shown)] == []
     assert "Traceback (" not in shown + result.stderr.str()
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import pytest
 
+from pytest_simbench.plugin.selection import select
 from tests.robot.small_arm import TOML, small_arm
 
 HOLDING = '''
@@ -183,6 +185,7 @@ def test_every_robot(pytester: pytest.Pytester) -> None:
     ("value", "message"),
     [
         ("ur7", "*--robot=ur7: unknown robot 'ur7'; choose from panda, so101, ur10, ur5, xarm7*"),
+        ("", "*robot='': give a name (simbench robots), a robot file, or all"),
         ("none.toml", "*--robot=none.toml: cannot read the robot file none.toml: No such file*"),
         ("bad.toml", "*--robot=bad.toml: bad.toml, [[]arm[]]: stiffness: -1 is no number of at*"),
     ],
@@ -190,12 +193,7 @@ def test_every_robot(pytester: pytest.Pytester) -> None:
 def test_a_robot_that_is_none(pytester: pytest.Pytester, value: str, message: str) -> None:
     path = small_arm(pytester.path, TOML.replace("2000.0", "-1"))
     path.rename(pytester.path / "bad.toml")
-    pytester.makepyfile("def test_it(repeat):\n    pass\n")
-    run(pytester, f"--robot={value}", ret=4).stderr.fnmatch_lines([message])
-    pytester.makeini(f"[pytest]\nrobot = {value}\n")
-    run(pytester, ret=4).stderr.fnmatch_lines([message])
-
-
-def test_a_robot_that_is_not_named(pytester: pytest.Pytester) -> None:
-    message = "*--robot='': give a name (simbench robots), a robot file, or all"
-    run(pytester, "--robot=", ret=4).stderr.fnmatch_lines([message])
+    for arguments in ([f"--robot={value}"], ["-o", f"robot={value}"]):
+        with pytest.raises(pytest.UsageError) as raised:
+            select(pytester.parseconfig(*arguments))
+        assert fnmatchcase(str(raised.value), message)

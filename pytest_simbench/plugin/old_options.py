@@ -19,7 +19,7 @@ from pytest_simbench.plugin import options
 
 
 @dataclass(frozen=True)
-class Command:
+class OldOption:
     """What an old option stands for.
 
     Attributes:
@@ -50,36 +50,39 @@ class Command:
 
 _RUNS = {"sim_output": "--output", "sim_badge": "--badge", "sim_record": "--record"}
 
-COMMANDS = (
-    Command("--sim-install", "install", 1),
-    Command("--sim-uninstall", "uninstall", 1),
-    Command("--sim-environments", "environments"),
-    Command("--sim-download", "download", 1, {"sim_data": "--data"}),
-    Command("--sim-bisect", "bisect", 2),
-    Command("--sim-merge", "merge", "+", _RUNS),
-    Command("--sim-report", "report", "+", _RUNS),
-    Command("--sims", "list", 0, {"sim_cluster": "--cluster"}),
-    Command("--sim-list", "list", 0, {"sim_cluster": "--cluster"}),
-    Command("--robots", "robots"),
-    Command("--sim-robots", "robots"),
+OLD_OPTIONS = (
+    OldOption("--sim-install", "install", 1),
+    OldOption("--sim-uninstall", "uninstall", 1),
+    OldOption("--sim-environments", "environments"),
+    OldOption("--sim-download", "download", 1, {"sim_data": "--data"}),
+    OldOption("--sim-bisect", "bisect", 2),
+    OldOption("--sim-merge", "merge", "+", _RUNS),
+    OldOption("--sim-report", "report", "+", _RUNS),
+    OldOption("--sims", "list", 0, {"sim_cluster": "--cluster"}),
+    OldOption("--sim-list", "list", 0, {"sim_cluster": "--cluster"}),
+    OldOption("--robots", "robots"),
+    OldOption("--sim-robots", "robots"),
 )
 """The first one that is given counts."""
 
 
-def asked(config: pytest.Config) -> Command | None:
+def asked(config: pytest.Config) -> OldOption | None:
     """The first of the old options that is on the command line."""
-    given = (found for found in COMMANDS if getattr(config.option, found.dest, None))
+    given = (found for found in OLD_OPTIONS if getattr(config.option, found.dest, None))
     return next(given, None)
 
 
-def run_command(config: pytest.Config, command: Command) -> int:
+def run_command(config: pytest.Config, command: OldOption) -> int:
     """Do what an old option asks for, by the command; the exit code, as pytest has it."""
     from pytest_simbench.cli.main import BAD_INPUT, INTERRUPTED, main
 
     values = getattr(config.option, command.dest)
     if command.name == "bisect":
         return _bisect(config, *values)
-    words = [command.name, *([] if values is True else values)]
+    names = "," if command.values == 1 else None  # in one value, as options have them
+    words = [command.name]
+    for value in [] if values is True else values:
+        words += value.split(names) if names else [value]
     if command.name == "robots" and options.value(config, "sim_robot") not in (None, "all"):
         words.append(options.value(config, "sim_robot"))
     for name, own in command.carried.items():
@@ -105,19 +108,18 @@ def _bisect(config: pytest.Config, span: str, metric: str) -> int:
     """The one that `simbench bisect` itself asks for: which folder it is, the options say."""
     from pathlib import Path
 
-    from pytest_simbench.cli import main, values
-    from pytest_simbench.cli.bisect import bisect
+    from pytest_simbench.cli import bisect, values
     from pytest_simbench.plugin.history import folder_of
     from pytest_simbench.simulator.errors import SimulatorError
 
     words = list(config.invocation_params.args)
     place = words.index("--sim-bisect")
     rest = [w for w in [*words[:place], *words[place + 3 :]] if not w.startswith("--sim-output=")]
-    if not config.pluginmanager.is_registered(main):
+    if not config.pluginmanager.is_registered(bisect):
         _announce("--sim-bisect", ["bisect", span, metric, *rest])
     with options.refusing((values.BadInput, SimulatorError), "simbench bisect"):
         wanted, metric = values.span(span), values.metric(metric)
         given = options.value(config, "sim_output")
         here = config.invocation_params.dir
         folder = Path(here, given) if given else folder_of(config, wanted.name)
-        return bisect(wanted, metric, folder, rest)
+        return bisect.bisect(wanted, metric, folder, rest)

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from pytest_simbench.cli import main
-from pytest_simbench.plugin import commands
+from pytest_simbench.plugin import old_options
 from pytest_simbench.report.capabilities import capability_markdown
 from pytest_simbench.simulator.registry import adapter, registered
 
@@ -17,9 +17,9 @@ def old(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, *words: str)
     given: list[list[str]] = []
     monkeypatch.setattr(main, "main", lambda words: given.append(words) or 0)
     config = pytester.parseconfig(*words)
-    command = commands.asked(config)
+    command = old_options.asked(config)
     assert command is not None
-    assert commands.run_command(config, command) == 0
+    assert old_options.run_command(config, command) == 0
     return given[0]
 
 
