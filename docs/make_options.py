@@ -96,7 +96,7 @@ def option_row(option: Option) -> tuple[str, str, str, str]:
 def command_rows() -> Iterable[tuple[str, str, str]]:
     """The cells of each command."""
     for name, text in ((c.name, c.help) for c in COMMANDS):
-        old = [option.flag for option in OLD_OPTIONS if option.name == name]
+        old = [option.flag for option in OLD_OPTIONS if option.command == name]
         yield f"simbench {name}", text, ", ".join(f"`{flag}`" for flag in old)
 
 

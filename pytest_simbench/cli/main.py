@@ -42,7 +42,7 @@ class Argument:
 
 
 @dataclass(frozen=True)
-class Command:
+class Subcommand:
     """A command.
 
     Attributes:
@@ -73,46 +73,46 @@ _OF_RUNS = (
 )  # fmt: skip
 
 COMMANDS = (
-    Command("list", "cli.simulators:list_simulators", "list the simulators, which are ready here, "
-            "and how to get the others", "", (
+    Subcommand("list", "cli.simulators:list_simulators", "list the simulators, which are ready "
+            "here, and how to get the others", "", (
                 Argument("names", read.simulator, "NAME", "say of this one what it is, where it "
                          "is, and how to get it; NAME==VERSION is a release", "*"),
                 Argument("--cluster", read.address, "ADDRESS", "ask the nodes of this cluster "
                          "instead of this machine"),
             ), "tell what each can do, and where it deviates from a scene"),
-    Command("robots", "cli.robots:list_robots", "list the robots, and check robot files", "",
+    Subcommand("robots", "cli.robots:list_robots", "list the robots, and check robot files", "",
             (Argument("names", read.robot, "NAME|FILE", "tell of this one alone", "*"),)),
-    Command("install", "cli.environments:install", "make the environment of a simulator that needs "
-            "one of its own", "The others come with pip, as extras of this package.",
+    Subcommand("install", "cli.environments:install", "make the environment of a simulator that "
+            "needs one of its own", "The others come with pip, as extras of this package.",
             (Argument("names", read.word, "NAME", "a simulator, or a release: NAME==VERSION",
                       "+"),)),
-    Command("uninstall", "cli.environments:uninstall", "remove such environments", "",
+    Subcommand("uninstall", "cli.environments:uninstall", "remove such environments", "",
             (Argument("names", read.word, "NAME", "as simbench environments lists it", "+"),)),
-    Command("environments", "cli.environments:list_environments", "list the environments that are "
-            "there, with their sizes"),
-    Command("download", "cli.data_sets:download", "bring a measured data set from its public "
+    Subcommand("environments", "cli.environments:list_environments", "list the environments that "
+            "are there, with their sizes"),
+    Subcommand("download", "cli.data_sets:download", "bring a measured data set from its public "
             "source", "", (
                 Argument("names", read.word, "NAME", "of a data set", "+"),
                 Argument("--data", read.file, "DIR", "folder to bring it to (default: "
                          "$SIMBENCH_DATA, else a cache of the user's)"),
             )),
-    Command("merge", "cli.runs:merge_runs", "join runs with different seeds, made on several "
+    Subcommand("merge", "cli.runs:merge_runs", "join runs with different seeds, made on several "
             "machines, into one", "", _OF_RUNS, "print whole tables"),
-    Command("report", "cli.runs:report_runs", "print the tables and write the report of runs "
+    Subcommand("report", "cli.runs:report_runs", "print the tables and write the report of runs "
             "again", "Their folders are enough. Several are merged first.", _OF_RUNS,
             "print whole tables"),
-    Command("bisect", "cli.bisect:start", "find the release in which a metric becomes worse",
+    Subcommand("bisect", "cli.bisect:start", "find the release in which a metric becomes worse",
             "It runs the tests on releases between a good and a bad one.", (
                 Argument("span", read.span, "NAME:GOOD..BAD", "a simulator and two releases"),
                 Argument("metric", read.metric, "METRIC", "that is worse in BAD"),
                 Argument("arguments", str, "...", "tests and options of pytest",
                          argparse.REMAINDER),
             )),
-    Command("stats", "measure.__main__:main", "print what the suites' claims let pass"),
-    Command("replay", "repeatability.__main__:main", "replay an episode that a failing test left "
-            "in its run folder"),
-    Command("cluster", "cluster.__main__:main", "start the head of a cluster, or a node of it"),
-    Command("swing", "robot.swing:main", "find a swing for the throw of a robot"),
+    Subcommand("stats", "measure.__main__:main", "print what the suites' claims let pass"),
+    Subcommand("replay", "repeatability.__main__:main", "replay an episode that a failing test "
+            "left in its run folder"),
+    Subcommand("cluster", "cluster.__main__:main", "start the head of a cluster, or a node of it"),
+    Subcommand("swing", "robot.swing:main", "find a swing for the throw of a robot"),
 )  # fmt: skip
 
 

@@ -244,8 +244,8 @@ def sections(written: Written, width: int, verbose: bool) -> Iterator[tuple[str,
         table = (render_run if verbose else render_brief)(written.summaries, width)
         yield "simulator comparison", "\n".join([*claims, table])
     if written.sweeps:
-        told = (sweep.whole if verbose else sweep.brief)(written.sweeps, width)
-        yield sweep.TITLE, for_terminal("\n".join(told))
+        lines = (sweep.whole if verbose else sweep.brief)(written.sweeps, width)
+        yield sweep.TITLE, for_terminal("\n".join(lines))
     if written.histories:
         yield "history", for_terminal("\n".join(history.lines(written.histories, width)))
 
@@ -266,12 +266,12 @@ def _extras(
     outcome: Outcome,
 ) -> list[str]:
     """Write badge and recordings where they are wanted; lines for the terminal."""
-    told = [badge(asked.badge, records, outcome.passed)]
+    lines = [badge(asked.badge, records, outcome.passed)]
     if asked.record and run is not None and target is not None:
-        told += recordings(run, target, records)
+        lines += recordings(run, target, records)
     elif asked.record:
-        told.append("no recordings: join the runs with simbench merge first")
-    return told
+        lines.append("no recordings: join the runs with simbench merge first")
+    return lines
 
 
 def badge(file: str | None, records: Sequence[Record], passed: bool | None) -> str:

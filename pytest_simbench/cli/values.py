@@ -215,13 +215,19 @@ def steps(text: str) -> tuple[float, ...]:
     return tuple(sorted(found.values(), reverse=True))
 
 
+def _matched(text: str, form: str, advice: str, fine: Callable[[Any], bool] = bool) -> Any:
+    """The match of a whole text, if it is fine."""
+    found = re.fullmatch(form, text.strip(), re.A | re.I)
+    if found is None or not fine(found):
+        raise BadValue(text, advice)
+    return found
+
+
 def address(text: str) -> str:
     """Where a scheduler listens: `tcp://HOST:PORT`, or `tls://` with Dask's own configuration."""
     form = r"(tcp|tls)://([\w.-]{1,253}|\[[0-9a-f:.]{2,45}\]):(\d{1,5})"
-    found = re.fullmatch(form, text.strip(), re.A | re.I)
-    if not found or not 0 < int(found[3]) < 65536:
-        raise BadValue(text, "write it as tcp://HOST:PORT or tls://HOST:PORT")
-    return text.strip()
+    advice = "write it as tcp://HOST:PORT or tls://HOST:PORT"
+    return str(_matched(text, form, advice, lambda found: 0 < int(found[3]) < 65536)[0])
 
 
 @dataclass(frozen=True)
@@ -235,9 +241,9 @@ class Releases:
 
 def releases(text: str) -> Releases:
     """`NAME:N` or `NAME:N:minor`."""
-    found = re.fullmatch(r"([\w-]{1,100}):(\d{1,3})(:minor)?", text.strip(), re.A)
-    if found is None or not 2 <= int(found[2]) <= 100:
-        raise BadValue(text, "write it as NAME:N or NAME:N:minor, with N from 2 to 100")
+    advice = "write it as NAME:N or NAME:N:minor, with N from 2 to 100"
+    form = r"([\w-]{1,100}):(\d{1,3})(:minor)?"
+    found = _matched(text, form, advice, lambda found: 2 <= int(found[2]) <= 100)
     return Releases(found[1], int(found[2]), bool(found[3]))
 
 
@@ -252,25 +258,21 @@ class Span:
 
 def span(text: str) -> Span:
     """`NAME:GOOD..BAD`."""
-    version = r"(\d[\w.+!-]{0,60}?)"
-    found = re.fullmatch(rf"([\w-]{{1,100}}):{version}\.\.{version}", text.strip(), re.A)
-    if found is None or found[2] == found[3]:
-        raise BadValue(text, "write it as NAME:GOOD..BAD, with two releases")
+    version, advice = r"(\d[\w.+!-]{0,60}?)", "write it as NAME:GOOD..BAD, with two releases"
+    form = rf"([\w-]{{1,100}}):{version}\.\.{version}"
+    found = _matched(text, form, advice, lambda found: found[2] != found[3])
     return Span(found[1], found[2], found[3])
 
 
 def metric(text: str) -> str:
     """The name of a metric."""
-    if not re.fullmatch(r"\w{1,100}", text, re.A):
-        raise BadValue(text, "give the name of a metric")
-    return text
+    return str(_matched(text, r"\w{1,100}", "give the name of a metric")[0])
 
 
 def limits(text: str) -> str:
     """`METRIC:LIMIT,...`; which metrics there are is known later, see `measure.limits`."""
     for part in text.split(","):
-        if not re.fullmatch(r"\w+\s*:\s*[\d.]{1,30}\s*%?", part.strip(), re.A):
-            raise BadValue(text, "write it as placed:5%,landing_error:0.01")
+        _matched(part, r"\w+\s*:\s*[\d.]{1,30}\s*%?", "write it as placed:5%,landing_error:0.01")
     return text
 
 

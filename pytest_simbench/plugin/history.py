@@ -83,5 +83,5 @@ def _named(config: pytest.Config, name: str) -> str:
     return f"{name}-{_digest({**values, 'version': __version__})}"
 
 
-def _digest(told: Mapping[str, object]) -> str:
-    return digest(json.dumps(told, sort_keys=True, default=str))
+def _digest(values: Mapping[str, object]) -> str:
+    return digest(json.dumps(values, sort_keys=True, default=str))

@@ -9,30 +9,26 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import pytest
 
 from pytest_simbench.plugin import options
 
 
-@dataclass(frozen=True)
-class OldOption:
+class OldOption(NamedTuple):
     """What an old option stands for.
 
     Attributes:
         flag: the option.
-        name: of the command.
+        command: its name.
         values: how many values the option takes, as argparse has it; 0 for none.
-        carried: options of a run that were for the option too, by what the command calls them.
     """
 
     flag: str
-    name: str
+    command: str
     values: int | str = 0
-    carried: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def dest(self) -> str:
@@ -42,61 +38,63 @@ class OldOption:
     @property
     def arguments(self) -> dict[str, Any]:
         """What argparse is told of it."""
-        taken = (
-            {"action": "extend", "nargs": self.values} if self.values else {"action": "store_true"}
-        )
-        return {"dest": self.dest, "default": None, "help": argparse.SUPPRESS, **taken}
+        taken = {"action": "extend", "nargs": self.values}
+        flag = {"action": "store_true"}
+        hidden = {"dest": self.dest, "default": None, "help": argparse.SUPPRESS}
+        return {**hidden, **(taken if self.values else flag)}
 
-
-_RUNS = {"sim_output": "--output", "sim_badge": "--badge", "sim_record": "--record"}
 
 OLD_OPTIONS = (
     OldOption("--sim-install", "install", 1),
     OldOption("--sim-uninstall", "uninstall", 1),
     OldOption("--sim-environments", "environments"),
-    OldOption("--sim-download", "download", 1, {"sim_data": "--data"}),
+    OldOption("--sim-download", "download", 1),
     OldOption("--sim-bisect", "bisect", 2),
-    OldOption("--sim-merge", "merge", "+", _RUNS),
-    OldOption("--sim-report", "report", "+", _RUNS),
-    OldOption("--sims", "list", 0, {"sim_cluster": "--cluster"}),
-    OldOption("--sim-list", "list", 0, {"sim_cluster": "--cluster"}),
+    OldOption("--sim-merge", "merge", "+"),
+    OldOption("--sim-report", "report", "+"),
+    OldOption("--sims", "list"),
+    OldOption("--sim-list", "list"),
     OldOption("--robots", "robots"),
     OldOption("--sim-robots", "robots"),
 )
 """The first one that is given counts."""
 
+CARRIED = {"sim_output": "--output", "sim_badge": "--badge", "sim_record": "--record",
+           "sim_data": "--data", "sim_cluster": "--cluster"}  # fmt: skip
+"""Options of runs, by what those commands call them that take them too."""
+
 
 def asked(config: pytest.Config) -> OldOption | None:
     """The first of the old options that is on the command line."""
-    given = (found for found in OLD_OPTIONS if getattr(config.option, found.dest, None))
-    return next(given, None)
+    return next((old for old in OLD_OPTIONS if getattr(config.option, old.dest, None)), None)
 
 
-def run_command(config: pytest.Config, command: OldOption) -> int:
+def run_command(config: pytest.Config, old: OldOption) -> int:
     """Do what an old option asks for, by the command; the exit code, as pytest has it."""
-    from pytest_simbench.cli.main import BAD_INPUT, INTERRUPTED, main
+    from pytest_simbench.cli.main import BAD_INPUT, COMMANDS, INTERRUPTED, main
 
-    values = getattr(config.option, command.dest)
-    if command.name == "bisect":
+    values = getattr(config.option, old.dest)
+    if old.command == "bisect":
         return _bisect(config, *values)
-    names = "," if command.values == 1 else None  # in one value, as options have them
+    (command,) = (command for command in COMMANDS if command.name == old.command)
     words = [command.name]
-    for value in [] if values is True else values:
-        words += value.split(names) if names else [value]
-    if command.name == "robots" and options.value(config, "sim_robot") not in (None, "all"):
-        words.append(options.value(config, "sim_robot"))
-    for name, own in command.carried.items():
-        if (value := options.value(config, name)) is not None:
-            words += [own, value]
-    if command.name == "list" or (command.carried is _RUNS and config.get_verbosity() > 0):
+    for value in values if old.values else ():
+        words += value.split(",") if old.values == 1 else [value]
+    robot = options.value(config, "sim_robot")
+    if command.name == "robots" and robot not in (None, "all"):
+        words.append(robot)
+    taken = {argument.name for argument in command.arguments}
+    for name, own in CARRIED.items():
+        if own in taken and options.value(config, name) is not None:
+            words += [own, options.value(config, name)]
+    if command.name == "list" or (command.verbose and config.get_verbosity() > 0):
         words.append("-v")
-    _announce(command.flag, words)
+    _announce(old.flag, words)
     status = main(words)
     if command.name == "list":
         print("\n".join(options.taken_names(config)))
-    return {BAD_INPUT: pytest.ExitCode.USAGE_ERROR, INTERRUPTED: pytest.ExitCode.INTERRUPTED}.get(
-        status, status
-    )
+    as_pytest = {BAD_INPUT: pytest.ExitCode.USAGE_ERROR, INTERRUPTED: pytest.ExitCode.INTERRUPTED}
+    return as_pytest.get(status, status)
 
 
 def _announce(flag: str, words: list[str]) -> None:
@@ -106,8 +104,6 @@ def _announce(flag: str, words: list[str]) -> None:
 
 def _bisect(config: pytest.Config, span: str, metric: str) -> int:
     """The one that `simbench bisect` itself asks for: which folder it is, the options say."""
-    from pathlib import Path
-
     from pytest_simbench.cli import bisect, values
     from pytest_simbench.plugin.history import folder_of
     from pytest_simbench.simulator.errors import SimulatorError

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import pytest
 
 from pytest_simbench.cli import values as read
-from pytest_simbench.cli.values import AUTO_LIMIT, MOST_REPETITIONS, Auto, BadValue
+from pytest_simbench.cli.values import AUTO_LIMIT, MOST_REPETITIONS, BadValue
 from pytest_simbench.records.choices import FIRST_SEED
 
 LARGEST_SEED = 2**53 - MOST_REPETITIONS - 1
@@ -245,12 +245,6 @@ def _ini(config: pytest.Config, item: Option) -> tuple[str, Any]:
         if raw is not None:
             return f"the ini option {name}", raw
     return "", None
-
-
-def repetitions(config: pytest.Config) -> int | Auto | None:
-    """What `--reps` asks for; None when it is not given."""
-    found: int | Auto | None = value(config, "sim_reps")
-    return found
 
 
 def mentioned(config: pytest.Config, names: Sequence[str]) -> bool:

@@ -58,6 +58,6 @@ def _of(item: pytest.Item, case_of: CaseOf) -> Iterator[Experiment]:
         )
     if not isinstance(variant, Variant) or variant.mode == "gui" or variant.robot:
         return
-    if (options.repetitions(item.config) or number_mark(item, "reps")) == 1:
+    if (options.value(item.config, "sim_reps") or number_mark(item, "reps")) == 1:
         with suppress(SimulatorError):  # its test tells
             yield Experiment(case_of(item, variant, {}), task)

@@ -52,7 +52,7 @@ class RepeatFixture:
 
     def __call__(self, task: Task) -> ResultSet:
         """Run a task's repetitions, as many as options and marks say."""
-        wanted = options.repetitions(self.node.config)
+        wanted = options.value(self.node.config, "sim_reps")
         skips = session_of(self.node.config).selection.every_robot
         experiment = can_do(Experiment(self.case, task), skips)
         experiment = experiment.in_case(attempt=self.run.begin(experiment))

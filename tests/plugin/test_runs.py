@@ -91,28 +91,6 @@ def test_ini_twins(pytester: pytest.Pytester) -> None:
     assert len(records(pytester.path / "here")) == 2
 
 
-def test_xdist_merges_records_and_prints_one_table(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(TEST)
-    result = pytester.runpytest_subprocess(
-        "--sim=mujoco,pybullet", "--reps=2", "--sim-output=out", "-n2", "-p", "no:randomly"
-    )
-    result.assert_outcomes(passed=2)
-    assert len(records(pytester.path / "out")) == 4
-    assert result.stdout.str().count("simulator comparison") == 1
-    result.stdout.fnmatch_lines(["mujoco*", "*pybullet*"])
-
-
-def test_jobs_run_side_by_side_and_say_so(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(TEST)
-    result = pytester.runpytest_subprocess(
-        "--sim=mujoco", "--reps=4", "--sim-jobs=2", "--sim-output=out"
-    )
-    result.assert_outcomes(passed=1)
-    kept = records(pytester.path / "out")
-    assert sorted(r["repetition"] for r in kept) == [1, 2, 3, 4]  # type: ignore[type-var]
-    assert all(r["contended"] for r in kept)
-
-
 def test_benchmark_rounds_are_worker_seconds_and_compare(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(TEST)
     arguments = ["--sim=mujoco", "--reps=3", "--benchmark-autosave"]
