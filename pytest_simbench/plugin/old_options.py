@@ -92,7 +92,8 @@ def run_command(config: pytest.Config, old: OldOption) -> int:
     _announce(old.flag, words)
     status = main(words)
     if command.name == "list":
-        print("\n".join(options.taken_names(config)))
+        for line in options.taken_names(config):
+            print(line)
     as_pytest = {BAD_INPUT: pytest.ExitCode.USAGE_ERROR, INTERRUPTED: pytest.ExitCode.INTERRUPTED}
     return as_pytest.get(status, status)
 

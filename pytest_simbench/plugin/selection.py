@@ -99,15 +99,15 @@ class Selection:
             return None
         return environments.missing(registry.adapter(name).info)
 
-    def unusable(self, name: str, installed: bool = True) -> str | None:
+    def unusable(self, name: str, to_install: bool = False) -> str | None:
         """Why a simulator cannot run in any of the profiles; None when it can. Tests in those that
         one lacks are skipped, with the reason.
 
         Args:
             name: of the simulator.
-            installed: whether what is missing will not be installed yet.
+            to_install: whether a missing environment is no fault, since it will be made.
         """
-        why = self.missing if installed else self.settings_problem
+        why = self.settings_problem if to_install else self.missing
         reasons = [why(name, (profile,)) for profile in self.profiles]
         return reasons[0] if all(reasons) else None
 
@@ -223,7 +223,7 @@ def check(selection: Selection, makes: bool) -> None:
         if refused := selection.settings_problem(name):
             raise BadInput(refused)
     for name in selection.named:
-        if reason := selection.unusable(name, installed=not makes):
+        if reason := selection.unusable(name, to_install=makes):
             raise BadInput(reason)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.command import simbench
+from tests.plugin.inner import FALLING
 
 GOOD = """
 from dataclasses import replace
@@ -27,13 +28,6 @@ class NoProfiles(MuJoCo):
     profiles = None
 """
 
-TEST = """
-from tests.tiny import Falling
-
-def test_falling(repeat):
-    repeat(Falling())
-"""
-
 
 @pytest.fixture
 def site(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -43,7 +37,7 @@ def site(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Path:
     (folder / "raises.py").write_text("raise ValueError('no\\nluck')")
     (folder / "exits.py").write_text("import sys; sys.exit(3)")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder), os.environ["PYTHONPATH"]]))
-    pytester.makepyfile(TEST)
+    pytester.makepyfile(FALLING)
     return folder
 
 
@@ -96,7 +90,7 @@ def test_broken_adapters_end_no_other(pytester: pytest.Pytester, site: Path) -> 
 def test_all_skips_a_broken_one_with_its_reason(pytester: pytest.Pytester, site: Path) -> None:
     distribution(site, "broken-sims", "broken = nosuch:Class")
     pytester.makepyfile(
-        TEST.replace("def ", "import pytest\n@pytest.mark.only_sim('broken')\ndef ")
+        FALLING.replace("def ", "import pytest\n@pytest.mark.only_sim('broken')\ndef ")
     )
     result = pytester.runpytest_subprocess("--sim=all", "-rs")
     result.assert_outcomes(skipped=1)

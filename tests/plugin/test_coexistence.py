@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from importlib.metadata import version
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import pytest
 from pytest_simbench import __version__
 from pytest_simbench.plugin.old_options import OLD_OPTIONS
 from pytest_simbench.plugin.options import OPTIONS
+from tests.plugin.inner import no_traceback, records
 
 FLAGS = [flag for o in OPTIONS for flag in (o.flag, o.long) if flag]
 FLAGS += [command.flag for command in OLD_OPTIONS]
@@ -38,12 +38,6 @@ from tests.tiny import Falling
 def test_falling(repeat):
     assert len(repeat(Falling())) == 2
 """
-
-
-def no_traceback(result: pytest.RunResult) -> None:
-    text = result.stdout.str() + result.stderr.str()
-    assert "Traceback (" not in text
-    assert "INTERNALERROR" not in text
 
 
 @pytest.mark.parametrize("place", ["conftest", "before", "after"])
@@ -76,7 +70,7 @@ def test_taken_short_names_leave_the_sure_ones(pytester: pytest.Pytester) -> Non
         result.stdout.fnmatch_lines(
             [f"{option.flag} belongs to another plugin or to a conftest*{option.long} for*"]
         )
-    record = json.loads((pytester.path / "out" / "records.jsonl").read_text().splitlines()[0])
+    record = records(pytester.path / "out")[0]
     assert record["mode"] == "headless"  # their --gui is not ours
     assert record["jitter"] == 0
     shown = pytester.runpytest_subprocess("--help").stdout.str()
@@ -131,7 +125,7 @@ def test_without_pytest_benchmark(pytester: pytest.Pytester) -> None:
     )
     result.assert_outcomes(passed=1)
     no_traceback(result)
-    assert len((pytester.path / "out" / "records.jsonl").read_text().splitlines()) == 2
+    assert len(records(pytester.path / "out")) == 2
 
 
 def test_a_project_s_own_benchmark_fixture(pytester: pytest.Pytester) -> None:

@@ -7,13 +7,7 @@ from fnmatch import fnmatchcase
 import pytest
 
 from pytest_simbench.plugin.session import session_of
-
-TEST = """
-    from tests.tiny import Falling
-
-    def test_falling(repeat):
-        repeat(Falling()).assert_at_least("landed", 0.1)
-"""
+from tests.plugin.inner import CLAIMING
 
 
 @pytest.mark.parametrize(
@@ -78,7 +72,7 @@ def test_bad_option(pytester: pytest.Pytester, arguments: list[str], message: st
 
 
 def test_a_bad_option_ends_the_run(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(TEST)
+    pytester.makepyfile(CLAIMING)
     result = pytester.runpytest_subprocess("--sim=mujocco")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     result.stderr.fnmatch_lines(["ERROR: unknown simulator 'mujocco'; choose from *, or all"])

@@ -10,6 +10,7 @@ from pytest_simbench.cli import main
 from pytest_simbench.plugin import old_options
 from pytest_simbench.report.capabilities import capability_markdown
 from pytest_simbench.simulator.registry import adapter, registered
+from tests.plugin.inner import FALLING
 
 
 def old(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, *words: str) -> list[str]:
@@ -77,14 +78,7 @@ class Unlisted(MuJoCo):  # as an engine of the system, which is no Python packag
     (package / "entry_points.txt").write_text(
         "[pytest_simbench.simulators]\nnewer = newer:Newer\nunlisted = newer:Unlisted\n"
     )
-    pytester.makepyfile(
-        test_it="""
-from tests.tiny import Falling
-
-def test_falling(repeat):
-    repeat(Falling())
-"""
-    )
+    pytester.makepyfile(test_it=FALLING)
     result = pytester.run(
         sys.executable, "-c",
         "import sys, pytest; sys.path.insert(0, '.'); "

@@ -6,11 +6,11 @@ import json
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from pytest_simbench.plugin.run import Run
+from tests.plugin.inner import records
 
 TEST = """
     from tests.tiny import Falling
@@ -22,10 +22,6 @@ TEST = """
 
 def run(pytester: pytest.Pytester, *arguments: str) -> pytest.RunResult:
     return pytester.runpytest_subprocess("--sim=mujoco", "--reps=1", *arguments)
-
-
-def records(folder: Path) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in (folder / "records.jsonl").read_text().splitlines()]
 
 
 def test_a_folder_with_a_run_is_refused_before_anything_runs(pytester: pytest.Pytester) -> None:

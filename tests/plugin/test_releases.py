@@ -9,6 +9,7 @@ import os
 import pytest
 
 from tests.cli.command import simbench
+from tests.plugin.inner import records
 from tests.plugin.planted import plant
 
 
@@ -25,9 +26,6 @@ def planted(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("planted")
 def test_history_bisection_and_gate(pytester: pytest.Pytester) -> None:
-    def recorded() -> int:
-        return len((folder / "records.jsonl").read_text().splitlines())
-
     result = pytester.runpytest_subprocess("--sim-history=planted:4", "--reps=5")
     result.assert_outcomes(passed=4)
     result.stdout.fnmatch_lines(
@@ -35,7 +33,7 @@ def test_history_bisection_and_gate(pytester: pytest.Pytester) -> None:
          "  landed fell with 1.3: 100 % -> 0 %, p = *"]
     )  # fmt: skip
     (folder,) = (pytester.path / ".simbench" / "history").iterdir()
-    assert recorded() == 20
+    assert len(records(folder)) == 20
     assert list(folder.glob("planted_falling_history*.png"))
 
     result = simbench(  # what the history has recorded is not run again
@@ -48,7 +46,7 @@ def test_history_bisection_and_gate(pytester: pytest.Pytester) -> None:
          "the first worse release is 1.3: 1.2 landed 100 %, 1.3 landed 0 % (p = 0.03*)",
          f"results: {folder}"]
     )  # fmt: skip
-    assert recorded() == 20
+    assert len(records(folder)) == 20
 
     result = pytester.runpytest_subprocess(
         "--sim=planted==1.2,planted==1.3", "--sim-baseline=planted==1.2", "--reps=5",

@@ -9,13 +9,8 @@ import re
 import pytest
 
 from tests.cli.command import simbench
+from tests.plugin.inner import FALLING
 
-TEST = """
-    from tests.tiny import Falling
-
-    def test_falling(repeat):
-        repeat(Falling())
-"""
 OTHER = """
     def test_sum(benchmark):
         assert benchmark(sum, [1, 2]) == 3
@@ -28,7 +23,7 @@ def run(pytester: pytest.Pytester, *arguments: str) -> pytest.RunResult:
 
 @pytest.fixture(autouse=True)
 def test_file(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(test_it=TEST)
+    pytester.makepyfile(test_it=FALLING)
 
 
 def test_an_interrupted_report_is_one_sentence(pytester: pytest.Pytester) -> None:
@@ -82,7 +77,7 @@ def test_everything_is_told_with_v(pytester: pytest.Pytester) -> None:
 
 
 def test_a_failed_claim_makes_the_badge_red(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(test_it=TEST.rstrip() + ".assert_at_least('landed', 0.5)\n        assert 0")
+    pytester.makepyfile(test_it=FALLING.rstrip() + ".assert_at_least('landed', 0.5)\n    assert 0")
     result = run(pytester, "--sim-badge=badge.json")
     result.assert_outcomes(failed=1)
     assert json.loads((pytester.path / "badge.json").read_text())["color"] == "red"
@@ -109,7 +104,7 @@ def test_the_table_of_pytest_benchmark_comes_with_one_of_its_options(
 
 
 def test_benchmarks_of_others_keep_their_table(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(test_it=TEST, test_other=OTHER)
+    pytester.makepyfile(test_it=FALLING, test_other=OTHER)
     result = run(pytester)
     result.assert_outcomes(passed=2)
     table = result.stdout.str().partition("- benchmark")[2].partition("Legend")[0]
@@ -141,7 +136,7 @@ def test_a_kept_run_shows_how_it_ended(pytester: pytest.Pytester) -> None:
 
 def test_the_badge_of_merged_runs_is_that_of_all(pytester: pytest.Pytester) -> None:
     run(pytester)
-    pytester.makepyfile(test_it=TEST.rstrip() + ".assert_at_least('landed', 0.5)\n        assert 0")
+    pytester.makepyfile(test_it=FALLING.rstrip() + ".assert_at_least('landed', 0.5)\n    assert 0")
     pytester.runpytest_subprocess(
         "--sim=mujoco", "--reps=5", "--sim-output=second", "--sim-seed=3000"
     ).assert_outcomes(failed=1)

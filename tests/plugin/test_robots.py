@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from fnmatch import fnmatchcase
-from pathlib import Path
 
 import pytest
 
 from pytest_simbench.plugin.selection import select
+from tests.plugin.inner import records
 from tests.robot.small_arm import TOML, small_arm
 
 HOLDING = '''
@@ -70,11 +69,6 @@ def run(pytester: pytest.Pytester, *arguments: str, ret: int = 0) -> pytest.RunR
     return result
 
 
-def records(folder: str) -> list[dict[str, object]]:
-    lines = Path(folder, "records.jsonl").read_text().splitlines()
-    return [json.loads(line) for line in lines]
-
-
 def test_a_run_with_another_robot(pytester: pytest.Pytester) -> None:
     """Its name is in the id and in the record; the default robot leaves no trace. A baseline of
     another robot is said to be one."""
@@ -92,7 +86,7 @@ def test_a_run_with_another_robot(pytester: pytest.Pytester) -> None:
         name.format(""), name.format("-ur5"), name.format("-small"),
     ]  # fmt: skip
     assert "robot" not in panda
-    assert [r["robot"]["name"] for r in (ur5, small)] == ["ur5", "small"]  # type: ignore[index]
+    assert [r["robot"]["name"] for r in (ur5, small)] == ["ur5", "small"]
     assert [r["metrics"] for r in (panda, ur5, small)] == [
         {"joints": 9.0}, {"joints": 8.0}, {"joints": 5.0},
     ]  # fmt: skip

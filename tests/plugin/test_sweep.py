@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 
 from tests.cli.command import simbench
+from tests.plugin.inner import records
 
 SUITE = Path(__file__).resolve().parents[2] / "suites" / "test_physics.py"
 
 
 def ids(folder: Path) -> list[str]:
-    lines = (folder / "records.jsonl").read_text().splitlines()
-    return [json.loads(line)["test"].partition("::")[2] for line in lines]
+    return [record["test"].partition("::")[2] for record in records(folder)]
 
 
 def test_a_sweep_of_two_profiles_is_one_run_that_is_resumed_and_reported(

@@ -11,6 +11,7 @@ import pytest
 from pytest_simbench.client.environments import MARKER, Environment
 from pytest_simbench.plugin.selection import select
 from pytest_simbench.simulator.registry import adapter
+from tests.plugin.inner import records
 
 
 def wrapper(python: Path) -> Path:
@@ -60,12 +61,9 @@ def test_versions_side_by_side(pytester: pytest.Pytester, release: str) -> None:
     result.assert_outcomes(passed=6, skipped=1)
     for name in ("mujoco", release, "mujoco@mine"):
         result.stdout.fnmatch_lines([f"{name} *"])  # of a table
-    lines = (pytester.path / "out" / "records.jsonl").read_text().splitlines()
-    found = {
-        (record["simulator"], record["settings"]["timestep"], record["seed"])
-        for record in map(json.loads, lines)
-    }
-    tests = {record["test"].partition("::")[2] for record in map(json.loads, lines)}
+    kept = records(pytester.path / "out")
+    found = {(r["simulator"], r["settings"]["timestep"], r["seed"]) for r in kept}
+    tests = {record["test"].partition("::")[2] for record in kept}
     assert tests == {f"test_falling[{name}-headless]" for name, _, _ in found}
     steps = {"mujoco": 0.001, release: 0.004, "mujoco@mine": 0.001}
     assert found == {(name, step, seed) for name, step in steps.items() for seed in (10001, 10002)}
