@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 from typing import Any, Literal
 
@@ -119,10 +120,10 @@ OPTIONS = (
            "STEP,...", ini="", bare=True),
     Option("--sim-set", read.settings, "change one setting: mysim.timestep=0.001", {},
            "SIM.SETTING=VALUE", read.each_once, "args"),
-    Option("--sim-python", read.assignment, "interpreter of a simulator's worker: mysim=PATH; "
-           "repeat the option for another one", {}, "SIM=PATH", read.each_once, "linelist"),
-    Option("--sim-spec", read.assignment, "execnet specification of a simulator's worker; repeat "
-           "the option for another one", {}, "SIM=SPEC", read.each_once, "linelist", rare=True),
+    Option("--sim-python", partial(read.assignment, form="SIM=PATH"), "interpreter of "
+           "a simulator's worker: mysim=PATH; repeat the option for another one", {}, "SIM=PATH", read.each_once, "linelist"),
+    Option("--sim-spec", partial(read.assignment, form="SIM=SPEC"), "execnet "
+           "specification of a simulator's worker; repeat the option for another one", {}, "SIM=SPEC", read.each_once, "linelist", rare=True),
     Option("--sim-fresh", read.flag, "a new worker for each repetition even where starting is "
            "costly", False, rare=True),
     Option("--sim-jobs", read.jobs, "repetitions at once, in the whole run also with -n, at most "

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pytest_simbench.experiment.experiment import Experiment
     from pytest_simbench.plugin.variants import Variant
 
-    CaseOf = Callable[[pytest.Item, Variant, dict[str, Any]], Case]
+    CaseOf = Callable[[pytest.Config, Variant, pytest.Item, dict[str, Any]], Case]
 
 MARK = "repeats"
 
@@ -60,4 +60,4 @@ def _of(item: pytest.Item, case_of: CaseOf) -> Iterator[Experiment]:
         return
     if (options.value(item.config, "sim_reps") or number_mark(item, "reps")) == 1:
         with suppress(SimulatorError):  # its test tells
-            yield Experiment(case_of(item, variant, {}), task)
+            yield Experiment(case_of(item.config, variant, item, {}), task)

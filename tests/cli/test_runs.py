@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.cli.runs import Wanted, merge_runs
+from pytest_simbench.cli.runs import merge_runs
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.records.folder import RunFolder
@@ -31,7 +31,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def merge(*runs: str) -> int:
-    return merge_runs(runs, Wanted("whole"))
+    return merge_runs(runs, output="whole")
 
 
 def test_logs_and_traces_are_copied_under_names_of_ours(here: Path) -> None:

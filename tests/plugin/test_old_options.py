@@ -31,7 +31,7 @@ def old(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, *words: str)
         ("--sim-list --sim=mujoco", "list -v"),
         ("--robots", "robots"),
         ("--sim-robots --robot=ur5", "robots ur5"),
-        ("--sim-install genesis,newton --sim-install x", "install genesis,newton x"),
+        ("--sim-install genesis,newton --sim-install x", "install genesis newton x"),
         ("--sim-uninstall=genesis", "uninstall genesis"),
         ("--sim-environments", "environments"),
         ("--sim-download=cube_tosses --sim-data=d", "download cube_tosses --data d"),
