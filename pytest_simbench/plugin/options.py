@@ -121,9 +121,11 @@ OPTIONS = (
     Option("--sim-set", read.settings, "change one setting: mysim.timestep=0.001", {},
            "SIM.SETTING=VALUE", read.each_once, "args"),
     Option("--sim-python", partial(read.assignment, form="SIM=PATH"), "interpreter of "
-           "a simulator's worker: mysim=PATH; repeat the option for another one", {}, "SIM=PATH", read.each_once, "linelist"),
+           "a simulator's worker: mysim=PATH; repeat the option for another one", {},
+           "SIM=PATH", read.each_once, "linelist"),
     Option("--sim-spec", partial(read.assignment, form="SIM=SPEC"), "execnet "
-           "specification of a simulator's worker; repeat the option for another one", {}, "SIM=SPEC", read.each_once, "linelist", rare=True),
+           "specification of a simulator's worker; repeat the option for another one", {},
+           "SIM=SPEC", read.each_once, "linelist", rare=True),
     Option("--sim-fresh", read.flag, "a new worker for each repetition even where starting is "
            "costly", False, rare=True),
     Option("--sim-jobs", read.jobs, "repetitions at once, in the whole run also with -n, at most "
