@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import importlib.util
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
+from pytest_simbench.plugin import recording
 from pytest_simbench.recordings.trace import Trace
 from tests.cli.command import simbench
 
@@ -81,21 +83,10 @@ def test_a_run_without_traces_says_so(pytester: pytest.Pytester) -> None:
     result.stdout.fnmatch_lines(["no recordings: the run has no traces; see --sim-trace"])
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--sim-record=avi"], "--sim-record=avi: choose from mcap"),
-        (["--sim-video=all"], "--sim-video=all: choose from off, first, on, retain-on-failure"),
-        (["--sim-record=mcap", "--sim-trace=off"], "leave --sim-trace=off out"),
-    ],
-)
-def test_what_cannot_be_recorded_is_refused_before_anything_runs(
-    pytester: pytest.Pytester, arguments: list[str], message: str
-) -> None:
-    pytester.makepyfile(TEST)
-    result = pytester.runpytest_subprocess("--sim=mujoco", *arguments)
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines([f"ERROR: *{message}"])
+def test_a_recording_without_traces_is_refused(pytester: pytest.Pytester) -> None:
+    config = pytester.parseconfig("--sim-record=mcap", "--sim-trace=off")
+    with pytest.raises(pytest.UsageError, match="leave --sim-trace=off out$"):
+        recording.check(config)
 
 
 @pytest.mark.parametrize(
@@ -103,20 +94,18 @@ def test_what_cannot_be_recorded_is_refused_before_anything_runs(
     [("rosbags", "--sim-record=mcap", "ros"), ("av", "--sim-video=first", "video")],
 )
 def test_a_missing_package_is_one_sentence_before_anything_runs(
-    pytester: pytest.Pytester, package: str, option: str, extra: str
+    pytester: pytest.Pytester,
+    monkeypatch: pytest.MonkeyPatch,
+    package: str,
+    option: str,
+    extra: str,
 ) -> None:
-    pytester.makepyfile(TEST)
-    pytester.makeconftest(
-        f"""
-        import importlib.util
-        find = importlib.util.find_spec
-        importlib.util.find_spec = lambda name, *a: None if name == "{package}" else find(name, *a)
-        """
-    )
-    result = pytester.runpytest_subprocess("--sim=mujoco", option)
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines([f"ERROR: {option}: *pip install 'pytest-simbench[[]{extra}]'"])
-    assert "Traceback" not in result.stdout.str() + result.stderr.str()
+    config, find = pytester.parseconfig(option), importlib.util.find_spec
+    for place in ("pytest_simbench.recordings.film.find_spec", "importlib.util.find_spec"):
+        monkeypatch.setattr(place, lambda name: None if name == package else find(name))
+    message = rf"^{option}: .*pip install 'pytest-simbench\[{extra}\]'$"
+    with pytest.raises(pytest.UsageError, match=message):
+        recording.check(config)
 
 
 def test_pictures_and_videos_are_taken_beside_what_is_measured(pytester: pytest.Pytester) -> None:
