@@ -65,8 +65,8 @@ class Subcommand:
 
 _OF_RUNS = (
     Argument("runs", read.file, "RUN", "folder of a run", "+"),
-    Argument("--output", read.file, "DIR", "folder to write to (default: of one run its own, of a "
-             "merge .simbench/TIME-merged)"),
+    Argument("--output", read.file, "DIR", "folder to write to (default: of one run its own, of "
+             "merged ones a new one; report writes nothing of several then)"),
     Argument("--badge", read.file, "FILE", "write the result as JSON for a badge of shields.io"),
     Argument("--record", read.choice("mcap"), "mcap", "write each repetition's motion as a rosbag2 "
              "folder"),

@@ -67,7 +67,7 @@ def nodes(config: pytest.Config) -> tuple[Node, ...]:
     return pool(config).nodes() if asked(config) else ()
 
 
-def lost(records: Iterable[Record]) -> str:
+def lost_nodes(records: Iterable[Record]) -> str:
     """How many repetitions were tried again, as a sentence for the end of the run, or nothing."""
     again = [record for record in records if record.notes.lost_nodes]
     if not again:

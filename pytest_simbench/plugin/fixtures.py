@@ -37,7 +37,7 @@ OF_CASES = ("fresh", "stall_timeout", "memory_limit", "seed", "jitter")
 """Options of the same name as an attribute of `Case`, behind `sim_`."""
 
 
-def beside(plugins: pytest.PytestPluginManager) -> ModuleType:
+def free_fixtures(plugins: pytest.PytestPluginManager) -> ModuleType:
     """A plugin with all fixtures but those whose name another plugin has.
 
     A conftest's fixture hides ours where it holds, as always. Ours can be had under any name by
@@ -200,7 +200,7 @@ def repeat(
     done: list[Task] = []
 
     def perform(task: Task) -> ResultSet:
-        arguments.once(arguments.checked_task(task, "repeat"), done)
+        arguments.refuse_second(arguments.checked_task(task, "repeat"), done)
         return repeat(task)
 
     request.node.stash[REPEATED] = repeat.check_crashes

@@ -64,7 +64,7 @@ def folder_of(config: pytest.Config, name: str) -> Path:
     return config.rootpath / FOLDER / f"{_named(config, name)}-{_digest(host())}"
 
 
-def elsewhere(config: pytest.Config, name: str) -> str:
+def on_other_machines(config: pytest.Config, name: str) -> str:
     """That another machine has such a history here, as a sentence; empty where none has."""
     own = folder_of(config, name)
     others = sorted(

@@ -55,7 +55,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
     session = session_of(config)
     config.pluginmanager.register(session, "simbench-session")
-    config.pluginmanager.register(fixtures.beside(config.pluginmanager), "simbench-fixtures")
+    config.pluginmanager.register(fixtures.free_fixtures(config.pluginmanager), "simbench-fixtures")
     if not (config.getoption("help") or config.getoption("version")):
         session.check_options()
 
@@ -134,7 +134,7 @@ def pytest_runtest_makereport(item: pytest.Item, call: Any) -> Any:
 @pytest.hookimpl(trylast=True)  # xdist has heard all its workers then
 def pytest_sessionfinish(session: pytest.Session) -> None:
     ours = session_of(session.config)
-    with ours.sparing():
+    with ours.interruptible():
         ours.finish(session)
 
 
@@ -148,7 +148,7 @@ def pytest_benchmark_group_stats(config: pytest.Config) -> Generator[None, Any, 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, exitstatus: int) -> None:
     ours = session_of(terminalreporter.config)
-    with ours.sparing():
+    with ours.interruptible():
         ours.summarise(terminalreporter, exitstatus)
 
 

@@ -26,7 +26,7 @@ from pytest_simbench.experiment.slots import Slots
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.plugin import cluster, options, recording, thresholds
 from pytest_simbench.plugin.compare import Comparison
-from pytest_simbench.plugin.history import elsewhere, folder_of
+from pytest_simbench.plugin.history import folder_of, on_other_machines
 from pytest_simbench.plugin.resume import Resumed, folder_to_resume
 from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import Threshold
@@ -69,7 +69,6 @@ class Run:
         self.expected: Callable[[], Iterable[Experiment]] = tuple
         self._attempts: Counter[tuple[str, str, str]] = Counter()
         self._lock = threading.Lock()
-        self._progress: Progress | None = None
         self.resumed: Resumed | None = None
         kept = options.value(config, "sim_history") is not None and self.folder.holds_run
         if options.given(config, "sim_resume") or kept:
@@ -78,16 +77,14 @@ class Run:
     def _choose_path(self) -> Path:
         if self._shared_by is not None and "simbench_folder" in self._shared_by:
             return Path(self._shared_by["simbench_folder"])
-        if options.given(self.config, "sim_resume"):
-            folder = folder_to_resume(self.config)
-            if folder is not None:
-                return folder
+        if (resumed := folder_to_resume(self.config)) is not None:
+            return resumed
         given = options.value(self.config, "sim_output")
         if given:
             return Path(self.config.invocation_params.dir, given)
         history = options.value(self.config, "sim_history")
         if history is not None:
-            self.tell(elsewhere(self.config, history.name))
+            self.tell(on_other_machines(self.config, history.name))
             return folder_of(self.config, history.name)
         return new_name(self.config.rootpath / RUNS)
 
@@ -153,15 +150,12 @@ class Run:
             return None
         return Slots(options.value(self.config, "sim_jobs"))
 
-    @property
+    @cached_property
     def progress(self) -> Progress:
         """The live line; silent in xdist workers, which have no terminal."""
-        if self._progress is None:
-            reporter = self._reporter
-            width = reporter._tw.fullwidth if reporter else 80
-            tty = bool(reporter and reporter.isatty)
-            self._progress = Progress(self._write, is_tty=tty, width=width)
-        return self._progress
+        reporter = self._reporter
+        width = reporter._tw.fullwidth if reporter else 80
+        return Progress(self._write, is_tty=bool(reporter and reporter.isatty), width=width)
 
     def _write(self, text: str) -> None:
         if self._reporter is not None and self._shared_by is None:
@@ -291,7 +285,7 @@ class Run:
         written = write_report(self.folder, self.reading, found, looks)
         unsaved = self.folder.flush()
         problems = [*self._problems, *self.reading.problems, *self.reading.refused]
-        problems += [*written.problems, cluster.lost(records)]
+        problems += [*written.problems, cluster.lost_nodes(records)]
         if written.summaries or written.sweeps:
             changes = comparison.markdown() if comparison else ""
             page = markdown.render_run(

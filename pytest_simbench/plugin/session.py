@@ -202,7 +202,7 @@ class SimSession:
             self._passed.add(report.nodeid)
 
     @contextmanager
-    def sparing(self) -> Iterator[None]:
+    def interruptible(self) -> Iterator[None]:
         """While results are put together: Ctrl-C ends that with one sentence."""
         try:
             yield
