@@ -8,8 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
+from pytest_simbench.cli.main import COMMANDS
 from pytest_simbench.plugin import fixtures, repeatability
 from pytest_simbench.plugin.hooks import MARKS
+from pytest_simbench.plugin.old_options import OLD_OPTIONS
 from pytest_simbench.plugin.options import OPTIONS, Option
 
 PAGE = Path(__file__).with_name("options.md")
@@ -34,16 +36,25 @@ The script `docs/make_options.py` writes this page. A test checks that it is up 
 
 {options}
 
-*also* is a short name. Another plugin or a conftest may have this name. Then the short name is
-theirs, and the long name still works. `pytest --sims` and the test run say so.
+Another plugin or a conftest may have a short name, `--gui` for instance. Then the name is theirs.
+The name under *sure* works in any case. The test run says so.
 
-Each option has a twin in the ini file. Its name has underscores: `sim_jobs = 2`. A short name works
-too: `reps = 40`. Options with *no ini* concern a single run and have no twin. The command line wins
-over the ini file. The plugin checks all values before the run begins. A wrong value ends the run in
-one sentence.
+`pytest --help` leaves out the options with *rare*.
+
+Each option has a twin in the ini file. Its name has underscores: `sim_jobs = 2`, `reps = 40`.
+Options with *no ini* concern a single run and have no twin. The command line wins over the ini
+file. The plugin checks all values before the run begins. A wrong value ends the run in one
+sentence.
 
 A comma separates several values (`--sim mujoco,pybullet`). A value of `--sim-python` or
 `--sim-spec` may hold a comma. Repeat these options instead.
+
+## What runs and exits
+
+The command `simbench` does it. `simbench COMMAND --help` says what a command takes. For one release
+the options of 0.1 still work. They call the command and name it.
+
+{commands}
 
 ## Marks
 
@@ -65,7 +76,8 @@ Without pytest-benchmark (`-p no:benchmark`) all works but its rounds.
 def page() -> str:
     """The page as it should be."""
     return TEMPLATE.format(
-        options=table(("option", "also", "default", "meaning"), map(option_row, OPTIONS)),
+        options=table(("option", "sure", "default", "meaning"), map(option_row, OPTIONS)),
+        commands=table(("command", "meaning", "option of 0.1"), command_rows(), code=1),
         marks=table(("mark", "meaning"), (mark.split(": ", 1) for mark in MARKS), code=1),
         fixtures=table(("fixture", "lives for", "meaning"), fixture_rows()),
     )
@@ -73,12 +85,19 @@ def page() -> str:
 
 def option_row(option: Option) -> tuple[str, str, str, str]:
     """The cells of an option."""
-    values = option.metavar or ""
-    typed = " ".join([option.flag, *([values] if isinstance(values, str) else values)]).strip()
+    typed = f"{option.flag} {option.metavar}".strip()
     told = ",".join(option.default) if isinstance(option.default, tuple) else option.default
     default = "" if told in (None, False, [], {}) else f"`{told}`"
-    meaning = option.help + ("" if option.ini else " (*no ini*)")
-    return f"`{typed}`", f"`{option.short}`" if option.short else "", default, meaning
+    notes = [note for note, holds in (("rare", option.rare), ("no ini", not option.ini)) if holds]
+    meaning = " ".join([option.help, *(f"(*{note}*)" for note in notes)])
+    return f"`{typed}`", f"`{option.long}`" if option.long else "", default, meaning
+
+
+def command_rows() -> Iterable[tuple[str, str, str]]:
+    """The cells of each command."""
+    for name, text in ((c.name, c.help) for c in COMMANDS):
+        old = [option.flag for option in OLD_OPTIONS if option.command == name]
+        yield f"simbench {name}", text, ", ".join(f"`{flag}`" for flag in old)
 
 
 def fixture_rows() -> Iterable[tuple[str, str, str]]:

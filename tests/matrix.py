@@ -25,6 +25,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pytest_simbench.laws import LAWS
+from pytest_simbench.plugin.options import OPTIONS
 
 HERE = Path(__file__).resolve().parent.parent
 
@@ -176,10 +177,10 @@ class Step:
 def steps(place: Place) -> Iterator[Step]:
     """What is run in an environment."""
     others = set().union(*(WANT_OUR_NAMES.get(plugin, set()) for plugin in place.plugins))
-    free = {"--gui", "--headless", "--protocol", "--reps", "--sim", "--jitter", "--sims"} - others
-    shorts = tuple(rf"(?m)^  {flag}\b.*\n?.* the same as --sim-" for flag in free)
-    own = [rf"(?m)^  {flag}[ =]" for flag in ("--sim-gui", "--sim-reps", "--sim-compare-fail")]
-    yield Step(("--help",), ("placed:5%,ram:10%,rtf:20%", *own, *shorts))
+    short = [option for option in OPTIONS if option.long]
+    names = [option.long if option.flag in others else option.flag for option in short]
+    own = [rf"(?m)^  {flag}[ =]" for flag in (*names, "--sim-compare-fail")]
+    yield Step(("--help",), ("placed:5%,ram:10%,rtf:20%", *own))
     yield Step(("--sims",), (r"mujoco: MuJoCo", *(f"{f} belongs to another" for f in others)))
     yield Step(("--markers",), ("only_sim",))
     yield Step(("--fixtures",), ("simulator", *(("output_path",))))
@@ -198,7 +199,8 @@ def steps(place: Place) -> Iterator[Step]:
         yield Step((suites[0], *smallest, *without), ("1 passed",), files)
     taken = (("test_own.py", OWN_TEST), ("conftest.py", WITH_OPTIONS))
     if "--gui" not in others:  # two others that want one name are no matter of ours
-        yield Step(("--help",), ("the project's own", *own), taken)
+        theirs = [rf"(?m)^  {flag}[ =]" for flag in ("--sim-gui", "--sim-reps")]
+        yield Step(("--help",), ("the project's own", *theirs), taken)
         yield Step(("--gui", "--reps", "x"), ("1 passed",), taken)
     if "xdist" in place.plugins:
         yield Step((*suites, *smallest, "-n2"), shown, files)

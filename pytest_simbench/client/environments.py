@@ -1,7 +1,7 @@
 """Interpreters of their own for engines whose packages clash with pytest's or with each other's.
 
 One folder per simulator and release, a plain virtual environment with the adapter's pinned
-requirements and nothing else: the worker's code reaches it from here. `pytest --sim-install NAME`
+requirements and nothing else: the worker's code reaches it from here. `simbench install NAME`
 makes it, and it is found by its place. A marker file, written last, tells a finished environment
 from half of one and remembers what was installed. Compiled kernels are kept in its `cache` folder.
 
@@ -82,7 +82,7 @@ class Environment:
 
     @property
     def place(self) -> str:
-        """Where that is, for `--sims`."""
+        """Where that is, for `simbench list`."""
         return f"in its own environment, {self.folder}"
 
     @property

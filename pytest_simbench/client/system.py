@@ -55,7 +55,7 @@ class SystemPython:
 
     @property
     def place(self) -> str:
-        """Where that is, for `--sims`."""
+        """Where that is, for `simbench list`."""
         return f"in the system's Python, {self.python}"
 
     @property

@@ -1,4 +1,4 @@
-"""`python -m pytest_simbench.cluster head` and `node tcp://head:8786`: the machines of a cluster.
+"""`simbench cluster head` and `node tcp://head:8786`: the machines of a cluster.
 
 They listen on loopback unless told otherwise. TLS is Dask's own (docs/cluster.md).
 """
@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m pytest_simbench.cluster", description="Repetitions on several machines."
+        prog="simbench cluster", description="Repetitions on several machines."
     )
     kinds = parser.add_subparsers(required=True, metavar="head|node")
     head = kinds.add_parser("head", help="the scheduler, which knows all nodes; one of it")

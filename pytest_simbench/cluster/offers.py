@@ -159,7 +159,7 @@ def _taken_apart(offer: str) -> tuple[str, str]:
 def refusal(nodes: Sequence[Node]) -> str:
     """Why a run cannot begin on these nodes at all, as a sentence, or nothing."""
     if not nodes:
-        return "it has no node; start one: python -m pytest_simbench.cluster node ADDRESS"
+        return "it has no node; start one: simbench cluster node ADDRESS"
     strangers = [f"{node.name} {node.stranger}" for node in nodes if node.stranger]
     if strangers:
         return f"{'; '.join(strangers)}; install the same version on both sides"
@@ -174,7 +174,7 @@ def unmet(nodes: Sequence[Node], simulator: str, modes: Iterable[str]) -> str | 
             what = f"{simulator} with a display" if mode == "gui" else simulator
             told = f"no node of the cluster offers {what}: {'; '.join(map(str, nodes))}"
             if RELEASE in simulator and not any(node.version(simulator) for node in nodes):
-                told += f"; on one of them: pytest --sim-install {simulator}, and start it again"
+                told += f"; on one of them: simbench install {simulator}, and start it again"
             return told
         versions: dict[str, list[str]] = {}
         for node in able:

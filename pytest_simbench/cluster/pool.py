@@ -80,7 +80,7 @@ class Pool:
             reason = " ".join(str(error).split())[:300]
             raise ExecutorError(
                 f"no scheduler of Dask answers at {address} ({reason}); start one: "
-                "python -m pytest_simbench.cluster head"
+                "simbench cluster head"
             ) from None
         self._begin()
         self.lost_after = float(settings.get("lost-after", LOST_AFTER))

@@ -248,7 +248,7 @@ def replay_command(path: Path, case: Case, scene: Scene) -> str:
     """What to type to see the episode in `path` again, as it was run here."""
     with suppress(ValueError):
         path = path.absolute().relative_to(Path.cwd())
-    words = ["python", "-m", "pytest_simbench.repeatability", str(path)]
+    words = ["simbench", "replay", str(path)]
     if case.spec:
         words.append(f"--spec={case.spec}")
     elif case.python and case.python != _own_python(case.simulator):

@@ -1,6 +1,10 @@
-"""`python -m pytest_simbench.measure`: what the suites' claims let pass."""
+"""`simbench stats`: what the suites' claims let pass."""
 
 from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
 
 from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.measure.power import alike_rate, least_supported, passing_rate
@@ -8,8 +12,9 @@ from pytest_simbench.measure.verdicts import confidence
 from pytest_simbench.records.metrics import Metric
 
 
-def main() -> None:
+def main(arguments: Sequence[str] = ()) -> None:
     """Print what the suites' claims let pass, for docs/gate.md."""
+    argparse.ArgumentParser("simbench stats", description=main.__doc__).parse_args(arguments)
     yes, share = (
         Metric("hit", "hit", kind="yes_no"),
         Metric("placed", "placed", kind="share", of=15),
@@ -39,4 +44,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

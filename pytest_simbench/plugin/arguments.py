@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import pytest
 
-from pytest_simbench.plugin.values import ANY_NUMBER, BadValue, shown
+from pytest_simbench.cli.values import ANY_NUMBER, BadValue, shown
 
 if TYPE_CHECKING:
     from pytest_simbench.experiment.experiment import Experiment
@@ -49,7 +49,7 @@ def can_do(experiment: Experiment, skips: bool) -> Experiment:
     return experiment
 
 
-def once(task: Task, done: list[Task]) -> None:
+def refuse_second(task: Task, done: list[Task]) -> None:
     """Fail a test that repeats a task twice: the repetitions could not be told apart. The same task
     with other parameters is another one."""
     if task in done:

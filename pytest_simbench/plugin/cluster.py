@@ -36,7 +36,7 @@ def pool(config: pytest.Config) -> Pool:
         given = f"--sim-cluster={options.value(config, 'sim_cluster')}"
         for name in HERE_ONLY:
             if options.value(config, name):
-                flag = options.option(name).flag
+                flag = options.option(name).sure
                 raise pytest.UsageError(
                     f"{given}: {flag} is for simulators on this machine; leave out one of them"
                 )
@@ -67,7 +67,7 @@ def nodes(config: pytest.Config) -> tuple[Node, ...]:
     return pool(config).nodes() if asked(config) else ()
 
 
-def lost(records: Iterable[Record]) -> str:
+def lost_nodes(records: Iterable[Record]) -> str:
     """How many repetitions were tried again, as a sentence for the end of the run, or nothing."""
     again = [record for record in records if record.notes.lost_nodes]
     if not again:

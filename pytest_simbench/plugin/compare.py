@@ -101,7 +101,7 @@ def prepare(
         pytest.UsageError: no baseline, a malformed one, a malformed limit, an unknown metric.
     """
     text = options.value(config, "sim_compare_fail")
-    typed = config.getoption("sim_compare_fail") is not None
+    typed = options.given(config, "sim_compare_fail")
     beside = _beside(config, simulators)
     if beside is not None:
         here = Reading(f"{beside[0]} in this run")

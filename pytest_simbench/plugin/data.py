@@ -1,4 +1,4 @@
-"""`--sim-data`, `--sim-download` and the fixture `data_set`: measured data sets."""
+"""`--sim-data` and the fixture `data_set`: measured data sets."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def check(config: pytest.Config) -> None:
     if not given.is_dir():
         raise pytest.UsageError(
             f"--sim-data: {for_terminal(str(given))} is no folder; name the one that holds the "
-            "data sets, or bring them there with --sim-download NAME"
+            "data sets, or bring them there with simbench download NAME --data DIR"
         )
 
 
@@ -47,15 +47,3 @@ def read_or_skip(config: pytest.Config, name: str) -> Any:
     if missing:
         pytest.skip(problem)
     pytest.fail(problem, pytrace=False)
-
-
-def download(config: pytest.Config) -> int:
-    """`--sim-download`: bring data sets from their public sources."""
-    from pytest_simbench.data.download import download as bring
-    from pytest_simbench.data.measured import DataError
-    from pytest_simbench.data.sets import data_set
-
-    with options.refusing(DataError):
-        for wanted in [data_set(name) for name in options.value(config, "sim_download")]:
-            bring(wanted, folder(config), lambda text: print(for_terminal(text)))
-    return 0

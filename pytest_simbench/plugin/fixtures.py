@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from pytest_simbench.plugin import arguments, benchmark, cluster, data, options, prefetch, recording
+from pytest_simbench.plugin.registration import is_conftest
 from pytest_simbench.plugin.session import REPEATED, session_of
-from pytest_simbench.plugin.spellings import is_conftest
 
 if TYPE_CHECKING:
     from pytest_simbench.client.display import Displays
@@ -37,7 +37,7 @@ OF_CASES = ("fresh", "stall_timeout", "memory_limit", "seed", "jitter")
 """Options of the same name as an attribute of `Case`, behind `sim_`."""
 
 
-def beside(plugins: pytest.PytestPluginManager) -> ModuleType:
+def free_fixtures(plugins: pytest.PytestPluginManager) -> ModuleType:
     """A plugin with all fixtures but those whose name another plugin has.
 
     A conftest's fixture hides ours where it holds, as always. Ours can be had under any name by
@@ -99,33 +99,53 @@ def output_path(request: pytest.FixtureRequest) -> Path:
     return session_of(request.config).run.use()
 
 
-def _case(config: pytest.Config, made_for: Variant, test: str, **more: Any) -> Case:
-    """What the options say of a simulator's repetitions."""
+def case_of(
+    config: pytest.Config,
+    made_for: Variant,
+    item: pytest.Item | None = None,
+    settings: Any = None,
+) -> Case:
+    """What the options say of a simulator's repetitions, and of a test's own.
+
+    Args:
+        config: of the run.
+        made_for: simulator, mode, profile, time step and robot.
+        item: the test; None for the handle that all tests share.
+        settings: that the test changes, unchecked.
+    """
     from pytest_simbench.experiment.case import Case
     from pytest_simbench.experiment.protocol import PROTOCOLS
+    from pytest_simbench.plugin.marks import number_mark
+    from pytest_simbench.plugin.variants import named
 
     name, mode = made_for.simulator, made_for.mode
     session = session_of(config)
     chosen, this = session.selection, session.run
     elsewhere = cluster.asked(config)  # nodes find interpreters and displays themselves
-    settings = more.pop("settings", {})
+    timeout, of_test = options.value(config, "sim_timeout"), {"test": "simulator"}
+    own: Mapping[str, Any] = {}
+    if item is not None:
+        function, others = named(item, made_for.id_with(len(chosen.profiles)))
+        of_test = {"test": item.nodeid, "function": function, "variant": others}
+        timeout = timeout if timeout is not None else number_mark(item, "sim_timeout")
+        own = arguments.checked_settings(settings, name, made_for.profile)
     return Case.of(
         name,
         python=chosen.pythons.get(name),
-        test=test,
         mode=mode,
         profile=made_for.profile,
         own_timestep=made_for.own_timestep,
         folder=this.use(),
-        changes={**settings, **chosen.changes_of(name), **made_for.changes},
+        changes={**own, **chosen.changes_of(name), **made_for.changes},
         spec=chosen.specs.get(name),
         robot=chosen.robots[made_for.robot],
         display=_display(this) if mode == "gui" and not elsewhere else None,
         protocol=PROTOCOLS[options.value(config, "sim_protocol")],
         trace=recording.trace_mode(config),
         video=recording.video_mode(config, name),
+        timeout=timeout,
         **{name: options.value(config, f"sim_{name}") for name in OF_CASES},
-        **more,
+        **of_test,
     )
 
 
@@ -145,26 +165,7 @@ def simbench_case(
     request: pytest.FixtureRequest, sim_case: Variant, sim_settings: dict[str, Any]
 ) -> Case:
     """Everything that the repetitions of this test have in common."""
-    return case_of(request.node, sim_case, sim_settings)
-
-
-def case_of(item: pytest.Item, variant: Variant, settings: dict[str, Any]) -> Case:
-    """The case of a test, with the settings that it changes."""
-    from pytest_simbench.plugin.marks import number_mark
-    from pytest_simbench.plugin.variants import named
-
-    given = options.value(item.config, "sim_timeout")
-    own = variant.id_with(len(session_of(item.config).selection.profiles))
-    function, others = named(item, own)
-    return _case(
-        item.config,
-        variant,
-        item.nodeid,
-        function=function,
-        variant=others,
-        settings=arguments.checked_settings(settings, variant.simulator, variant.profile),
-        timeout=given if given is not None else number_mark(item, "sim_timeout"),
-    )
+    return case_of(request.config, sim_case, request.node, sim_settings)
 
 
 def _on_this_machine(config: pytest.Config, case: Case) -> Case:
@@ -199,7 +200,7 @@ def repeat(
     done: list[Task] = []
 
     def perform(task: Task) -> ResultSet:
-        arguments.once(arguments.checked_task(task, "repeat"), done)
+        arguments.refuse_second(arguments.checked_task(task, "repeat"), done)
         return repeat(task)
 
     request.node.stash[REPEATED] = repeat.check_crashes
@@ -306,9 +307,7 @@ def simbench_handle(request: pytest.FixtureRequest, sim_case: Variant) -> Iterat
     """The session's handle, whatever is named `simulator` here."""
     from pytest_simbench.experiment.handle import SimulatorHandle
 
-    timeout = options.value(request.config, "sim_timeout")
-    case = _case(request.config, sim_case, "simulator", timeout=timeout)
-    case = _on_this_machine(request.config, case)
+    case = _on_this_machine(request.config, case_of(request.config, sim_case))
     with closing(SimulatorHandle(case)) as handle:
         yield handle
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench import __version__
+from pytest_simbench.cli.values import Releases
 from pytest_simbench.client.package_index import newest_of_minors, releases
 from pytest_simbench.ground.host import host
 from pytest_simbench.ground.names import digest
 from pytest_simbench.plugin import options
-from pytest_simbench.plugin.values import Releases
 from pytest_simbench.simulator.registry import adapter
 
 FOLDER = ".simbench/history"
@@ -64,7 +64,7 @@ def folder_of(config: pytest.Config, name: str) -> Path:
     return config.rootpath / FOLDER / f"{_named(config, name)}-{_digest(host())}"
 
 
-def elsewhere(config: pytest.Config, name: str) -> str:
+def on_other_machines(config: pytest.Config, name: str) -> str:
     """That another machine has such a history here, as a sentence; empty where none has."""
     own = folder_of(config, name)
     others = sorted(
@@ -83,5 +83,5 @@ def _named(config: pytest.Config, name: str) -> str:
     return f"{name}-{_digest({**values, 'version': __version__})}"
 
 
-def _digest(told: Mapping[str, object]) -> str:
-    return digest(json.dumps(told, sort_keys=True, default=str))
+def _digest(values: Mapping[str, object]) -> str:
+    return digest(json.dumps(values, sort_keys=True, default=str))

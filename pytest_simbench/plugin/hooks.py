@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from pytest_simbench.plugin import harmless, options, spellings
+from pytest_simbench.plugin import old_options, options, registration, sanitise
 from pytest_simbench.plugin.session import REPEATED, fixtures_of, session_of
 
 MARKS = (
@@ -27,10 +27,10 @@ MARKS = (
 
 def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
     """Only where a conftest has loaded us (`pytest_plugins`), which is later than the next hook."""
-    pluginmanager.register(harmless, "simbench-harmless")
+    pluginmanager.register(sanitise, "simbench-sanitise")
     config = pluginmanager.get_plugin("pytestconfig")
-    if config is not None and any(map(spellings.is_conftest, pluginmanager.get_plugins())):
-        spellings.register(parser, config)
+    if config is not None and any(map(registration.is_conftest, pluginmanager.get_plugins())):
+        registration.register(parser, config)
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
@@ -38,14 +38,14 @@ def pytest_load_initial_conftests(
     early_config: pytest.Config, parser: pytest.Parser, args: list[str]
 ) -> Generator[None, Any, Any]:
     """Register the options when all plugins and conftests have taken the names they want."""
-    ours = spellings.without_ours(args)
+    ours = registration.without_ours(args)
     if ours != args:
         known = early_config.known_args_namespace
         known.file_or_dir = parser.parse_known_args(ours).file_or_dir
     try:
         return (yield)
     finally:  # also where a conftest does not import: --help goes on then
-        spellings.register(parser, early_config)
+        registration.register(parser, early_config)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -55,7 +55,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
     session = session_of(config)
     config.pluginmanager.register(session, "simbench-session")
-    config.pluginmanager.register(fixtures.beside(config.pluginmanager), "simbench-fixtures")
+    config.pluginmanager.register(fixtures.free_fixtures(config.pluginmanager), "simbench-fixtures")
     if not (config.getoption("help") or config.getoption("version")):
         session.check_options()
 
@@ -72,11 +72,8 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 
 def pytest_cmdline_main(config: pytest.Config) -> int | None:
-    if not any(options.given(config, name) for name in options.COMMANDS):
-        return None
-    from pytest_simbench.plugin.commands import run_command
-
-    return run_command(config)
+    old = old_options.asked(config)
+    return None if old is None else old_options.run_command(config, old)
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -96,7 +93,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_report_collectionfinish(config: pytest.Config, items: list[pytest.Item]) -> list[str]:
     """Which of our options go by another name here, where there are tests of simulators."""
     ours = any("sim_case" in fixtures_of(item) for item in items)
-    return spellings.foreign(config) if ours else []
+    return options.taken_names(config) if ours else []
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
@@ -137,7 +134,7 @@ def pytest_runtest_makereport(item: pytest.Item, call: Any) -> Any:
 @pytest.hookimpl(trylast=True)  # xdist has heard all its workers then
 def pytest_sessionfinish(session: pytest.Session) -> None:
     ours = session_of(session.config)
-    with ours.sparing():
+    with ours.interruptible():
         ours.finish(session)
 
 
@@ -151,7 +148,7 @@ def pytest_benchmark_group_stats(config: pytest.Config) -> Generator[None, Any, 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, exitstatus: int) -> None:
     ours = session_of(terminalreporter.config)
-    with ours.sparing():
+    with ours.interruptible():
         ours.summarise(terminalreporter, exitstatus)
 
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.cli.values import REPETITIONS, SECONDS, SHARE, BadValue, shown
 from pytest_simbench.ground.text import in_one_line
 from pytest_simbench.ground.versions import covers
 from pytest_simbench.plugin import options
 from pytest_simbench.plugin.selection import Selection
-from pytest_simbench.plugin.values import BadValue, shown
 from pytest_simbench.plugin.variants import Variant, named
 from pytest_simbench.simulator import registry
 from pytest_simbench.simulator.info import Capability
@@ -112,7 +112,7 @@ def _names(mark: pytest.Mark, node: Any) -> list[str]:
     return list(mark.args)
 
 
-def told(item: pytest.Item, report: pytest.TestReport, profiles: int) -> dict[str, Any]:
+def describe_failure(item: pytest.Item, report: pytest.TestReport, profiles: int) -> dict[str, Any]:
     """Plain data of a claim: that a test of a simulator failed as a whole, and why."""
     variant = item.callspec.params["sim_case"]  # type: ignore[attr-defined]
     function, others = named(item, variant.id_with(profiles))
@@ -129,6 +129,9 @@ def told(item: pytest.Item, report: pytest.TestReport, profiles: int) -> dict[st
         "advice": in_one_line(message.split("\n")[0]),
     }
 
+
+NUMBERS = {"reps": REPETITIONS, "sim_timeout": SECONDS, "sim_crashes": SHARE}
+"""What the marks that take a number may hold."""
 
 KEYWORDS = {"skip_sim": ("reason",), "xfail_sim": ("reason",)}
 """Keyword arguments of the marks that take any."""
@@ -159,7 +162,7 @@ def number_mark(node: Any, name: str) -> Any:
     if len(mark.args) > 1:
         raise pytest.UsageError(f"{node.nodeid}: {name}{shown(mark.args)}: give one number")
     try:
-        return options.number(f"sim_{name.removeprefix('sim_')}", *(mark.args or [None]))
+        return NUMBERS[name].check(*(mark.args or [None]))
     except BadValue as error:
         raise pytest.UsageError(
             f"{node.nodeid}: {name}({shown(repr(error.text))}): {error.advice}"

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pytest_simbench.experiment.experiment import Experiment
     from pytest_simbench.plugin.variants import Variant
 
-    CaseOf = Callable[[pytest.Item, Variant, dict[str, Any]], Case]
+    CaseOf = Callable[[pytest.Config, Variant, pytest.Item, dict[str, Any]], Case]
 
 MARK = "repeats"
 
@@ -32,7 +32,7 @@ def expected(
         case_of: gives the case of a test of a variant that changes no settings.
     """
     alone = not hasattr(config, "workerinput") and not cluster.asked(config)
-    again = config.getoption("sim_resume") is not None
+    again = options.given(config, "sim_resume")
     if not alone or again or options.value(config, "sim_jobs") < 2:
         return []
     return [experiment for item in items for experiment in _of(item, case_of)]
@@ -58,6 +58,6 @@ def _of(item: pytest.Item, case_of: CaseOf) -> Iterator[Experiment]:
         )
     if not isinstance(variant, Variant) or variant.mode == "gui" or variant.robot:
         return
-    if (options.repetitions(item.config) or number_mark(item, "reps")) == 1:
+    if (options.value(item.config, "sim_reps") or number_mark(item, "reps")) == 1:
         with suppress(SimulatorError):  # its test tells
-            yield Experiment(case_of(item, variant, {}), task)
+            yield Experiment(case_of(item.config, variant, item, {}), task)

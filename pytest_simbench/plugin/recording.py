@@ -5,10 +5,7 @@ Imported at plugin load: standard library and pytest only; everything else is im
 
 from __future__ import annotations
 
-import shutil
-import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -18,7 +15,6 @@ from pytest_simbench.plugin import options
 if TYPE_CHECKING:
     from pytest_simbench.experiment.experiment import Experiment
     from pytest_simbench.records.record import Record
-    from pytest_simbench.report.terminal.progress import Progress
 
 RECORD, TRACE, PICTURES, VIDEO = "sim_record", "sim_trace", "sim_pictures", "sim_video"
 
@@ -59,13 +55,13 @@ def photograph(
         return
     from pytest_simbench.experiment import photographer
 
-    told = photographer.draws(experiment.case.simulator)
-    if not told and (pictures or video == "first"):
-        told = photographer.photograph(experiment, pictures=pictures, video=video == "first")
+    problem = photographer.draws(experiment.case.simulator)
+    if not problem and (pictures or video == "first"):
+        problem = photographer.photograph(experiment, pictures=pictures, video=video == "first")
     ended = next((r.notes.video for r in records if r.notes.video), None)
-    for problem in (told, f"{experiment.case.simulator}: no video: {ended}" if ended else ""):
-        if problem:
-            tell(problem)
+    for text in (problem, f"{experiment.case.simulator}: no video: {ended}" if ended else ""):
+        if text:
+            tell(text)
 
 
 def check(config: pytest.Config) -> None:
@@ -89,44 +85,3 @@ def check(config: pytest.Config) -> None:
 
     with options.refusing(BagsUnavailable, "--sim-record=mcap"):
         check_available()
-
-
-def record(
-    config: pytest.Config,
-    run: Path,
-    target: Path,
-    records: Sequence[Record],
-    progress: Progress | None = None,
-) -> list[str]:
-    """Write the recordings that were asked for.
-
-    Args:
-        config: of pytest.
-        run: folder of the run, which holds the traces.
-        target: folder to write to.
-        records: of the run.
-        progress: the live line; None: one on standard output.
-
-    Returns:
-        Lines for the terminal.
-    """
-    if not options.value(config, RECORD):
-        return []
-    from pytest_simbench.report.files import shown
-    from pytest_simbench.report.replay.recorded import FOLDER, write_bags
-
-    count, problems = write_bags(run, target, records, progress or _printed())
-    if not count:
-        return [*problems, "no recordings: the run has no traces; see --sim-trace"]
-    many = f"{count} recording{'s' if count > 1 else ''}"
-    return [*problems, f"{many}: {shown(target / FOLDER, config.invocation_params.dir)}"]
-
-
-def _printed() -> Progress:
-    """For a command, which has no terminal of pytest's."""
-    from pytest_simbench.report.terminal.progress import Progress
-
-    def write(text: str) -> None:
-        print(text, end="", flush=True)
-
-    return Progress(write, sys.stdout.isatty(), shutil.get_terminal_size().columns)

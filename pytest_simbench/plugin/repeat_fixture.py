@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.cli.values import Auto
 from pytest_simbench.client.errors import ExecutorError
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
@@ -51,7 +52,7 @@ class RepeatFixture:
 
     def __call__(self, task: Task) -> ResultSet:
         """Run a task's repetitions, as many as options and marks say."""
-        wanted = options.repetitions(self.node.config)
+        wanted = options.value(self.node.config, "sim_reps")
         skips = session_of(self.node.config).selection.every_robot
         experiment = can_do(Experiment(self.case, task), skips)
         experiment = experiment.in_case(attempt=self.run.begin(experiment))
@@ -64,7 +65,7 @@ class RepeatFixture:
             return self._up_to(number, experiment, found)
 
         metrics = experiment.task.metrics
-        if isinstance(wanted, options.Auto):
+        if isinstance(wanted, Auto):
             plan = Plan.up_to(wanted.limit)
             first = up_to(plan.looks[0])
             result: ResultSet = SequentialResultSet(first, metrics, plan, up_to)

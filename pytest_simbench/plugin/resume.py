@@ -30,7 +30,7 @@ def folder_to_resume(config: pytest.Config) -> Path | None:
     Raises:
         pytest.UsageError: there is no such run, or none at all.
     """
-    given = config.getoption("sim_resume")
+    given = options.value(config, "sim_resume")
     if given is None:
         return None
     given = "" if given is True else given  # the option without a value

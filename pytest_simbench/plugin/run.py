@@ -14,6 +14,8 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.cli import runs
+from pytest_simbench.cli.runs import RUNS
 from pytest_simbench.client.display import Displays
 from pytest_simbench.cluster.executor import ClusterExecutor
 from pytest_simbench.experiment.executor import Executor, LocalExecutor
@@ -22,8 +24,7 @@ from pytest_simbench.experiment.slots import Slots
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.plugin import cluster, options, recording, thresholds
 from pytest_simbench.plugin.compare import Comparison
-from pytest_simbench.plugin.history import elsewhere, folder_of
-from pytest_simbench.plugin.merge import publish
+from pytest_simbench.plugin.history import folder_of, on_other_machines
 from pytest_simbench.plugin.resume import Resumed, folder_to_resume
 from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import Threshold
@@ -34,18 +35,10 @@ from pytest_simbench.records.repeatability import NAME
 from pytest_simbench.report.files import write_outcome, write_report
 from pytest_simbench.report.markdown import run as markdown
 from pytest_simbench.report.markdown.github import append_summary
-from pytest_simbench.report.model import sweep
 from pytest_simbench.report.model.outcome import Outcome
 from pytest_simbench.report.page import PAGE_NAME
-from pytest_simbench.report.terminal.parts import claim_lines as lines_of
-from pytest_simbench.report.terminal.parts import history_lines as lines
-from pytest_simbench.report.terminal.parts import sweep_lines
 from pytest_simbench.report.terminal.progress import Progress
-from pytest_simbench.report.terminal.run import render_brief, render_run
 from pytest_simbench.tasks.base import Task
-
-RUNS = ".simbench"
-"""Where runs without an `--sim-output` lie, in pytest's root folder."""
 
 
 class Run:
@@ -74,25 +67,22 @@ class Run:
         self.expected: Callable[[], Iterable[Experiment]] = tuple
         self._attempts: Counter[tuple[str, str, str]] = Counter()
         self._lock = threading.Lock()
-        self._progress: Progress | None = None
         self.resumed: Resumed | None = None
         kept = options.value(config, "sim_history") is not None and self.folder.holds_run
-        if config.getoption("sim_resume") is not None or kept:
+        if options.given(config, "sim_resume") or kept:
             self.resumed = Resumed(self.folder)
 
     def _choose_path(self) -> Path:
         if self._shared_by is not None and "simbench_folder" in self._shared_by:
             return Path(self._shared_by["simbench_folder"])
-        if self.config.getoption("sim_resume") is not None:
-            folder = folder_to_resume(self.config)
-            if folder is not None:
-                return folder
+        if (resumed := folder_to_resume(self.config)) is not None:
+            return resumed
         given = options.value(self.config, "sim_output")
         if given:
             return Path(self.config.invocation_params.dir, given)
         history = options.value(self.config, "sim_history")
         if history is not None:
-            self.tell(elsewhere(self.config, history.name))
+            self.tell(on_other_machines(self.config, history.name))
             return folder_of(self.config, history.name)
         return new_name(self.config.rootpath / RUNS)
 
@@ -155,15 +145,12 @@ class Run:
             return None
         return Slots(options.value(self.config, "sim_jobs"))
 
-    @property
+    @cached_property
     def progress(self) -> Progress:
         """The live line; silent in xdist workers, which have no terminal."""
-        if self._progress is None:
-            reporter = self._reporter
-            width = reporter._tw.fullwidth if reporter else 80
-            tty = bool(reporter and reporter.isatty)
-            self._progress = Progress(self._write, is_tty=tty, width=width)
-        return self._progress
+        reporter = self._reporter
+        width = reporter._tw.fullwidth if reporter else 80
+        return Progress(self._write, is_tty=bool(reporter and reporter.isatty), width=width)
 
     def _write(self, text: str) -> None:
         if self._reporter is not None and self._shared_by is None:
@@ -191,9 +178,8 @@ class Run:
 
         More than once when a plugin reruns a failed test, or a test repeats a task twice.
         """
-
-        case, told = experiment.case, json.dumps(experiment.parameters, default=str)
-        key = (case.test, experiment.task.name, told)
+        case, parameters = experiment.case, json.dumps(experiment.parameters, default=str)
+        key = (case.test, experiment.task.name, parameters)
         self._attempts[key] += 1
         return self._attempts[key]
 
@@ -287,39 +273,31 @@ class Run:
         if not self.reading.records and not (self.folder.path / NAME).is_file():
             return
         path, records = self.folder.path, self.reading.records
-        recorded = recording.record(self.config, path, path, records, self.progress)
+        recorded: list[str] = []
+        if options.value(self.config, recording.RECORD):
+            recorded = runs.recordings(path, path, records, self.progress)
         found, looks = comparison.found if comparison else None, self._looks()
         written = write_report(self.folder, self.reading, found, looks)
         unsaved = self.folder.flush()
         problems = [*self._problems, *self.reading.problems, *self.reading.refused]
-        problems += [*written.problems, cluster.lost(self.reading.records)]
+        problems += [*written.problems, cluster.lost_nodes(records)]
         if written.summaries or written.sweeps:
             changes = comparison.markdown() if comparison else ""
             page = markdown.render_run(written)
             problems.append(append_summary("\n".join([changes, page])))
-            reporter.write_sep("=", "simulator comparison")
-            if written.claims:
-                reporter.write_line(lines_of(written.claims, reporter._tw.fullwidth) + "\n")
-            verbose = self.config.get_verbosity() > 0
-            show = render_run if verbose else render_brief
-            reporter.write_line(show(written.summaries, reporter._tw.fullwidth))
-        if written.sweeps:
-            reporter.write_sep("=", sweep.TITLE)
-            for line in sweep_lines(written.sweeps, reporter._tw.fullwidth, verbose):
-                reporter.write_line(for_terminal(line))
-        if written.histories:
-            reporter.write_sep("=", "history")
-            for line in lines(written.histories, reporter._tw.fullwidth):
-                reporter.write_line(for_terminal(line))
+        verbose = self.config.get_verbosity() > 0
+        for title, text in runs.sections(written, reporter._tw.fullwidth, verbose):
+            reporter.write_sep("=", title)
+            reporter.write_line(text)
         baseline, report = found or ("", None)
         outcome = Outcome(passed, baseline, report, looks)
-        problems.append(write_outcome(self.folder.path, outcome))
-        problems.append(publish(self.config, self.reading.records, passed))
+        problems.append(write_outcome(path, outcome))
+        problems.append(runs.badge(options.value(self.config, "sim_badge"), records, passed))
         problems += recorded
         if written.complete and not unsaved:
-            self.page = self.folder.path / PAGE_NAME
+            self.page = path / PAGE_NAME
         else:
-            problems.insert(0, f"\nwhat could be written is in {self.folder.path}")
+            problems.insert(0, f"\nwhat could be written is in {path}")
         for line in [*map(for_terminal, filter(None, problems)), *unsaved]:
             reporter.write_line(line)
 

@@ -1,4 +1,5 @@
-"""Which simulators, modes and robots a run covers, from options; all checks of user input."""
+"""Which simulators, modes and robots a run covers: parsed from the options, then checked, then
+installed where that is asked for."""
 
 from __future__ import annotations
 
@@ -7,14 +8,14 @@ from dataclasses import dataclass, field, replace
 
 import pytest
 
+from pytest_simbench.cli.interpreters import checked_specification, interpreter_path
+from pytest_simbench.cli.names import install_missing, progress, read_names
+from pytest_simbench.cli.values import BadInput, shown
 from pytest_simbench.client import environments
 from pytest_simbench.cluster.offers import Node, unmet
 from pytest_simbench.ground.versions import base_name
 from pytest_simbench.plugin import cluster, options
 from pytest_simbench.plugin.history import releases_of
-from pytest_simbench.plugin.interpreters import checked_specification, interpreter_path
-from pytest_simbench.plugin.simulator_names import install_missing, progress, read_names
-from pytest_simbench.plugin.values import shown
 from pytest_simbench.plugin.variants import Variant, problem, variants
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator import registry
@@ -22,6 +23,9 @@ from pytest_simbench.simulator.errors import SettingsError, SimulatorError
 from pytest_simbench.simulator.settings import Settings
 
 MODES = ("headless", "gui")
+
+EVERY = "all"
+"""Every registered simulator, or every built-in robot."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,7 @@ class Selection:
     robots: Mapping[str, Robot | None] = field(default_factory=lambda: {"": None})
     nodes: tuple[Node, ...] = ()
     sweep: bool | tuple[float, ...] | None = None
+    named: tuple[str, ...] = ()
 
     @property
     def every_robot(self) -> bool:
@@ -64,7 +69,7 @@ class Selection:
     def _of_one_robot(self, name: str, mode: str) -> list[Variant]:
         found = []
         for profile in self.profiles:
-            unknown = registry.problem(name) or self._settings_problem(name, (profile,))
+            unknown = registry.problem(name) or self.settings_problem(name, (profile,))
             if self.sweep is None or unknown:
                 found.append(Variant(name, mode, profile))
             else:
@@ -84,7 +89,7 @@ class Selection:
             name: of the simulator.
             profiles: that it needs; none for all of the run.
         """
-        found = registry.problem(name) or self._settings_problem(name, profiles)
+        found = registry.problem(name) or self.settings_problem(name, profiles)
         if found:
             return found
         if self.nodes:
@@ -94,10 +99,16 @@ class Selection:
             return None
         return environments.missing(registry.adapter(name).info)
 
-    def unusable(self, name: str) -> str | None:
-        """Why a simulator cannot run in any of the profiles. Tests in those that one lacks are
-        skipped, with the reason."""
-        reasons = [self.missing(name, (profile,)) for profile in self.profiles]
+    def unusable(self, name: str, to_install: bool = False) -> str | None:
+        """Why a simulator cannot run in any of the profiles; None when it can. Tests in those that
+        one lacks are skipped, with the reason.
+
+        Args:
+            name: of the simulator.
+            to_install: whether a missing environment is no fault, since it will be made.
+        """
+        why = self.settings_problem if to_install else self.missing
+        reasons = [why(name, (profile,)) for profile in self.profiles]
         return reasons[0] if all(reasons) else None
 
     def _settings(self, name: str, profile: str) -> Settings:
@@ -108,7 +119,8 @@ class Selection:
         """
         return registry.settings_of(name, profile, self.changes_of(name))
 
-    def _settings_problem(self, name: str, profiles: Sequence[str] = ()) -> str | None:
+    def settings_problem(self, name: str, profiles: Sequence[str] = ()) -> str | None:
+        """Why a simulator has no such profile, or cannot take a change; None when it can."""
         try:
             for profile in profiles or self.profiles:
                 self._settings(name, profile)
@@ -118,73 +130,112 @@ class Selection:
 
 
 def select(config: pytest.Config) -> Selection:
-    """The checked selection.
+    """What the options ask for, checked and installed.
 
     Raises:
         pytest.UsageError: an unknown or broken simulator, an unknown setting or profile, an
             interpreter or specification that cannot be one; one sentence.
     """
-    with options.refusing(SimulatorError):
-        selection = _select(config)
-    return selection
+    with options.refusing((SimulatorError, BadInput)):
+        selection = parse(config)
+        makes = _installs(config)
+        check(selection, makes)
+        if makes:
+            install(selection)
+    if selection.named or options.value(config, "sim_name"):
+        return selection
+    here = tuple(name for name in selection.simulators if not selection.unusable(name))
+    return replace(selection, simulators=here)
 
 
-def _select(config: pytest.Config) -> Selection:
-    for name in options.value(config, "sim_profile"):
-        _check_profile(name)
-    sweep = options.value(config, "sim_sweep")
-    if not isinstance(sweep, bool | None) and (wrong := problem(sweep)):
-        raise pytest.UsageError(wrong)
-    asked = options.value(config, "sim_name")
-    names, builds = read_names([name for name in asked if name != "all"], config)
+def parse(config: pytest.Config) -> Selection:
+    """What the options say. Nothing is held against settings or environments yet.
+
+    Raises:
+        BadInput: a name, interpreter or specification that cannot be one.
+        RobotError, SimulatorError, pytest.UsageError: a robot, history or cluster that cannot be.
+    """
+    here, asked = config.invocation_params.dir, options.value(config, "sim_name")
+    with options.refusing(BadInput, "--sim"):
+        names, builds = read_names([name for name in asked if name != EVERY], here)
     names += releases_of(config)
     changes: dict[str, dict[str, str]] = {}
     for key, text in options.value(config, "sim_set").items():
         name, _, setting = key.rpartition(".")
         if not (name and setting):
-            raise pytest.UsageError(f"--sim-set={key}={text}: write it as SIM.SETTING=VALUE")
+            raise BadInput(f"--sim-set={key}={text}: write it as SIM.SETTING=VALUE")
         changes.setdefault(name, {})[setting] = text
     pythons = {
-        name: interpreter_path(path, f"--sim-python={name}={shown(path)}", config)
+        name: interpreter_path(path, f"--sim-python={name}={shown(path)}", here)
         for name, path in options.value(config, "sim_python").items()
     }
     specs = {
         name: checked_specification(text, f"--sim-spec={name}={shown(text)}")
         for name, text in options.value(config, "sim_spec").items()
     }
-    named = [*names, *changes, *pythons, *specs]
-    registry.check_names(named)
-    for name in named:
-        registry.adapter(name)  # complains of a broken one
-    for name in pythons.keys() & specs.keys():
-        raise pytest.UsageError(
-            f"{name} has both --sim-python and --sim-spec; a specification names its own "
-            "interpreter (python=...), so give one of them"
-        )
-    if _installs(config):
-        install_missing(names, progress())
-    everything = registry.known() if not names or "all" in asked else []
-    selection = Selection(
+    everything = registry.known() if not names or EVERY in asked else []
+    gui, headless = options.value(config, "sim_gui"), options.value(config, "sim_headless")
+    return Selection(
         tuple(dict.fromkeys([*everything, *names])),
-        _modes(config),
+        (MODES if headless else ("gui",)) if gui else ("headless",),
         options.value(config, "sim_profile"),
         changes,
         {**builds, **pythons},
         specs,
         _robots(options.value(config, "sim_robot")),
         cluster.nodes(config),
-        sweep,
+        options.value(config, "sim_sweep"),
+        tuple(names),
     )
-    for name in changes:
-        if refused := selection._settings_problem(name):
-            raise pytest.UsageError(refused)
-    for name in names:
-        if reason := selection.unusable(name):
-            raise pytest.UsageError(reason)
-    if asked or names:
-        return selection
-    here = tuple(name for name in selection.simulators if not selection.unusable(name))
-    return replace(selection, simulators=here)
+
+
+def check(selection: Selection, makes: bool) -> None:
+    """Complain of what cannot run.
+
+    Args:
+        selection: what the options say.
+        makes: missing environments are no fault, since they are made afterwards.
+
+    Raises:
+        BadInput: one sentence.
+        SimulatorError: an unknown or broken simulator.
+    """
+    valid = dict.fromkeys(
+        profile for name in registry.registered() for profile in registry.adapter(name).profiles
+    )
+    for profile in selection.profiles:
+        if profile not in valid:
+            raise BadInput(
+                f"no simulator has a settings profile {profile!r}; choose from {', '.join(valid)}"
+            )
+    if isinstance(selection.sweep, tuple) and (wrong := problem(selection.sweep)):
+        raise BadInput(wrong)
+    named = [*selection.named, *selection.changes, *selection.pythons, *selection.specs]
+    registry.check_names(named)
+    for name in named:
+        registry.adapter(name)  # complains of a broken one
+    for name in selection.pythons.keys() & selection.specs.keys():
+        raise BadInput(
+            f"{name} has both --sim-python and --sim-spec; a specification names its own "
+            "interpreter (python=...), so give one of them"
+        )
+    for name in selection.changes:
+        if refused := selection.settings_problem(name):
+            raise BadInput(refused)
+    for name in selection.named:
+        if reason := selection.unusable(name, to_install=makes):
+            raise BadInput(reason)
+
+
+def install(selection: Selection) -> None:
+    """Make the environments that are missing.
+
+    Raises:
+        SimulatorError: one cannot be made.
+        BadInput: a simulator is missing that has no environment of its own.
+    """
+    install_missing(selection.named, progress())
+    check(selection, makes=False)
 
 
 def _installs(config: pytest.Config) -> bool:
@@ -193,10 +244,6 @@ def _installs(config: pytest.Config) -> bool:
     asked = ("sim_install_missing", "sim_history")
     here = not (hasattr(config, "workerinput") or cluster.asked(config))
     return here and any(options.value(config, name) for name in asked)
-
-
-EVERY = "all"
-"""Every built-in robot, as the value of `--robot`."""
 
 
 def _robots(text: str | None) -> Mapping[str, Robot | None]:
@@ -210,20 +257,3 @@ def _robots(text: str | None) -> Mapping[str, Robot | None]:
     with options.refusing(RobotError, f"--robot={shown(text)}"):
         found = [None if name == DEFAULT else find(name) for name in names]
     return {"" if robot is None else robot.name: robot for robot in found}
-
-
-def _check_profile(name: str) -> None:
-    valid = dict.fromkeys(
-        found for sim in registry.registered() for found in registry.adapter(sim).profiles
-    )
-    if name not in valid:
-        raise pytest.UsageError(
-            f"no simulator has a settings profile {name!r}; choose from {', '.join(valid)}"
-        )
-
-
-def _modes(config: pytest.Config) -> tuple[str, ...]:
-    gui, headless = options.value(config, "sim_gui"), options.value(config, "sim_headless")
-    if gui:
-        return MODES if headless else ("gui",)
-    return ("headless",)

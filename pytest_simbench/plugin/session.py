@@ -86,7 +86,7 @@ class SimSession:
         config = self.config
         options.values(config)
         if options.mentioned(config, NAMING) or any(
-            options.given(config, option.name) for option in options.OPTIONS
+            options.given(config, item.name) for item in options.OPTIONS
         ):
             _ = self.selection
 
@@ -188,9 +188,9 @@ class SimSession:
         if report.when == "call" and (lines := self.run.of_test(item.nodeid)):
             report.simbench = lines
         if report.failed and "sim_case" in fixtures_of(item):
-            from pytest_simbench.plugin.marks import told
+            from pytest_simbench.plugin.marks import describe_failure
 
-            report.simbench_failed = told(item, report, len(self.selection.profiles))
+            report.simbench_failed = describe_failure(item, report, len(self.selection.profiles))
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Keep what came with a report until all tests have ended."""
@@ -202,7 +202,7 @@ class SimSession:
             self._passed.add(report.nodeid)
 
     @contextmanager
-    def sparing(self) -> Iterator[None]:
+    def interruptible(self) -> Iterator[None]:
         """While results are put together: Ctrl-C ends that with one sentence."""
         try:
             yield
@@ -212,7 +212,7 @@ class SimSession:
             folder = self.run.folder.path
             pytest.exit(
                 f"interrupted while the report was made; the records are kept in {folder}, and "
-                f"pytest --sim-report {shlex.quote(str(folder))} makes the report",
+                f"simbench report {shlex.quote(str(folder))} makes the report",
                 returncode=pytest.ExitCode.INTERRUPTED,
             )
 

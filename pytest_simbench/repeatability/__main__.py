@@ -1,4 +1,4 @@
-"""`python -m pytest_simbench.repeatability FILE`: replay a failing episode outside pytest."""
+"""`simbench replay FILE`: replay a failing episode outside pytest."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Replay, print where the cubes end, and return the exit status: 0, or 1 when the worker
     failed, or 2 for a file that holds no episode for this machine."""
     parser = argparse.ArgumentParser(
-        prog="python -m pytest_simbench.repeatability",
+        prog="simbench replay",
         description="Replay an episode that a failing test left in its run folder. The file says "
         "what to simulate; how to start the simulator is this machine's own.",
     )

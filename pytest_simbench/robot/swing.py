@@ -1,7 +1,7 @@
 """Finds a swing for the throw of any arm; `[throw]` in the robot's file keeps it.
 
-    python -m pytest_simbench.robot.swing ur5
-    python -m pytest_simbench.robot.swing my_arm.toml
+    simbench swing ur5
+    simbench swing my_arm.toml
 
 The arm swings from rest to rest on a straight line in joint space and lets go halfway, where all
 joints are fastest (`throw.feasible_swing`). So a swing is a position q and a velocity v of the
@@ -247,8 +247,8 @@ def _adjusted(
 
 def main(arguments: Sequence[str]) -> int:
     """Prints the swing of a robot as its file takes it."""
-    parser = argparse.ArgumentParser(prog="python -m pytest_simbench.robot.swing")
-    parser.add_argument("robot", help="a name that pytest --robots lists, or a TOML file")
+    parser = argparse.ArgumentParser(prog="simbench swing")
+    parser.add_argument("robot", help="a name that simbench robots lists, or a TOML file")
     parser.add_argument(
         "--landing",
         type=float,

@@ -70,7 +70,7 @@ def swing_of(robot: Robot) -> tuple[FloatArray, FloatArray]:
     if robot.swing is None:
         raise RobotError(
             f"robot {robot.name!r} has no swing for the throw: write one into its file, under "
-            "[throw]; python -m pytest_simbench.robot.swing FILE looks for one"
+            "[throw]; simbench swing FILE looks for one"
         )
     start, end = robot.swing
     return np.array(start), np.array(end)

@@ -109,7 +109,7 @@ def no_module(absent: Iterable[str]) -> str:
 
 @dataclass(frozen=True)
 class SimulatorInfo:
-    """The facts that `--sims` lists.
+    """The facts that `simbench list` lists.
 
     Attributes:
         name: short and stable; part of test ids and records.
@@ -190,7 +190,7 @@ class SimulatorInfo:
             home=name.base if own else "",
             requirements=self.requirements if own else (pin, *self._companions(name.which)),
             system_packages=(),
-            install=f"pytest --sim-install {whole}",
+            install=f"simbench install {whole}",
         )
 
     def refused(self, version: str) -> str:

@@ -53,9 +53,9 @@ def refused(what: str) -> Iterator[list[WorkerError]]:
 
 @check()
 def imports_without_engine(subject: Subject) -> None:
-    """The adapter's module imports where the engine is not installed, or not loaded: `--sims` reads
-    its facts. The engine is the packages in `info.modules`; in the adapter's own package it is just
-    the modules that stand there by name."""
+    """The adapter's module imports where the engine is not installed, or not loaded: `simbench
+    list` reads its facts. The engine is the packages in `info.modules`; in the adapter's own
+    package it is just the modules that stand there by name."""
     module, _, name = subject.adapter.partition(":")
     own = module.partition(".")[0]
     roots = {part: part.partition(".")[0] for part in subject.cls.info.modules}

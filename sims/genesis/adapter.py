@@ -69,7 +69,7 @@ class Genesis(Simulator):
         title="Genesis",
         distribution="genesis-world",
         modules=("genesis",),
-        install="pytest --sim-install genesis",
+        install="simbench install genesis",
         licence="Apache-2.0",
         engine="Genesis",
         tested_version="1.2.3",

@@ -55,7 +55,7 @@ class Newton(Simulator):
         title="Newton",
         distribution="newton",
         modules=("newton", "mujoco_warp", "pyglet", "trimesh"),
-        install="pytest --sim-install newton",
+        install="simbench install newton",
         licence="Apache-2.0",
         engine="MuJoCo",
         language="Python (Warp), C",

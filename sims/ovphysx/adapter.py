@@ -56,7 +56,7 @@ class OvPhysX(Simulator):
         title="Omniverse PhysX",
         distribution="ovphysx",
         modules=("ovphysx", "ovstage"),
-        install="pytest --sim-install ovphysx",
+        install="simbench install ovphysx",
         licence="NVIDIA Omniverse licence (proprietary)",
         engine="PhysX 5",
         language="C++",

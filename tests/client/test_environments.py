@@ -41,7 +41,7 @@ def info(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SimulatorI
         distribution="six",
         modules=("no_such_module_here",),
         requirements=("six==1.16.0",),
-        install="pytest --sim-install sixth",
+        install="simbench install sixth",
         caches={"SIXTH_CACHE": "kernels"},
     )
 
@@ -130,7 +130,7 @@ def test_a_release_lives_in_its_own_even_where_the_engine_is_installed_here(
     info: SimulatorInfo,
 ) -> None:
     release = adapter("mujoco==3.3.7").info
-    assert "not there yet: pytest --sim-install mujoco==3.3.7" in str(missing(release))
+    assert "not there yet: simbench install mujoco==3.3.7" in str(missing(release))
     assert Environment.of(release).folder.name == "mujoco==3.3.7"
     assert missing(adapter("mujoco").info) is None
 
@@ -146,13 +146,13 @@ def test_one_that_does_not_install_stays_half_made(info: SimulatorInfo) -> None:
     info = replace(info, requirements=("./no/such/package",))
     with pytest.raises(SimulatorError, match="only half installed"):
         Environment.of(info).create()
-    assert "half installed: pytest --sim-install sixth" in str(missing(info))
+    assert "half installed: simbench install sixth" in str(missing(info))
 
 
 @pytest.mark.parametrize(
     ("marker", "python", "said"),
     [
-        (None, False, "not there yet: pytest --sim-install sixth"),
+        (None, False, "not there yet: simbench install sixth"),
         (None, True, "half installed"),
         ("", True, "half installed"),
         ("[]", True, "half installed"),

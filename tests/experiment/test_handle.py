@@ -85,7 +85,7 @@ def test_a_failing_test_keeps_its_worker_and_tells_how_to_replay(
         raise AssertionError("too low")
     (note,) = caught.value.__notes__
     (path,) = (tmp_path / "examples").iterdir()
-    assert note.startswith("replay this episode: python -m pytest_simbench.repeatability ")
+    assert note.startswith("replay this episode: simbench replay ")
     assert note.endswith(path.name)
     with handle.episode(SCENE) as world:
         assert world.process.pid == pid

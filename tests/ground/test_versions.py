@@ -94,7 +94,7 @@ def test_the_adapter_of_a_version() -> None:
     cls = adapter("mujoco==3.3.7")
     assert issubclass(cls, MuJoCo)
     assert cls.info.name == "mujoco==3.3.7"
-    assert cls.info.install == "pytest --sim-install mujoco==3.3.7"
+    assert cls.info.install == "simbench install mujoco==3.3.7"
     assert address("mujoco==3.3.7") == address("mujoco")
     with pytest.raises(UnknownSimulatorError, match="choose from"):
         adapter("nosuch==3.3.7")

@@ -10,6 +10,8 @@ import json
 import sys
 from pathlib import Path
 
+from tests.plugin.inner import FALLING
+
 ADAPTER = """
 from dataclasses import replace
 
@@ -32,13 +34,6 @@ class Planted(MuJoCo):
             super().step()
 """
 
-TEST = """
-from tests.tiny import Falling
-
-def test_falling(repeat):
-    repeat(Falling())
-"""
-
 RELEASES = ("1.0", "1.1", "1.2", "1.3", "1.4", "1.5")
 
 
@@ -50,7 +45,7 @@ def plant(folder: Path, environments: Path) -> Path:
         environments: of the simulators (`SIMBENCH_ENVIRONMENTS`).
     """
     site, index = folder / "site", folder / "index" / "planted-engine"
-    (folder / "test_planted.py").write_text(TEST)
+    (folder / "test_planted.py").write_text(FALLING)
     info = site / "planted_adapter-1.0.dist-info"
     info.mkdir(parents=True)
     (site / "planted_adapter.py").write_text(ADAPTER)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from tests.plugin.inner import no_traceback
+
 HEAD = """
 import math
 import pytest
@@ -32,10 +34,9 @@ TESTS = {
 }
 
 
-def no_traceback(result: pytest.RunResult) -> None:
-    text = result.stdout.str() + result.stderr.str()
-    assert "Traceback (" not in text
-    assert "Error:" not in text
+def no_error(result: pytest.RunResult) -> None:
+    no_traceback(result)
+    assert "Error:" not in result.stdout.str() + result.stderr.str()
 
 
 def test_wrong_arguments(pytester: pytest.Pytester) -> None:
@@ -47,7 +48,7 @@ def test_wrong_arguments(pytester: pytest.Pytester) -> None:
     result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=out")
     result.assert_outcomes(failed=len(TESTS))
     result.stdout.fnmatch_lines([f"{message}*" for message in TESTS.values()])
-    no_traceback(result)
+    no_error(result)
     assert not (pytester.path / "out").exists()
 
 
@@ -67,7 +68,7 @@ def test_two_tasks(repeat):
     result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=1")
     result.assert_outcomes(failed=1, passed=1)
     result.stdout.fnmatch_lines(["repeat() is called for the task 'falling' a second time in one*"])
-    no_traceback(result)
+    no_error(result)
 
 
 SETTINGS = {
@@ -102,7 +103,7 @@ def test_wrong_settings(pytester: pytest.Pytester) -> None:
             "the fixture sim_settings gives *; it must give a dict of settings by name*",
         ]
     )
-    no_traceback(result)
+    no_error(result)
     assert not (pytester.path / "out").exists()
 
 

@@ -8,6 +8,8 @@ from xml.etree import ElementTree
 
 import pytest
 
+from tests.plugin.inner import records
+
 TEST = """
     from tests.tiny import Falling
 
@@ -29,8 +31,8 @@ def test_it_repeats_until_the_claims_are_decided(pytester: pytest.Pytester) -> N
         *("--junitxml=junit.xml", "--benchmark-json=b.json"),
     )
     result.assert_outcomes(passed=3)
-    lines = (pytester.path / "out" / "records.jsonl").read_text().splitlines()
-    tests = [json.loads(line)["test"].split("::")[1].split("[")[0] for line in lines]
+    kept = records(pytester.path / "out")
+    tests = [record["test"].split("::")[1].split("[")[0] for record in kept]
     wanted = {"test_decided": 10, "test_undecided": 12, "test_without_a_claim": 10}
     assert {name: tests.count(name) for name in wanted} == wanted
     result.stdout.fnmatch_lines(["UNDECIDED test_undecided: *>= 90 %: mujoco *"])

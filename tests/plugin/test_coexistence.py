@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
 from pytest_simbench import __version__
+from pytest_simbench.plugin.old_options import OLD_OPTIONS
 from pytest_simbench.plugin.options import OPTIONS
+from tests.plugin.inner import no_traceback, records
 
-FLAGS = [flag for option in OPTIONS for flag in option.flags]
-INI = [flag.lstrip("-").replace("-", "_") for o in OPTIONS if o.ini for flag in o.flags]
+FLAGS = [flag for o in OPTIONS for flag in (o.flag, o.long) if flag]
+FLAGS += [command.flag for command in OLD_OPTIONS]
+INI = [name for option in OPTIONS for name in option.ini_names]
 
 OWN = """
 def pytest_addoption(parser):
@@ -38,12 +40,6 @@ def test_falling(repeat):
 """
 
 
-def no_traceback(result: pytest.RunResult) -> None:
-    text = result.stdout.str() + result.stderr.str()
-    assert "Traceback (" not in text
-    assert "INTERNALERROR" not in text
-
-
 @pytest.mark.parametrize("place", ["conftest", "before", "after"])
 def test_any_of_our_names_may_be_somebody_else_s(pytester: pytest.Pytester, place: str) -> None:
     """All at once, in a conftest, in a plugin loaded before ours and in one loaded after it."""
@@ -60,22 +56,25 @@ def test_any_of_our_names_may_be_somebody_else_s(pytester: pytest.Pytester, plac
     no_traceback(pytester.runpytest_subprocess(*early, "--help"))
 
 
-@pytest.mark.parametrize("option", [o for o in OPTIONS if o.short], ids=lambda o: o.short)
-def test_a_taken_short_name_leaves_the_long_one(pytester: pytest.Pytester, option: object) -> None:
-    flag, short = option.flag, option.short  # type: ignore[attr-defined]
-    pytester.makeconftest(OWN.format(flags=[short], ini=[short.lstrip("-")]))
+def test_taken_short_names_leave_the_sure_ones(pytester: pytest.Pytester) -> None:
+    short = [option.flag for option in OPTIONS if option.long]
+    pytester.makeconftest(OWN.format(flags=short, ini=[name.lstrip("-") for name in short]))
     pytester.makepyfile(FALLING)
-    long = {"--sim-name": ["--sim-name=mujoco"], "--sim-reps": [], "--sim-gui": [],
-            "--sim-protocol": ["--sim-protocol=fast"], "--sim-jitter": ["--sim-jitter=0"],
-            "--sim-headless": ["--sim-headless"], "--sim-list": [],
-            "--sim-robot": ["--sim-robot=panda"], "--sim-robots": []}[flag]  # fmt: skip
-    sim = ["--sim=mujoco"] if short != "--sim" else []
-    result = pytester.runpytest_subprocess(*sim, *long, "--sim-reps=2", short, "--sim-output=out")
+    pytester.makeini("[pytest]\nsim_jitter = 0\n")
+    result = pytester.runpytest_subprocess(
+        *short, "--sim-name=mujoco", "--sim-protocol=fast", "--sim-headless", "--sim-robot=panda",
+        "--sim-reps=2", "--sim-output=out",
+    )  # fmt: skip
     result.assert_outcomes(passed=1)
-    result.stdout.fnmatch_lines([f"{short} belongs to another plugin or to a conftest*{flag}*"])
-    record = json.loads((pytester.path / "out" / "records.jsonl").read_text().splitlines()[0])
+    for option in (option for option in OPTIONS if option.long):
+        result.stdout.fnmatch_lines(
+            [f"{option.flag} belongs to another plugin or to a conftest*{option.long} for*"]
+        )
+    record = records(pytester.path / "out")[0]
     assert record["mode"] == "headless"  # their --gui is not ours
-    assert record["jitter"] == (0 if flag == "--sim-jitter" else 1)
+    assert record["jitter"] == 0
+    shown = pytester.runpytest_subprocess("--help").stdout.str()
+    assert all(f"\n  {option.long}" in shown for option in OPTIONS if option.long)
 
 
 def test_values_of_ours_are_no_folders_with_conftests(pytester: pytest.Pytester) -> None:
@@ -126,7 +125,7 @@ def test_without_pytest_benchmark(pytester: pytest.Pytester) -> None:
     )
     result.assert_outcomes(passed=1)
     no_traceback(result)
-    assert len((pytester.path / "out" / "records.jsonl").read_text().splitlines()) == 2
+    assert len(records(pytester.path / "out")) == 2
 
 
 def test_a_project_s_own_benchmark_fixture(pytester: pytest.Pytester) -> None:

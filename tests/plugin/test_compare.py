@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from fnmatch import fnmatchcase
 from pathlib import Path
 from textwrap import dedent
 from xml.etree import ElementTree
@@ -15,6 +16,7 @@ from xml.etree import ElementTree
 import pytest
 
 import pytest_simbench.tasks  # noqa: F401 - pytester would import native modules a second time
+from pytest_simbench.plugin.compare import prepare
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.metrics import Metric
 
@@ -114,6 +116,7 @@ def test_limits_in_the_ini_file_wait_for_a_baseline_which_alone_fails_nothing(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (["--sim-compare-fail=x:5%"], "--sim-compare-fail needs a run to compare with: *"),
         (["--sim-compare-fail=rtf:200%"], "rtf:200% can never be exceeded: rtf cannot fall by *"),
         (
             ["--sim-compare-fail=placed:5"],
@@ -152,13 +155,11 @@ def test_bad_input_is_one_sentence(
     pytester.path.joinpath("empty").write_text("")
     pytester.path.joinpath("other.json").write_text('{"benchmarks": [{"fullname": "t"}]}')
     pytester.path.joinpath("wrong.json").write_text('{"benchmarks": 3}')
-    pytester.makepyfile(TEST)
-    first = [] if "baseline" in arguments[0] else ["--sim-baseline=good"]
-    result = pytester.runpytest_subprocess("--sim=mujoco", *first, *arguments)
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines([f"*{message}"])
-    assert len(result.stderr.str().strip().splitlines()) == 1
-    assert "Traceback" not in result.stderr.str() + result.stdout.str()
+    first = [] if "baseline" in arguments[0] or "needs" in message else ["--sim-baseline=good"]
+    with pytest.raises(pytest.UsageError) as raised:
+        prepare(pytester.parseconfig("--sim=mujoco", *first, *arguments), [])
+    assert fnmatchcase(str(raised.value), f"*{message}")
+    assert "\n" not in str(raised.value)
 
 
 def test_a_limit_of_another_package_s_share_that_nothing_can_exceed_fails_the_run(
@@ -205,13 +206,6 @@ def test_a_limit_that_compares_nothing_fails_the_run_and_says_why(
         if code:
             result.stdout.fnmatch_lines([told])
             assert "no metric got worse" not in result.stdout.str()
-
-
-def test_limits_need_a_baseline(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(TEST)
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-compare-fail=landed:5%")
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(["ERROR: --sim-compare-fail needs a run to compare with: *"])
 
 
 def test_junit_has_a_property_for_each_metric(

@@ -1,4 +1,4 @@
-"""`--sim-data`, `--sim-download` and the fixture `data_set`."""
+"""`--sim-data` and the fixture `data_set`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_a_set_is_read_from_the_folder_and_each_toss_is_a_repetition(
 @pytest.mark.parametrize(
     ("content", "name", "outcome", "sentence"),
     [
-        (None, "cube_tosses", "skipped", "*is not in *: pytest --sim-download cube_tosses*"),
+        (None, "cube_tosses", "skipped", "*is not in *: simbench download cube_tosses*"),
         (b"x", "cube_tosses", "failed", "*contactnets_cube_tosses_1.npz holds no arrays*"),
         (None, "nosuch", "failed", "*no data set 'nosuch'; choose from cube_tosses*"),
     ],
@@ -49,12 +49,6 @@ def test_what_is_not_there_or_broken_is_one_sentence(
     result.assert_outcomes(**{outcome: 1})
     result.stdout.fnmatch_lines([sentence])
     assert "Traceback" not in result.stdout.str()
-
-
-def test_an_unknown_download_lists_what_there_is(pytester: pytest.Pytester) -> None:
-    result = pytester.runpytest_subprocess("--sim-download", "nosuch")
-    assert result.ret == 4
-    result.stderr.fnmatch_lines(["*no data set 'nosuch'; choose from cube_tosses*"])
 
 
 def test_a_folder_that_is_not_there_hides_no_test(pytester: pytest.Pytester) -> None:

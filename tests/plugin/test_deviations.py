@@ -2,16 +2,9 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
 
-TASK = """
-from tests.tiny import Falling
-
-def test_falling(repeat):
-    repeat(Falling())
-"""
+from tests.plugin.inner import FALLING, records
 
 TOLD = {
     "pybullet": [
@@ -30,13 +23,12 @@ TOLD = {
 
 @pytest.mark.parametrize("name", TOLD)
 def test_declared_deviations_are_recorded_and_shown(pytester: pytest.Pytester, name: str) -> None:
-    pytester.makepyfile(test_it=TASK)
+    pytester.makepyfile(test_it=FALLING)
     result = pytester.runpytest_subprocess(
         f"--sim={name}", "--reps=1", "-v", f"--sim-output={pytester.path / 'out'}"
     )
     assert result.ret == 0
-    line = (pytester.path / "out" / "records.jsonl").read_text().splitlines()[0]
-    recorded = json.loads(line)["deviations"]
+    recorded = records(pytester.path / "out")[0]["deviations"]
     page = " ".join(result.stdout.str().split())
     for text in TOLD[name]:
         assert text in recorded

@@ -11,16 +11,12 @@ import pytest
 from pytest_simbench.recordings.film import Film
 from pytest_simbench.records.folder import TASKS, RunFolder
 from pytest_simbench.report.files import write_report
+from tests.cli.command import simbench
+from tests.plugin.inner import CLAIMING
 from tests.records.build import record
 
 pytest.importorskip("av", reason="videos need the extra 'video'")
 
-TEST = """
-    from tests.tiny import Falling
-
-    def test_falling(repeat):
-        repeat(Falling()).assert_at_least("landed", 0.1)
-"""
 KEEP = ("--sim-trace=on", "--sim-record=mcap", "--sim-pictures", "--sim-video=on")
 
 
@@ -34,7 +30,7 @@ def test_links_in_a_run_folder_are_not_followed(
 ) -> None:
     """All that a run leaves lies elsewhere, behind links; it is resumed and reported."""
     monkeypatch.setenv("TMPDIR", str(pytester.mkdir("spare")))
-    pytester.makepyfile(TEST)
+    pytester.makepyfile(CLAIMING)
     pytester.runpytest_subprocess("--sim=mujoco", "--reps=1", "--sim-output=o", *KEEP)
     run, elsewhere = pytester.path / "o", pytester.mkdir("elsewhere")
     for name in ("repeatability.jsonl", "thresholds.jsonl"):
@@ -48,7 +44,7 @@ def test_links_in_a_run_folder_are_not_followed(
     before = content(elsewhere)
     resumed = pytester.runpytest_subprocess("--sim=mujoco", "--reps=2", "--sim-resume=o", *KEEP)
     resumed.assert_outcomes(passed=1)
-    reported = pytester.runpytest_subprocess("--sim-report=o", "--sim-record=mcap")
+    reported = simbench(pytester, "report", "o", "--record=mcap")
     assert content(elsewhere) == before
     assert len((run / "records.jsonl").read_text().splitlines()) == 2
     assert not (run / "report.html").is_symlink()

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.command import simbench
+
 PACKAGE = '''
     """Pours seven drops: what only this package says of its numbers."""
 
@@ -108,21 +110,21 @@ def test_where_the_package_is_gone(
         shutil.move(name, elsewhere / name)
     monkeypatch.chdir(elsewhere)
 
-    shown = run(pytester, "-v", "--sim-report", "a").stdout.str()
+    shown = simbench(pytester, "report", "-v", "a").stdout.str()
     assert "spilt volume ml" in shown
     assert report(Path("a")) == straight
 
-    merged = run(pytester, "-v", "--sim-merge", "b", "a", "--sim-output=whole")
+    merged = simbench(pytester, "merge", "-v", "b", "a", "--output=whole")
     merged.stdout.fnmatch_lines(
         ["caught drops: mujoco 86 %*", "*spilt volume ml*", "reference*0.25*"]
     )
     whole = report(Path("whole"))
     told(whole["report.md"].decode())
     before = sorted(path for path in Path(".").rglob("*") if path.is_file())
-    both = run(pytester, "-v", "--sim-report", "a", "b")  # nowhere to write
+    both = simbench(pytester, "report", "-v", "a", "b")  # nowhere to write
     assert sorted(path for path in Path(".").rglob("*") if path.is_file()) == before
     both.stdout.fnmatch_lines(["pouring: 9 repetitions*", "*spilt volume ml*", "reference*0.25*"])
-    run(pytester, "--sim-report", "a", "b", "--sim-output=both")
+    simbench(pytester, "report", "a", "b", "--output=both")
     told(report(Path("both"))["report.md"].decode())
 
     # Limits are known by name, unit and direction before anything has run.
@@ -159,8 +161,8 @@ def test_the_gate_and_a_resumed_run_know_it_too(
     result.stdout.fnmatch_lines([f"test_pouring*would not be comparable: {message}"])
     assert len(Path("a/tasks.jsonl").read_text().splitlines()) == 1
     run(pytester, "--reps=1", "--sim-output=litres", "--sim-seed=3000")
-    result = run(pytester, "--sim-merge", "a", "litres", ret=pytest.ExitCode.USAGE_ERROR)
-    result.stderr.fnmatch_lines([f"ERROR: --sim-merge: a and litres are not*: {message} (*is a)"])
+    result = simbench(pytester, "merge", "a", "litres")
+    result.stderr.fnmatch_lines([f"simbench merge: a and litres are not*: {message} (*is a)"])
     result = run(pytester, "--reps=1", "--sim-baseline=a")
     result.stdout.fnmatch_lines(["different in the baseline*", f"*{message}*"])
     monkeypatch.delenv("UNIT")
@@ -179,7 +181,7 @@ def test_a_run_of_before_is_shown_with_a_note(pytester: pytest.Pytester, package
     for benchmark in saved["benchmarks"]:
         assert benchmark["extra_info"]["simbench"].pop("tasks")
     Path("a.json").write_text(json.dumps(saved))
-    result = run(pytester, "--sim-report", "a")
+    result = simbench(pytester, "report", "a")
     result.stdout.fnmatch_lines(["*note: pouring: the run does not say what its metrics mean (*"])
     for baseline in ("a", "a.json"):  # the run that is compared with it knows
         result = run(
@@ -187,5 +189,5 @@ def test_a_run_of_before_is_shown_with_a_note(pytester: pytest.Pytester, package
         )
         result.stdout.fnmatch_lines(["*spill*3.5 ml*3.5 ml*passed, limit 1 ml*"])
     package.unlink()
-    run(pytester, "--sim-merge", "a", "--sim-output=whole")
+    simbench(pytester, "merge", "a", "--output=whole")
     assert "does not say what its metrics mean" in Path("whole/report.md").read_text()

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
+from fnmatch import fnmatchcase
+
 import pytest
 
-TEST = """
-    from tests.tiny import Falling
-
-    def test_falling(repeat):
-        repeat(Falling()).assert_at_least("landed", 0.1)
-"""
+from pytest_simbench.plugin.session import session_of
+from tests.plugin.inner import CLAIMING
 
 
 @pytest.mark.parametrize(
@@ -62,54 +60,55 @@ TEST = """
     ids=lambda value: value[0] if isinstance(value, list) else "",
 )
 def test_bad_option(pytester: pytest.Pytester, arguments: list[str], message: str) -> None:
-    pytester.makepyfile(TEST)
-    result = pytester.runpytest_subprocess(*arguments)
+    def begin() -> None:
+        session = session_of(pytester.parseconfig(*arguments))
+        session.check_options()
+        session.start()
+
+    with pytest.raises(pytest.UsageError) as raised:
+        begin()
+    assert fnmatchcase(str(raised.value), f"*{message}*")
+    assert "\n" not in str(raised.value)
+
+
+def test_a_bad_option_ends_the_run(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(CLAIMING)
+    result = pytester.runpytest_subprocess("--sim=mujocco")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines([f"*{message}*"])
+    result.stderr.fnmatch_lines(["ERROR: unknown simulator 'mujocco'; choose from *, or all"])
     assert "Traceback" not in result.stderr.str() + result.stdout.str()
 
 
-@pytest.mark.parametrize(
-    ("mark", "message"),
-    [
-        ("only_sim('mujocco')", "unknown simulator 'mujocco'; choose from *mujoco, *pybullet*"),
-        ("skip_sim()", "skip_sim needs the name of a simulator"),
-        ("skip_sim(['mujoco'])", "unknown simulator \"['mujoco']\"; choose from"),
-        ("skip_sim('mujoco', reson='x')", "skip_sim has no keyword argument 'reson'; *reason"),
-        ("only_sim('mujoco', strict=1)", "only_sim has no keyword argument 'strict'; *none"),
-        ("xfail_sim('mujoco', reason=3)", "xfail_sim: reason must be a text"),
-        ("needs('wings')", "needs('wings'): choose from *window*offscreen*"),
-        ("needs()", "needs() without a capability: choose from *window*offscreen*"),
-        ("reps(0)", "reps(0): give a whole number from 1 to 100000"),
-        ("reps(1.5)", "reps(1.5): give a whole number from 1"),
-        ("reps(2, 3)", "reps(2, 3): give one number"),
-        ("sim_timeout('long')", "sim_timeout('long'): give a number from 0.001 to 1e+06"),
-        ("sim_timeout(float('nan'))", "sim_timeout(nan): give a number from 0.001"),
-    ],
-)
-def test_bad_mark(pytester: pytest.Pytester, mark: str, message: str) -> None:
-    pytester.makepyfile("import pytest\npytestmark = pytest.mark." + mark + "\n" + _dedented())
+BAD_MARKS = [
+    ("only_sim('mujocco')", "unknown simulator 'mujocco'; choose from *mujoco, *pybullet*"),
+    ("skip_sim()", "skip_sim needs the name of a simulator"),
+    ("skip_sim(['mujoco'])", "unknown simulator \"['mujoco']\"; choose from"),
+    ("skip_sim('mujoco', reson='x')", "skip_sim has no keyword argument 'reson'; *reason"),
+    ("only_sim('mujoco', strict=1)", "only_sim has no keyword argument 'strict'; *none"),
+    ("xfail_sim('mujoco', reason=3)", "xfail_sim: reason must be a text"),
+    ("needs('wings')", "needs('wings'): choose from *window*offscreen*"),
+    ("needs()", "needs() without a capability: choose from *window*offscreen*"),
+    ("reps(0)", "reps(0): give a whole number from 1 to 100000"),
+    ("reps(1.5)", "reps(1.5): give a whole number from 1"),
+    ("reps(2, 3)", "reps(2, 3): give one number"),
+    ("sim_timeout('long')", "sim_timeout('long'): give a number from 0.001 to 1e+06"),
+    ("sim_timeout(float('nan'))", "sim_timeout(nan): give a number from 0.001"),
+]
+
+
+def test_bad_marks_are_told_all_at_once(pytester: pytest.Pytester) -> None:
+    tests = (
+        f"@pytest.mark.{mark}\ndef test_{number}(repeat):\n    pass\n"
+        for number, (mark, _) in enumerate(BAD_MARKS)
+    )
+    pytester.makepyfile("\n".join(["import pytest", *tests]))
     result = pytester.runpytest_subprocess("--sim=mujoco")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     assert "Traceback" not in result.stderr.str() + result.stdout.str()
-    text = result.stdout.str() + result.stderr.str()
-    assert all(part in text for part in message.split("*") if part), text
-
-
-def _dedented() -> str:
-    import textwrap
-
-    return textwrap.dedent(TEST)
-
-
-def test_settings_of_a_fixture_are_checked(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(
-        "import pytest\n@pytest.fixture\ndef sim_settings():\n    return {'speed': 3}\n"
-        + _dedented()
-    )
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=1")
-    assert result.ret != 0
-    result.stdout.fnmatch_lines(["*mujoco has no setting 'speed'; choose from timestep=*"])
+    lines = [*result.stdout.lines, *result.stderr.lines]
+    for number, (_, message) in enumerate(BAD_MARKS):
+        (told,) = (line for line in lines if f"::test_{number}: " in line)
+        assert all(part in told for part in message.split("*")), told
 
 
 def test_unreadable_robot_description(pytester: pytest.Pytester) -> None:

@@ -7,10 +7,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import chain, repeat
 
 import pytest
 
-from pytest_simbench.plugin import options
+import pytest_simbench.robot.registry  # noqa: F401 - or pytester imports it again
+from pytest_simbench.cli.values import Auto, BadValue, flag
+from pytest_simbench.plugin import options, registration
+from pytest_simbench.plugin.old_options import OLD_OPTIONS
 from pytest_simbench.plugin.options import OPTIONS, Option
 from pytest_simbench.plugin.selection import select
 
@@ -28,16 +33,15 @@ BAD = {
 PATHS = BAD.keys() - {"empty", "blank", "long", "long list", "NUL", "half a word"}
 FINE = {
     "sim_jitter": {"zero"}, "sim_seed": {"zero"},
-    "sim_output": PATHS, "sim_baseline": PATHS, "sim_resume": PATHS, "sim_merge": PATHS,
-    "sim_report": PATHS, "sim_badge": PATHS, "sim_data": PATHS,
+    "sim_output": PATHS, "sim_baseline": PATHS, "sim_resume": PATHS, "sim_badge": PATHS,
+    "sim_data": PATHS,
     "sim_gui": {"zero"}, "sim_headless": {"zero"}, "sim_fresh": {"zero"}, "sim_pictures": {"zero"},
     "sim_install_missing": {"zero"},
-    "sim_bisect": {"minus inf"},  # where a second value is missing then, for argparse
     "sim_strict": {"zero"}, "sim_crashes": {"zero"},
 }  # fmt: skip
 """Values that an option may have after all."""
 
-LATER = {"sim_download", "sim_install", "sim_profile", "sim_uninstall"}
+LATER = {"sim_profile"}
 """Options of names that are looked up when they are used: any word will do for a start."""
 
 Configure = Callable[..., pytest.Config]
@@ -67,7 +71,7 @@ def is_sentence(text: str, name: str) -> bool:
     """Whether a message is one short line that names the option."""
     option = options.option(name)
     return (
-        any(known in text for known in (*option.flags, name, "simulator"))
+        any(known in text for known in (option.flag, option.sure, name, "simulator"))
         and len(text) < 600
         and "\n" not in text
         and text.isprintable()
@@ -83,34 +87,33 @@ def bad(option: Option) -> dict[str, str]:
     return {what: text for what, text in BAD.items() if what not in fine}
 
 
-@pytest.mark.parametrize("name", [o.name for o in OPTIONS if not o.kind.flag])
-def test_bad_values_on_the_command_line(configure: Configure, name: str) -> None:
+@pytest.mark.parametrize("name", [o.name for o in OPTIONS if o.type is not flag])
+def test_bad_values(configure: Configure, name: str) -> None:
+    """Most are refused by their form alone; the others when they are looked up."""
     option = options.option(name)
-    found = {
-        what: complaint(configure, [f"{option.flag}={text}"]) for what, text in bad(option).items()
-    }
-    if option.arguments.get("nargs") in ("+", 2):
-        more = ["placed"] if option.arguments["nargs"] == 2 else []
-        found = {w: complaint(configure, [option.flag, t, *more]) for w, t in bad(option).items()}
+    found = {}
+    for what, text in bad(option).items():
+        try:
+            option.value([text])
+        except BadValue as error:
+            found[what] = error.sentence(option.flag)
+        else:
+            found[what] = complaint(configure, [f"{option.flag}={text}"])
     assert {what: text for what, text in found.items() if not is_sentence(text, name)} == {}
 
 
 @pytest.mark.parametrize("name", [o.name for o in OPTIONS if o.ini])
-def test_bad_values_in_the_ini_file(pytester: pytest.Pytester, name: str) -> None:
-    option = options.option(name)
-    found = {}
-    for what, text in bad(option).items():
-        config = pytester.parseconfig("-o", f"{name}={text}")
-        try:
-            checked(config)
-        except pytest.UsageError as error:
-            found[what] = str(error)
-        else:
-            found[what] = ""
+def test_bad_values_in_the_ini_file(configure: Configure, name: str) -> None:
+    texts = bad(options.option(name))
+    found = {
+        what: complaint(configure, ["-o", f"{name}={texts[what]}"])
+        for what in ("empty", "quote", "escape", "half a word")
+        if what in texts
+    }
     assert {what: text for what, text in found.items() if not is_sentence(text, name)} == {}
 
 
-@pytest.mark.parametrize("name", [o.name for o in OPTIONS if o.kind.flag and o.ini])
+@pytest.mark.parametrize("name", [o.name for o in OPTIONS if o.type is flag and o.ini])
 @pytest.mark.parametrize(("word", "value"), [("yes", True), ("TRUE", True), ("off", False)])
 def test_ini_flags(pytester: pytest.Pytester, name: str, word: str, value: bool) -> None:
     assert options.value(pytester.parseconfig("-o", f"{name}={word}"), name) is value
@@ -124,25 +127,17 @@ def test_jobs_auto_takes_the_cores_that_pytest_may_use(
     assert options.value(pytester.parseconfig("-o", "sim_jobs=auto"), "sim_jobs") == 3
 
 
-@pytest.mark.parametrize("short", [o.short for o in OPTIONS if o.short])
-def test_short_names_are_the_same_option(pytester: pytest.Pytester, short: str) -> None:
-    option = next(o for o in OPTIONS if o.short == short)
+@pytest.mark.parametrize("option", [o for o in OPTIONS if o.long], ids=lambda o: o.flag)
+def test_the_sure_name_is_the_same_option(pytester: pytest.Pytester, option: Option) -> None:
     words = {"--sim": "mujoco", "--robot": "ur5", "--reps": "3", "--protocol": "smoke"}
-    word = {**words, "--jitter": "2"}.get(short)
+    word = {**words, "--jitter": "2"}.get(option.flag)
     value = [] if word is None else [word]
-    by_short = options.value(pytester.parseconfig(short, *value), option.name)
-    by_long = options.value(pytester.parseconfig(option.flag, *value), option.name)
-    assert by_short == by_long != option.default
-    if option.ini:
-        ini = f"{short.lstrip('-')}={word or 'true'}"
-        assert options.value(pytester.parseconfig("-o", ini), option.name) == by_long
-
-
-@pytest.mark.parametrize("name", ["sim_merge", "sim_report"])
-def test_runs_may_be_given_one_by_one(configure: Configure, name: str) -> None:
-    flag = options.option(name).flags[0]
-    config = configure(flag, "a", "b", flag, "c")
-    assert options.value(config, name) == ["a", "b", "c"]
+    by_flag = options.value(pytester.parseconfig(option.flag, *value), option.name)
+    by_long = options.value(pytester.parseconfig(option.long, *value), option.name)
+    assert by_flag == by_long != option.default
+    for name in option.ini_names:
+        ini = f"{name}={word or 'true'}"
+        assert options.value(pytester.parseconfig("-o", ini), option.name) == by_flag
 
 
 def test_values_of_every_form(pytester: pytest.Pytester) -> None:
@@ -156,7 +151,7 @@ def test_values_of_every_form(pytester: pytest.Pytester) -> None:
     assert found["sim_set"] == {"mujoco.timestep": "1", "pybullet.timestep": "2"}
     assert found["sim_spec"] == {"mujoco": "popen//python=a,b=c d"}
     assert found["sim_threshold"] == {"placed": 0.9}
-    assert found["sim_reps"] == options.Auto(7)
+    assert found["sim_reps"] == Auto(7)
     assert (found["sim_jitter"], found["sim_seed"], found["sim_memory_limit"]) == (1e-3, 0, 2000)
     assert found["sim_resume"] is True
 
@@ -187,40 +182,32 @@ def test_the_same_in_pyproject(pytester: pytest.Pytester) -> None:
         options.values(config)
 
 
-@pytest.mark.parametrize("text", ["50 %", "100 %, and %(prog)s %d", "%"])
-def test_any_help_text_renders(
-    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, text: str
-) -> None:
+def test_any_help_text_renders(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
     """argparse expands %, in whichever text it stands."""
-    from pytest_simbench.plugin import spellings
-
+    texts = chain(["50 %", "100 %, and %(prog)s %d", "%"], repeat("fine"))
     changed = [
-        Option(o.flag, o.kind, text, metavar=o.metavar, ini=False, arguments=o.arguments)
-        for o in OPTIONS
+        replace(option, help=text, rare=False) for option, text in zip(OPTIONS, texts, strict=False)
     ]
-    monkeypatch.setattr(spellings, "OPTIONS", changed)
-    result = pytester.inline_run("--help")
-    assert result.ret == 0
+    monkeypatch.setattr(registration, "OPTIONS", changed)
+    assert pytester.inline_run("--help").ret == 0
 
 
-def test_help_shows_every_option(pytester: pytest.Pytester) -> None:
+def test_help_shows_an_option_once_and_no_old_one(pytester: pytest.Pytester) -> None:
     result = pytester.runpytest_subprocess("--help")
     assert result.ret == 0
     shown = " ".join(result.stdout.str().split())
     for option in OPTIONS:
-        assert f"{option.flag}" in shown
-        assert " ".join(option.help.split()) in shown
-        if option.short:
-            assert f" {option.short}" in shown
-        if option.ini:
-            assert f" {option.name} (" in shown
+        assert (f" {option.flag}" in shown.partition("[pytest] ")[0]) is not option.rare
+        assert (" ".join(option.help.split()) in shown) is not option.rare
+        assert all(f" {name} (" in shown for name in option.ini_names)
+    old = {*(o.long for o in OPTIONS if o.long), *(c.flag for c in OLD_OPTIONS)}
+    assert [name for name in old if re.search(rf"{name}[ =]", shown)] == []
     assert "Traceback (" not in shown + result.stderr.str()
 
 
 @pytest.mark.parametrize(
     "command",
-    ["--help", "--sims", "--sim-list", "--markers", "--fixtures", "--fixtures-per-test",
-     "--version", "--collect-only", "--setup-plan", "--sims --sim=mujoco", "--cache-show",
+    ["--help", "--markers", "--fixtures-per-test", "--version", "--setup-plan",
      "--trace-config --collect-only"],
 )  # fmt: skip
 def test_informational_commands(pytester: pytest.Pytester, command: str) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
+
+from tests.cli.command import simbench
+from tests.plugin.inner import records
 
 SUITE = Path(__file__).resolve().parents[2] / "suites" / "test_physics.py"
 
@@ -26,16 +28,15 @@ def test_a_broken_law_is_a_finding_and_no_failure_unless_asked_for(
             "pybullet *1/1 *x *0/1 *x *",
         ]
     )
-    lines = (pytester.path / "out" / "records.jsonl").read_text().splitlines()
-    records = [json.loads(line) for line in lines]
-    assert [(r["simulator"], r["task"], r["repetition"], r["status"]) for r in records] == [
+    kept = records(pytester.path / "out")
+    assert [(r["simulator"], r["task"], r["repetition"], r["status"]) for r in kept] == [
         (simulator, law, 1, "ok") for simulator in ("mujoco", "pybullet")
         for law in ("free_fall", "sag")
     ]  # fmt: skip
-    assert [r["reused_worker"] for r in records] == [False, True, False, True]
-    law = records[-1]["notes"]["reading"]
+    assert [r["reused_worker"] for r in kept] == [False, True, False, True]
+    law = kept[-1]["notes"]["reading"]
     assert law["exact"] == pytest.approx(0.1925, abs=1e-4)
-    assert records[-1]["metrics"]["ratio"] == pytest.approx(law["exact"] / law["tolerance"], 0.01)
-    again = pytester.runpytest_subprocess("--sim-report", "out")
+    assert kept[-1]["metrics"]["ratio"] == pytest.approx(law["exact"] / law["tolerance"], 0.01)
+    again = simbench(pytester, "report", "out")
     assert again.ret == 0
     again.stdout.fnmatch_lines(["for joints: mujoco, which keeps 1 of 1 laws."])

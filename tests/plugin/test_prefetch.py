@@ -3,12 +3,13 @@ repeat."""
 
 from __future__ import annotations
 
-import json
 from itertools import pairwise
 from pathlib import Path
 from textwrap import dedent
 
 import pytest
+
+from tests.plugin.inner import records
 
 TEST = """
     import os
@@ -57,8 +58,7 @@ def run(pytester: pytest.Pytester, *arguments: str) -> pytest.RunResult:
 
 
 def kept(folder: Path) -> list[tuple[str, str]]:
-    lines = (folder / "out" / "records.jsonl").read_text().splitlines()
-    return [(record["test"], record["status"]) for record in map(json.loads, lines)]
+    return [(record["test"], record["status"]) for record in records(folder / "out")]
 
 
 def test_two_tests_run_at_once_and_each_record_is_there_once(

@@ -3,13 +3,16 @@
 
 from __future__ import annotations
 
+import importlib.util
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
+from pytest_simbench.plugin import recording
 from pytest_simbench.recordings.trace import Trace
+from tests.cli.command import simbench
 
 TEST = """
     import pytest
@@ -62,13 +65,13 @@ def test_a_kept_run_is_recorded_later(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(TEST)
     pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=o", "--sim-trace=on")
     assert not (pytester.path / "o" / "recordings").exists()
-    result = pytester.runpytest_subprocess("--sim-report=o", "--sim-record=mcap")
+    result = simbench(pytester, "report", "o", "--record=mcap")
     assert result.ret == 0
     result.stdout.fnmatch_lines(["2 recordings: o/recordings"])
     (first, _) = sorted((pytester.path / "o" / "recordings").iterdir())
     written = (first / "metadata.yaml").stat().st_mtime_ns
     (sorted((pytester.path / "o" / "traces").iterdir())[1]).write_text("no trace")
-    result = pytester.runpytest_subprocess("--sim-report=o", "--sim-record=mcap")
+    result = simbench(pytester, "report", "o", "--record=mcap")
     result.stdout.fnmatch_lines(["no recording: *holds no arrays*", "1 recording: o/recordings"])
     assert (first / "metadata.yaml").stat().st_mtime_ns == written
 
@@ -76,25 +79,14 @@ def test_a_kept_run_is_recorded_later(pytester: pytest.Pytester) -> None:
 def test_a_run_without_traces_says_so(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(TEST)
     pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=o", "--sim-trace=off")
-    result = pytester.runpytest_subprocess("--sim-report=o", "--sim-record=mcap")
+    result = simbench(pytester, "report", "o", "--record=mcap")
     result.stdout.fnmatch_lines(["no recordings: the run has no traces; see --sim-trace"])
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--sim-record=avi"], "--sim-record=avi: choose from mcap"),
-        (["--sim-video=all"], "--sim-video=all: choose from off, first, on, retain-on-failure"),
-        (["--sim-record=mcap", "--sim-trace=off"], "leave --sim-trace=off out"),
-    ],
-)
-def test_what_cannot_be_recorded_is_refused_before_anything_runs(
-    pytester: pytest.Pytester, arguments: list[str], message: str
-) -> None:
-    pytester.makepyfile(TEST)
-    result = pytester.runpytest_subprocess("--sim=mujoco", *arguments)
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines([f"ERROR: *{message}"])
+def test_a_recording_without_traces_is_refused(pytester: pytest.Pytester) -> None:
+    config = pytester.parseconfig("--sim-record=mcap", "--sim-trace=off")
+    with pytest.raises(pytest.UsageError, match="leave --sim-trace=off out$"):
+        recording.check(config)
 
 
 @pytest.mark.parametrize(
@@ -102,20 +94,18 @@ def test_what_cannot_be_recorded_is_refused_before_anything_runs(
     [("rosbags", "--sim-record=mcap", "ros"), ("av", "--sim-video=first", "video")],
 )
 def test_a_missing_package_is_one_sentence_before_anything_runs(
-    pytester: pytest.Pytester, package: str, option: str, extra: str
+    pytester: pytest.Pytester,
+    monkeypatch: pytest.MonkeyPatch,
+    package: str,
+    option: str,
+    extra: str,
 ) -> None:
-    pytester.makepyfile(TEST)
-    pytester.makeconftest(
-        f"""
-        import importlib.util
-        find = importlib.util.find_spec
-        importlib.util.find_spec = lambda name, *a: None if name == "{package}" else find(name, *a)
-        """
-    )
-    result = pytester.runpytest_subprocess("--sim=mujoco", option)
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines([f"ERROR: {option}: *pip install 'pytest-simbench[[]{extra}]'"])
-    assert "Traceback" not in result.stdout.str() + result.stderr.str()
+    config, find = pytester.parseconfig(option), importlib.util.find_spec
+    for place in ("pytest_simbench.recordings.film.find_spec", "importlib.util.find_spec"):
+        monkeypatch.setattr(place, lambda name: None if name == package else find(name))
+    message = rf"^{option}: .*pip install 'pytest-simbench\[{extra}\]'$"
+    with pytest.raises(pytest.UsageError, match=message):
+        recording.check(config)
 
 
 def test_pictures_and_videos_are_taken_beside_what_is_measured(pytester: pytest.Pytester) -> None:
@@ -137,5 +127,5 @@ def test_pictures_and_videos_are_taken_beside_what_is_measured(pytester: pytest.
     assert [name.partition("_mujoco")[0] for name in videos] == ["test_again", "test_falling"]
     assert all(f'href="videos/{name}"' in page for name in videos)
     (folder / "falling_pictures.png").unlink()
-    pytester.runpytest_subprocess("--sim-report=o")
+    simbench(pytester, "report", "o")
     assert (folder / "falling_pictures.png").exists()

@@ -8,6 +8,8 @@ import os
 
 import pytest
 
+from tests.cli.command import simbench
+from tests.plugin.inner import records
 from tests.plugin.planted import plant
 
 
@@ -24,9 +26,6 @@ def planted(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("planted")
 def test_history_bisection_and_gate(pytester: pytest.Pytester) -> None:
-    def recorded() -> int:
-        return len((folder / "records.jsonl").read_text().splitlines())
-
     result = pytester.runpytest_subprocess("--sim-history=planted:4", "--reps=5")
     result.assert_outcomes(passed=4)
     result.stdout.fnmatch_lines(
@@ -34,11 +33,11 @@ def test_history_bisection_and_gate(pytester: pytest.Pytester) -> None:
          "  landed fell with 1.3: 100 % -> 0 %, p = *"]
     )  # fmt: skip
     (folder,) = (pytester.path / ".simbench" / "history").iterdir()
-    assert recorded() == 20
+    assert len(records(folder)) == 20
     assert list(folder.glob("planted_falling_history*.png"))
 
-    result = pytester.runpytest_subprocess(  # what the history has recorded is not run again
-        "--sim-bisect", "planted:1.2..1.5", "landed", "--reps=5", "test_planted.py"
+    result = simbench(  # what the history has recorded is not run again
+        pytester, "bisect", "planted:1.2..1.5", "landed", "--reps=5", "test_planted.py"
     )
     assert result.ret == 0
     result.stdout.fnmatch_lines(
@@ -47,7 +46,7 @@ def test_history_bisection_and_gate(pytester: pytest.Pytester) -> None:
          "the first worse release is 1.3: 1.2 landed 100 %, 1.3 landed 0 % (p = 0.03*)",
          f"results: {folder}"]
     )  # fmt: skip
-    assert recorded() == 20
+    assert len(records(folder)) == 20
 
     result = pytester.runpytest_subprocess(
         "--sim=planted==1.2,planted==1.3", "--sim-baseline=planted==1.2", "--reps=5",
@@ -80,7 +79,10 @@ def test_a_worker_with_another_release_than_its_name_says(pytester: pytest.Pytes
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--sim-bisect", "planted:1.0..1.9", "landed"], "no planted-engine 1.9 for Python *"),
+        (
+            ["--sim-bisect", "planted:1.0..1.9", "landed"],
+            "simbench bisect: no planted-engine 1.9 for Python *",
+        ),
         (["--sim=planted==1.2", "--sim-baseline=planted==1.2"], "*no other version of planted*"),
         (["--sim-history=ode:3"], "--sim-history: ode comes with packages of the system*"),
     ],

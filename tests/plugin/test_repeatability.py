@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 
 import pytest
+
+from tests.cli.command import simbench
 
 TEST = """
     from pytest_simbench.tasks import Moment
@@ -117,13 +117,8 @@ def test_a_failing_example_shrinks_and_tells_how_to_replay(pytester: pytest.Pyte
     assert "height=42" in text
     assert "HealthCheck" not in text
     (example,) = (pytester.path / "out" / "examples").iterdir()
-    command = f"python -m pytest_simbench.repeatability out/examples/{example.name}"
+    command = f"simbench replay out/examples/{example.name}"
     assert f"replay this episode: {command}" in text
-    replayed = subprocess.run(
-        [sys.executable, *command.split()[1:]],
-        cwd=pytester.path,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert replayed.stdout.startswith("mujoco headless tuned, t = 0.200 s\n  a: 0.0000 0.0000 0.2")
+    replayed = simbench(pytester, *command.split()[1:])
+    assert replayed.ret == 0
+    replayed.stdout.fnmatch_lines(["mujoco headless tuned, t = 0.200 s", "  a: 0.0000 0.0000 0.2*"])

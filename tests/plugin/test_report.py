@@ -8,12 +8,9 @@ import re
 
 import pytest
 
-TEST = """
-    from tests.tiny import Falling
+from tests.cli.command import simbench
+from tests.plugin.inner import FALLING
 
-    def test_falling(repeat):
-        repeat(Falling())
-"""
 OTHER = """
     def test_sum(benchmark):
         assert benchmark(sum, [1, 2]) == 3
@@ -26,34 +23,23 @@ def run(pytester: pytest.Pytester, *arguments: str) -> pytest.RunResult:
 
 @pytest.fixture(autouse=True)
 def test_file(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(test_it=TEST)
+    pytester.makepyfile(test_it=FALLING)
 
 
-@pytest.mark.parametrize(
-    ("what", "options", "message"),
-    [
-        ("run.write_report", (), "Exit: interrupted while the report was made; the records are "
-         "kept in */o, and pytest --sim-report */o makes the report"),
-        ("merge.Report.of", ("--sim-report=o",), "--sim-report: interrupted; nothing that it "
-         "read was changed"),
-    ],
-)  # fmt: skip
-def test_an_interrupted_report_is_one_sentence(
-    pytester: pytest.Pytester, what: str, options: tuple[str, ...], message: str
-) -> None:
-    assert not options or run(pytester).ret == 0
+def test_an_interrupted_report_is_one_sentence(pytester: pytest.Pytester) -> None:
     pytester.makeconftest(
-        f"""
+        """
         import signal
-        from pytest_simbench.plugin import merge, run
-        {what} = lambda *given: signal.raise_signal(signal.SIGINT)
+        from pytest_simbench.plugin import run
+        run.write_report = lambda *given: signal.raise_signal(signal.SIGINT)
         """
     )
-    result = pytester.runpytest_subprocess(*options) if options else run(pytester)
+    result = run(pytester)
     assert result.ret == pytest.ExitCode.INTERRUPTED
-    result_text = f"{result.stdout.str()}\n{result.stderr.str()}"
-    assert "Traceback" not in result_text
-    assert fnmatch.filter(result_text.splitlines(), message)
+    assert "Traceback" not in f"{result.stdout.str()}\n{result.stderr.str()}"
+    lines = [*result.stdout.lines, *result.stderr.lines]
+    message = "interrupted while the report was made; the records are kept in */o, and simbench "
+    assert fnmatch.filter(lines, f"Exit: {message}report */o makes the report")
     assert len((pytester.path / "o" / "records.jsonl").read_text().splitlines()) == 5
 
 
@@ -91,7 +77,7 @@ def test_everything_is_told_with_v(pytester: pytest.Pytester) -> None:
 
 
 def test_a_failed_claim_makes_the_badge_red(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(test_it=TEST.rstrip() + ".assert_at_least('landed', 0.5)\n        assert 0")
+    pytester.makepyfile(test_it=FALLING.rstrip() + ".assert_at_least('landed', 0.5)\n    assert 0")
     result = run(pytester, "--sim-badge=badge.json")
     result.assert_outcomes(failed=1)
     assert json.loads((pytester.path / "badge.json").read_text())["color"] == "red"
@@ -118,7 +104,7 @@ def test_the_table_of_pytest_benchmark_comes_with_one_of_its_options(
 
 
 def test_benchmarks_of_others_keep_their_table(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(test_it=TEST, test_other=OTHER)
+    pytester.makepyfile(test_it=FALLING, test_other=OTHER)
     result = run(pytester)
     result.assert_outcomes(passed=2)
     table = result.stdout.str().partition("- benchmark")[2].partition("Legend")[0]
@@ -141,7 +127,7 @@ def test_a_kept_run_shows_how_it_ended(pytester: pytest.Pytester) -> None:
     (pytester.path / "base").rename(pytester.path / "elsewhere")
     kept = (pytester.path / "o" / "report.html").read_bytes()
     (pytester.path / "o" / "report.html").unlink()
-    result = pytester.runpytest_subprocess("--sim-report=o", "--sim-badge=badge.json")
+    result = simbench(pytester, "report", "o", "--badge=badge.json")
     assert result.ret == 0
     assert (pytester.path / "o" / "report.html").read_bytes() == kept
     result.stdout.fnmatch_lines([f"baseline: {pytester.path / 'base'}", "*landed*", "report: o/*"])
@@ -150,18 +136,18 @@ def test_a_kept_run_shows_how_it_ended(pytester: pytest.Pytester) -> None:
 
 def test_the_badge_of_merged_runs_is_that_of_all(pytester: pytest.Pytester) -> None:
     run(pytester)
-    pytester.makepyfile(test_it=TEST.rstrip() + ".assert_at_least('landed', 0.5)\n        assert 0")
+    pytester.makepyfile(test_it=FALLING.rstrip() + ".assert_at_least('landed', 0.5)\n    assert 0")
     pytester.runpytest_subprocess(
         "--sim=mujoco", "--reps=5", "--sim-output=second", "--sim-seed=3000"
     ).assert_outcomes(failed=1)
     badge = pytester.path / "badge.json"
-    for command in (["--sim-merge", "o", "second", "--sim-output=whole"], ["--sim-report=whole"]):
-        result = pytester.runpytest_subprocess("--sim-badge=badge.json", *command)
+    for command in (["merge", "o", "second", "--output=whole"], ["report", "whole"]):
+        result = simbench(pytester, *command, "--badge=badge.json")
         assert result.ret == 0
         assert json.loads(badge.read_text())["color"] == "red"
         badge.unlink()
     (pytester.path / "o" / "outcome.json").unlink()
-    pytester.runpytest_subprocess("--sim-report", "o", "--sim-badge=badge.json")
+    simbench(pytester, "report", "o", "--badge=badge.json")
     assert json.loads(badge.read_text())["message"] == "mujoco: 5 repetitions, not judged"
 
 

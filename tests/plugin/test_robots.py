@@ -1,12 +1,13 @@
-"""`--robot` and `--robots`: ids, records, baselines, and what a robot or a task cannot do."""
+"""`--robot`: ids, records, baselines, and what a robot or a task cannot do."""
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
+from fnmatch import fnmatchcase
 
 import pytest
 
+from pytest_simbench.plugin.selection import select
+from tests.plugin.inner import records
 from tests.robot.small_arm import TOML, small_arm
 
 HOLDING = '''
@@ -68,11 +69,6 @@ def run(pytester: pytest.Pytester, *arguments: str, ret: int = 0) -> pytest.RunR
     return result
 
 
-def records(folder: str) -> list[dict[str, object]]:
-    lines = Path(folder, "records.jsonl").read_text().splitlines()
-    return [json.loads(line) for line in lines]
-
-
 def test_a_run_with_another_robot(pytester: pytest.Pytester) -> None:
     """Its name is in the id and in the record; the default robot leaves no trace. A baseline of
     another robot is said to be one."""
@@ -90,7 +86,7 @@ def test_a_run_with_another_robot(pytester: pytest.Pytester) -> None:
         name.format(""), name.format("-ur5"), name.format("-small"),
     ]  # fmt: skip
     assert "robot" not in panda
-    assert [r["robot"]["name"] for r in (ur5, small)] == ["ur5", "small"]  # type: ignore[index]
+    assert [r["robot"]["name"] for r in (ur5, small)] == ["ur5", "small"]
     assert [r["metrics"] for r in (panda, ur5, small)] == [
         {"joints": 9.0}, {"joints": 8.0}, {"joints": 5.0},
     ]  # fmt: skip
@@ -183,6 +179,7 @@ def test_every_robot(pytester: pytest.Pytester) -> None:
     ("value", "message"),
     [
         ("ur7", "*--robot=ur7: unknown robot 'ur7'; choose from panda, so101, ur10, ur5, xarm7*"),
+        ("", "*robot='': give a name (simbench robots), a robot file, or all"),
         ("none.toml", "*--robot=none.toml: cannot read the robot file none.toml: No such file*"),
         ("bad.toml", "*--robot=bad.toml: bad.toml, [[]arm[]]: stiffness: -1 is no number of at*"),
     ],
@@ -190,28 +187,7 @@ def test_every_robot(pytester: pytest.Pytester) -> None:
 def test_a_robot_that_is_none(pytester: pytest.Pytester, value: str, message: str) -> None:
     path = small_arm(pytester.path, TOML.replace("2000.0", "-1"))
     path.rename(pytester.path / "bad.toml")
-    pytester.makepyfile("def test_it(repeat):\n    pass\n")
-    run(pytester, f"--robot={value}", ret=4).stderr.fnmatch_lines([message])
-    pytester.makeini(f"[pytest]\nrobot = {value}\n")
-    run(pytester, ret=4).stderr.fnmatch_lines([message])
-
-
-def test_a_robot_that_is_not_named(pytester: pytest.Pytester) -> None:
-    message = "*--robot='': give a name (pytest --robots), a robot file, or all"
-    run(pytester, "--robot=", ret=4).stderr.fnmatch_lines([message])
-
-
-def test_the_list_of_robots(pytester: pytest.Pytester) -> None:
-    path = small_arm(pytester.path)
-    result = run(pytester, "--robots", f"--robot={path}")
-    result.stdout.fnmatch_lines(
-        [
-            "panda: 7 arm joints, 2 fingers that open to 0.035 m, base at (0, 0, 0)",
-            "so101: 5 arm joints, one jaw that opens to 1 rad, base at (0, 0, 0)",
-            "ur5: 6 arm joints, 2 fingers*",
-            "small: 3 arm joints, 2 fingers that open to 0.04 m, base at (0.1, 0, 0.2)",
-            "    no stacking: robot 'small' cannot handle a cube at (0.12, -0.18, 0.20): it is *",
-            "    no throwing: robot 'small' has no swing for the throw: write one into its file*",
-            "    no pushing: robot 'small' cannot push the block: unreachable: *",
-        ]
-    )
+    for arguments in ([f"--robot={value}"], ["-o", f"robot={value}"]):
+        with pytest.raises(pytest.UsageError) as raised:
+            select(pytester.parseconfig(*arguments))
+        assert fnmatchcase(str(raised.value), message)

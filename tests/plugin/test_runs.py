@@ -8,26 +8,15 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import psutil
 import pytest
 
-TEST = """
-    import pytest
-    from tests.tiny import Falling
-
-    def test_falling(repeat):
-        repeat(Falling()).assert_at_least("landed", 0.1)
-"""
-
-
-def records(folder: Path) -> list[dict[str, object]]:
-    return [json.loads(line) for line in (folder / "records.jsonl").read_text().splitlines()]
+from tests.plugin.inner import CLAIMING, records
 
 
 def test_ids_table_records_and_logs(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(TEST)
+    pytester.makepyfile(CLAIMING)
     result = pytester.runpytest_subprocess(
         "--sim=mujoco,pybullet", "--reps=2", "--sim-output=out", "-v"
     )
@@ -84,44 +73,22 @@ def test_marks(pytester: pytest.Pytester) -> None:
 
 
 def test_ini_twins(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(TEST)
+    pytester.makepyfile(CLAIMING)
     pytester.makeini("[pytest]\nsim = mujoco\nreps = 2\nsim_output = here\n")
     result = pytester.runpytest_subprocess()
     result.assert_outcomes(passed=1)
     assert len(records(pytester.path / "here")) == 2
 
 
-def test_xdist_merges_records_and_prints_one_table(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(TEST)
-    result = pytester.runpytest_subprocess(
-        "--sim=mujoco,pybullet", "--reps=2", "--sim-output=out", "-n2", "-p", "no:randomly"
-    )
-    result.assert_outcomes(passed=2)
-    assert len(records(pytester.path / "out")) == 4
-    assert result.stdout.str().count("simulator comparison") == 1
-    result.stdout.fnmatch_lines(["mujoco*", "*pybullet*"])
-
-
-def test_jobs_run_side_by_side_and_say_so(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(TEST)
-    result = pytester.runpytest_subprocess(
-        "--sim=mujoco", "--reps=4", "--sim-jobs=2", "--sim-output=out"
-    )
-    result.assert_outcomes(passed=1)
-    kept = records(pytester.path / "out")
-    assert sorted(r["repetition"] for r in kept) == [1, 2, 3, 4]  # type: ignore[type-var]
-    assert all(r["contended"] for r in kept)
-
-
 def test_benchmark_rounds_are_worker_seconds_and_compare(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(TEST)
+    pytester.makepyfile(CLAIMING)
     arguments = ["--sim=mujoco", "--reps=3", "--benchmark-autosave"]
     pytester.runpytest_subprocess(
         *arguments, "--benchmark-json=b.json", "--sim-output=out"
     ).assert_outcomes(passed=1)
     (benchmark,) = json.loads((pytester.path / "b.json").read_text())["benchmarks"]
     kept = records(pytester.path / "out")
-    seconds = [r["stepping"]["wall"] for r in kept]  # type: ignore[index]
+    seconds = [r["stepping"]["wall"] for r in kept]
     assert benchmark["stats"]["rounds"] == 3
     assert benchmark["stats"]["min"] == pytest.approx(min(seconds))
     assert benchmark["stats"]["max"] == pytest.approx(max(seconds))
@@ -137,7 +104,7 @@ def test_benchmark_rounds_are_worker_seconds_and_compare(pytester: pytest.Pytest
 def test_trace(pytester: pytest.Pytester) -> None:
     import numpy as np
 
-    pytester.makepyfile(TEST)
+    pytester.makepyfile(CLAIMING)
     pytester.runpytest_subprocess("--sim=mujoco", "--reps=1", "--sim-output=o", "--sim-trace=on")
     (path,) = (pytester.path / "o" / "traces").iterdir()
     trace = np.load(path)
@@ -164,7 +131,7 @@ os.write = full
 def test_full_disk_loses_nothing(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pytester.makepyfile(TEST)
+    pytester.makepyfile(CLAIMING)
     pytester.makeconftest(FULL_DISK)
     monkeypatch.setenv("TMPDIR", str(pytester.mkdir("spare")))
     result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=2", "--sim-output=out")
@@ -238,10 +205,10 @@ def test_interrupt_prints_the_table_and_keeps_the_records(
 
 def test_k_and_x_choose_and_stop(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(
-        TEST
+        CLAIMING
         + """
-    def test_impossible(repeat):
-        repeat(Falling()).assert_at_most("landed", -1.0)
+def test_impossible(repeat):
+    repeat(Falling()).assert_at_most("landed", -1.0)
 """
     )
     arguments = ["--sim=mujoco,pybullet", "--reps=1"]
@@ -271,16 +238,10 @@ def test_plugin_load_is_light(pytester: pytest.Pytester) -> None:
     pytester.runpytest_subprocess(*plugins).assert_outcomes(passed=1)
 
 
-def test_sims_lists_and_exits(pytester: pytest.Pytester) -> None:
-    result = pytester.runpytest_subprocess("--sims")
-    assert result.ret == 0
-    result.stdout.fnmatch_lines(["mujoco: MuJoCo (Apache-2.0)*", "*deviates: *", "pybullet: *"])
-
-
 def test_gui_without_any_display_is_a_skip(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pytester.makepyfile(TEST)
+    pytester.makepyfile(CLAIMING)
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("PATH", str(pytester.mkdir("empty")))

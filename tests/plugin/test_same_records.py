@@ -8,11 +8,15 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from fnmatch import fnmatchcase
 from itertools import pairwise
 from pathlib import Path
 from textwrap import dedent
 
 import pytest
+
+from pytest_simbench.plugin.run import Run
+from tests.cli.command import simbench
 
 TEST = """
     import os
@@ -90,7 +94,9 @@ def run(pytester: pytest.Pytester, *arguments: str) -> pytest.RunResult:
 def test_side_by_side(
     pytester: pytest.Pytester, folder: Path, straight: list[str], arguments: list[str]
 ) -> None:
-    run(pytester, "--reps=4", "--sim-output=out", *arguments).assert_outcomes(passed=2)
+    result = run(pytester, "--reps=4", "--sim-output=out", *arguments)
+    result.assert_outcomes(passed=2)
+    assert result.stdout.str().count("simulator comparison") == 1
     assert kept(folder / "out", jobs="--sim-jobs=2" in arguments) == straight
 
 
@@ -122,7 +128,7 @@ def test_interrupted_and_resumed(
     stopped = run(pytester, "--reps=4", "--sim-output=out")
     assert stopped.ret == pytest.ExitCode.INTERRUPTED
     assert kept(folder / "out") == straight[:2]
-    assert stopped.stdout.str().count("1 cut") == 1
+    assert stopped.stdout.str().count("1 cut short") == 2  # the claims, the answer
     monkeypatch.delenv("STOP_AT")
     result = run(pytester, "--reps=4", "--sim-resume=out", *arguments)
     result.assert_outcomes(passed=2)
@@ -137,7 +143,7 @@ def test_sharded_and_merged_then_judged_without_running(
 ) -> None:
     run(pytester, "--reps=3", "--sim-output=a").assert_outcomes(passed=2)
     run(pytester, "--reps=1", "--sim-seed=10004", "--sim-output=b").assert_outcomes(passed=2)
-    merged = run(pytester, "--sim-merge", "b", "a", "--sim-output=whole")
+    merged = simbench(pytester, "merge", "b", "a", "--output=whole")
     assert merged.ret == pytest.ExitCode.OK
     merged.stdout.fnmatch_lines(["falling: 4 repetitions*"])
     assert kept(folder / "whole") == straight
@@ -148,22 +154,12 @@ def test_sharded_and_merged_then_judged_without_running(
     assert kept(folder / "whole") == straight
 
 
-def test_resuming_is_refused_with_the_difference(pytester: pytest.Pytester, folder: Path) -> None:
+def test_another_version_is_not_resumed(pytester: pytest.Pytester, folder: Path) -> None:
+    """Another test of the same simulator may have other settings, but not another version; nor may
+    a test of which nothing is missing."""
     run(pytester, "--reps=1", "--sim-output=out", "-k", "one").assert_outcomes(passed=1)
-    text = (folder / "out" / "records.jsonl").read_text()
-    for arguments, difference in (
-        (["--sim-set=mujoco.timestep=0.002"], "settings.timestep was 0.001, is 0.002"),
-        (["--jitter=0.5"], "jitter was 1.0, is 0.5"),
-        (["--sim-seed=3000"], "--sim-seed was 10001, is 3000"),
-    ):
-        result = run(pytester, "--reps=2", "--sim-resume=out", "-k", "one", *arguments)
-        result.assert_outcomes(failed=1)
-        result.stdout.fnmatch_lines([f"test_one*would not be comparable: {difference}"])
-        assert "Traceback" not in result.stdout.str()
-    # Another test of the same simulator may have other settings, but not another version; nor
-    # may a test of which nothing is missing.
     path = folder / "out" / "records.jsonl"
-    path.write_text(text.replace('"mujoco": "', '"mujoco": "0.'))
+    path.write_text(path.read_text().replace('"mujoco": "', '"mujoco": "0.'))
     result = run(pytester, "--reps=1", "--sim-resume=out")
     result.assert_outcomes(failed=2)
     result.stdout.fnmatch_lines(['test_one*would not be comparable: versions.mujoco was "0.*'])
@@ -178,34 +174,13 @@ def test_resuming_is_refused_with_the_difference(pytester: pytest.Pytester, fold
         (["--sim-resume=none"], "there is no run to resume in *none (it has no records.jsonl); *"),
         (["--sim-resume=a", "--sim-output=b"], "--sim-resume a and --sim-output b: *"),
         (["--sim-resume=bad"], "--sim-resume: *bad/records.jsonl:1: not JSON*"),
-        (["--sim-merge", "none"], "--sim-merge none: cannot read records from *"),
-        (["--sim-merge", "a", "a"], "--sim-merge a: the run is given twice"),
-        (["--sim-merge", "a", "b"], "--sim-merge: a and b overlap: both have seed 10001 of *"),
-        (["--sim-merge", "a", "--sim-output=b"], "--sim-merge: *b already holds a run; *"),
-        (["--sim-merge", "empty"], "--sim-merge: none of the runs holds a repetition that ended"),
-        (
-            ["--sim-report", "none"],
-            "--sim-report none: cannot read records from *No such file*",
-        ),
-        (["--sim-report", "empty"], "--sim-report empty: it holds no repetition"),
-        (["--sim-report", "bad"], "--sim-report bad: *bad/records.jsonl:1: not JSON*"),
-        (["--sim-report", "a", "./a"], "--sim-report ./a: the run is given twice"),
-        (["--sim-report", "a", "b"], "--sim-report: a and b overlap: both have seed 10001 of *"),
-        (
-            ["--sim-report", "a", "--sim-output=b"],
-            "--sim-report: *b holds another run; *",
-        ),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
 def test_bad_input_is_one_sentence(
-    pytester: pytest.Pytester, request: pytest.FixtureRequest, arguments: list[str], message: str
+    pytester: pytest.Pytester, arguments: list[str], message: str
 ) -> None:
-    real = Path(request.config.rootpath, "tests/measure/stacking_records.jsonl")
-    first = real.read_text().splitlines()[0] + "\n"
-    for name, text in (("a", first), ("b", first), ("bad", "no record\n"), ("empty", "")):
-        pytester.mkdir(name).joinpath("records.jsonl").write_text(text)
-    result = run(pytester, *arguments)
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines([f"ERROR: {message}"])
-    assert "Traceback" not in result.stderr.str() + result.stdout.str()
+    pytester.mkdir("bad").joinpath("records.jsonl").write_text("no record\n")
+    with pytest.raises(pytest.UsageError) as raised:
+        Run(pytester.parseconfig(*arguments))
+    assert fnmatchcase(str(raised.value), message)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
+
+from tests.cli.command import simbench
+from tests.plugin.inner import records
 
 SUITE = Path(__file__).resolve().parents[2] / "suites" / "test_physics.py"
 
 
 def ids(folder: Path) -> list[str]:
-    lines = (folder / "records.jsonl").read_text().splitlines()
-    return [json.loads(line)["test"].partition("::")[2] for line in lines]
+    return [record["test"].partition("::")[2] for record in records(folder)]
 
 
 def test_a_sweep_of_two_profiles_is_one_run_that_is_resumed_and_reported(
@@ -65,5 +66,5 @@ def test_a_sweep_of_two_profiles_is_one_run_that_is_resumed_and_reported(
     text = (out / "report.md").read_text()
     assert "free\\_fall | 1.00 [" in text
     assert "no such step for me" in text
-    again = pytester.runpytest_subprocess("--sim-report", "out")
+    again = simbench(pytester, "report", "out")
     again.stdout.fnmatch_lines(["the same laws over time steps", "mujoco (tuned) *2/2 [12]*ms *"])

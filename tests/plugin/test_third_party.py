@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import os
 from pathlib import Path
 
 import pytest
 
 from pytest_simbench.laws import LAWS
+from tests.cli.command import simbench
+from tests.plugin.inner import records
 
 ADAPTER = '''
 """A third party's simulator: MuJoCo with a coarser step, under its own name."""
@@ -50,7 +51,7 @@ def test_third_party_simulator_runs_all_suites(
         "-k", "not test_law or free_fall",
     )  # fmt: skip
     result.assert_outcomes(passed=9, skipped=4, deselected=len(LAWS) - 1)  # no measured data
-    kept = [json.loads(line) for line in (output / "records.jsonl").read_text().splitlines()]
+    kept = records(output)
     assert [(r["simulator"], r["task"], r["status"]) for r in kept] == [
         ("elsewhere", "free_fall", "ok"),
         ("elsewhere", "pushing", "ok"),
@@ -59,4 +60,4 @@ def test_third_party_simulator_runs_all_suites(
         ("elsewhere", "throwing", "ok"),
     ]
     assert {r["settings"]["timestep"] for r in kept} == {0.002}
-    assert "elsewhere: Elsewhere" in pytester.runpytest_subprocess("--sims").stdout.str()
+    assert "elsewhere: Elsewhere" in simbench(pytester, "list", "-v").stdout.str()

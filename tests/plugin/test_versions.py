@@ -11,6 +11,7 @@ import pytest
 from pytest_simbench.client.environments import MARKER, Environment
 from pytest_simbench.plugin.selection import select
 from pytest_simbench.simulator.registry import adapter
+from tests.plugin.inner import records
 
 
 def wrapper(python: Path) -> Path:
@@ -60,12 +61,9 @@ def test_versions_side_by_side(pytester: pytest.Pytester, release: str) -> None:
     result.assert_outcomes(passed=6, skipped=1)
     for name in ("mujoco", release, "mujoco@mine"):
         result.stdout.fnmatch_lines([f"{name} *"])  # of a table
-    lines = (pytester.path / "out" / "records.jsonl").read_text().splitlines()
-    found = {
-        (record["simulator"], record["settings"]["timestep"], record["seed"])
-        for record in map(json.loads, lines)
-    }
-    tests = {record["test"].partition("::")[2] for record in map(json.loads, lines)}
+    kept = records(pytester.path / "out")
+    found = {(r["simulator"], r["settings"]["timestep"], r["seed"]) for r in kept}
+    tests = {record["test"].partition("::")[2] for record in kept}
     assert tests == {f"test_falling[{name}-headless]" for name, _, _ in found}
     steps = {"mujoco": 0.001, release: 0.004, "mujoco@mine": 0.001}
     assert found == {(name, step, seed) for name, step in steps.items() for seed in (10001, 10002)}
@@ -76,7 +74,7 @@ def test_versions_side_by_side(pytester: pytest.Pytester, release: str) -> None:
     [
         (["--sim=mujoco==abc d"], "'abc d' is no version; write mujoco==3.3.7"),
         (["--sim=nosuch==1.0"], "unknown simulator 'nosuch==1.0'; choose from "),
-        (["--sim=mujoco==3.3.7"], "not there yet: pytest --sim-install mujoco==3.3.7"),
+        (["--sim=mujoco==3.3.7"], "not there yet: simbench install mujoco==3.3.7"),
         (["--sim=mujoco@"], "give a path"),
         (["--sim=mujoco@./nowhere"], "there is no such file"),
         (["--sim=mujoco@a b=python"], "a label has letters"),
@@ -105,13 +103,3 @@ def test_a_build_without_a_label_is_called_by_its_version(
     name = release.replace("==", "@")
     assert selection.simulators == (name,)
     assert selection.pythons == {name: str(python)}
-
-
-def test_the_environments_that_are_there(pytester: pytest.Pytester, release: str) -> None:
-    result = pytester.runpytest_subprocess("--sim-environments")
-    assert result.ret == 0
-    result.stdout.fnmatch_lines([f"{release}: 0 MB, MuJoCo *", "0 MB in *"])
-    for code, line in ((0, f"{release}: removed, 0 MB"), (4, "*choose from none is there")):
-        result = pytester.runpytest_subprocess("--sim-uninstall", release)
-        assert result.ret == code
-        (result.stdout if code == 0 else result.stderr).fnmatch_lines([line])

@@ -19,4 +19,5 @@ def test_the_page_is_up_to_date() -> None:
 
 def test_the_page_names_every_option() -> None:
     page = (DOCS / "options.md").read_text("utf-8")
-    assert [item.flag for item in OPTIONS for flag in item.flags if f"`{flag}" not in page] == []
+    names = [name for item in OPTIONS for name in (item.flag, item.sure)]
+    assert [name for name in names if f"`{name}" not in page] == []

@@ -48,7 +48,7 @@ def test_shrinks_to_the_margin_and_tells_how_to_replay(
     with pytest.raises(
         AssertionError,
         match=r"mm in x of cube_01 topples tower 1, though it should bear 9 mm\n"
-        r"replay it: python -m pytest_simbench\.repeatability .*smallest-leaning_towers-mujoco",
+        r"replay it: simbench replay .*smallest-leaning_towers-mujoco",
     ):
         finding.assert_not_below("x", 0.009)
     assert main([finding.replay.rpartition(" ")[2]]) == 0

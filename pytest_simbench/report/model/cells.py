@@ -46,7 +46,7 @@ def spread(found: Spread | None, metric: Metric) -> Cell:
     if found is None:
         return Cell([MISSING])
     if metric.kind == "yes_no":
-        yes, share = round(found.mean * found.count), metric_value(found.mean, metric)
+        yes, share = f"{found.mean * found.count:.0f}", metric_value(found.mean, metric)
         lines = [f"{yes} of {found.count}", f"{share} {interval(found, metric)}".rstrip()]
         return Cell(lines, found.mean)
     parts = (found.min, found.mean, found.max)

@@ -1,4 +1,4 @@
-"""Hooks that keep what pytest itself prints of us harmless: usage errors and failing tests.
+"""Hooks that sanitise what pytest itself prints of us: usage errors and failing tests.
 
 A message may quote a record, a worker's log or a file's name. Standard library and pytest only.
 """
@@ -31,7 +31,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, Any]:
     """The report of a test that uses a simulator."""
     report = yield
     if "sim_case" in getattr(item, "fixturenames", ()):
-        report.longrepr = _harmless(report.longrepr)
+        report.longrepr = _sanitised(report.longrepr)
     return report
 
 
@@ -43,12 +43,12 @@ def pytest_warning_recorded(warning_message: Any) -> None:
         warning.args = tuple(for_terminal(str(arg)) for arg in warning.args)
 
 
-def _harmless(shown: Any) -> Any:
+def _sanitised(shown: Any) -> Any:
     """A failure's or a skip's representation, whose lines are all printable."""
     if isinstance(shown, str):
         return for_terminal(shown, LONGEST_LINE)
     if isinstance(shown, tuple):  # of a skip: path, line, reason
-        return tuple(_harmless(part) for part in shown)
+        return tuple(_sanitised(part) for part in shown)
     chain = getattr(shown, "chain", None) or [
         (getattr(shown, "reprtraceback", None), getattr(shown, "reprcrash", None), None)
     ]

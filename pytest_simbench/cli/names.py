@@ -6,27 +6,30 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Iterable
+from pathlib import Path
 
-import pytest
-
+from pytest_simbench.cli.interpreters import interpreter_path
+from pytest_simbench.cli.values import BadInput, shown
 from pytest_simbench.client.environments import Environment, create_all, outside
 from pytest_simbench.client.system import OLDEST, look_into
 from pytest_simbench.ground.versions import BUILD, RELEASE, VersionedName, base_name
-from pytest_simbench.plugin.interpreters import interpreter_path
-from pytest_simbench.plugin.values import shown
 from pytest_simbench.simulator.info import no_module
 from pytest_simbench.simulator.registry import adapter, check_names
 
 LABEL = re.compile(r"[A-Za-z0-9](?:[\w.+-]{0,58}\w)?", re.ASCII)
 
 
-def read_names(asked: Iterable[str], config: pytest.Config) -> tuple[list[str], dict[str, str]]:
+def read_names(asked: Iterable[str], here: Path) -> tuple[list[str], dict[str, str]]:
     """Names of simulators, and the interpreters of the builds among them by name.
 
     A build without a label is called by the version that its interpreter has.
 
+    Args:
+        asked: as a user wrote them.
+        here: folder where a relative path begins.
+
     Raises:
-        pytest.UsageError: an unknown simulator, a version that is none, an interpreter that
+        BadInput: an unknown simulator, a version that is none, an interpreter that
             cannot be used; one sentence.
     """
     names: list[str] = []
@@ -38,35 +41,31 @@ def read_names(asked: Iterable[str], config: pytest.Config) -> tuple[list[str], 
             names.append(text)
             continue
         check_names([base])
+        where = shown(text)
         if base != base_name(base):
-            raise pytest.UsageError(
-                f"--sim={shown(text)}: a build has no release; write {base_name(base)}@PYTHON"
-            )
-        where = f"--sim={shown(text)}"
+            raise BadInput(f"{where}: a build has no release; write {base_name(base)}@PYTHON")
         label, equals, path = rest.partition("=")
         if not equals:
             label, path = "", rest
         elif not LABEL.fullmatch(label):
-            raise pytest.UsageError(
-                f"{where}: a label has letters, digits, and . + - _ between them"
-            )
+            raise BadInput(f"{where}: a label has letters, digits, and . + - _ between them")
         if not path.strip():
-            raise pytest.UsageError(f"{where}: write it as {base}@PYTHON or {base}@LABEL=PYTHON")
-        python = interpreter_path(path, where, config)
+            raise BadInput(f"{where}: write it as {base}@PYTHON or {base}@LABEL=PYTHON")
+        python = interpreter_path(path, where, here)
         version = _version(base, python, where)
         if not (label or version):
-            raise pytest.UsageError(
+            raise BadInput(
                 f"{where}: {python} does not tell the version of {base}; give the build a label: "
                 f"{base}@LABEL=PYTHON"
             )
         name = f"{base}{BUILD}{label or version}"
         if builds.get(name, python) != python:
-            raise pytest.UsageError(
+            raise BadInput(
                 f"{where}: another build is called {name} too; give each a label: "
                 f"{base}@LABEL=PYTHON"
             )
         if refused := adapter(base).info.refused(version):
-            raise pytest.UsageError(f"{where}: {refused}")
+            raise BadInput(f"{where}: {refused}")
         builds[name] = python
         names.append(name)
     return names, builds
@@ -76,8 +75,8 @@ def _check_release(text: str) -> None:
     """Complain of `==` without a version behind it."""
     base, equals, version = text.partition(RELEASE)
     if equals and VersionedName.of(text).which != version:
-        raise pytest.UsageError(
-            f"--sim={shown(text)}: {shown(version)!r} is no version; write {shown(base)}==3.3.7, "
+        raise BadInput(
+            f"{shown(text)}: {shown(version)!r} is no version; write {shown(base)}==3.3.7, "
             "for instance"
         )
 
@@ -88,14 +87,14 @@ def _version(base: str, python: str, where: str) -> str:
     info = adapter(base).info
     found = look_into(python, info.distribution, ("numpy", *info.modules))
     if found is None:
-        raise pytest.UsageError(f"{where}: {python} does not run, or is no Python")
+        raise BadInput(f"{where}: {python} does not run, or is no Python")
     if tuple(found["python"]) < OLDEST:
-        raise pytest.UsageError(
+        raise BadInput(
             f"{where}: {python} is Python {'.'.join(map(str, found['python']))}, older than "
             f"{'.'.join(map(str, OLDEST))}"
         )
     if found["absent"]:
-        raise pytest.UsageError(f"{where}: {python} has no module {no_module(found['absent'])}")
+        raise BadInput(f"{where}: {python} has no module {no_module(found['absent'])}")
     return found["version"] or ""
 
 

@@ -8,12 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.plugin.interpreters import checked_specification, interpreter_path
+from pytest_simbench.cli.interpreters import checked_specification, interpreter_path
+from pytest_simbench.cli.values import BadInput
+from pytest_simbench.plugin.selection import select
 
 
 @pytest.fixture
-def config(pytester: pytest.Pytester) -> pytest.Config:
-    return pytester.parseconfig()
+def here(tmp_path: Path) -> Path:
+    return tmp_path
 
 
 def wrapper(path: Path, executable: bool = True) -> Path:
@@ -39,35 +41,31 @@ def wrapper(path: Path, executable: bool = True) -> Path:
         ("/dev/null", "the file cannot be executed"),
     ],
 )
-def test_no_interpreter(config: pytest.Config, text: str, message: str) -> None:
-    here = config.invocation_params.dir
+def test_no_interpreter(here: Path, text: str, message: str) -> None:
     (here / "folder").mkdir()
     wrapper(here / "venv" / "bin" / "python")
     wrapper(here / "plain.txt", executable=False)
-    with pytest.raises(pytest.UsageError, match=f"^--sim-python=x: {message}"):
-        interpreter_path(text, "--sim-python=x", config)
+    with pytest.raises(BadInput, match=f"^--sim-python=x: {message}"):
+        interpreter_path(text, "--sim-python=x", here)
 
 
-def test_paths_become_absolute(config: pytest.Config, monkeypatch: pytest.MonkeyPatch) -> None:
-    here = config.invocation_params.dir
+def test_paths_become_absolute(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     python = wrapper(here / "a, b" / "bin" / "python")
     monkeypatch.setenv("HOME", str(here))
     monkeypatch.setenv("PATH", f"{python.parent}:{os.environ['PATH']}")
     for text in (str(python), "a, b/bin/python", "./a, b//bin///python", f"/{python}", "python",
                  "~/a, b/bin/python", "venv/../a, b/bin/python"):  # fmt: skip
-        assert interpreter_path(text, "", config) == str(python)
+        assert interpreter_path(text, "", here) == str(python)
 
 
-def test_a_link_is_not_followed(config: pytest.Config) -> None:
+def test_a_link_is_not_followed(here: Path) -> None:
     """A virtual environment's interpreter is a link, and knows by its path where it belongs."""
-    here = config.invocation_params.dir
     (here / "link").symlink_to(sys.executable)
-    assert interpreter_path("./link", "", config) == str(here / "link")
+    assert interpreter_path("./link", "", here) == str(here / "link")
 
 
-@pytest.mark.parametrize("name", ["with blank", "a,b", "a//b", "it's", 'say "x"', "50%", "ü"])
-def test_a_worker_runs_in_a_folder_of_any_name(pytester: pytest.Pytester, name: str) -> None:
-    wrapper(pytester.path / name / "python")
+def test_a_worker_runs_in_a_folder_of_any_name(pytester: pytest.Pytester) -> None:
+    wrapper(pytester.path / """a//b, it's "50%" ü""" / "python")
     pytester.makepyfile(
         """
         from pytest_simbench.scene import Scene
@@ -76,7 +74,8 @@ def test_a_worker_runs_in_a_folder_of_any_name(pytester: pytest.Pytester, name: 
             sim(Scene("s")).wait(0.1)
         """
     )
-    result = pytester.runpytest_subprocess("--sim=mujoco", f"--sim-python=mujoco={name}/python")
+    path = """a//b, it's "50%" ü/python"""
+    result = pytester.runpytest_subprocess("--sim=mujoco", f"--sim-python=mujoco={path}")
     result.assert_outcomes(passed=1)
 
 
@@ -106,7 +105,7 @@ def test_a_worker_runs_in_a_folder_of_any_name(pytester: pytest.Pytester, name: 
     ],
 )
 def test_no_specification(text: str, message: str) -> None:
-    with pytest.raises(pytest.UsageError, match=f"^--sim-spec=x: {message}"):
+    with pytest.raises(BadInput, match=f"^--sim-spec=x: {message}"):
         checked_specification(text, "--sim-spec=x")
 
 
@@ -133,7 +132,7 @@ def test_specifications(text: str) -> None:
 def test_said_before_anything_runs(
     pytester: pytest.Pytester, arguments: list[str], message: str
 ) -> None:
-    result = pytester.runpytest_subprocess(*arguments)
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines([f"ERROR: *{message}*"])
-    assert len(result.stderr.lines) <= 2
+    with pytest.raises(pytest.UsageError) as raised:
+        select(pytester.parseconfig(*arguments))
+    assert message in str(raised.value)
+    assert "\n" not in str(raised.value)

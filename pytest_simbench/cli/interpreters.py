@@ -8,7 +8,7 @@ import shutil
 from pathlib import Path
 from typing import NoReturn
 
-import pytest
+from pytest_simbench.cli.values import BadInput
 
 TYPES = ("popen", "ssh", "socket", "vagrant_ssh")
 """Of gateways that a worker may be behind. execnet's `via` needs a second gateway beside it."""
@@ -20,16 +20,16 @@ MODELS = ("main_thread_only", "thread")
 """Execution models of execnet that are plain Python."""
 
 
-def interpreter_path(text: str, where: str, config: pytest.Config) -> str:
+def interpreter_path(text: str, where: str, here: Path) -> str:
     """The absolute path of an interpreter given as a path (`~` allowed) or by its name on PATH.
 
     Args:
         text: as the user gave it.
         where: option and value, for the message.
-        config: says where a relative path begins.
+        here: folder where a relative path begins.
 
     Raises:
-        pytest.UsageError: there is none, or it cannot be executed.
+        BadInput: there is none, or it cannot be executed.
     """
     path = os.path.expanduser(text)
     if "/" not in path:
@@ -39,7 +39,7 @@ def interpreter_path(text: str, where: str, config: pytest.Config) -> str:
         path = found
     # Not resolved: a virtual environment's interpreter is a link, and must be called as one.
     # execnet separates what it is told by //.
-    path = "/" + os.path.normpath(Path(config.invocation_params.dir, path)).lstrip("/")
+    path = "/" + os.path.normpath(Path(here, path)).lstrip("/")
     if os.path.isdir(path):
         hint = Path(path, "bin", "python")
         _refuse(where, f"is a folder; give the interpreter in it{_if(hint)}")
@@ -58,7 +58,7 @@ def checked_specification(text: str, where: str) -> str:
     """An execnet specification such as `ssh=host//python=/usr/bin/python3`.
 
     Raises:
-        pytest.UsageError: execnet would not understand it; one sentence.
+        BadInput: execnet would not understand it; one sentence.
     """
     parts: dict[str, str] = {}
     for part in text.split("//"):
@@ -98,4 +98,4 @@ def _check_command(text: str, where: str) -> None:
 
 
 def _refuse(where: str, why: str) -> NoReturn:
-    raise pytest.UsageError(f"{where}: {why}")
+    raise BadInput(f"{where}: {why}")

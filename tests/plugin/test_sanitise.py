@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.command import simbench
 from tests.hostile import assert_harmless_terminal
 
 EVIL = "\x1b]0;owned\x07\x1b[2Jred\r\u202e\x9b31m"
@@ -78,7 +79,7 @@ RECORDS = Path(__file__).parents[1] / "measure" / "stacking_records.jsonl"
 
 def test_merging_and_comparing(pytester: pytest.Pytester) -> None:
     hostile_run(pytester.path / "a", RECORDS)
-    result = pytester.runpytest_subprocess("--sim-merge", "a", "--sim-output=both")
+    result = simbench(pytester, "merge", "a", "--output=both")
     text = plain(result)
     assert result.ret == 0
     assert r"\x1b]0;owned" in text
@@ -103,7 +104,7 @@ def test_a_usage_error(pytester: pytest.Pytester, line: dict[str, object]) -> No
     record = {**json.loads(RECORDS.read_text().splitlines()[0]), **line}
     folder = pytester.mkdir("\x1b[2Jrun")
     (folder / "records.jsonl").write_text(json.dumps(record) + "\n")
-    for option in ("--sim-merge", "--sim-baseline"):
-        result = pytester.runpytest_subprocess(option, folder.name, "--color=no")
-        assert result.ret == pytest.ExitCode.USAGE_ERROR
-        assert re.search(r"ERROR: .*\\x1b\[2Jrun", plain(result))
+    result = pytester.runpytest_subprocess("--sim-baseline", folder.name, "--color=no")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    assert re.search(r"ERROR: .*\\x1b\[2Jrun", plain(result))
+    assert re.search(r"merge: .*\\x1b\[2Jrun", plain(simbench(pytester, "merge", folder.name)))

@@ -1,18 +1,24 @@
-"""`--sim-bisect NAME:GOOD..BAD METRIC`: the first release in which a metric is worse.
+"""`simbench bisect NAME:GOOD..BAD METRIC`: the first release in which a metric is worse.
 
 Each step is a pytest run of its own, with the same tests and options, on one more release. All of
 them lie in one folder, that of `--sim-history` with the same settings: what is recorded there is
 not run again.
+
+Which folder that is depends on all options, and on the ini file. So the command starts pytest,
+whose plugin knows them and calls `bisect`.
 """
 
 from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
+from pytest_simbench.cli.values import BadInput, Span, shown
 from pytest_simbench.client import package_index
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.measure.bisection import (
@@ -24,25 +30,27 @@ from pytest_simbench.measure.bisection import (
 )
 from pytest_simbench.measure.limits import CRASHED, named
 from pytest_simbench.measure.results import ResultSet
-from pytest_simbench.plugin import options
-from pytest_simbench.plugin.history import folder_of
-from pytest_simbench.plugin.values import Span, shown
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.metrics import Metric, UnknownMetric
 from pytest_simbench.records.series import series
-from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.registry import adapter
 
 
-def bisect(config: pytest.Config) -> int:
+def bisect(wanted: Span, metric_name: str, folder: Path, arguments: Sequence[str]) -> int:
     """Find it, say so, and return the exit code: 1 where the bad release is not worse.
 
+    Args:
+        wanted: the releases.
+        metric_name: what is worse in the bad one.
+        folder: of all runs.
+        arguments: tests and options of each run.
+
     Raises:
-        pytest.UsageError: no such simulator, release or metric; a run that ends with an error.
+        BadInput: no such simulator, release or metric; a run that ends with an error.
+        SimulatorError: no such simulator, or no package index answers.
     """
-    wanted: Span = options.value(config, "sim_bisect")
     releases = _releases(wanted)
-    search = Search(config, wanted, releases)
+    search = Search(wanted.name, metric_name, releases, folder, arguments)
     last = len(releases) - 1
     print(
         f"bisecting {len(releases)} releases of {wanted.name}: {steps(len(releases))} steps, and "
@@ -53,12 +61,12 @@ def bisect(config: pytest.Config) -> int:
     good, bad = search.result(0), search.result(last)
     for end, place in ((good, 0), (bad, last)):
         if not (end.values(metric.name) if metric.name in end.known else len(end)):
-            raise pytest.UsageError(f"--sim-bisect: {search.told(place)}, so nothing tells worse")
+            raise BadInput(f"{search.describe(place)}, so nothing tells worse")
     found = difference(metric, good, bad)
     if not found.significant():
         print(
-            f"{search.told(0)}, {search.told(last)}: these repetitions do not show that it is "
-            f"worse (p = {found.p_value:.2g}), so there is nothing to find; try more of them, "
+            f"{search.describe(0)}, {search.describe(last)}: these repetitions do not show that it "
+            f"is worse (p = {found.p_value:.2g}), so there is nothing to find; try more of them, "
             "--reps 40 for instance"
         )
         return 1
@@ -66,72 +74,78 @@ def bisect(config: pytest.Config) -> int:
     def is_worse(place: int) -> bool:
         search.run(place)
         worse = like_the_bad_one(metric, good, bad, search.result(place))
-        print(f"{search.told(place)}: {'worse' if worse else 'good'}", flush=True)
+        print(f"{search.describe(place)}: {'worse' if worse else 'good'}", flush=True)
         return worse
 
     place = first_worse(len(releases), is_worse)
     before = search.result(place - 1)
     p_value = difference(metric, before, search.result(place)).p_value if before.ok else 1.0
     print(
-        f"the first worse release is {releases[place]}: {search.told(place - 1)}, "
-        f"{search.told(place)} (p = {p_value:.2g})"
+        f"the first worse release is {releases[place]}: {search.describe(place - 1)}, "
+        f"{search.describe(place)} (p = {p_value:.2g})"
     )
     print(f"results: {search.folder}")
     return 0
+
+
+def start(span: Span, metric: str, arguments: Sequence[str]) -> int:
+    """Have the plugin of pytest call `bisect` for these tests and options; pytest's exit code."""
+    releases = f"{span.name}:{span.good}..{span.bad}"
+    own = [sys.modules[__name__]]  # tells the plugin who asks
+    return int(pytest.main([*arguments, "--sim-bisect", releases, metric], plugins=own))
 
 
 def _releases(wanted: Span) -> list[str]:
     """The releases from the good one to the bad one.
 
     Raises:
-        pytest.UsageError: no such simulator or release; one sentence.
+        BadInput: no such simulator or release; one sentence.
     """
-    with options.refusing(SimulatorError, "--sim-bisect"):
-        info = adapter(wanted.name).info
-        known = package_index.releases(info.distribution)
-        for version in (wanted.good, wanted.bad):
-            problem = package_index.unreleased(info.distribution, version, known)
-            if problem or version not in known:
-                raise pytest.UsageError(f"--sim-bisect: {problem or f'write {version} in full'}")
-            if refused := info.refused(version):
-                raise pytest.UsageError(f"--sim-bisect: {refused}")
+    info = adapter(wanted.name).info
+    known = package_index.releases(info.distribution)
+    for version in (wanted.good, wanted.bad):
+        problem = package_index.unreleased(info.distribution, version, known)
+        if problem or version not in known:
+            raise BadInput(problem or f"write {version} in full")
+        if refused := info.refused(version):
+            raise BadInput(refused)
     return between(known, wanted.good, wanted.bad)
 
 
+@dataclass(frozen=True)
 class Search:
     """The runs of a bisection.
 
-    Args:
-        config: of the command.
-        wanted: what it looks for.
-        releases: from the good one to the bad one.
-
     Attributes:
+        simulator: whose releases are compared.
+        metric_name: what is looked at.
+        releases: from the good one to the bad one.
         folder: of all runs.
+        arguments: tests and options of each run.
     """
 
-    def __init__(self, config: pytest.Config, wanted: Span, releases: list[str]) -> None:
-        given = options.value(config, "sim_output")
-        here = config.invocation_params.dir
-        self.folder = Path(here, given) if given else folder_of(config, wanted.name)
-        self._config, self._wanted, self._releases = config, wanted, releases
+    simulator: str
+    metric_name: str
+    releases: Sequence[str]
+    folder: Path
+    arguments: Sequence[str]
 
     def run(self, *places: int) -> None:
         """Run the tests on some of the releases, unless the folder holds that."""
         names = ",".join(self._name(place) for place in places)
         keep = "--sim-resume" if RunFolder(self.folder).holds_run else "--sim-output"
         command = [
-            *(sys.executable, "-m", "pytest", *self._arguments(), f"{keep}={self.folder}"),
+            *(sys.executable, "-m", "pytest", *self.arguments, f"{keep}={self.folder}"),
             *(f"--sim-name={names}", "--sim-install-missing", "-q"),
         ]
         done = subprocess.run(
-            command, cwd=self._config.invocation_params.dir, text=True, errors="replace",
+            command, text=True, errors="replace",
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
         )  # fmt: skip
         if done.returncode not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED):
             lines = [line for line in done.stdout.splitlines() if line.strip()]
-            raise pytest.UsageError(
-                f"--sim-bisect: the run on {names} ended with exit code {done.returncode}: "
+            raise BadInput(
+                f"the run on {names} ended with exit code {done.returncode}: "
                 f"{for_terminal(' '.join(lines[-3:]))[:600]}"
             )
 
@@ -139,22 +153,24 @@ class Search:
         """What is looked at.
 
         Raises:
-            pytest.UsageError: no test has it, or several have, or neither direction is worse.
+            BadInput: no test has it, or several have, or neither direction is worse.
         """
-        name, result = self._wanted.metric, self.result(0)
+        name, result = self.metric_name, self.result(0)
         if named(name, result.known) == CRASHED.name:
             return CRASHED
-        with options.refusing(UnknownMetric, "--sim-bisect"):
+        try:
             metric = result.metric(name)
+        except UnknownMetric as error:
+            raise BadInput(str(error)) from None
         if metric.better is None:
-            raise pytest.UsageError(f"--sim-bisect: {name} can be neither better nor worse")
+            raise BadInput(f"{name} can be neither better nor worse")
         return metric
 
     def result(self, place: int) -> ResultSet:
         """What a release scored.
 
         Raises:
-            pytest.UsageError: the folder holds nothing of it, or several tests.
+            BadInput: the folder holds nothing of it, or several tests.
         """
         reading = RunFolder(self.folder).read()
         rows = [
@@ -165,31 +181,24 @@ class Search:
         ]
         if len(rows) > 1:
             names = {task: [m.name for m in known] for task, known in reading.metrics.items()}
-            rows = [r for r in rows if self._wanted.metric in names[r.records[0].task]]
+            rows = [r for r in rows if self.metric_name in names[r.records[0].task]]
         if len(rows) != 1:
             what = "no test" if not rows else "more than one test"
-            raise pytest.UsageError(
-                f"--sim-bisect: {what} with {shown(self._wanted.metric)} has run on "
+            raise BadInput(
+                f"{what} with {shown(self.metric_name)} has run on "
                 f"{self._name(place)}; choose one test, with its file or with -k"
             )
         records = rows[0].records
         return ResultSet(records, reading.metrics[records[0].task])
 
-    def told(self, place: int) -> str:
+    def describe(self, place: int) -> str:
         """What a release scored, in words."""
-        name, result = self._wanted.metric, self.result(place)
+        name, result = self.metric_name, self.result(place)
         crashed = f", {len(result.crashed)} crashed" if result.crashed else ""
         if name in result.known and result.values(name):
             mean = result.metric(name).format(result.interval(name).mean)
-            return f"{self._releases[place]} {name} {mean}{crashed}"
-        return f"{self._releases[place]} {len(result.crashed)} of {len(result)} crashed"
+            return f"{self.releases[place]} {name} {mean}{crashed}"
+        return f"{self.releases[place]} {len(result.crashed)} of {len(result)} crashed"
 
     def _name(self, place: int) -> str:
-        return f"{self._wanted.name}=={self._releases[place]}"
-
-    def _arguments(self) -> list[str]:
-        """The command line, without what this command is asked for."""
-        found = list(self._config.invocation_params.args)
-        place = found.index("--sim-bisect")
-        kept = [*found[:place], *found[place + 3 :]]
-        return [text for text in kept if not text.startswith("--sim-output=")]
+        return f"{self.simulator}=={self.releases[place]}"

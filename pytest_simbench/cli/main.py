@@ -1,0 +1,193 @@
+"""The command `simbench`: its arguments, and what is said of wrong ones.
+
+What a command needs is imported when it runs: `simbench --help` answers at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, NoReturn
+
+from pytest_simbench.cli import values as read
+
+BAD_INPUT = 2
+"""Exit code, as argparse has it."""
+
+INTERRUPTED = 130
+"""Exit code, as shells have it."""
+
+
+@dataclass(frozen=True)
+class Argument:
+    """An argument of a command.
+
+    Attributes:
+        name: as typed, or, without dashes, of the parameter that takes the values by their place.
+        type: makes the value of a text.
+        metavar: placeholder of the value in the help.
+        help: what it says.
+        nargs: how many values it takes, as argparse has it.
+    """
+
+    name: str
+    type: Callable[[str], Any]
+    metavar: str
+    help: str
+    nargs: str | None = None
+
+
+@dataclass(frozen=True)
+class Subcommand:
+    """A command.
+
+    Attributes:
+        name: of it.
+        function: `module:name` of what does the work. It takes the arguments by their names; one
+            called `main` takes the words and reads them itself.
+        help: what it does.
+        more: a second sentence for its own help.
+        arguments: that it takes.
+        verbose: what -v adds; empty for a command without it.
+    """
+
+    name: str
+    function: str
+    help: str
+    more: str = ""
+    arguments: tuple[Argument, ...] = ()
+    verbose: str = ""
+
+
+_OF_RUNS = (
+    Argument("runs", read.file, "RUN", "folder of a run", "+"),
+    Argument("--output", read.file, "DIR", "folder to write to (default: of one run its own, of "
+             "merged ones a new one; report writes nothing of several then)"),
+    Argument("--badge", read.file, "FILE", "write the result as JSON for a badge of shields.io"),
+    Argument("--record", read.choice("mcap"), "mcap", "write each repetition's motion as a rosbag2 "
+             "folder"),
+)  # fmt: skip
+
+COMMANDS = (
+    Subcommand("list", "cli.simulators:list_simulators", "list the simulators, which are ready "
+            "here, and how to get the others", "", (
+                Argument("names", read.simulator, "NAME", "say of this one what it is, where it "
+                         "is, and how to get it; NAME==VERSION is a release", "*"),
+                Argument("--cluster", read.address, "ADDRESS", "ask the nodes of this cluster "
+                         "instead of this machine"),
+            ), "tell what each can do, and where it deviates from a scene"),
+    Subcommand("robots", "cli.robots:list_robots", "list the robots, and check robot files", "",
+            (Argument("names", read.robot, "NAME|FILE", "tell of this one alone", "*"),)),
+    Subcommand("install", "cli.environments:install", "make the environment of a simulator that "
+            "needs one of its own", "The others come with pip, as extras of this package.",
+            (Argument("names", read.word, "NAME", "a simulator, or a release: NAME==VERSION",
+                      "+"),)),
+    Subcommand("uninstall", "cli.environments:uninstall", "remove such environments", "",
+            (Argument("names", read.word, "NAME", "as simbench environments lists it", "+"),)),
+    Subcommand("environments", "cli.environments:list_environments", "list the environments that "
+            "are there, with their sizes"),
+    Subcommand("download", "cli.data_sets:download", "bring a measured data set from its public "
+            "source", "", (
+                Argument("names", read.word, "NAME", "of a data set", "+"),
+                Argument("--data", read.file, "DIR", "folder to bring it to (default: "
+                         "$SIMBENCH_DATA, else a cache of the user's)"),
+            )),
+    Subcommand("merge", "cli.runs:merge_runs", "join runs with different seeds, made on several "
+            "machines, into one", "", _OF_RUNS, "print whole tables"),
+    Subcommand("report", "cli.runs:report_runs", "print the tables and write the report of runs "
+            "again", "Their folders are enough. Several are merged first.", _OF_RUNS,
+            "print whole tables"),
+    Subcommand("bisect", "cli.bisect:start", "find the release in which a metric becomes worse",
+            "It runs the tests on releases between a good and a bad one.", (
+                Argument("span", read.span, "NAME:GOOD..BAD", "a simulator and two releases"),
+                Argument("metric", read.metric, "METRIC", "that is worse in BAD"),
+                Argument("arguments", str, "...", "tests and options of pytest",
+                         argparse.REMAINDER),
+            )),
+    Subcommand("stats", "measure.__main__:main", "print what the suites' claims let pass"),
+    Subcommand("replay", "repeatability.__main__:main", "replay an episode that a failing test "
+            "left in its run folder"),
+    Subcommand("cluster", "cluster.__main__:main", "start the head of a cluster, or a node of it"),
+    Subcommand("swing", "robot.swing:main", "find a swing for the throw of a robot"),
+)  # fmt: skip
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that complains in one sentence."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong with the arguments, and exit."""
+        self.exit(BAD_INPUT, f"{self.prog}: {message}; {self.prog} --help says more\n")
+
+
+def parser() -> Parser:
+    """The parser of all commands."""
+    top = Parser(
+        prog="simbench",
+        description="Compare robot simulators: everything besides the tests, which pytest runs.",
+        epilog="simbench COMMAND --help says what a command takes.",
+    )
+    commands = top.add_subparsers(metavar="COMMAND", dest="command", parser_class=Parser)
+    for command in COMMANDS:
+        about = f"{command.help[0].upper()}{command.help[1:]}. {command.more}".strip()
+        one = commands.add_parser(command.name, help=command.help, description=about)
+        for argument in command.arguments:
+            one.add_argument(
+                argument.name,
+                type=argument.type,
+                metavar=argument.metavar,
+                help=argument.help,
+                nargs=argument.nargs,
+            )
+        if command.verbose:
+            one.add_argument("-v", "--verbose", action="store_true", help=command.verbose)
+    return top
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Do what a command line asks for; the exit code: 2 for one that cannot be."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    functions = {command.name: command.function for command in COMMANDS}
+    name = words[0] if words else ""
+    if functions.get(name, "").endswith(":main"):
+        return int(_function(functions[name])(words[1:]) or 0)
+    top = parser()
+    given = vars(top.parse_args(words))
+    if given.pop("command") is None:
+        top.print_help(sys.stderr)
+        return BAD_INPUT
+    try:
+        return int(_function(functions[name])(**given))
+    except _complaints() as error:  # looked at when there is one
+        return _complain(name, str(error), BAD_INPUT)
+    except KeyboardInterrupt:
+        return _complain(name, "interrupted; nothing that it read was changed", INTERRUPTED)
+    except BrokenPipeError:  # of `simbench list | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+
+
+def _function(place: str) -> Callable[..., Any]:
+    module, _, name = place.partition(":")
+    found: Callable[..., Any] = getattr(import_module(f"pytest_simbench.{module}"), name)
+    return found
+
+
+def _complaints() -> tuple[type[Exception], ...]:
+    """The errors whose messages are for the user."""
+    from pytest_simbench.data.measured import DataError
+    from pytest_simbench.client.errors import ExecutorError
+    from pytest_simbench.simulator.errors import SimulatorError
+
+    return read.BadInput, SimulatorError, ExecutorError, DataError
+
+
+def _complain(command: str, sentence: str, status: int) -> int:
+    from pytest_simbench.ground.text import for_terminal
+
+    print(for_terminal(f"simbench {command}: {sentence}"), file=sys.stderr)
+    return status

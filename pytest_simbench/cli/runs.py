@@ -1,0 +1,367 @@
+"""`simbench merge` and `simbench report`: runs with different seeds as one, and runs shown again.
+
+The runs may come from anybody: of their folders only the records, what their numbers mean, and the
+files beside them that records name are read, nothing outside, and every file written has a name of
+ours.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import stat
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pytest_simbench.cli.values import BadInput
+from pytest_simbench.experiment.identity import file_stem_of
+from pytest_simbench.ground.text import for_terminal
+from pytest_simbench.records.folder import RECORDS, TASKS, Reading, RunFolder
+from pytest_simbench.records.merging import Merged, MergeError, merge, merge_tasks
+from pytest_simbench.records.paths import FolderError, new_name, opened, whole
+from pytest_simbench.records.record import Record, RecordError
+from pytest_simbench.report.files import (
+    Written,
+    shown,
+    where,
+    write_badge,
+    write_files,
+    write_outcome,
+    write_report,
+    write_tables,
+)
+from pytest_simbench.report.model import sweep
+from pytest_simbench.report.model.outcome import Outcome
+from pytest_simbench.report.model.report import Report
+from pytest_simbench.report.page import PAGE_NAME
+from pytest_simbench.report.replay.recorded import FOLDER, write_bags
+from pytest_simbench.report.terminal.parts import (
+    claim_lines,
+    history_lines,
+    render_changes,
+    render_tables,
+    sweep_lines,
+)
+from pytest_simbench.report.terminal.progress import Progress
+from pytest_simbench.report.terminal.run import render_brief, render_run
+
+RUNS = ".simbench"
+"""Where runs lie for which no folder is given."""
+
+
+@contextmanager
+def _refused(error: type[Exception], where: str = "") -> Iterator[None]:
+    """Make bad input of such errors in this block, after `WHERE: `."""
+    try:
+        yield
+    except error as reason:
+        raise BadInput(f"{where}: {reason}" if where else str(reason)) from None
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is wanted of runs besides their tables.
+
+    Attributes:
+        output: folder to write to; None for the one of a single run, or a new one.
+        badge: file to write a badge into.
+        record: `mcap` for recordings of their motions.
+        verbose: whether whole tables are printed.
+    """
+
+    output: str | None = None
+    badge: str | None = None
+    record: str | None = None
+    verbose: bool = False
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Runs that a user named.
+
+    Attributes:
+        folders: of each, by its name.
+        readings: what each holds, by its name.
+    """
+
+    folders: dict[str, RunFolder]
+    readings: dict[str, Reading]
+
+    @property
+    def problems(self) -> list[str]:
+        """What is wrong with them, one sentence each."""
+        return [text for reading in self.readings.values() for text in reading.problems]
+
+    @classmethod
+    def named(cls, names: Sequence[str]) -> Runs:
+        """Those of these folders, or files of records.
+
+        Raises:
+            BadInput: one cannot be read, or is named twice.
+        """
+        folders: dict[str, RunFolder] = {}
+        readings: dict[str, Reading] = {}
+        files: set[Path] = set()
+        for name in names:
+            path = Path(name)
+            file = (path / RECORDS if path.is_dir() else path).resolve()
+            if file in files:
+                raise BadInput(f"{name}: the run is given twice")
+            folders[name] = RunFolder.of(path)
+            with _refused(RecordError, name):
+                readings[name] = folders[name].read()
+            files.add(file)
+        return cls(folders, readings)
+
+    def outcome(self) -> tuple[Outcome, list[str]]:
+        """How they ended together, and what is wrong with what says so. Whether the tests passed
+        is not known where one run does not know, and a comparison is that of one run alone."""
+        found = [Outcome.read(folder.path) for folder in self.folders.values()]
+        outcomes, wrong = [outcome for outcome, _ in found], [text for _, text in found if text]
+        if len(outcomes) == 1:
+            return outcomes[0], wrong
+        passed = [outcome.passed for outcome in outcomes]
+        together = False if False in passed else None if None in passed else True
+        return Outcome(together, looks=max(outcome.looks for outcome in outcomes)), wrong
+
+    def merged(self) -> tuple[list[Merged], Reading]:
+        """Their records as those of one run: with where each comes from, and to be shown.
+
+        Raises:
+            BadInput: they are not parts of one run, or hold nothing.
+        """
+        with _refused(MergeError):
+            records = merge({name: found.records for name, found in self.readings.items()})
+            tasks = merge_tasks({name: found.tasks for name, found in self.readings.items()})
+        if not records:
+            raise BadInput("none of the runs holds a repetition that ended")
+        return records, Reading(records=tuple(item.record for item in records), tasks=tasks)
+
+
+def merge_runs(runs: Sequence[str], **wanted: Any) -> int:
+    """Merge runs, print the result, and return the exit code.
+
+    Args:
+        runs: their folders.
+        wanted: see `Wanted`.
+
+    Raises:
+        BadInput: a run that cannot be read, runs that are not parts of one, or a folder that
+            already holds a run or cannot be written to.
+    """
+    found, asked = Runs.named(runs), Wanted(**wanted)
+    records, reading = found.merged()
+    folder = _locked(asked.output)
+    try:
+        for task in reading.tasks.values():
+            folder.describe(task)
+        refused = _copy(records, found.folders, folder)
+        unsaved = folder.flush()
+        outcome, wrong = found.outcome()
+        written = write_report(folder, looks=outcome.looks)
+        problems = [*found.problems, *refused, *unsaved, *written.problems, *wrong]
+        ended = Outcome(outcome.passed, looks=outcome.looks)
+        problems.append(write_outcome(folder.path, ended))
+        kept = reading.records
+        problems += _extras(asked, folder.path, folder.path, kept, outcome)
+        _print(asked, written, problems)
+        if written.complete and not unsaved:
+            print(where(folder.path / PAGE_NAME, Path.cwd()))
+    finally:
+        folder.close()
+    return 0
+
+
+def report_runs(runs: Sequence[str], **wanted: Any) -> int:
+    """Show runs again: print the tables, write the report, and return the exit code.
+
+    One run's report is written into its folder, or into the one that is wanted; that of several,
+    which are merged for it, into the one that is wanted alone.
+
+    Args:
+        runs: their folders.
+        wanted: see `Wanted`.
+
+    Raises:
+        BadInput: a run that cannot be read, or runs that are not parts of one.
+    """
+    found, asked = Runs.named(runs), Wanted(**wanted)
+    target = _target(asked.output, list(found.folders.values()))
+    (first, folder), *others = found.folders.items()
+    run = None if others else folder.path
+    reading = found.merged()[1] if others else found.readings[first]
+    outcome, wrong = found.outcome()
+    tables, untold = ([], []) if run is None else write_tables(run, target)
+    if not (reading.records or tables or untold):
+        raise BadInput(f"{first}: it holds no repetition")
+    compared = outcome.compared
+    report = Report.of(reading, compared, outcome.looks)
+    written = Written(**vars(report)) if target is None else write_files(target, report, run)
+    extras = _extras(asked, run, target, reading.records, outcome)
+    _print(asked, written, [*found.problems, *wrong, *written.problems, *extras])
+    width = shutil.get_terminal_size().columns
+    if compared is not None:
+        name, gate = compared
+        text = render_changes(gate, width, bool(gate.changes))
+        print(for_terminal(f"\nbaseline: {name}\n{text}"))
+    if tables or untold:
+        print(f"\n{render_tables(tables, width)}")
+        print(*map(for_terminal, untold), sep="\n")
+    if target is not None and written.complete:
+        print(where(target / PAGE_NAME, Path.cwd()))
+    return 0 if written.complete else 1
+
+
+def sections(written: Report, width: int, verbose: bool) -> Iterator[tuple[str, str]]:
+    """What the terminal shows of a result: titles, and the text below each.
+
+    Args:
+        written: the result.
+        width: of the terminal, in columns.
+        verbose: for whole tables.
+    """
+    if written.summaries or written.sweeps:
+        claims = [claim_lines(written.claims, width), ""] if written.claims else []
+        table = (render_run if verbose else render_brief)(written.summaries, width)
+        yield "simulator comparison", "\n".join([*claims, table])
+    if written.sweeps:
+        yield sweep.TITLE, for_terminal("\n".join(sweep_lines(written.sweeps, width, verbose)))
+    if written.histories:
+        yield "history", for_terminal("\n".join(history_lines(written.histories, width)))
+
+
+def _print(asked: Wanted, written: Written, problems: Iterable[str]) -> None:
+    width = shutil.get_terminal_size().columns
+    for number, (title, text) in enumerate(sections(written, width, asked.verbose)):
+        print(f"\n{title}\n{text}" if number else text)
+    for problem in filter(None, problems):
+        print(for_terminal(problem))
+
+
+def _extras(
+    asked: Wanted,
+    run: Path | None,
+    target: Path | None,
+    records: Sequence[Record],
+    outcome: Outcome,
+) -> list[str]:
+    """Write badge and recordings where they are wanted; lines for the terminal."""
+    lines = [badge(asked.badge, records, outcome.passed)]
+    if asked.record and run is not None and target is not None:
+        lines += recordings(run, target, records)
+    elif asked.record:
+        lines.append("no recordings: join the runs with simbench merge first")
+    return lines
+
+
+def badge(file: str | None, records: Sequence[Record], passed: bool | None) -> str:
+    """Write the badge, if one is asked for; a sentence when it could not be written."""
+    return write_badge(Path(file), records, passed) if file else ""
+
+
+def recordings(
+    run: Path, target: Path, records: Sequence[Record], progress: Progress | None = None
+) -> list[str]:
+    """Write the motions of a run as rosbag2 folders.
+
+    Args:
+        run: its folder, which holds the traces.
+        target: folder to write to.
+        records: of the run.
+        progress: the live line; None: one on standard output.
+
+    Returns:
+        Lines for the terminal.
+    """
+    count, problems = write_bags(run, target, records, progress or _printed())
+    if not count:
+        return [*problems, "no recordings: the run has no traces; see --sim-trace"]
+    many = f"{count} recording{'s' if count > 1 else ''}"
+    return [*problems, f"{many}: {shown(target / FOLDER, Path.cwd())}"]
+
+
+def _printed() -> Progress:
+    def write(text: str) -> None:
+        print(text, end="", flush=True)
+
+    return Progress(write, sys.stdout.isatty(), shutil.get_terminal_size().columns)
+
+
+def _target(output: str | None, folders: list[RunFolder]) -> Path | None:
+    """Where a report is written; None: nowhere.
+
+    Raises:
+        BadInput: that folder holds another run.
+    """
+    if output is None:
+        return folders[0].path if len(folders) == 1 else None
+    target = Path(output)
+    own = len(folders) == 1 and target.resolve() == folders[0].path.resolve()
+    if RunFolder(target).holds_run and not own:
+        raise BadInput(f"{target} holds another run; give another --output")
+    return target
+
+
+def _locked(output: str | None) -> RunFolder:
+    folder = RunFolder(Path(output) if output else new_name(Path(RUNS), "-merged"))
+    try:
+        folder.lock()
+        for name in (RECORDS, TASKS):
+            folder.inside(name)
+    except FolderError as error:
+        folder.release()
+        raise BadInput(str(error)) from None
+    if folder.holds_run:
+        folder.release()
+        raise BadInput(f"{folder.path} already holds a run; give another --output")
+    return folder
+
+
+BESIDE = ("traces/{}.npz", "pictures/{}.npz", "videos/{}.mp4")
+"""What else a run folder may hold of a repetition, named as its log is."""
+
+
+def _copy(records: list[Merged], folders: dict[str, RunFolder], to: RunFolder) -> list[str]:
+    """Write the records, with their logs and what else there is of them (`BESIDE`) under the names
+    that they have in the whole.
+
+    Returns:
+        What was refused, one sentence each.
+    """
+    refused: dict[str, None] = {}
+    for item in records:
+        was, stem, folder = file_stem_of(item.was), file_stem_of(item.record), folders[item.run]
+        kept, log = "", item.was.notes.log
+        for source, target in (
+            (log, f"logs/{stem}.log"),
+            *((name.format(was), name.format(stem)) for name in BESIDE),
+        ):
+            try:
+                if source and _copied(folder, source, to, target) and source == log:
+                    kept = target
+            except FolderError as error:
+                refused.setdefault(f"not copied: {error}")
+        to.append(item.record.noting(log=kept))
+    return list(refused)
+
+
+def _copied(folder: RunFolder, source: str, to: RunFolder, target: str) -> bool:
+    """Copy an ordinary file; a log that is missing makes no result wrong.
+
+    Raises:
+        FolderError: one of them would lie outside of its folder.
+    """
+    folder.inside(source), to.inside(target)
+    try:
+        with open(opened(folder.path, source), "rb") as old:
+            if not stat.S_ISREG(os.fstat(old.fileno()).st_mode):
+                return False
+            with whole(to.path, target) as new:
+                shutil.copyfileobj(old, new)
+    except OSError:
+        return False
+    return True

@@ -1,0 +1,134 @@
+"""`simbench list`: the known simulators, which are ready here, and how to get the others."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+from pytest_simbench.cli.names import read_names
+from pytest_simbench.client import environments
+from pytest_simbench.ground.text import for_terminal
+from pytest_simbench.report.terminal.parts import capability_table
+from pytest_simbench.simulator.registry import adapter, known, problem, registered, registry
+
+Missing = Callable[[str], str | None]
+"""Why a simulator whose adapter is fine cannot run, with what mends it; None when it can."""
+
+HEADINGS = ("simulator", "version", "ready", "tuned", "real", "step")
+
+
+def list_simulators(
+    names: Sequence[str] = (), verbose: bool = False, cluster: str | None = None
+) -> int:
+    """Print a table of all simulators, or a paragraph for each that is named.
+
+    Args:
+        names: as `--sim` takes them; none for all.
+        verbose: tell of each what it can do and where it deviates from the scene.
+        cluster: address of the scheduler whose nodes count, instead of this machine.
+
+    Raises:
+        BadInput: an interpreter that cannot be used.
+        SimulatorError: an unknown or broken simulator; no such cluster.
+    """
+    chosen, builds = read_names(names, Path.cwd())
+    for name in chosen:
+        adapter(name)  # complains of a broken one
+    found = _missing(cluster, builds)
+    if not chosen and not verbose:
+        lines = _table(found)
+    else:
+        lines = _paragraphs(chosen, found, builds, verbose)
+    for line in [*lines, *(f"BROKEN: {sentence}" for sentence in registry().unreadable)]:
+        print(for_terminal(line))
+    return 0
+
+
+def _missing(cluster: str | None, builds: dict[str, str]) -> Missing:
+    if cluster is None:
+        return lambda name: None if name in builds else environments.missing(adapter(name).info)
+    from pytest_simbench.cluster.offers import unmet
+    from pytest_simbench.cluster.pool import Pool
+
+    pool = Pool(cluster)
+    try:
+        nodes = pool.nodes()
+    finally:
+        pool.close()
+    return lambda name: unmet(nodes, name, ["headless"])
+
+
+def _table(missing: Missing) -> Iterator[str]:
+    """A line for each simulator; one that is not ready says how to learn more."""
+    cells: dict[str, tuple[str, ...] | str] = {}
+    for name in known():
+        if broken := problem(name):
+            cells[name] = f"BROKEN: {broken}"
+        elif missing(name):
+            cells[name] = f"no: not here; simbench list {name} says how to get it"
+        else:
+            profiles = adapter(name).profiles
+            has = ("yes" if profile in profiles else "-" for profile in ("tuned", "real"))
+            settings = profiles.get("tuned") or next(iter(profiles.values()))
+            step = f"{1000 * settings.timestep:.3g} ms"
+            cells[name] = (_version(name) or "-", "yes", *has, step)
+    rows = [cell for cell in cells.values() if not isinstance(cell, str)]
+    widths = [max(map(len, column)) for column in zip(HEADINGS[1:], *rows, strict=True)]
+    first = max(map(len, [HEADINGS[0], *cells]))
+    for name, row in {HEADINGS[0]: HEADINGS[1:], **cells}.items():
+        row = ("-", row) if isinstance(row, str) else row
+        padded = [text.ljust(width) for text, width in zip(row, widths, strict=False)]
+        yield "  ".join([name.ljust(first), *padded]).rstrip()
+
+
+def _paragraphs(
+    names: Sequence[str], missing: Missing, builds: dict[str, str], verbose: bool
+) -> Iterator[str]:
+    """Of each simulator what it is, where it is and what it can; of all the table of capabilities
+    too, and the reasons of those whose adapter is broken."""
+    if not names:
+        width = shutil.get_terminal_size((160, 24)).columns
+        yield capability_table([adapter(name).info for name in registered()], width)
+        yield ""
+    for name in names or known():
+        if broken := problem(name):
+            yield from (f"{name}: BROKEN: {broken}", "")
+            continue
+        info = adapter(name).info
+        reason = missing(name)
+        size = "" if info.install_size_mb is None else f"{info.install_size_mb} MB on disk; "
+        start = "compiles at first use" if info.costly_start else "nothing to compile"
+        yield f"{name}: {info.title} ({info.licence}), engine {info.engine}"
+        yield f"    {f'NOT HERE: {reason}' if reason else _place(name, builds)}"
+        yield f"    tested with version {info.tested_range}; {size}{start}"
+        yield f"    modes: {', '.join(info.modes)}; profiles: {', '.join(adapter(name).profiles)}"
+        yield f"    can: {', '.join(sorted(info.capabilities))}"
+        for deviation in info.deviations if verbose else ():
+            what = f"{deviation.quantity}: " if deviation.quantity else ""
+            yield f"    deviates: {what}{deviation.reason}"
+        yield ""
+
+
+def _place(name: str, builds: dict[str, str]) -> str:
+    """Where a simulator is and which version."""
+    if name in builds:
+        return f"in {builds[name]}"
+    info = adapter(name).info
+    other = environments.outside(info) if environments.interpreter(info) else None
+    place = other.place if other else "installed"
+    found = _version(name)
+    if not found:  # no Python package tells it: the engine does, when it runs
+        return f"version not known before it runs, {place}"
+    return f"version {found}{'' if info.tested(found) else ', UNTESTED'}, {place}"
+
+
+def _version(name: str) -> str | None:
+    """The engine's version, if its Python package tells it."""
+    info = adapter(name).info
+    other = environments.outside(info) if environments.interpreter(info) else None
+    try:
+        return other.version() if other else version(info.distribution)
+    except Exception:  # not there, or metadata that nobody can read
+        return None

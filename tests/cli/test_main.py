@@ -1,0 +1,204 @@
+"""The command `simbench`: its help, what it lists, and one sentence for whatever cannot be."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+import pytest
+
+import pytest_simbench
+from pytest_simbench.cli import environments
+from pytest_simbench.cli.main import COMMANDS, main
+from pytest_simbench.client.environments import MARKER, Environment
+from pytest_simbench.simulator.registry import adapter, registered
+from tests.robot.small_arm import small_arm
+
+NAMES = [command.name for command in COMMANDS]
+
+
+def said(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error of a command line."""
+    try:
+        status = main(words)
+    except SystemExit as error:
+        status = int(error.code or 0)
+    return status, *capsys.readouterr()
+
+
+def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = said(capsys, "--help")
+    assert status == 0
+    shown = " ".join(out.split())
+    assert [c.name for c in COMMANDS if f" {c.name} {c.help}" not in shown] == []
+    assert said(capsys)[::2] == (2, out)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_command_has_help(capsys: pytest.CaptureFixture[str], name: str) -> None:
+    status, out, _ = said(capsys, name, "--help")
+    assert status == 0
+    assert out.startswith(f"usage: simbench {name} [-h]")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [[sys.executable, "-m", "pytest_simbench"], [str(Path(sys.executable).parent / "simbench")]],
+)
+def test_it_is_installed(command: list[str]) -> None:
+    """By both of its names; nothing but the standard library is loaded for help."""
+    found = subprocess.run([*command, "robots"], text=True, capture_output=True, check=True)
+    assert "panda: 7 arm joints, 2 fingers that open to " in found.stdout
+
+
+def test_help_loads_nothing_large() -> None:
+    script = (
+        "import sys; from pytest_simbench.cli.main import parser; parser().format_help(); "
+        "print({'numpy', 'pytest', 'pinocchio'} & {*sys.modules})"
+    )
+    root = Path(pytest_simbench.__file__).parents[1]
+    found = subprocess.run([sys.executable, "-c", script], cwd=root, text=True, capture_output=True)
+    assert found.stdout == "set()\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ("lst", "simbench: argument COMMAND: invalid choice: 'lst' (choose from 'list', *"),
+        ("list nosuch", "simbench list: unknown simulator 'nosuch'; choose from *mujoco*"),
+        ("list mujoco@nowhere/x", "simbench list: mujoco@nowhere/x: there is no such file; *"),
+        ("list --cluster x", "*--cluster: write it as tcp://HOST:PORT or tls://HOST:PORT; *"),
+        ("robots nosuch", "simbench robots: *nosuch*panda*"),
+        ("install nosuch", "simbench install: unknown simulator 'nosuch'; choose from *"),
+        ("install mujoco", "simbench install: mujoco needs no environment of its own: *"),
+        ("install", "simbench install: the following arguments are required: NAME; *"),
+        ("uninstall x", "simbench uninstall: there is no environment 'x' in *; choose from *"),
+        ("download nosuch", "*no data set 'nosuch'; choose from cube_tosses*"),
+        ("merge", "simbench merge: the following arguments are required: RUN; *"),
+        ("merge none", "simbench merge: none: cannot read records from *"),
+        ("merge a a", "simbench merge: a: the run is given twice"),
+        ("merge a b", "simbench merge: a and b overlap: both have seed 2022 of *"),
+        ("merge a --output b", "simbench merge: b already holds a run; give another --output"),
+        ("merge empty", "simbench merge: none of the runs holds a repetition that ended"),
+        ("report none", "simbench report: none: cannot read records from *No such file*"),
+        ("report empty", "simbench report: empty: it holds no repetition"),
+        ("report bad", "simbench report: bad: bad/records.jsonl:1: not JSON*"),
+        ("report a ./a", "simbench report: ./a: the run is given twice"),
+        ("report a b", "simbench report: a and b overlap: both have seed 2022 of *"),
+        ("report a --output b", "simbench report: b holds another run; give another --output"),
+        ("bisect mujoco:3 placed", "*NAME:GOOD..BAD: write it as NAME:GOOD..BAD, with two *"),
+        ("bisect mujoco:3..4 a-b", "*METRIC: give the name of a metric; *"),
+        ("stats more", "*unrecognized arguments: more*"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    request: pytest.FixtureRequest,
+    words: str,
+    sentence: str,
+) -> None:
+    real = Path(request.config.rootpath, "tests/measure/stacking_records.jsonl")
+    first = real.read_text().splitlines()[0] + "\n"
+    for name, text in (("a", first), ("b", first), ("bad", "no record\n"), ("empty", "")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "records.jsonl").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path / "environments"))
+    status, _, told = said(capsys, *words.split())
+    assert status == 2
+    assert told.count("\n") == 1 or words.startswith("stats")
+    assert fnmatchcase(told.splitlines()[-1], sentence)
+
+
+def test_the_list_is_a_table(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path))
+    status, out, _ = said(capsys, "list")
+    heading, *lines = out.splitlines()
+    assert status == 0
+    assert heading.split() == ["simulator", "version", "ready", "tuned", "real", "step"]
+    assert [line.split()[0] for line in lines] == list(registered())
+    (mujoco,) = (line.split() for line in lines if line.startswith("mujoco"))
+    assert mujoco[2:] == ["yes", "yes", "yes", "1", "ms"]
+    own = [name for name in registered() if adapter(name).info.requirements]
+    assert own
+    for name in own:
+        assert f"no: not here; simbench list {name} says how to get it\n" in out
+
+
+def test_one_simulator_is_told_whole(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path))
+    name = next(name for name in registered() if adapter(name).info.requirements)
+    _, out, _ = said(capsys, "list", name)
+    assert f"not there yet: simbench install {name}" in out
+    assert "    modes: headless" in out
+    assert "deviates" not in out
+    assert "deviates" in said(capsys, "list", "-v", "mujoco")[1]
+    everything = said(capsys, "list", "-v")[1]
+    assert all(f"\n{name}: {adapter(name).info.title}" in everything for name in registered())
+    assert "deterministic" in everything.partition("\ndart: ")[0]  # the table of capabilities
+
+
+def test_robots_and_their_files(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out = said(capsys, "robots")[1]
+    for line in (
+        "panda: 7 arm joints, 2 fingers that open to 0.035 m, base at (0, 0, 0)",
+        "so101: 5 arm joints, one jaw that opens to 1 rad, base at (0, 0, 0)",
+        "ur5: 6 arm joints, 2 fingers",
+    ):
+        assert line in out
+    status, out, _ = said(capsys, "robots", str(small_arm(tmp_path)))
+    assert status == 0
+    lines = (
+        "small: 3 arm joints, 2 fingers that open to 0.04 m, base at (0.1, 0, 0.2)",
+        "    no stacking: robot 'small' cannot handle a cube at (0.12, -0.18, 0.20): it is *",
+        "    no throwing: robot 'small' has no swing for the throw: write one into its file*",
+        "    no pushing: robot 'small' cannot push the block: unreachable: *",
+    )
+    for line, pattern in zip(out.splitlines(), lines, strict=True):
+        assert fnmatchcase(line, pattern)
+
+
+def test_environments_come_and_go(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path))
+    name = f"mujoco=={adapter('mujoco').info.tested_version}"
+    environment = Environment.of(adapter(name).info)
+    (environment.folder / "bin").mkdir(parents=True)
+    environment.python.touch()
+    told = {"requirements": list(environment.info.requirements)}
+    (environment.folder / MARKER).write_text(json.dumps(told))
+    assert said(capsys, "environments") == (
+        0, f"{name}: 0 MB, MuJoCo None\n0 MB in {tmp_path}\n", ""
+    )  # fmt: skip
+    assert said(capsys, "uninstall", name) == (0, f"{name}: removed, 0 MB\n", "")
+    assert "choose from none is there" in said(capsys, "uninstall", name)[2]
+
+
+def test_an_interruption_is_one_sentence(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted() -> int:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(environments, "list_environments", interrupted)
+    assert said(capsys, "environments") == (
+        130, "", "simbench environments: interrupted; nothing that it read was changed\n"
+    )  # fmt: skip
+
+
+def test_a_reader_that_ends_early_is_no_fault(tmp_path: Path) -> None:
+    command = f"'{sys.executable}' -m pytest_simbench list -v | head -1"
+    environment = {**os.environ, "SIMBENCH_ENVIRONMENTS": str(tmp_path)}
+    found = subprocess.run(command, shell=True, capture_output=True, text=True, env=environment)
+    assert found.stderr == ""

@@ -1,0 +1,101 @@
+"""Old options that are commands now, and engines of an untested version."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+from pytest_simbench.report.markdown.capabilities import capability_markdown
+
+from pytest_simbench.cli import main
+from pytest_simbench.plugin import old_options
+from pytest_simbench.simulator.registry import adapter, registered
+from tests.plugin.inner import FALLING
+
+
+def old(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, *words: str) -> list[str]:
+    """What the command is asked for by an old option."""
+    given: list[list[str]] = []
+    monkeypatch.setattr(main, "main", lambda words: given.append(words) or 0)
+    config = pytester.parseconfig(*words)
+    command = old_options.asked(config)
+    assert command is not None
+    assert old_options.run_command(config, command) == 0
+    return given[0]
+
+
+@pytest.mark.parametrize(
+    ("words", "command"),
+    [
+        ("--sims", "list -v"),
+        ("--sim-list --sim=mujoco", "list -v"),
+        ("--robots", "robots"),
+        ("--sim-robots --robot=ur5", "robots ur5"),
+        ("--sim-install genesis,newton --sim-install x", "install genesis newton x"),
+        ("--sim-uninstall=genesis", "uninstall genesis"),
+        ("--sim-environments", "environments"),
+        ("--sim-download=cube_tosses --sim-data=d", "download cube_tosses --data d"),
+        ("--sim-merge a b --sim-merge c --sim-output=d", "merge a b c --output d"),
+        ("-v --sim-report a --sim-badge=b --sim-record=mcap",
+         "report a --badge b --record mcap -v"),
+    ],
+)  # fmt: skip
+def test_an_old_option_is_a_command(
+    pytester: pytest.Pytester,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    words: str,
+    command: str,
+) -> None:
+    assert old(pytester, monkeypatch, *words.split()) == command.split()
+    assert f"will go with the next release; write: simbench {command}\n" in capsys.readouterr().err
+
+
+def test_an_old_option_that_cannot_be(pytester: pytest.Pytester) -> None:
+    result = pytester.runpytest_subprocess("--sim-merge", "none")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(
+        ["--sim-merge will go with the next release; write: simbench merge none",
+         "simbench merge: none: cannot read records from *"]
+    )  # fmt: skip
+
+
+def test_an_untested_version_runs_and_is_named(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        newer="""
+from dataclasses import replace
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
+
+class Newer(MuJoCo):
+    info = replace(MuJoCo.info, name="newer", tested_version="3.9.0")
+
+class Unlisted(MuJoCo):  # as an engine of the system, which is no Python package
+    info = replace(MuJoCo.info, name="unlisted", distribution="no-such-package")
+"""
+    )
+    package = pytester.mkdir("newer-1.0.dist-info")
+    (package / "METADATA").write_text("Metadata-Version: 2.1\nName: newer\nVersion: 1.0\n")
+    (package / "entry_points.txt").write_text(
+        "[pytest_simbench.simulators]\nnewer = newer:Newer\nunlisted = newer:Unlisted\n"
+    )
+    pytester.makepyfile(test_it=FALLING)
+    result = pytester.run(
+        sys.executable, "-c",
+        "import sys, pytest; sys.path.insert(0, '.'); "
+        "sys.exit(pytest.main(['--sim=newer', '--reps=1', '--sim-output=out']))",
+    )  # fmt: skip
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(["*UNTESTED VERSION: mujoco * is here, the*"])
+    result = pytester.run(
+        sys.executable, "-c",
+        "import sys; sys.path.insert(0, '.'); from pytest_simbench.cli.main import main; "
+        "main(['list', '-v'])",
+    )  # fmt: skip
+    result.stdout.fnmatch_lines(
+        ["newer: *", "*UNTESTED*", "unlisted: *", "    version not known before it runs, installed"]
+    )
+
+
+def test_the_page_of_the_documentation_is_up_to_date(request: pytest.FixtureRequest) -> None:
+    page = (request.config.rootpath / "docs" / "simulators.md").read_text("utf-8")
+    assert capability_markdown([adapter(name).info for name in registered()]) in page
