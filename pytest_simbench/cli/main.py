@@ -179,8 +179,8 @@ def _function(place: str) -> Callable[..., Any]:
 
 def _complaints() -> tuple[type[Exception], ...]:
     """The errors whose messages are for the user."""
-    from pytest_simbench.data.measured import DataError
     from pytest_simbench.client.errors import ExecutorError
+    from pytest_simbench.data.measured import DataError
     from pytest_simbench.simulator.errors import SimulatorError
 
     return read.BadInput, SimulatorError, ExecutorError, DataError

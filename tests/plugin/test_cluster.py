@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from pytest_simbench.plugin.cluster import lost
+from pytest_simbench.plugin.cluster import lost_nodes
 from pytest_simbench.records.notes import Notes
 from tests.records.build import failed, record
 
@@ -34,7 +34,9 @@ def test_a_lost_cube_is_no_lost_node(pytester: pytest.Pytester) -> None:
 
 def test_what_was_tried_again_is_counted() -> None:
     again = Notes(lost_nodes=("a: its process ended",))
-    assert lost([record(0), record(1)]) == ""
-    told = lost([record(0), record(1, notes=again), replace(failed(2, "NodeLost"), notes=again)])
+    assert lost_nodes([record(0), record(1)]) == ""
+    told = lost_nodes(
+        [record(0), record(1, notes=again), replace(failed(2, "NodeLost"), notes=again)]
+    )
     assert told.startswith("nodes were lost: 2 of the repetitions")
     assert "1 of them failed for it" in told

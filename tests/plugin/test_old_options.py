@@ -5,10 +5,10 @@ from __future__ import annotations
 import sys
 
 import pytest
-from pytest_simbench.report.markdown.capabilities import capability_markdown
 
 from pytest_simbench.cli import main
 from pytest_simbench.plugin import old_options
+from pytest_simbench.report.markdown.capabilities import capability_markdown
 from pytest_simbench.simulator.registry import adapter, registered
 from tests.plugin.inner import FALLING
 
