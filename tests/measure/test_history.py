@@ -100,6 +100,8 @@ def test_a_release_is_like_the_one_that_it_is_nearer_to() -> None:
         other = ResultSet(release("5", placed), METRICS)
         assert like_the_bad_one(PLACED, good, bad, other) is worse
     assert like_the_bad_one(PLACED, good, bad, ResultSet([failed(1)], METRICS))
+    halfway, bad = (ResultSet(release(v, x), METRICS) for v, x in (("5", 0.75), ("9", 0.5)))
+    assert not like_the_bad_one(PLACED, good, bad, halfway)
 
 
 def test_releases_between_two() -> None:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.robot.panda import panda
-from pytest_simbench.scene import Box, Pose, Scene, SceneError, Trajectory
+from pytest_simbench.scene import Box, Pose, Scene, SceneError, Sphere, Trajectory
 from pytest_simbench.scene.pose import quaternion_of
 
 
@@ -54,6 +54,13 @@ def test_a_ground_that_bounces_crosses_and_another_is_not_named() -> None:
     assert "ground_restitution" not in Scene("s").to_wire()
     with pytest.raises(SceneError, match="the ground's restitution in scene 's' is 2"):
         Scene("s", ground_restitution=2.0)
+
+
+def test_a_scene_bounces_by_its_ground_or_by_one_body() -> None:
+    ball = Sphere("ball", 0.1, Pose.at(0, 0, 1), 1.0, restitution=0.5)
+    assert "restitution" in Scene("s", ground_restitution=0.5).words
+    assert "restitution" in Scene("s", (ball,)).words
+    assert "restitution" not in Scene("s", (box("a", 1.0),)).words
 
 
 numbers = st.floats(-10, 10, allow_nan=False)

@@ -255,8 +255,11 @@ class Noisy(MuJoCo):
 
 
 class Blank(MuJoCo):
+    """Its pictures are of one colour, which is no grey, and another one in each scene."""
+
     def render(self, width: int, height: int) -> Any:
-        return np.zeros((height, width, 3), np.uint8)
+        colour = (len(self.scene.bodies), 90, 200)
+        return np.full((height, width, 3), colour, np.uint8)
 
 
 class Misbuilt(MuJoCo):

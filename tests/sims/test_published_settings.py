@@ -1,0 +1,41 @@
+"""Published numbers are of these settings.
+
+Who changes a setting of a profile measures the pages again (docs/made.py), and then its line here.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from hashlib import sha256
+
+import pytest
+
+from pytest_simbench.simulator.registry import adapter, registered
+
+PUBLISHED = {
+    "dart": {"default": "66deefbc", "tuned": "a4fc61ec", "real": "a4fc61ec"},
+    "drake": {"default": "09441a8f", "tuned": "cf3c33e5", "real": "d8e9fec8"},
+    "gazebo": {"default": "3def4e2e", "tuned": "93d12aae"},
+    "genesis": {"default": "de5dd03b", "tuned": "22a5088c", "real": "22a5088c"},
+    "mujoco": {"default": "547fd8a1", "tuned": "e78c49da", "real": "851260d7"},
+    "newton": {"default": "f383bffb", "tuned": "a5b7dbbe", "real": "b00c1176"},
+    "ode": {"default": "f1f2c655", "tuned": "7c840eea", "real": "85bf7f2e"},
+    "ovphysx": {"default": "0791bbcb", "tuned": "d65af419", "real": "e9c2722b"},
+    "pybullet": {"default": "4aa77342", "tuned": "aae95f40", "real": "4c560c5f"},
+    "sapien": {"default": "67451d2d", "tuned": "c57855c2", "real": "72f5c933"},
+}
+
+
+def digests(name: str) -> dict[str, str]:
+    """Of each profile of a simulator: what its settings are, in eight letters."""
+    told = {
+        profile: json.dumps(asdict(settings), sort_keys=True)
+        for profile, settings in adapter(name).profiles.items()
+    }
+    return {profile: sha256(text.encode()).hexdigest()[:8] for profile, text in told.items()}
+
+
+@pytest.mark.parametrize("name", sorted(registered()))
+def test_profiles_are_those_of_the_published_numbers(name: str) -> None:
+    assert digests(name) == PUBLISHED[name]
