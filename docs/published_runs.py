@@ -78,7 +78,7 @@ class Run:
         if metric.kind == "yes_no" and found:
             yes = f"{round(found.mean * found.count)} of {found.count}"
             return f"{yes} {cells.interval(found, metric)}"
-        return " ".join(cells.mean_interval(found, metric)).rstrip()
+        return cells.mean_interval(found, metric).text
 
     @property
     def repetitions(self) -> str:
