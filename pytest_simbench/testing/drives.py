@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
+from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.scene import (
     STANDARD_GRAVITY,
     FloatArray,
@@ -24,8 +26,6 @@ ARM_TICK = 0.004
 
 
 def model_of(robot: Robot) -> Any:
-    from pytest_simbench.robot.model import RobotModel
-
     return RobotModel(robot)
 
 
@@ -196,8 +196,6 @@ def has_armature(subject: Subject) -> bool:
 
 def joint_momentum(robot: Robot, q: FloatArray, v: FloatArray, armature: bool) -> FloatArray:
     """Momentum of each joint, M(q) v, (n_joints,) [kg m^2/s, kg m/s]."""
-    import pinocchio as pin
-
     model = model_of(robot).pin
     if not armature:
         model.armature = np.zeros(len(q))

@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from pytest_simbench.laws.loops import FourBarClosure, FourBarSwing
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Trajectory, Vector3
@@ -65,8 +66,6 @@ def _falling_arm(subject: Subject, rng: np.random.Generator) -> tuple[Robot, Flo
 
 def _fall(robot: Robot, armature: bool) -> tuple[FloatArray, FloatArray]:
     """Positions (n, n_arm) and final speeds (n_arm,) of the falling arm, its fingers held."""
-    import pinocchio as pin
-
     full, q = model_of(robot).pin, robot.column("initial_position")
     fingers = [full.getJointId(name) for name in robot.gripper.joints]
     model: Any = pin.buildReducedModel(full, fingers, q)
@@ -184,8 +183,6 @@ def joint_loads_are_told(subject: Subject) -> None:
 
 def _loads(robot: Robot, positions: FloatArray) -> FloatArray:
     """Wrenches by which joints hold still what hangs on them, as `Simulator.joint_wrenches`."""
-    import pinocchio as pin
-
     model, still = model_of(robot), np.zeros((1, len(positions)))
     model.inverse_dynamics(np.array(STANDARD_GRAVITY), positions[None], still, still)
     pin.forwardKinematics(model.pin, model.data, positions)
