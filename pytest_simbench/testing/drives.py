@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+import pinocchio as pin
 
+from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.scene import (
     STANDARD_GRAVITY,
     FloatArray,
@@ -23,16 +23,10 @@ ARM_TICK = 0.004
 """Control tick of the set points [s], as in the tasks."""
 
 
-def model_of(robot: Robot) -> Any:
-    from pytest_simbench.robot.model import RobotModel
-
-    return RobotModel(robot)
-
-
 def gravity_effort(robot: Robot, q: FloatArray, gravity: Vector3 = STANDARD_GRAVITY) -> FloatArray:
     """Efforts that hold the robot at rest at `q`, (n_joints,) [N m, N]."""
     zero = np.zeros((1, len(q)))
-    return np.asarray(model_of(robot).inverse_dynamics(np.array(gravity), q[None], zero, zero)[0])
+    return np.asarray(RobotModel(robot).inverse_dynamics(np.array(gravity), q[None], zero, zero)[0])
 
 
 @check(robot=any_robot)
@@ -73,7 +67,7 @@ def tracks_trajectory(subject: Subject) -> None:
     q = start + (goal - start) * (10 * s**3 - 15 * s**4 + 6 * s**5)
     v = (goal - start) * (30 * s**2 - 60 * s**3 + 30 * s**4) / 1.5
     a = (goal - start) * (60 * s - 180 * s**2 + 120 * s**3) / 1.5**2
-    effort = model_of(robot).inverse_dynamics(np.array(STANDARD_GRAVITY), q, v, a)
+    effort = RobotModel(robot).inverse_dynamics(np.array(STANDARD_GRAVITY), q, v, a)
     rest = gravity_effort(robot, start)
     hold = Trajectory.holding(ARM_TICK, start, rest)
     with subject.world(scenes.arm_alone(robot)) as world:
@@ -90,7 +84,7 @@ def tracks_trajectory(subject: Subject) -> None:
 
 def _turn(robot: Robot) -> FloatArray:
     """How far each joint goes in `tracks_trajectory` from its start, (n_joints,) [rad, m]."""
-    model, arm = model_of(robot), len(robot.arm_joints)
+    model, arm = RobotModel(robot), len(robot.arm_joints)
     start, turn = robot.column("initial_position"), np.full(len(robot.joints), -0.01)
     turn[:arm] = np.resize([0.4, -0.3, 0.3], arm)
     goal = (start + turn)[:arm]
@@ -130,7 +124,7 @@ def require_limit_reached(
 
 def _far(robot: Robot) -> float:
     """A far way of joint 1, away from the nearer of its limits [rad]."""
-    model, start = model_of(robot), robot.joints[0].initial_position
+    model, start = RobotModel(robot), robot.joints[0].initial_position
     return 2.0 if model.upper[0] - start >= start - model.lower[0] else -2.0
 
 
@@ -196,9 +190,7 @@ def has_armature(subject: Subject) -> bool:
 
 def joint_momentum(robot: Robot, q: FloatArray, v: FloatArray, armature: bool) -> FloatArray:
     """Momentum of each joint, M(q) v, (n_joints,) [kg m^2/s, kg m/s]."""
-    import pinocchio as pin
-
-    model = model_of(robot).pin
+    model = RobotModel(robot).pin
     if not armature:
         model.armature = np.zeros(len(q))
     upper = np.triu(pin.crba(model, model.createData(), q))

@@ -6,8 +6,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from pytest_simbench.laws.loops import FourBarClosure, FourBarSwing
+from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Trajectory, Vector3
 from pytest_simbench.simulator import Capability, PreparedRobot
 from pytest_simbench.testing import scenes
@@ -16,7 +18,6 @@ from pytest_simbench.testing.drives import (
     gravity_effort,
     has_armature,
     hold_command,
-    model_of,
     own_inertia,
     require_limit_reached,
 )
@@ -65,9 +66,7 @@ def _falling_arm(subject: Subject, rng: np.random.Generator) -> tuple[Robot, Flo
 
 def _fall(robot: Robot, armature: bool) -> tuple[FloatArray, FloatArray]:
     """Positions (n, n_arm) and final speeds (n_arm,) of the falling arm, its fingers held."""
-    import pinocchio as pin
-
-    full, q = model_of(robot).pin, robot.column("initial_position")
+    full, q = RobotModel(robot).pin, robot.column("initial_position")
     fingers = [full.getJointId(name) for name in robot.gripper.joints]
     model: Any = pin.buildReducedModel(full, fingers, q)
     n = model.nv
@@ -184,9 +183,7 @@ def joint_loads_are_told(subject: Subject) -> None:
 
 def _loads(robot: Robot, positions: FloatArray) -> FloatArray:
     """Wrenches by which joints hold still what hangs on them, as `Simulator.joint_wrenches`."""
-    import pinocchio as pin
-
-    model, still = model_of(robot), np.zeros((1, len(positions)))
+    model, still = RobotModel(robot), np.zeros((1, len(positions)))
     model.inverse_dynamics(np.array(STANDARD_GRAVITY), positions[None], still, still)
     pin.forwardKinematics(model.pin, model.data, positions)
     rows = []

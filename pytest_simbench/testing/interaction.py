@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from pytest_simbench.laws.contact import DeadLanding
+from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
-from pytest_simbench.testing.drives import close_command, gravity_effort, hold_command, model_of
+from pytest_simbench.testing.drives import close_command, gravity_effort, hold_command
 from pytest_simbench.testing.robots import any_robot, grasping
 from pytest_simbench.testing.scenes import GRAVITY, MASS
 from pytest_simbench.testing.subject import Subject, asked, logged, require, require_close
@@ -46,7 +47,7 @@ def open_hand_holds_nothing(subject: Subject) -> None:
     s = g t^2 / 2 and v = g t after 0.1 s, within what a step changes and 1 %."""
     robot = subject.arm
     between = scenes.grip(robot, gap=0.01, name="open hand")
-    tool = model_of(robot).tool_pose(robot.column("initial_position"))
+    tool = RobotModel(robot).tool_pose(robot.column("initial_position"))
     x, y, z = (tool * Pose.at(0.0, 0.0, 0.06)).position
     below = Scene("closing hand", (scenes.cube("below", Pose.at(x, y, z)),), robot=robot)
     for scene, closing in ((between, False), (below, True)):
@@ -92,7 +93,7 @@ def held_weight_is_felt(subject: Subject) -> None:
     mass, robot = 1.5, subject.arm
     q = robot.column("initial_position")
     arm_load = gravity_effort(robot, q)[: len(robot.arm_joints)]
-    model = model_of(robot)
+    model = RobotModel(robot)
     lift = model.tool_transform(q).rotation.T @ np.array([0.0, 0.0, mass * GRAVITY])
     cube_load = model.tool_jacobian(q)[:3].T @ lift
     joint = int(np.argmax(cube_load * np.sign(arm_load)))

@@ -8,12 +8,13 @@ import numpy as np
 
 from pytest_simbench.client.world import Motion
 from pytest_simbench.laws.free import rotation_of
+from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.scene import Pose, Wrench
 from pytest_simbench.tasks.manipulator import Manipulator
 from pytest_simbench.tasks.throw_analysis import Thrown
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
-from pytest_simbench.testing.drives import close_command, hold_command, model_of
+from pytest_simbench.testing.drives import close_command, hold_command
 from pytest_simbench.testing.robots import grasping, throwing
 from pytest_simbench.testing.scenes import EDGE, GRAVITY
 from pytest_simbench.testing.subject import Subject, logged, require, require_close
@@ -32,7 +33,7 @@ def pulled_grip_slips(subject: Subject) -> None:
     force = 5.0
     robot = scenes.squeezing(subject.arm, force)
     scene = replace(scenes.grip(robot, name="pulled grip"), gravity=(0.0, 0.0, 0.0))
-    along = model_of(robot).tool_pose(robot.column("initial_position")).rotation()[:, 2]
+    along = RobotModel(robot).tool_pose(robot.column("initial_position")).rotation()[:, 2]
     ends = np.array([_GRASP, _GRASP + 0.3, _GRASP + 0.6])
     wrenches = []
     for share, start, end in zip((0.8, 1.25), ends[:-1], ends[1:], strict=True):
@@ -45,7 +46,7 @@ def pulled_grip_slips(subject: Subject) -> None:
         places = []
         for end in ends:
             world.wait(end - world.time)
-            tool = model_of(robot).tool_pose(world.joints[0])
+            tool = RobotModel(robot).tool_pose(world.joints[0])
             places.append(np.asarray((tool.inverse() * world.pose("held")).position))
     held_by, left_by = np.linalg.norm(np.diff(places, axis=0), axis=1)
     require_close("way in the hand under 0.8 of 2 mu F", float(held_by), 0.0, EDGE / 2, "m")
@@ -110,7 +111,7 @@ def thrown_cube_flies_free(subject: Subject) -> None:
         hand, began = Manipulator(world, np.random.default_rng(0)), world.time
         swing, perfect = hand.throw(goal, 0.5, feasible=True)
         motion = Motion.joined([logged(swing), logged(world.wait(0.6, log_period=0.0))])
-    flight = Thrown(model_of(robot), motion, scene, "held", began, perfect).flight
+    flight = Thrown(RobotModel(robot), motion, scene, "held", began, perfect).flight
     require(flight is not None, "the cube did not leave the hand that threw it")
     assert flight is not None
     opened = (motion.joints[:, 0, robot.finger_indices] > EDGE / 2 + 1e-3).all(axis=1)

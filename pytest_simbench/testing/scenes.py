@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.robot.panda import panda
 from pytest_simbench.scene import (
     STANDARD_GRAVITY,
     Box,
@@ -20,6 +22,7 @@ from pytest_simbench.scene import (
     Sphere,
     Vector3,
 )
+from pytest_simbench.simulator import PreparedRobot
 
 GRAVITY = -STANDARD_GRAVITY[2]
 EDGE, MASS = 0.05, 0.1
@@ -162,8 +165,6 @@ def collision() -> Scene:
 
 def arm() -> Robot:
     """The Panda."""
-    from pytest_simbench.robot.panda import panda
-
     return panda()
 
 
@@ -180,8 +181,6 @@ def of_scene(scene: Scene) -> Robot:
 
 def lifted(robot: Robot) -> Robot:
     """The same robot, so high above the ground that it does not touch it in any posture."""
-    from pytest_simbench.robot.model import RobotModel
-
     return replace(robot, base=Pose.at(0.0, 0.0, max(2.0, 1.2 * RobotModel(robot).reach)))
 
 
@@ -193,8 +192,6 @@ def with_joint(robot: Robot, name: str, **values: Any) -> Robot:
 
 def at_random(robot: Robot, rng: np.random.Generator) -> Robot:
     """The same robot starting at random joint positions, its fingers alike."""
-    from pytest_simbench.simulator import PreparedRobot
-
     limits = PreparedRobot(robot).limits
     opening = rng.uniform(0.2, 0.8)
     for joint in robot.joints:
@@ -214,8 +211,6 @@ def grip(
     robot: Robot | None = None, mass: float = MASS, gap: float = 2e-4, name: str = "grip"
 ) -> Scene:
     """A robot with a cube between its fingers, which stand `gap` [m] from it on either side."""
-    from pytest_simbench.robot.model import RobotModel
-
     robot = robot or arm()
     for finger in robot.gripper.joints:
         robot = with_joint(robot, finger, initial_position=EDGE / 2 + gap)

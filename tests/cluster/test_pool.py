@@ -53,8 +53,8 @@ def test_a_release_with_an_environment_of_its_own_is_offered_by_its_name(
     assert [offer for offer in found.offers if offer.count("==") == 2] == [f"{name}==unknown"]
     assert f", {name}," in str(found)
     assert str(unmet([lab("lab1", "mujoco==4.0.0")], name, ["headless"])) == (
-        f"no node of the cluster offers {name}: lab1 has mujoco 4.0.0; on one of them: pytest "
-        f"--sim-install {name}, and start it again"
+        f"no node of the cluster offers {name}: lab1 has mujoco 4.0.0; on one of them: "
+        f"simbench install {name}, and start it again"
     )
 
 
