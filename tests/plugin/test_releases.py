@@ -81,7 +81,7 @@ def test_a_worker_with_another_release_than_its_name_says(pytester: pytest.Pytes
     [
         (
             ["--sim-bisect", "planted:1.0..1.9", "landed"],
-            "simbench bisect: no planted-engine 1.9 for Python *",
+            "simbench bisect: the package index has no planted-engine 1.9 for Python *",
         ),
         (["--sim=planted==1.2", "--sim-baseline=planted==1.2"], "*no other version of planted*"),
         (["--sim-history=ode:3"], "--sim-history: ode comes with packages of the system*"),
