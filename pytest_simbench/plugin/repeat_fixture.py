@@ -109,8 +109,11 @@ class RepeatFixture:
             most = options.value(config, "sim_crashes")
         if most is None:
             most = 0.0 if self.case.own_timestep is None else 1.0
-        for result in self.results:
-            result.check_crashes(most)
+        try:
+            for result in self.results:
+                result.check_crashes(most)
+        except AssertionError as error:
+            pytest.fail(str(error), pytrace=False)
 
     def finish(self, benchmark: Any) -> None:
         """Tell pytest-benchmark, where there is one, and JUnit; called when the test has ended."""
