@@ -17,8 +17,8 @@ from fnmatch import fnmatchcase
 
 from common import ROOT, arguments, present
 
+from pytest_simbench.parity.compare import ParityResult
 from pytest_simbench.simulator import Capability
-from pytest_simbench.simulator.parity import ParityResult
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.testing import CHECKS, Subject
 from pytest_simbench.testing.expected import read_expected_failures, reason_for

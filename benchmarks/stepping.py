@@ -27,8 +27,8 @@ from pytest_simbench.client.environments import Environment, interpreter
 from pytest_simbench.client.errors import Where
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
-from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.timing import straight_move
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.timing import straight_move
 from pytest_simbench.scene import Trajectory
 from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.tasks import Jitter, Stacking

@@ -62,7 +62,7 @@ def test_the_core_names_no_simulator() -> None:
     assert not found
 
 
-@pytest.mark.parametrize("room", ["scene", "simulator", "worker"])
+@pytest.mark.parametrize("room", ["scene", "description", "simulator", "parity", "worker"])
 def test_workers_need_numpy_and_the_standard_library_alone(room: str) -> None:
     """A worker runs in interpreters that hold nothing else, the system's Python for instance."""
     allowed = {*sys.stdlib_module_names, "numpy", "pytest_simbench"}

@@ -14,8 +14,8 @@ from pytest_simbench.client.environments import (
     remove,
     size_mb,
 )
+from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.ground.text import for_terminal
-from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.registry import adapter
 
 

@@ -112,7 +112,7 @@ COMMANDS = (
     Subcommand("replay", "repeatability.__main__:main", "replay an episode that a failing test "
             "left in its run folder"),
     Subcommand("cluster", "cluster.__main__:main", "start the head of a cluster, or a node of it"),
-    Subcommand("swing", "robot.swing:main", "find a swing for the throw of a robot"),
+    Subcommand("swing", "motion.swing:main", "find a swing for the throw of a robot"),
 )  # fmt: skip
 
 
@@ -181,7 +181,7 @@ def _complaints() -> tuple[type[Exception], ...]:
     """The errors whose messages are for the user."""
     from pytest_simbench.client.errors import ExecutorError
     from pytest_simbench.data.measured import DataError
-    from pytest_simbench.simulator.errors import SimulatorError
+    from pytest_simbench.ground.errors import SimulatorError
 
     return read.BadInput, SimulatorError, ExecutorError, DataError
 

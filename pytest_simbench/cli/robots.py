@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.ground.text import for_terminal
-from pytest_simbench.robot.errors import RobotError
-from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.registry import find, known, known_robot
+from pytest_simbench.motion.errors import RobotError
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.registry import find, known, known_robot
 from pytest_simbench.scene import Robot
 from pytest_simbench.tasks import Pushing, Stacking, Throwing
 

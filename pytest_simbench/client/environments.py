@@ -27,9 +27,9 @@ from pathlib import Path
 
 from pytest_simbench.client import package_index
 from pytest_simbench.client.system import SystemPython
+from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.ground.versions import RELEASE, VersionedName
 from pytest_simbench.records.paths import opened, write_whole
-from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.info import SimulatorInfo, alternatives, importable, no_module
 
 MARKER = "simbench.json"

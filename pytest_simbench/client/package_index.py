@@ -29,7 +29,7 @@ from packaging.utils import (
 )
 from packaging.version import InvalidVersion, Version
 
-from pytest_simbench.simulator.errors import SimulatorError
+from pytest_simbench.ground.errors import SimulatorError
 
 PYPI = "https://pypi.org/simple"
 """Where pip asks when nothing is configured."""

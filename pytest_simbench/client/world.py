@@ -15,12 +15,12 @@ from pytest_simbench.client.errors import Diverged, EngineFailed
 from pytest_simbench.client.frame import Frame
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.stopwatch import Stopwatch
+from pytest_simbench.description.robot_files import with_content
+from pytest_simbench.ground.files import FileError
 from pytest_simbench.scene import FloatArray, Pose, Scene, Trajectory
 from pytest_simbench.scene.checks import check_number
 from pytest_simbench.scene.plausibility import implausible
 from pytest_simbench.simulator import DescriptionError
-from pytest_simbench.simulator.files import FileError
-from pytest_simbench.simulator.robot_files import with_content
 
 TRACE_PERIOD = 0.02
 """Between two samples of a trace [s]: 50 Hz. A task's own log is thinned to that."""

@@ -18,7 +18,7 @@ from typing import Any
 
 from pytest_simbench.cluster.offers import Node, here
 from pytest_simbench.cluster.pool import LOST_AFTER, SETTINGS
-from pytest_simbench.simulator.errors import SimulatorError
+from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.simulator.registry import check_names
 
 LOOPBACK = "127.0.0.1"

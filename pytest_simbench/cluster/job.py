@@ -20,11 +20,11 @@ from typing import Any, cast
 from pytest_simbench.client import errors
 from pytest_simbench.client.environments import Environment, interpreter
 from pytest_simbench.client.errors import Where, WorkerError
+from pytest_simbench.description.robot_files import content_of, keep
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.simulator.robot_files import content_of, keep
 from pytest_simbench.tasks.base import ROBOT, Task
 
 OF_THE_MACHINE = ("folder", "python", "spec", "environment", "display", "robot", "contended")
@@ -45,7 +45,7 @@ class SentRobot:
 
     Attributes:
         robot: without its paths.
-        content: see `simulator.robot_files`.
+        content: see `description.robot_files`.
         srdf: text of that file.
     """
 

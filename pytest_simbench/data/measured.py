@@ -12,7 +12,7 @@ from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
 
-from pytest_simbench.simulator.files import FileError, read_arrays
+from pytest_simbench.ground.files import FileError, read_arrays
 
 LARGEST = 256 * 2**20
 """Of a file of motions [bytes]; the shared ones have 7 MB."""

@@ -20,13 +20,13 @@ import numpy as np
 from pytest_simbench.client.environments import interpreter, missing
 from pytest_simbench.client.tape import ARRAYS, Operation
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.ground.errors import SimulatorError
+from pytest_simbench.ground.files import FileError, read_file, read_json
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.text import in_one_line
+from pytest_simbench.motion.registry import BUILT_IN as ROBOTS
 from pytest_simbench.records.paths import write_whole
-from pytest_simbench.robot.registry import BUILT_IN as ROBOTS
 from pytest_simbench.scene import Scene
-from pytest_simbench.simulator.errors import SimulatorError
-from pytest_simbench.simulator.files import FileError, read_file, read_json
 from pytest_simbench.simulator.registry import adapter, settings_of
 
 FOLDER = "examples"

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.robot.errors import RobotError
+from pytest_simbench.motion.errors import RobotError
 from pytest_simbench.scene import Robot, Scene
 from pytest_simbench.tasks.base import ROBOT, Jitter, Task
 

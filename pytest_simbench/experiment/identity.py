@@ -15,6 +15,7 @@ from typing import Any
 
 from pytest_simbench import __version__
 from pytest_simbench.client.environments import outside
+from pytest_simbench.description.robot_files import CONTENT, with_content
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.ground.names import file_name
@@ -23,7 +24,6 @@ from pytest_simbench.records.record import Record, Status
 from pytest_simbench.records.series import short
 from pytest_simbench.scene import MotionLimits, Pose, Robot
 from pytest_simbench.simulator.registry import adapter, address, settings_of
-from pytest_simbench.simulator.robot_files import CONTENT, with_content
 from pytest_simbench.tasks.base import Jitter, Task
 
 

@@ -1,1 +1,1 @@
-"""What everybody needs: versions of simulators, names of files, text that is safe to show."""
+"""What everybody needs: errors, versions, names and reading of files, text that is safe to show."""

@@ -15,8 +15,8 @@ from pytest_simbench.laws.contact import tilt
 from pytest_simbench.laws.drives import STRONG, follow
 from pytest_simbench.laws.mechanisms import Part, mechanism
 from pytest_simbench.laws.sticking import SHARES, fan
-from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.panda import panda
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import (
     Box,
     ConvexMesh,

@@ -67,7 +67,7 @@ class Passive(Law, phenomenon="joints"):
 
 
 def model_of(robot: Robot, gravity: Vector3):  # type: ignore[no-untyped-def]  # Pinocchio has no types
-    from pytest_simbench.robot.model import RobotModel
+    from pytest_simbench.motion.model import RobotModel
 
     model = RobotModel(robot).pin
     model.gravity.linear = np.array(gravity)

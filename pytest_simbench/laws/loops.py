@@ -10,12 +10,12 @@ from typing import ClassVar
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from pytest_simbench.description.links import ends, reduced
 from pytest_simbench.laws.base import Reading, Watched, rounding
 from pytest_simbench.laws.joints import Motion, Passive, Y, model_of
 from pytest_simbench.laws.mechanisms import MOUNT, Part, mechanism
 from pytest_simbench.scene import Closure, FloatArray, Scene, Vector3
 from pytest_simbench.simulator import Capability, PreparedRobot
-from pytest_simbench.simulator.links import ends, reduced
 
 CRANK, COUPLER, ROCKER, GROUND = 0.25, 0.5, 0.4, 0.5
 """Lengths of the four bars [m]. Shortest and longest together are shorter than the others, so the

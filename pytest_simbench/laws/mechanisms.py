@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pytest_simbench.description.robot_files import keep
 from pytest_simbench.scene import Closure, Gripper, Joint, Pose, Robot, Vector3
-from pytest_simbench.simulator.robot_files import keep
 
 WIDEST = 6.0
 """Limits of a hinge [rad]: less than a turn to each side, which every engine can hold."""

@@ -62,7 +62,7 @@ def refuse_second(task: Task, done: list[Task]) -> None:
 
 def checked_settings(value: Any, simulator: str, profile: str) -> dict[str, Any]:
     """What the fixture `sim_settings` gives, if the simulator can take it; else the test fails."""
-    from pytest_simbench.simulator.errors import SettingsError
+    from pytest_simbench.ground.errors import SettingsError
     from pytest_simbench.simulator.registry import settings_of
 
     if not isinstance(value, Mapping):

@@ -286,7 +286,7 @@ def robot(simbench_robot: Robot) -> Robot:
 @pytest.fixture(scope="session")
 def simbench_robot(request: pytest.FixtureRequest) -> Robot:
     """The test's robot, whatever is named `robot` here."""
-    from pytest_simbench.robot.panda import panda
+    from pytest_simbench.motion.panda import panda
 
     robots = session_of(request.config).selection.robots
     return robots[getattr(request, "param", next(iter(robots)))] or panda()

@@ -106,8 +106,8 @@ def _announce(flag: str, words: list[str]) -> None:
 def _bisect(config: pytest.Config, span: str, metric: str) -> int:
     """The one that `simbench bisect` itself asks for: which folder it is, the options say."""
     from pytest_simbench.cli import bisect, values
+    from pytest_simbench.ground.errors import SimulatorError
     from pytest_simbench.plugin.history import folder_of
-    from pytest_simbench.simulator.errors import SimulatorError
 
     words = list(config.invocation_params.args)
     place = words.index("--sim-bisect")

@@ -13,13 +13,13 @@ from pytest_simbench.cli.names import install_missing, progress, read_names
 from pytest_simbench.cli.values import BadInput, shown
 from pytest_simbench.client import environments
 from pytest_simbench.cluster.offers import Node, unmet
+from pytest_simbench.ground.errors import SettingsError, SimulatorError
 from pytest_simbench.ground.versions import base_name
 from pytest_simbench.plugin import cluster, options
 from pytest_simbench.plugin.history import releases_of
 from pytest_simbench.plugin.variants import Variant, problem, variants
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator import registry
-from pytest_simbench.simulator.errors import SettingsError, SimulatorError
 from pytest_simbench.simulator.settings import Settings
 
 MODES = ("headless", "gui")
@@ -250,8 +250,8 @@ def _robots(text: str | None) -> Mapping[str, Robot | None]:
     """The robots of that name or file; "" for the one that the tasks have anyway."""
     if text is None:
         return {"": None}
-    from pytest_simbench.robot.errors import RobotError
-    from pytest_simbench.robot.registry import BUILT_IN, DEFAULT, find
+    from pytest_simbench.motion.errors import RobotError
+    from pytest_simbench.motion.registry import BUILT_IN, DEFAULT, find
 
     names = BUILT_IN if text == EVERY else [text]
     with options.refusing(RobotError, f"--robot={shown(text)}"):

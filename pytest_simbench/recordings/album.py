@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_simbench.ground.files import read_arrays
 from pytest_simbench.records.paths import write_whole
-from pytest_simbench.simulator.files import read_arrays
 
 FOLDER = "pictures"
 """In the run folder."""

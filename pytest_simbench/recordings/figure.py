@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_simbench.description.mesh_check import HEADER, TRIANGLE
+from pytest_simbench.description.urdf import MovingJoint, PreparedRobot
 from pytest_simbench.scene import FloatArray, Pose, Robot, Vector3
 from pytest_simbench.scene.wire import Wire
-from pytest_simbench.simulator.mesh_check import HEADER, TRIANGLE
-from pytest_simbench.simulator.urdf import MovingJoint, PreparedRobot
 
 
 @dataclass(frozen=True, eq=False)

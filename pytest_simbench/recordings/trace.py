@@ -24,10 +24,10 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.client.world import Motion
+from pytest_simbench.ground.files import FileError, read_arrays, read_json
 from pytest_simbench.recordings.figure import Figure, Mesh
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.scene import Body, FloatArray, Scene
-from pytest_simbench.simulator.files import FileError, read_arrays, read_json
 
 LARGEST = 512 * 2**20
 """Of a trace when it is read [bytes]."""

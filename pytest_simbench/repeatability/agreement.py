@@ -19,12 +19,12 @@ from typing import TypedDict
 import numpy as np
 
 from pytest_simbench.client.world import Motion
+from pytest_simbench.ground.files import read_arrays, read_json
 from pytest_simbench.records import checked
 from pytest_simbench.records.paths import inside, write_whole
 from pytest_simbench.repeatability.episode import Episode
 from pytest_simbench.repeatability.motions import gaps
 from pytest_simbench.scene import FloatArray
-from pytest_simbench.simulator.files import read_arrays, read_json
 
 LIMITS = (0.001, 0.01)
 """Distances of interest [m]."""

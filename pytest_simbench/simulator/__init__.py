@@ -1,8 +1,7 @@
 """What an adapter implements, its settings, capabilities and report of the world it built."""
 
-from pytest_simbench.records.choices import Seen
-from pytest_simbench.simulator.base import Simulator, chosen_on, heavy, lazy_import
-from pytest_simbench.simulator.errors import (
+from pytest_simbench.description.urdf import PreparedRobot
+from pytest_simbench.ground.errors import (
     DescriptionError,
     DivergedError,
     EngineError,
@@ -13,10 +12,10 @@ from pytest_simbench.simulator.errors import (
     StateError,
     UnavailableError,
 )
+from pytest_simbench.records.choices import Seen
+from pytest_simbench.simulator.base import Simulator, chosen_on, heavy, lazy_import
 from pytest_simbench.simulator.info import FOLLOWER, Capability, Deviation, SimulatorInfo
-from pytest_simbench.simulator.parity import one_value
 from pytest_simbench.simulator.settings import Settings
-from pytest_simbench.simulator.urdf import PreparedRobot
 
 __all__ = [
     "FOLLOWER",
@@ -39,5 +38,4 @@ __all__ = [
     "chosen_on",
     "heavy",
     "lazy_import",
-    "one_value",
 ]

@@ -12,9 +12,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_simbench.ground.errors import NotSupportedError
 from pytest_simbench.records.choices import Seen
 from pytest_simbench.scene import FloatArray, Scene, Vector3
-from pytest_simbench.simulator.errors import NotSupportedError
 from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.settings import Settings
 
@@ -80,7 +80,7 @@ class Simulator(ABC):
     bodies are always given in the order of `scene.free_bodies`, joints in the order of
     `scene.robot.joints`. Joint drives obey the law in `scene.Joint`; where the engine has a native
     drive, it is used. Links of the robot collide with each other only where
-    the robot has `self_collide` (`simulator.links`), everything else does.
+    the robot has `self_collide` (`description.links`), everything else does.
 
     Attributes:
         info: facts about the engine, its capabilities and its deviations.
@@ -114,7 +114,7 @@ class Simulator(ABC):
 
     @abstractmethod
     def read_back(self) -> dict[str, Any]:
-        """What the engine says that it built, by the names in `simulator.quantities`.
+        """What the engine says that it built, by the names in `parity.quantities`.
 
         Values must come from the engine, never from the scene. What the engine cannot tell is
         left out and declared in `info.deviations`.

@@ -19,9 +19,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import ClassVar
 
+from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.scene import Scene
 from pytest_simbench.simulator.base import Simulator
-from pytest_simbench.simulator.errors import SimulatorError
 
 GUARD = 'read -r line; kill -s KILL -- "-$1"; rm -rf -- "$2"'
 """Waits in a shell for the end of this process, which closes a pipe, however it ends."""

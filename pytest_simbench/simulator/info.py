@@ -8,9 +8,9 @@ from enum import StrEnum
 from fnmatch import fnmatchcase
 from importlib.util import find_spec
 
+from pytest_simbench.ground.errors import NotSupportedError, SimulatorError
 from pytest_simbench.ground.versions import BUILD, VersionedName, release_numbers
 from pytest_simbench.scene import Robot, Scene
-from pytest_simbench.simulator.errors import SimulatorError
 
 
 class Capability(StrEnum):
@@ -227,3 +227,21 @@ class SimulatorInfo:
     @property
     def modes(self) -> tuple[str, ...]:
         return ("headless", "gui") if Capability.WINDOW in self.capabilities else ("headless",)
+
+
+def check_loops(info: SimulatorInfo, scene: Scene) -> None:
+    """Raise `NotSupportedError` for a scene with loops on a simulator that closes none."""
+    if "loop" in scene.words and Capability.LOOPS not in info.capabilities:
+        raise NotSupportedError(
+            f"{info.name} closes no loops of links, and the robot of scene {scene.name!r} has one"
+        )
+
+
+def check_self_collision(info: SimulatorInfo, scene: Scene) -> None:
+    """Raise `NotSupportedError` for a robot whose links collide with each other, on a simulator
+    that has them pass through each other."""
+    if "self_collide" in scene.words and Capability.SELF_COLLIDE not in info.capabilities:
+        raise NotSupportedError(
+            f"{info.name} has links of a robot pass through each other, and those of scene "
+            f"{scene.name!r} are to collide"
+        )

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from pytest_simbench.simulator.errors import SettingsError
+from pytest_simbench.ground.errors import SettingsError
 
 S = TypeVar("S", bound="Settings")
 

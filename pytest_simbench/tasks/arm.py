@@ -13,11 +13,11 @@ from typing import TypeVar
 import numpy as np
 
 from pytest_simbench.client.world import Motion, World
-from pytest_simbench.robot.collision import PlanningScene
-from pytest_simbench.robot.grasping import grasp_of
-from pytest_simbench.robot.kinematics import inverse_kinematics
-from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.planning import MotionPlanner
+from pytest_simbench.motion.collision import PlanningScene
+from pytest_simbench.motion.grasping import grasp_of
+from pytest_simbench.motion.kinematics import inverse_kinematics
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.planning import MotionPlanner
 from pytest_simbench.scene import FloatArray, Pose, Trajectory
 from pytest_simbench.tasks.base import CUBE_SIZE
 

@@ -18,8 +18,8 @@ from scipy.signal import medfilt
 
 from pytest_simbench.client.world import World
 from pytest_simbench.data.pushes import COMMANDS, FREE, PUSH, ArmRun, Command
+from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.scene import FloatArray, Pose, Robot, Scene, Trajectory
 from pytest_simbench.tasks.arm_pushing import (
     CUBE,

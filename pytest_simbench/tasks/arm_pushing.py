@@ -22,13 +22,13 @@ from pytest_simbench.client.world import World
 from pytest_simbench.data import pushes
 from pytest_simbench.data.measured import DataError, Half
 from pytest_simbench.data.pushes import PUSH, ArmRun, ArmRuns
+from pytest_simbench.description.robot_files import keep
+from pytest_simbench.motion.adapting import bound_joints, lock_joints
+from pytest_simbench.motion.kinematics import track
+from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.robot.adapting import bound_joints, lock_joints
-from pytest_simbench.robot.kinematics import track
-from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.scene import Box, FloatArray, Gripper, Joint, Pose, Robot, Scene, Trajectory
 from pytest_simbench.simulator import DescriptionError
-from pytest_simbench.simulator.robot_files import keep
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
 from pytest_simbench.tasks.measured import MeasuredTask
 

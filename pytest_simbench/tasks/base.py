@@ -11,9 +11,9 @@ import numpy as np
 
 from pytest_simbench.client.tape import Tape
 from pytest_simbench.client.world import World
+from pytest_simbench.motion.errors import RobotError
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.readings import Reading
-from pytest_simbench.robot.errors import RobotError
 from pytest_simbench.scene import Box, Pose, Robot, Scene, Vector3
 
 CUBE_SIZE = 0.05

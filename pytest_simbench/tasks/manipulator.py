@@ -8,12 +8,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from pytest_simbench.client.world import Motion, World
-from pytest_simbench.robot.collision import PlanningScene
-from pytest_simbench.robot.errors import PlanningError, Unreachable
-from pytest_simbench.robot.grasping import CLEARANCE, GRASP_LINK, Choice, choose, grasp_of
-from pytest_simbench.robot.kinematics import inverse_kinematics, tool_over, top_down_grasps
-from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.throw import Throw
+from pytest_simbench.motion.collision import PlanningScene
+from pytest_simbench.motion.errors import PlanningError, Unreachable
+from pytest_simbench.motion.grasping import CLEARANCE, GRASP_LINK, Choice, choose, grasp_of
+from pytest_simbench.motion.kinematics import inverse_kinematics, tool_over, top_down_grasps
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.throw import Throw
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene
 from pytest_simbench.tasks.arm import Arm, LostCube, Speeds
 from pytest_simbench.tasks.base import CUBE_SIZE

@@ -17,13 +17,13 @@ import numpy as np
 from scipy.optimize import brentq
 
 from pytest_simbench.client.world import Motion, World
+from pytest_simbench.motion.collision import PlanningScene
+from pytest_simbench.motion.errors import PlanningError, Unreachable
+from pytest_simbench.motion.kinematics import inverse_kinematics, tool_over, tool_path
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.motion.scale import scale_of
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.robot.collision import PlanningScene
-from pytest_simbench.robot.errors import PlanningError, Unreachable
-from pytest_simbench.robot.kinematics import inverse_kinematics, tool_over, tool_path
-from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.panda import panda
-from pytest_simbench.robot.scale import scale_of
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene, Vector3
 from pytest_simbench.tasks.arm import Arm
 from pytest_simbench.tasks.base import Count, Jitter, Moment, Outcome, Randomness, Task, distance

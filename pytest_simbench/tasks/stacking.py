@@ -14,11 +14,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import World
+from pytest_simbench.motion.grasping import grasping
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.motion.planning import PlanningError
+from pytest_simbench.motion.scale import grasping_scale_of
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.robot.grasping import grasping
-from pytest_simbench.robot.panda import panda
-from pytest_simbench.robot.planning import PlanningError
-from pytest_simbench.robot.scale import grasping_scale_of
 from pytest_simbench.scene import Box, Pose, Robot, Scene
 from pytest_simbench.tasks.arm import FULL_SPEED, LostCube, Speeds
 from pytest_simbench.tasks.base import (

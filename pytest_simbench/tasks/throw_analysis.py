@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_simbench.client.world import Motion
-from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.strain import strain
-from pytest_simbench.robot.throw import Throw, landing_x
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.strain import strain
+from pytest_simbench.motion.throw import Throw, landing_x
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.tasks.base import CUBE_SIZE

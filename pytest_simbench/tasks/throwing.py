@@ -19,13 +19,12 @@ from typing import ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import Motion, World
-from pytest_simbench.records.metrics import Metric
-from pytest_simbench.robot.errors import PlanningError, RobotError
-from pytest_simbench.robot.grasping import grasping
-from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.panda import panda
-from pytest_simbench.robot.scale import grasping_scale_of
-from pytest_simbench.robot.throw import (
+from pytest_simbench.motion.errors import PlanningError, RobotError
+from pytest_simbench.motion.grasping import grasping
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.motion.scale import grasping_scale_of
+from pytest_simbench.motion.throw import (
     LANDING_HEIGHT,
     Throw,
     feasible_swing,
@@ -33,6 +32,7 @@ from pytest_simbench.robot.throw import (
     study_swing,
     swing_of,
 )
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Pose, Robot, Scene
 from pytest_simbench.tasks.arm import LostCube, Speeds
 from pytest_simbench.tasks.base import (

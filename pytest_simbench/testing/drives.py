@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import (
     STANDARD_GRAVITY,
     FloatArray,

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from pytest_simbench.laws.loops import FourBarClosure, FourBarSwing
-from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Trajectory, Vector3
 from pytest_simbench.simulator import Capability, PreparedRobot
 from pytest_simbench.testing import scenes

@@ -14,6 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.mesh_check import TRIANGLE
+from pytest_simbench.description.robot_files import description_xml, digest
+from pytest_simbench.description.shapes import mesh_points
 from pytest_simbench.scene import (
     Box,
     Capsule,
@@ -26,9 +29,6 @@ from pytest_simbench.scene import (
     Sphere,
 )
 from pytest_simbench.simulator import Capability, PreparedRobot
-from pytest_simbench.simulator.mesh_check import TRIANGLE
-from pytest_simbench.simulator.robot_files import description_xml, digest
-from pytest_simbench.simulator.shapes import mesh_points
 from pytest_simbench.testing import scenes
 
 Plant = Callable[[Scene, Path], Scene]

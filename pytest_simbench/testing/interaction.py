@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from pytest_simbench.laws.contact import DeadLanding
-from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check

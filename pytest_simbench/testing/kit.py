@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from pytest_simbench.client.environments import missing
-from pytest_simbench.robot.registry import known
+from pytest_simbench.motion.registry import known
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator import Simulator
 from pytest_simbench.simulator.registry import adapter

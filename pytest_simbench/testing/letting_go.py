@@ -8,7 +8,7 @@ import numpy as np
 
 from pytest_simbench.client.world import Motion
 from pytest_simbench.laws.free import rotation_of
-from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import Pose, Wrench
 from pytest_simbench.tasks.manipulator import Manipulator
 from pytest_simbench.tasks.throw_analysis import Thrown

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from pytest_simbench.parity.compare import ParityResult, compare
+from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.simulator import Capability
-from pytest_simbench.simulator.parity import ParityResult, compare
-from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
 from pytest_simbench.testing.contract import SINGLE

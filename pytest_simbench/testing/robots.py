@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import Robot
 
 CUBE, SPACE = 0.05, 0.01

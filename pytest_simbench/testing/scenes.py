@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.panda import panda
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import (
     STANDARD_GRAVITY,
     Box,

@@ -18,12 +18,12 @@ from pytest_simbench.client.errors import BadState, Diverged, Where, WorkerError
 from pytest_simbench.client.launch import Constructed, Launch
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import Motion, World
+from pytest_simbench.description.urdf import ROOT
 from pytest_simbench.laws import Law
-from pytest_simbench.robot.panda import panda
+from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Robot, Scene
 from pytest_simbench.simulator import Capability, Settings, Simulator
 from pytest_simbench.simulator.settings import profile
-from pytest_simbench.simulator.urdf import ROOT
 
 
 class ConformanceFailure(AssertionError):

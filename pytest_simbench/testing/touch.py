@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pytest_simbench.description.links import link_poses
+from pytest_simbench.description.shapes import DIRECTIONS, placed, shape_points
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot
 from pytest_simbench.simulator import PreparedRobot
-from pytest_simbench.simulator.links import link_poses
-from pytest_simbench.simulator.shapes import DIRECTIONS, placed, shape_points
 from pytest_simbench.testing.scenes import MASS, at_random, lifted
 
 _EDGE = 0.02

@@ -1,11 +1,10 @@
 """The request loop in the simulator's process.
 
-Imports nothing but the rooms `scene` and `simulator`, numpy and the standard library, so that it
-runs in an interpreter that holds nothing but the engine. Each request is a dict
+Imports nothing but rooms below it, numpy and the standard library, so that it runs in an
+interpreter that holds nothing but the engine. Each request is a dict
 `{"op": name, "number": n, ...}`; the answer has the same number, and is `{"ok": result}` or
-`{"error": {type, message}}`. In between may
-come any number of times `{"alive": simulated time}`, and `{"frame": {time, seconds, picture or
-problem}}` while a film is taken.
+`{"error": {type, message}}`. In between may come any number of times `{"alive": simulated time}`,
+and `{"frame": {time, seconds, picture or problem}}` while a film is taken.
 """
 
 from __future__ import annotations
@@ -23,14 +22,19 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench import __version__
+from pytest_simbench.description.links import check_names
+from pytest_simbench.description.robot_files import received
+from pytest_simbench.parity.compare import check
+from pytest_simbench.parity.memory import remembering
+from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import Scene, Trajectory
 from pytest_simbench.simulator import Simulator, SimulatorError, SimulatorInfo
-from pytest_simbench.simulator.info import alternatives, importable
-from pytest_simbench.simulator.links import check_loops, check_names, check_self_collision
-from pytest_simbench.simulator.memory import remembering
-from pytest_simbench.simulator.parity import check
-from pytest_simbench.simulator.quantities import expected_quantities
-from pytest_simbench.simulator.robot_files import received
+from pytest_simbench.simulator.info import (
+    alternatives,
+    check_loops,
+    check_self_collision,
+    importable,
+)
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.worker.acting import Acting
 from pytest_simbench.worker.state import (

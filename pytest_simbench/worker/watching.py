@@ -1,7 +1,7 @@
 """What an engine does while a world is stepped, and must not: a repetition is watched.
 
 - It is asked again what it holds, at steps drawn after loading and at the end; what lasts must be
-  what it told when the world was loaded (`simulator.parity`).
+  what it told when the world was loaded (`parity.compare`).
 - What flies free accelerates as gravity has it.
 - Nothing jumps: bodies and joints move no farther than their speeds explain.
 
@@ -18,14 +18,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_simbench.description.links import link_poses
+from pytest_simbench.description.shapes import DIRECTIONS, OUTLINES
+from pytest_simbench.description.urdf import PreparedRobot
+from pytest_simbench.parity.compare import Lasting
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.scene.plausibility import implausible
 from pytest_simbench.simulator import DivergedError, ParityError, Simulator
-from pytest_simbench.simulator.links import link_poses
-from pytest_simbench.simulator.parity import Lasting
-from pytest_simbench.simulator.shapes import DIRECTIONS, OUTLINES
-from pytest_simbench.simulator.urdf import PreparedRobot
 from pytest_simbench.worker.state import checked_quantities
 
 WINDOW, GROWTH = 1.0, 4
@@ -68,7 +68,7 @@ class Watch:
     Args:
         simulator: a loaded one.
         scene: what it loaded.
-        expected: the scene's quantities (`simulator.quantities`).
+        expected: the scene's quantities (`parity.quantities`).
         reported: what the engine told of them.
         seed: of the repetition; draws the steps.
 

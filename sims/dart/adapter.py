@@ -20,6 +20,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from pytest_simbench.description.links import ends, reduced
 from pytest_simbench.scene import FloatArray, Scene, rotation_matrix
 from pytest_simbench.simulator import (
     FOLLOWER,
@@ -32,7 +33,6 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
-from pytest_simbench.simulator.links import ends, reduced
 
 from .bodies import ONE_CONTACT_ON_A_PLANE, add_body, add_ground, set_surface
 from .readback import ReadBack

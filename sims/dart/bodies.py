@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.shapes import write_obj
 from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, Sphere
 from pytest_simbench.simulator import NotSupportedError, lazy_import
-from pytest_simbench.simulator.shapes import write_obj
 
 dartpy = lazy_import("dartpy")
 

@@ -10,9 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose
-from pytest_simbench.simulator import lazy_import, one_value, readback
-from pytest_simbench.simulator.shapes import (
+from pytest_simbench.description.shapes import (
     DIRECTIONS,
     box_corners,
     cylinder_reach,
@@ -20,6 +18,10 @@ from pytest_simbench.simulator.shapes import (
     reach,
     round_reach,
 )
+from pytest_simbench.parity import readback
+from pytest_simbench.parity.readback import one_value
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.simulator import lazy_import
 
 dartpy = lazy_import("dartpy")
 
@@ -28,7 +30,7 @@ _PROBE, _AWAY = 2.0, 3.0
 
 
 class ReadBack(readback.ReadBack):
-    """Reads the quantities of `simulator.quantities` that DART tells."""
+    """Reads the quantities of `parity.quantities` that DART tells."""
 
     def __init__(self, simulator: Any) -> None:
         super().__init__(simulator)

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose
-from pytest_simbench.simulator import heavy, lazy_import, one_value, readback
-from pytest_simbench.simulator.shapes import (
+from pytest_simbench.description.shapes import (
     box_corners,
     cylinder_reach,
     outlines,
@@ -18,6 +16,10 @@ from pytest_simbench.simulator.shapes import (
     reach,
     round_reach,
 )
+from pytest_simbench.parity import readback
+from pytest_simbench.parity.readback import one_value
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.simulator import heavy, lazy_import
 
 from .world import World
 
@@ -27,7 +29,7 @@ trees = lazy_import("pydrake.multibody.tree")
 
 
 class ReadBack(readback.ReadBack):
-    """Reads the quantities of `simulator.quantities` from plant, shapes and context."""
+    """Reads the quantities of `parity.quantities` from plant, shapes and context."""
 
     def __init__(self, simulator: Any) -> None:
         super().__init__(simulator.world)

@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.links import joined, reduced
+from pytest_simbench.description.shapes import mesh_points
+from pytest_simbench.description.urdf import Link, MovingJoint, Shape
 from pytest_simbench.scene import (
     Body,
     Box,
@@ -20,9 +23,6 @@ from pytest_simbench.scene import (
     Sphere,
 )
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, heavy, lazy_import
-from pytest_simbench.simulator.links import joined, reduced
-from pytest_simbench.simulator.shapes import mesh_points
-from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
 
 from .settings import DrakeSettings, without_sampled_ports
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.urdf import pose_of_rpy
 from pytest_simbench.scene import FloatArray, Pose
-from pytest_simbench.simulator.urdf import pose_of_rpy
 
 
 def vector(found: Any) -> FloatArray:

@@ -16,10 +16,7 @@ from urllib.parse import unquote, urlparse
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose, Scene
-from pytest_simbench.simulator import PreparedRobot, one_value
-from pytest_simbench.simulator.quantities import touches
-from pytest_simbench.simulator.shapes import (
+from pytest_simbench.description.shapes import (
     box_corners,
     cylinder_reach,
     mesh_points,
@@ -28,6 +25,10 @@ from pytest_simbench.simulator.shapes import (
     reach,
     round_reach,
 )
+from pytest_simbench.parity.quantities import touches
+from pytest_simbench.parity.readback import one_value
+from pytest_simbench.scene import FloatArray, Pose, Scene
+from pytest_simbench.simulator import PreparedRobot
 
 from .bindings import bindings
 from .drives import Drives
@@ -40,7 +41,7 @@ EVERYTHING = 0xFFFF
 
 
 class ReadBack:
-    """Reads the quantities of `simulator.quantities` that Gazebo tells.
+    """Reads the quantities of `parity.quantities` that Gazebo tells.
 
     Args:
         server: runs the world.

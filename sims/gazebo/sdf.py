@@ -12,6 +12,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from pytest_simbench.description.links import link_poses
+from pytest_simbench.description.shapes import write_obj
+from pytest_simbench.description.urdf import MovingJoint, Shape
 from pytest_simbench.scene import (
     Body,
     Box,
@@ -24,9 +27,6 @@ from pytest_simbench.scene import (
     Sphere,
 )
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot
-from pytest_simbench.simulator.links import link_poses
-from pytest_simbench.simulator.shapes import write_obj
-from pytest_simbench.simulator.urdf import MovingJoint, Shape
 
 from .drawn import add_drawing
 

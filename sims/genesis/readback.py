@@ -7,15 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose, rotation_matrix
-from pytest_simbench.simulator import heavy, lazy_import, one_value, readback
-from pytest_simbench.simulator.shapes import (
+from pytest_simbench.description.shapes import (
     box_corners,
     cylinder_reach,
     outlines,
     reach,
     round_reach,
 )
+from pytest_simbench.parity import readback
+from pytest_simbench.parity.readback import one_value
+from pytest_simbench.scene import FloatArray, Pose, rotation_matrix
+from pytest_simbench.simulator import heavy, lazy_import
 
 from ..mujoco.bounces import bounce
 from .engine import array_of, centre_of_mass, numbers, of_collider
@@ -26,7 +28,7 @@ _ROUND = ("SPHERE", "CYLINDER", "CAPSULE")
 
 
 class ReadBack(readback.ReadBack):
-    """Reads the quantities of `simulator.quantities` that Genesis tells."""
+    """Reads the quantities of `parity.quantities` that Genesis tells."""
 
     def __init__(self, simulator: Any) -> None:
         super().__init__(simulator)

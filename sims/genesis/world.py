@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.links import reduced
+from pytest_simbench.description.shapes import write_obj
 from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, Scene, Sphere
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, lazy_import
 from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
-from pytest_simbench.simulator.links import reduced
-from pytest_simbench.simulator.shapes import write_obj
 
 from .settings import GenesisSettings
 

@@ -9,15 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose
-from pytest_simbench.simulator import heavy, lazy_import, one_value, readback
-from pytest_simbench.simulator.shapes import (
+from pytest_simbench.description.shapes import (
     box_corners,
     cylinder_reach,
     outlines,
     reach,
     round_reach,
 )
+from pytest_simbench.parity import readback
+from pytest_simbench.parity.readback import one_value
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.simulator import heavy, lazy_import
 
 from .bounces import bounce
 from .world import closed
@@ -43,7 +45,7 @@ class Numbers:
 
 
 class ReadBack(readback.ReadBack):
-    """Reads the quantities of `simulator.quantities` from a model and the state of `data`."""
+    """Reads the quantities of `parity.quantities` from a model and the state of `data`."""
 
     def __init__(self, simulator: Any, model: Any, data: Any, at: Numbers) -> None:
         super().__init__(simulator)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.links import reduced
 from pytest_simbench.scene import (
     Body,
     Box,
@@ -20,7 +21,6 @@ from pytest_simbench.scene import (
     Sphere,
 )
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, heavy, lazy_import
-from pytest_simbench.simulator.links import reduced
 
 from .bounces import direct
 from .settings import MuJoCoSettings

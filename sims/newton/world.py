@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.links import reduced
 from pytest_simbench.scene import (
     Body,
     Box,
@@ -18,7 +19,6 @@ from pytest_simbench.scene import (
     Sphere,
 )
 from pytest_simbench.simulator import PreparedRobot, heavy, lazy_import
-from pytest_simbench.simulator.links import reduced
 
 from .settings import NewtonSettings
 

@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose
-from pytest_simbench.simulator import lazy_import, readback
-from pytest_simbench.simulator.shapes import (
+from pytest_simbench.description.shapes import (
     DIRECTIONS,
     box_corners,
     cylinder_reach,
@@ -20,6 +18,9 @@ from pytest_simbench.simulator.shapes import (
     reach,
     round_reach,
 )
+from pytest_simbench.parity import readback
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.simulator import lazy_import
 
 from .axes import Axis
 from .contacts import Part
@@ -39,7 +40,7 @@ ode = lazy_import("ode")
 
 
 class ReadBack(readback.ReadBack):
-    """Reads the quantities of `simulator.quantities` that ODE tells."""
+    """Reads the quantities of `parity.quantities` that ODE tells."""
 
     def __init__(self, simulator: Any) -> None:
         super().__init__(simulator)

@@ -14,6 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.links import ends, link_poses, motion_subspace
+from pytest_simbench.description.mesh_check import TRIANGLE
+from pytest_simbench.description.urdf import Link, MovingJoint, Shape
 from pytest_simbench.scene import (
     Body,
     Box,
@@ -26,9 +29,6 @@ from pytest_simbench.scene import (
     Sphere,
 )
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, lazy_import
-from pytest_simbench.simulator.links import ends, link_poses, motion_subspace
-from pytest_simbench.simulator.mesh_check import TRIANGLE
-from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
 
 from .axes import Axis
 from .contacts import BASE, FIXED, FREE, GROUND, LINK, LINKS, Part, Surface

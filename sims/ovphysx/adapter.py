@@ -24,6 +24,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_simbench.description.links import link_poses
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import (
     Capability,
@@ -36,7 +37,6 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
-from pytest_simbench.simulator.links import link_poses
 
 from . import stage as usd
 from .readback import ReadBack, wrenches

@@ -1,4 +1,4 @@
-"""What PhysX says that it built, by the names of `simulator.quantities`."""
+"""What PhysX says that it built, by the names of `parity.quantities`."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.links import link_poses
+from pytest_simbench.description.shapes import box_corners, outlines, reach
+from pytest_simbench.parity import readback
+from pytest_simbench.parity.readback import one_value
 from pytest_simbench.scene import Box, ConvexMesh, FloatArray, Pose
-from pytest_simbench.simulator import PreparedRobot, one_value, readback
-from pytest_simbench.simulator.links import link_poses
-from pytest_simbench.simulator.shapes import box_corners, outlines, reach
+from pytest_simbench.simulator import PreparedRobot
 
 from . import stage as usd
 from .session import Session
@@ -37,7 +39,7 @@ _Values = Mapping[str, Mapping[str, FloatArray]]
 
 
 class ReadBack(readback.ReadBack):
-    """Reads the quantities of `simulator.quantities` that PhysX tells.
+    """Reads the quantities of `parity.quantities` that PhysX tells.
 
     Until the first step PhysX's scene queries find the links where the stage put them (`places`);
     from then on, where they are.

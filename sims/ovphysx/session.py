@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.shapes import DIRECTIONS
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.simulator import lazy_import
-from pytest_simbench.simulator.shapes import DIRECTIONS
 
 ovphysx = lazy_import("ovphysx")
 ovphysx_types = lazy_import("ovphysx.types")

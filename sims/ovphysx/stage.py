@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.links import reduced
+from pytest_simbench.description.urdf import Link, MovingJoint, Shape
 from pytest_simbench.scene import (
     Body,
     Box,
@@ -28,8 +30,6 @@ from pytest_simbench.scene import (
     Sphere,
 )
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot
-from pytest_simbench.simulator.links import reduced
-from pytest_simbench.simulator.urdf import Link, MovingJoint, Shape
 
 from . import usd_text as usd
 

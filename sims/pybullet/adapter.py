@@ -18,6 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_simbench.description.links import joined, motion_subspace, reduced
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
@@ -31,7 +32,6 @@ from pytest_simbench.simulator import (
     lazy_import,
 )
 from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
-from pytest_simbench.simulator.links import joined, motion_subspace, reduced
 
 from .anchors import Anchors
 from .readback import ReadBack, wrench

@@ -10,9 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose
-from pytest_simbench.simulator import heavy, lazy_import, readback
-from pytest_simbench.simulator.shapes import (
+from pytest_simbench.description.shapes import (
     box_corners,
     cylinder_reach,
     outlines,
@@ -20,6 +18,9 @@ from pytest_simbench.simulator.shapes import (
     reach,
     round_reach,
 )
+from pytest_simbench.parity import readback
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.simulator import heavy, lazy_import
 
 from .world import points, pose_of
 
@@ -27,7 +28,7 @@ pybullet = lazy_import("pybullet")
 
 
 class ReadBack(readback.ReadBack):
-    """Reads the quantities of `simulator.quantities` that Bullet tells."""
+    """Reads the quantities of `parity.quantities` that Bullet tells."""
 
     def __init__(self, simulator: Any) -> None:
         super().__init__(simulator)
@@ -200,7 +201,7 @@ def wrench(client: int, robot: int, joint: int, subspace: FloatArray) -> FloatAr
 
     Args:
         client, robot, joint: Bullet's numbers.
-        subspace: of the joint, `simulator.links.motion_subspace`.
+        subspace: of the joint, `description.links.motion_subspace`.
     """
     told = pybullet.getJointState(robot, joint, physicsClientId=client)
     state = pybullet.getLinkState(robot, joint, physicsClientId=client)

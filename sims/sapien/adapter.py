@@ -18,6 +18,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_simbench.description.links import reduced
 from pytest_simbench.scene import Closure, FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
@@ -29,7 +30,6 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
-from pytest_simbench.simulator.links import reduced
 
 from .bodies import ROBOT, WORLD, add_body, add_ground
 from .drawing import Drawing

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Pose
-from pytest_simbench.simulator import lazy_import, one_value, readback
-from pytest_simbench.simulator.shapes import (
+from pytest_simbench.description.shapes import (
     box_corners,
     cylinder_reach,
     outlines,
@@ -18,6 +16,10 @@ from pytest_simbench.simulator.shapes import (
     reach,
     round_reach,
 )
+from pytest_simbench.parity import readback
+from pytest_simbench.parity.readback import one_value
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.simulator import lazy_import
 
 physx = lazy_import("sapien.physx")
 
@@ -26,7 +28,7 @@ LYING = Pose(quaternion=(math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0))
 
 
 class ReadBack(readback.ReadBack):
-    """Reads the quantities of `simulator.quantities` that SAPIEN tells."""
+    """Reads the quantities of `parity.quantities` that SAPIEN tells."""
 
     def __init__(self, simulator: Any) -> None:
         super().__init__(simulator)

@@ -16,7 +16,7 @@ from pytest_simbench.cli import environments
 from pytest_simbench.cli.main import COMMANDS, main
 from pytest_simbench.client.environments import MARKER, Environment
 from pytest_simbench.simulator.registry import adapter, registered
-from tests.robot.small_arm import small_arm
+from tests.motion.small_arm import small_arm
 
 NAMES = [command.name for command in COMMANDS]
 

@@ -26,8 +26,8 @@ from pytest_simbench.client.environments import (
     remove,
 )
 from pytest_simbench.client.system import SystemPython
+from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.simulator import SimulatorInfo
-from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.registry import adapter
 
 

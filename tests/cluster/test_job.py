@@ -18,7 +18,7 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import describe_robot, expected
-from pytest_simbench.robot.registry import find
+from pytest_simbench.motion.registry import find
 from pytest_simbench.tasks import Stacking
 from tests.cluster.test_pool import A, Told
 from tests.tiny import Falling
@@ -61,7 +61,7 @@ def test_a_robot_travels_by_content(
     robot = find("xarm7")
     experiment = Experiment(replace(case, robot=robot), Stacking())
     job = Job.unpack(Job.of(experiment).pack().data or b"")
-    monkeypatch.setattr("pytest_simbench.simulator.robot_files.folder", lambda: tmp_path)
+    monkeypatch.setattr("pytest_simbench.description.robot_files.folder", lambda: tmp_path)
     assert job.robot is not None
     assert str(robot.urdf) not in str(job.robot.robot)
     there = job.experiment(tmp_path)

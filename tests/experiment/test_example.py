@@ -22,9 +22,9 @@ from pytest_simbench.experiment.example import (
     replay_command,
     write_example,
 )
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.motion.registry import find
 from pytest_simbench.repeatability.__main__ import main
-from pytest_simbench.robot.panda import panda
-from pytest_simbench.robot.registry import find
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.tasks.base import cube
 from tests.hostile import assert_harmless_terminal

@@ -10,7 +10,7 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.protocol import PROTOCOLS
 from pytest_simbench.experiment.repetition import Hooks, Repetition, group
-from pytest_simbench.simulator.errors import SimulatorError
+from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.tasks.base import Jitter, Task
 from tests.tiny import Falling
 

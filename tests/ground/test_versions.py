@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
+from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.ground.versions import VersionedName, covers, release_numbers
-from pytest_simbench.simulator.errors import SimulatorError
 from pytest_simbench.simulator.registry import UnknownSimulatorError, adapter, address, registered
 
 INFO = replace(

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from pytest_simbench.description.robot_files import keep
 from pytest_simbench.scene import Body, Box, Pose, Robot, Scene
-from pytest_simbench.simulator.robot_files import keep
 
 Fault = Callable[[Scene], Scene]
 

@@ -115,7 +115,7 @@ def test_unreadable_robot_description(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(
         """
         from dataclasses import replace
-        from pytest_simbench.robot.panda import panda
+        from pytest_simbench.motion.panda import panda
         from pytest_simbench.scene import Scene
 
         def test_it(sim):

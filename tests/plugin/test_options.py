@@ -12,7 +12,7 @@ from itertools import chain, repeat
 
 import pytest
 
-import pytest_simbench.robot.registry  # noqa: F401 - or pytester imports it again
+import pytest_simbench.motion.registry  # noqa: F401 - or pytester imports it again
 from pytest_simbench.cli.values import Auto, BadValue, flag
 from pytest_simbench.plugin import options, registration
 from pytest_simbench.plugin.old_options import OLD_OPTIONS

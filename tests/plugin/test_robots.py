@@ -7,8 +7,8 @@ from fnmatch import fnmatchcase
 import pytest
 
 from pytest_simbench.plugin.selection import select
+from tests.motion.small_arm import TOML, small_arm
 from tests.plugin.inner import records
-from tests.robot.small_arm import TOML, small_arm
 
 HOLDING = '''
     """A robot stands still, whichever it is."""
@@ -16,7 +16,7 @@ HOLDING = '''
     from dataclasses import dataclass
     from typing import ClassVar
 
-    from pytest_simbench.robot.panda import panda
+    from pytest_simbench.motion.panda import panda
     from pytest_simbench.scene import Robot, Scene
     from pytest_simbench.tasks.base import Outcome, Task
     from pytest_simbench.records.metrics import Metric

@@ -32,7 +32,7 @@ def test_each_module_that_the_page_names_is_mutated() -> None:
         for room, names in re.findall(r"`(\w+)/\{([\w,]+)\}\.py`", page)
         for name in names.split(",")
     }
-    assert {f"pytest_simbench/{name}.py" for name in ("simulator/parity", "robot/throw")} < named
+    assert {f"pytest_simbench/{name}.py" for name in ("parity/compare", "motion/throw")} < named
     assert named - mutated() == set()
 
 

@@ -80,10 +80,10 @@ def test_it_reads_back_as_the_trace(read: Any, tmp_path: Path) -> None:
 
 def test_links_stand_where_the_model_has_them(tmp_path: Path) -> None:
     """Along /tf from the root, as a viewer goes, against the adapters' own forward kinematics."""
-    from pytest_simbench.robot.panda import panda
+    from pytest_simbench.description.links import link_poses
+    from pytest_simbench.description.urdf import PreparedRobot
+    from pytest_simbench.motion.panda import panda
     from pytest_simbench.scene import Pose
-    from pytest_simbench.simulator.links import link_poses
-    from pytest_simbench.simulator.urdf import PreparedRobot
 
     kept = trace()
     write_bag(kept, tmp_path / "x")

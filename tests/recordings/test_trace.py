@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from pytest_simbench.client.world import Motion
+from pytest_simbench.description.links import link_poses
+from pytest_simbench.description.urdf import PreparedRobot
+from pytest_simbench.motion.registry import known, known_robot
 from pytest_simbench.recordings.figure import Figure
 from pytest_simbench.recordings.trace import Trace, TraceError
-from pytest_simbench.robot.registry import known, known_robot
 from pytest_simbench.scene import Pose
-from pytest_simbench.simulator.links import link_poses
-from pytest_simbench.simulator.urdf import PreparedRobot
 from tests.recordings.samples import motion, scene, trace
 
 

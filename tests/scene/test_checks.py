@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.robot.panda import panda
+from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Box, Gripper, Joint, Pose, Robot, Scene, SceneError
 from tests.hostile import HOSTILE, assert_harmless_terminal
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.robot.panda import panda
+from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Box, Pose, Scene, SceneError, Sphere, Trajectory
 from pytest_simbench.scene.pose import quaternion_of
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.robot.registry import find
+from pytest_simbench.motion.registry import find
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.testing import CHECKS, ConformanceTest, Subject
 from pytest_simbench.testing.expected import read_expected_failures

@@ -13,13 +13,13 @@ from pytest_simbench.sims.dart import adapter
 from pytest_simbench.sims.dart.adapter import DART
 from pytest_simbench.sims.dart.bodies import add_ground
 
-from pytest_simbench.robot.grasping import grasp_of, grasping
-from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.registry import known_robot
+from pytest_simbench.motion.grasping import grasp_of, grasping
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.registry import known_robot
+from pytest_simbench.parity.compare import check
+from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene
 from pytest_simbench.simulator import ParityError
-from pytest_simbench.simulator.parity import check
-from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.tasks import Jitter, Stacking
 from pytest_simbench.testing import scenes

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from pytest_simbench.sims.drake.adapter import Drake
 
+from pytest_simbench.parity.compare import check
+from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.simulator import ParityError
-from pytest_simbench.simulator.parity import check
-from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.tasks import Jitter, Stacking
 
 SCENE = Stacking().scene(1, Jitter())

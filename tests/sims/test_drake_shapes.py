@@ -11,7 +11,7 @@ from pytest_simbench.sims.drake.world import (
     pad_centres,
 )
 
-from pytest_simbench.robot.panda import panda
+from pytest_simbench.motion.panda import panda
 from pytest_simbench.simulator import PreparedRobot
 
 edges = st.tuples(*[st.floats(0.004, 1.0)] * 3)

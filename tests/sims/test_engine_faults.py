@@ -17,10 +17,10 @@ from typing import Any
 import pytest
 
 from pytest_simbench.client.errors import WorldParityError
+from pytest_simbench.parity.compare import compare
+from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import Scene
 from pytest_simbench.simulator import Simulator
-from pytest_simbench.simulator.parity import compare
-from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
 from pytest_simbench.testing.faults import true_scene
 

@@ -13,14 +13,14 @@ from pytest_simbench.client.errors import EngineFailed
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.handle import SimulatorHandle
-from pytest_simbench.robot.files import read_robot
-from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.registry import find
+from pytest_simbench.motion.files import read_robot
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.registry import find
 from pytest_simbench.scene import FloatArray, Robot, Scene, Trajectory
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks import Jitter, Pushing, Stacking
 from tests.conftest import ADAPTERS, case_of
-from tests.robot.small_arm import TOML, URDF, joint, link, small_arm
+from tests.motion.small_arm import TOML, URDF, joint, link, small_arm
 
 QUICK = [name for name in ADAPTERS if not adapter(name).info.costly_start]
 """The others compile each robot anew, for a minute and more."""

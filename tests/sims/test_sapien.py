@@ -17,11 +17,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pytest_simbench.sims.sapien.adapter import SAPIEN
 
+from pytest_simbench.ground.errors import DescriptionError
+from pytest_simbench.parity.compare import check
+from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene
 from pytest_simbench.simulator import ParityError, PreparedRobot
-from pytest_simbench.simulator.errors import DescriptionError
-from pytest_simbench.simulator.parity import check
-from pytest_simbench.simulator.quantities import expected_quantities
 from pytest_simbench.tasks import Jitter, Stacking
 from pytest_simbench.testing import scenes
 
@@ -78,7 +78,7 @@ def turned_by_joint_1(robot: Robot, effort: float, seconds: float) -> tuple[floa
     """Angular momentum about joint 1 [N m s] after an effort feed-forward, and the time [s]."""
     import pinocchio as pin
 
-    from pytest_simbench.robot.model import RobotModel
+    from pytest_simbench.motion.model import RobotModel
 
     start = robot.column("initial_position")
     push = np.zeros_like(start)

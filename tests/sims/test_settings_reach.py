@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from pytest_simbench.client.world import World
-from pytest_simbench.robot.panda import panda
+from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Pose, Trajectory
 from pytest_simbench.simulator import Simulator
 from pytest_simbench.simulator.registry import adapter

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from pytest_simbench.data.pushes import COMMANDS, ArmRun, ArmRuns
-from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks import ArmFollowing
 from pytest_simbench.tasks.arm_following import TICK, began, started

@@ -20,9 +20,9 @@ import numpy as np
 from pytest_simbench.client.errors import Where, WorkerError
 from pytest_simbench.client.launch import Constructed
 from pytest_simbench.client.world import World
-from pytest_simbench.robot.model import RobotModel
+from pytest_simbench.description.robot_files import received
+from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import FloatArray, Pose, Scene
-from pytest_simbench.simulator.robot_files import received
 from pytest_simbench.tasks import Jitter, Task
 from pytest_simbench.tasks.base import CUBE_SIZE, Outcome
 

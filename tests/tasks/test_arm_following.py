@@ -12,8 +12,8 @@ from pytest_simbench.data.pushes import COMMANDS, FREE, PUSH, ArmRun, ArmRuns, C
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.records.record import Record
-from pytest_simbench.robot.model import RobotModel
 from pytest_simbench.tasks import ArmFollowing, CorrectedArmFollowing
 from pytest_simbench.tasks.arm_following import CONTROL_PERIOD, REACHED, hands, reference, started
 from pytest_simbench.tasks.arm_pushing import arm

@@ -13,9 +13,9 @@ from pytest_simbench.data import DataError, DataMissing, read
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
-from pytest_simbench.robot.kinematics import track
-from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.panda import panda
+from pytest_simbench.motion.kinematics import track
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks import ArmPushing
 from pytest_simbench.tasks.arm_pushing import compared, described, world_start

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pytest_simbench.robot.registry import find
+from pytest_simbench.motion.registry import find
 from pytest_simbench.scene import Box, Pose
 from pytest_simbench.tasks import Jitter, LeaningTowers, Stacking, Task, Throwing
 from pytest_simbench.tasks.base import CUBE_MASS, CUBE_SIZE, STUDY_TOLERANCE, Randomness, cube

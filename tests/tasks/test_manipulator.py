@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pytest_simbench.robot.errors import PlanningError
-from pytest_simbench.robot.kinematics import tool_over
-from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.panda import READY
-from pytest_simbench.robot.planning import MotionPlanner
+from pytest_simbench.motion.errors import PlanningError
+from pytest_simbench.motion.kinematics import tool_over
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.panda import READY
+from pytest_simbench.motion.planning import MotionPlanner
 from pytest_simbench.scene import Box, Pose, Scene, Trajectory
 from pytest_simbench.tasks import Jitter, Stacking
 from pytest_simbench.tasks.arm import FULL_SPEED, LostCube, Speeds

@@ -15,15 +15,15 @@ from pytest_simbench.client.errors import Diverged
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
-from pytest_simbench.robot.files import read_robot
-from pytest_simbench.robot.kinematics import DOWNWARD
-from pytest_simbench.robot.panda import panda
-from pytest_simbench.robot.registry import find
+from pytest_simbench.motion.files import read_robot
+from pytest_simbench.motion.kinematics import DOWNWARD
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.motion.registry import find
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks import CurvePushing, Jitter, Pushing
 from pytest_simbench.tasks.pushing import BLOCK_SIZE, START, lever, smallest_turning_radius
 from tests.conftest import case_of
-from tests.robot.small_arm import small_arm
+from tests.motion.small_arm import small_arm
 from tests.tasks.scripted import Mishap, ScriptedProcess, fail, move, perform, slip
 
 LINE, CURVE = Pushing(), CurvePushing()

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from pytest_simbench.client.errors import Diverged, RepetitionTimeout
+from pytest_simbench.motion.files import read_robot
+from pytest_simbench.motion.registry import find
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.robot.files import read_robot
-from pytest_simbench.robot.registry import find
 from pytest_simbench.scene import Box, Pose
 from pytest_simbench.tasks import Jitter, Stacking
 from pytest_simbench.tasks.base import Randomness
 from pytest_simbench.tasks.stacking import GRID, TABLE, TOWERS, Place, _placed, _strict
-from tests.robot.small_arm import TOML, URDF, small_arm
+from tests.motion.small_arm import TOML, URDF, small_arm
 from tests.tasks.scripted import (
     Asked,
     Mishap,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pytest_simbench.robot.panda import READY
+from pytest_simbench.motion.panda import READY
 from pytest_simbench.tasks import Jitter, Stacking, stacking
 from pytest_simbench.tasks.arm import Speeds
 from pytest_simbench.tasks.base import Randomness

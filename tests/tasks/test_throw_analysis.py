@@ -11,7 +11,7 @@ import pytest
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 from pytest_simbench.client.world import World
-from pytest_simbench.robot.throw import swing_of
+from pytest_simbench.motion.throw import swing_of
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.tasks import Jitter, Throwing
 from pytest_simbench.tasks.manipulator import Manipulator

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pytest_simbench.robot.files import read_robot
-from pytest_simbench.robot.panda import panda
+from pytest_simbench.motion.files import read_robot
+from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks import Jitter, Outcome, Throwing
 from pytest_simbench.tasks.throwing import perfect_throw
-from tests.robot.small_arm import small_arm
+from tests.motion.small_arm import small_arm
 from tests.tasks.flying import GRAVITY, PROJECTILE, FlyingProcess
 from tests.tasks.scripted import Mishap, drop, move, perform, put
 
@@ -142,7 +142,7 @@ def test_a_late_release(late: float) -> None:
     assert outcome.metrics["release_time_error"] == pytest.approx(late, abs=0.003)
     timed = PERFECT.timed
     row = PERFECT.row + round(late / 0.004)
-    from pytest_simbench.robot.model import RobotModel
+    from pytest_simbench.motion.model import RobotModel
 
     model = RobotModel(panda())
     position = np.array(model.tool_pose(timed.position[row]).position)

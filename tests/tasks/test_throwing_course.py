@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pytest_simbench.robot.panda import panda
+from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Pose
 from pytest_simbench.tasks import Jitter, Throwing
 from pytest_simbench.tasks.throwing import PYRAMID, perfect_throw

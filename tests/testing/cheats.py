@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
+from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import Body, FloatArray, Scene
-from pytest_simbench.simulator.quantities import expected_quantities
 from tests.laws.faults import bodies, bouncier, drives, heavier, rougher
 
 FINGERS = ("panda_leftfinger", "panda_rightfinger")

@@ -9,7 +9,7 @@ from textwrap import dedent
 import pytest
 
 from pytest_simbench.client.errors import WorkerError, WorldParityError
-from pytest_simbench.robot.registry import find
+from pytest_simbench.motion.registry import find
 from pytest_simbench.simulator import Simulator
 from pytest_simbench.testing import CHECKS, ConformanceFailure, ConformanceTest, Subject
 

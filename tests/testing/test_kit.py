@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
-from pytest_simbench.robot.model import RobotModel
-from pytest_simbench.robot.registry import BUILT_IN, find
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.registry import BUILT_IN, find
 from pytest_simbench.testing import CHECKS, ConformanceTest, ConformanceWarning, Subject
 from pytest_simbench.testing.faults import robot_faults
 from pytest_simbench.testing.kit import Kit, conformance_checks

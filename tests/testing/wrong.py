@@ -15,10 +15,10 @@ import mujoco  # on purpose: this module does not import without its engine
 import numpy as np
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
+from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.simulator import SimulatorInfo
-from pytest_simbench.simulator.quantities import expected_quantities
 
 
 class Lying(MuJoCo):

@@ -11,9 +11,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import Deviation, Settings, Simulator, SimulatorInfo
-from pytest_simbench.simulator.quantities import expected_quantities
 
 DEVIATION = Deviation("body/*/margin", "has margins")
 OF_CYLINDERS = Deviation("body/*/mass", "weighs cylinders by their hulls", only="cylinder")

@@ -198,7 +198,7 @@ def test_a_world_that_starts_elsewhere_is_found(ask: Asked, monkeypatch: Any) ->
 
 
 def test_a_body_with_the_name_of_a_link(ask: Asked) -> None:
-    from pytest_simbench.robot.panda import panda
+    from pytest_simbench.motion.panda import panda
 
     ask.construct()
     cube = Box("panda_hand", (0.05,) * 3, Pose.at(0.5, 0, 0.5), mass=0.1)

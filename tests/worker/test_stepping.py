@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
-from pytest_simbench.robot.panda import panda
+from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Box, Pose, Robot, Scene, Trajectory
 from pytest_simbench.simulator import DivergedError
 from pytest_simbench.worker import control

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pytest_simbench.robot.panda import panda
+from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Scene, Wrench
 from pytest_simbench.worker.server import Server
 from pytest_simbench.worker.watching import Watch

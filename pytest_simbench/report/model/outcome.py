@@ -10,10 +10,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from pytest_simbench.ground.files import FileError, read_file, read_json
 from pytest_simbench.measure.gate import GateReport
 from pytest_simbench.records import checked
 from pytest_simbench.records.paths import FolderError, inside, write_whole
-from pytest_simbench.simulator.files import FileError, read_file, read_json
 
 NAME = "outcome.json"
 

@@ -1,0 +1,161 @@
+"""Links of the reduced robot: where they stand (forward kinematics of its description), what closes
+loops of them, which of them collide with each other; and whether a robot's files fit its drives and
+its scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pytest_simbench.description.urdf import ROOT, MovingJoint, PreparedRobot
+from pytest_simbench.description.urdf_check import read_xml
+from pytest_simbench.ground.errors import DescriptionError
+from pytest_simbench.scene import Closure, FloatArray, Pose, Robot, Scene, SceneError, Vector3
+
+
+def link_poses(prepared: PreparedRobot, positions: Mapping[str, float]) -> dict[str, Pose]:
+    """Pose in the world of every link's frame, by name, at joint positions [rad or m]."""
+    poses = {prepared.root: Pose()}
+    for joint in prepared.joints:  # parents first
+        moved = _motion(joint, positions[joint.name])
+        poses[joint.child] = poses[joint.parent] * joint.origin * moved
+    return poses
+
+
+def motion_subspace(joint: MovingJoint) -> FloatArray:
+    """Velocity of the joint's child at unit joint speed, (6,), in the child's own frame.
+
+    Angular velocity first [rad/s], then the linear velocity of the frame's origin [m/s]
+    (Featherstone, Rigid Body Dynamics Algorithms, section 3.5).
+    """
+    axis = _unit(joint)
+    still = np.zeros(3)
+    return np.concatenate([axis, still] if joint.kind == "revolute" else [still, axis])
+
+
+def _unit(joint: MovingJoint) -> FloatArray:
+    axis = np.asarray(joint.axis, dtype=float)
+    return np.asarray(axis / np.linalg.norm(axis))
+
+
+def _motion(joint: MovingJoint, position: float) -> Pose:
+    x, y, z = (float(value) for value in _unit(joint))
+    if joint.kind == "prismatic":
+        return Pose((x * position, y * position, z * position))
+    s = float(np.sin(position / 2))
+    return Pose(quaternion=(float(np.cos(position / 2)), x * s, y * s, z * s))
+
+
+OPEN = 1e-6
+"""How far the points of a closure may be apart at the joints' initial positions [m]: rounding."""
+
+
+def reduced(prepared: PreparedRobot) -> tuple[Closure, ...]:
+    """The closures between links of the reduced robot, points in their frames.
+
+    Raises:
+        DescriptionError: a closure names a link that is not there, holds a link at itself, or is
+            open at the joints' initial positions.
+    """
+    return tuple(_reduced(prepared, closure) for closure in prepared.robot.closures)
+
+
+def _reduced(prepared: PreparedRobot, closure: Closure) -> Closure:
+    robot = prepared.robot
+    names, points = [], []
+    for name, point in (
+        (closure.first, closure.first_point),
+        (closure.second, closure.second_point),
+    ):
+        if name not in prepared.places:
+            raise DescriptionError(
+                f"a closure of {robot.name} holds link {name!r}, which is none of {robot.urdf}; "
+                f"choose from {', '.join(prepared.places)}"
+            )
+        link, pose = prepared.places[name]
+        names.append(link)
+        points.append(_vector(pose.rotation() @ np.asarray(point) + pose.position))
+    if names[0] == names[1]:
+        raise DescriptionError(
+            f"a closure of {robot.name} holds {closure.first!r} at {closure.second!r}, and no "
+            "joint between them moves"
+        )
+    found = Closure(names[0], names[1], points[0], points[1])
+    first, second = ends(prepared, found)
+    if (apart := float(np.linalg.norm(first - second))) > OPEN:
+        raise DescriptionError(
+            f"the closure of {closure.first!r} and {closure.second!r} of {robot.name} is open by "
+            f"{1000 * apart:.3g} mm at the joints' initial positions; close it there"
+        )
+    return found
+
+
+def ends(
+    prepared: PreparedRobot, closure: Closure, positions: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Where both points of a reduced closure are in the world, (3,) each [m].
+
+    Args:
+        prepared: whose links are held.
+        closure: one of `reduced`.
+        positions: of the joints, (n_joints,); None for the initial ones.
+    """
+    robot = prepared.robot
+    if positions is None:
+        positions = robot.column("initial_position")
+    poses = link_poses(prepared, dict(zip(robot.joint_names, positions, strict=True)))
+    first, second = (
+        np.asarray(poses[link].rotation() @ np.asarray(point) + poses[link].position)
+        for link, point in (
+            (closure.first, closure.first_point),
+            (closure.second, closure.second_point),
+        )
+    )
+    return first, second
+
+
+def _vector(values: FloatArray) -> Vector3:
+    x, y, z = (float(value) for value in values)
+    return (x, y, z)
+
+
+def joined(prepared: PreparedRobot) -> frozenset[frozenset[str]]:
+    """Pairs of links that one joint joins: they never collide with each other."""
+    return frozenset(frozenset((joint.parent, joint.child)) for joint in prepared.joints)
+
+
+def links_collide(prepared: PreparedRobot, first: str, second: str) -> bool:
+    """Whether two links of the reduced robot are to collide with each other."""
+    return prepared.robot.self_collide and {first, second} not in joined(prepared)
+
+
+def check_robot(robot: Robot) -> None:
+    """Check all files of a robot, and that they fit its drives.
+
+    Raises:
+        DescriptionError: what is wrong, where, and what to do.
+    """
+    reduced(PreparedRobot(robot))
+    if not robot.srdf:
+        return
+    srdf = read_xml(robot.srdf, "the list of link pairs")
+    if srdf.tag != "robot":
+        raise DescriptionError(f"{robot.srdf} is no SRDF: it holds <{srdf.tag}>, not <robot>")
+
+
+def check_names(scene: Scene) -> None:
+    """Raise `SceneError` for a body that has the name of one of the robot's links.
+
+    Engines keep both under their names, in one list.
+    """
+    if scene.robot is None:
+        return
+    xml = read_xml(scene.robot.urdf, "the robot description")
+    links = {ROOT, *(link.get("name") for link in xml.findall("link"))}
+    for body in scene.bodies:
+        if body.name in links:
+            raise SceneError(
+                f"scene {scene.name!r}: a body is named {body.name!r}, as a link of the robot "
+                f"{scene.robot.name!r} is; give it another name"
+            )

@@ -1,0 +1,141 @@
+"""A robot's description as content: it travels to workers without any path of the client's.
+
+A description is one URDF without what no engine is given (pictures of links, transmissions), and
+the meshes that it names, each called by the digest of its content. Where it arrives it is kept in a
+folder under these names, so the same description always lies in the same place: engines keep
+compiled meshes by path. Used in workers too: standard library and numpy only.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Mapping
+from copy import deepcopy
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pytest_simbench.description.mesh_check import LARGEST_MESH
+from pytest_simbench.description.urdf_check import LARGEST_FILE, Description
+from pytest_simbench.ground.files import FileError, read_file
+from pytest_simbench.scene import Robot
+
+CONTENT = "content"
+"""Key under which a robot's wire form carries its description."""
+
+
+def description_xml(robot: Robot, name_of: Callable[[Path], str] = str) -> ET.Element:
+    """Links and joints of a robot's URDF, collision shapes only, its meshes named anew.
+
+    Args:
+        robot: whose files are read and checked.
+        name_of: what to call a mesh file; by default its absolute path.
+
+    Raises:
+        DescriptionError: a file is missing or wrong; says which.
+    """
+    return _collision_xml(Description(robot.urdf, robot.packages), robot.name, name_of)
+
+
+def _collision_xml(checked: Description, name: str, name_of: Callable[[Path], str]) -> ET.Element:
+    root = ET.Element("robot", name=name)
+    for element in deepcopy(checked.xml):
+        if element.tag not in ("link", "joint"):
+            continue
+        for visual in element.findall("visual"):
+            element.remove(visual)
+        for mesh in element.iterfind("collision/geometry/mesh"):
+            mesh.set("filename", name_of(Path(checked.mesh(mesh.get("filename", "")))))
+        root.append(element)
+    return root
+
+
+def content_of(robot: Robot) -> dict[str, Any]:
+    """The description as plain data: `urdf`, a text, and `meshes`, bytes by name.
+
+    Raises:
+        DescriptionError: a file is missing or wrong; says which.
+    """
+    return content(Description(robot.urdf, robot.packages), robot.name)
+
+
+def content(checked: Description, name: str) -> dict[str, Any]:
+    """The same of a description that was read, for a robot of that name."""
+    meshes: dict[str, bytes] = {}
+
+    def name_of(path: Path) -> str:
+        data = read_file(path, LARGEST_MESH, "the mesh")
+        name = f"{digest(data)}{path.suffix.lower()}"
+        meshes[name] = data
+        return name
+
+    xml = _collision_xml(checked, name, name_of)
+    return {"urdf": ET.tostring(xml, encoding="unicode"), "meshes": meshes}
+
+
+def with_content(wire: dict[str, Any], robot: Robot | None) -> dict[str, Any]:
+    """A scene's wire form with the description of its robot in place of paths."""
+    if robot is None:
+        return wire
+    paths = {"urdf": "", "srdf": "", "packages": {}}
+    return {**wire, "robot": {**wire["robot"], **paths, CONTENT: content_of(robot)}}
+
+
+def received(wire: Mapping[str, Any]) -> dict[str, Any]:
+    """A scene's wire form with paths of this machine, where it carries a description.
+
+    Raises:
+        OSError: the description cannot be kept here.
+    """
+    robot = dict(wire.get("robot") or {})
+    if CONTENT not in robot:
+        return dict(wire)
+    content = robot.pop(CONTENT)
+    return {**wire, "robot": {**robot, "urdf": str(keep(content["urdf"], content["meshes"]))}}
+
+
+def keep(urdf: str, meshes: Mapping[str, bytes], ending: str = ".urdf") -> Path:
+    """Write a description into the folder of this machine, unless it is there; where the URDF is.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    for name, data in meshes.items():
+        _write(folder() / Path(name).name, data)
+    text = urdf.encode()
+    return _write(folder() / f"{digest(text)}{ending}", text)
+
+
+def digest(data: bytes) -> str:
+    """Of a file, 24 digits."""
+    return hashlib.sha256(data).hexdigest()[:24]
+
+
+@cache
+def folder() -> Path:
+    """Where descriptions are kept: the user's cache folder, or where that cannot be written a new
+    folder of the machine's temporary ones."""
+    caches = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    found = Path(caches) / "pytest-simbench" / "robots"
+    try:
+        found.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=found):
+            return found
+    except OSError:
+        return Path(tempfile.mkdtemp(prefix="simbench-robots-"))
+
+
+def _write(path: Path, data: bytes) -> Path:
+    """Write a file at once, unless it is there as it should be."""
+    try:
+        if read_file(path, max(LARGEST_MESH, LARGEST_FILE)) == data:
+            return path
+    except FileError:
+        pass
+    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+        file.write(data)
+    os.replace(file.name, path)
+    return path

@@ -1,0 +1,148 @@
+"""What a collision shape is compared by: how far it reaches, and the files that meshes come from.
+
+An engine may keep a box as a box, a mesh as its convex hull or as triangles, and number the shapes
+of a link as it likes. How far each reaches in 26 directions (its support function) is the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from pytest_simbench.description.mesh_check import HEADER, TRIANGLE
+from pytest_simbench.description.urdf import Shape
+from pytest_simbench.ground.errors import DescriptionError
+from pytest_simbench.scene import FloatArray, Polytope, Pose
+
+_GRID = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+DIRECTIONS: FloatArray = _GRID / np.linalg.norm(_GRID, axis=1, keepdims=True)
+"""The 26 directions to faces, edges and corners of a cube, unit vectors, (26, 3)."""
+
+OUTLINES = ("boxes", "meshes", "rounds")
+"""The quantities of a body or link that `outlines` makes."""
+
+_ORDER = np.sqrt(np.arange(2.0, 28.0))
+"""Weights of the directions that put shapes in an order of their own; roots, so that no
+symmetry makes two different shapes equal."""
+
+
+def reach(points: FloatArray) -> FloatArray:
+    """How far points (n, 3) reach in each of `DIRECTIONS` from the frame's origin [m], (26,)."""
+    return np.asarray((np.atleast_2d(points) @ DIRECTIONS.T).max(axis=0))
+
+
+def round_reach(radius: float, length: float = 0.0, pose: Pose | None = None) -> FloatArray:
+    """The `reach` of a sphere, or of a capsule along the z axis of a pose, (26,) [m].
+
+    Args:
+        radius: [m].
+        length: of the capsule's cylindrical part [m].
+        pose: of its centre in the frame; by default the frame itself.
+    """
+    pose = pose or Pose()
+    axis = pose.rotation()[:, 2]
+    along: FloatArray = np.abs(DIRECTIONS @ axis) * length / 2
+    return np.asarray(DIRECTIONS @ np.asarray(pose.position) + along + radius)
+
+
+def cylinder_reach(radius: float, length: float, pose: Pose | None = None) -> FloatArray:
+    """The `reach` of a cylinder along the z axis of a pose; arguments as of `round_reach`."""
+    pose = pose or Pose()
+    along = DIRECTIONS @ pose.rotation()[:, 2]
+    across = np.sqrt(np.maximum(0.0, 1.0 - along**2))
+    reached = np.abs(along) * length / 2 + across * radius
+    return np.asarray(DIRECTIONS @ np.asarray(pose.position) + reached)
+
+
+def outlines(
+    prefix: str,
+    boxes: Iterable[FloatArray],
+    meshes: Iterable[FloatArray],
+    rounds: Iterable[FloatArray] = (),
+) -> dict[str, FloatArray]:
+    """The quantities `boxes`, `meshes` and `rounds` of a body or link named `prefix`.
+
+    Args:
+        prefix: of the quantities' names.
+        boxes, meshes, rounds: each shape by its `reach`.
+
+    Returns:
+        Of each kind the reaches in an order of their own, (n_shapes, 26) [m].
+    """
+    kinds = zip(OUTLINES, (boxes, meshes, rounds), strict=True)
+    return {f"{prefix}/{kind}": _ordered(shapes) for kind, shapes in kinds}
+
+
+def _ordered(reaches: Iterable[FloatArray]) -> FloatArray:
+    rows = np.array(list(reaches), dtype=float).reshape(-1, len(DIRECTIONS))
+    return np.asarray(rows[np.argsort(rows @ _ORDER)])
+
+
+def box_corners(size: Sequence[float] | FloatArray) -> FloatArray:
+    """Corners (8, 3) of a box of edge lengths `size` about its centre [m]."""
+    return np.asarray(np.array(list(product((-0.5, 0.5), repeat=3))) * np.asarray(size))
+
+
+def placed(points: FloatArray, pose: Pose) -> FloatArray:
+    """Points (n, 3) given in the frame at `pose`."""
+    return np.asarray(points @ pose.rotation().T + np.asarray(pose.position))
+
+
+def shape_points(shape: Shape) -> FloatArray:
+    """Corners of a box or a mesh in the frame of its link, (n, 3) [m]."""
+    corners = box_corners(shape.size) if shape.size else mesh_points(shape.mesh or "")
+    return placed(corners, shape.pose)
+
+
+def write_obj(path: Path, mesh: Polytope) -> Path:
+    """Write a hull as an OBJ file, for engines that take meshes from files alone; the path."""
+    corners = [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.points.tolist()]
+    sides = [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.triangles]
+    path.write_text("\n".join([*corners, *sides, ""]), encoding="utf-8")
+    return path
+
+
+def mesh_points(path: str) -> FloatArray:
+    """The distinct corners of a mesh, (n, 3) [m].
+
+    Raises:
+        DescriptionError: the file is neither STL nor OBJ.
+    """
+    return _mesh_points(path, Path(path).stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=64)
+def _mesh_points(path: str, _changed: int) -> FloatArray:
+    reader = {".stl": _stl_points, ".obj": _obj_points}.get(Path(path).suffix.lower())
+    points = reader(Path(path)) if reader else None
+    if points is None or not len(points):
+        raise DescriptionError(f"{path} is no STL or OBJ file: collision meshes must be one")
+    return np.unique(points, axis=0)
+
+
+def _stl_points(path: Path) -> FloatArray | None:
+    data = path.read_bytes()
+    count = int.from_bytes(data[80:HEADER], "little")
+    if len(data) == HEADER + count * TRIANGLE.itemsize:
+        triangles = np.frombuffer(data, TRIANGLE, count, HEADER)
+        return np.asarray(triangles["corners"], dtype=float).reshape(-1, 3)
+    if not data.lstrip().startswith(b"solid"):
+        return None
+    return _points_after("vertex", data)
+
+
+def _obj_points(path: Path) -> FloatArray | None:
+    return _points_after("v", path.read_bytes())
+
+
+def _points_after(word: str, data: bytes) -> FloatArray | None:
+    lines = (line.split() for line in data.decode("utf-8", "replace").splitlines())
+    try:
+        rows = [[float(x) for x in line[1:4]] for line in lines if line and line[0] == word]
+        return np.array(rows, dtype=float).reshape(-1, 3)
+    except ValueError:
+        return None

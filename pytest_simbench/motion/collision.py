@@ -1,0 +1,280 @@
+"""The planning scene: robot, obstacles and held cube, checked for collision by Coal."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from itertools import product
+
+import coal
+import numpy as np
+import pinocchio as pin
+from scipy.spatial import ConvexHull
+
+from pytest_simbench.description.robot_files import description_xml
+from pytest_simbench.motion.model import RobotModel, last_change
+from pytest_simbench.scene import Body, FloatArray, Pose, Robot, Scene
+
+MARGIN = 0.012
+"""Distance kept from obstacles in free motions [m]; straight approaches may touch. In a scene of
+the study's size; all distances here go with the scene's scale but `FLATNESS`."""
+
+HELD_SLACK = 0.002
+"""The held cube is checked smaller by this on each face [m]: it may rest where it stands."""
+
+FLATNESS = 0.0005
+"""What stands back by less belongs to the hand's front [m]."""
+
+GROUND = "ground"
+
+
+class PlanningScene:
+    """Where the robot would touch what.
+
+    Meshes of the links are checked as their convex hulls, which is what the engines collide too.
+    Link pairs listed in the SRDF are not checked. The root link is fixed and not checked
+    against the world.
+
+    Args:
+        scale: of the scene's lengths over those of the study's.
+
+    Attributes:
+        scale: the same.
+        opening: position of each finger that is assumed in every check [m, or rad].
+        held: name of the cube in the hand, or None.
+    """
+
+    def __init__(self, model: RobotModel, scene: Scene, scale: float = 1.0) -> None:
+        self.model = model
+        self.scale = scale
+        self.opening = model.robot.gripper.opened
+        self.held: str | None = None
+        geometry = _links(model.robot, last_change(model.robot)).copy()
+        self._links = list(range(len(geometry.geometryObjects)))
+        inverse = model.base.inverse()
+        self._free = {body.name: body for body in scene.free_bodies}
+        self._bodies: dict[str, int] = {}
+        for body in scene.bodies:
+            shape = coal.Box(*body.extents)
+            placement = inverse * pin.SE3(body.pose.matrix())
+            obstacle = pin.GeometryObject(body.name, 0, placement, shape)
+            self._bodies[body.name] = geometry.addGeometryObject(obstacle)
+        half_space = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+        ground = geometry.addGeometryObject(pin.GeometryObject(GROUND, 0, inverse, half_space))
+        moving = [i for i in self._links if geometry.geometryObjects[i].parentJoint > 0]
+        for obstacle_index in [*self._bodies.values(), ground]:
+            for link in moving:
+                geometry.addCollisionPair(pin.CollisionPair(link, obstacle_index))
+        self._add_held_cubes(scene, geometry, ground)
+        self._geometry = geometry
+        self._pairs = [(pair.first, pair.second) for pair in geometry.collisionPairs]
+        self._exact, self._wide = pin.GeometryData(geometry), pin.GeometryData(geometry)
+        for request, (_, second) in zip(self._wide.collisionRequests, self._pairs, strict=True):
+            request.security_margin = MARGIN * scale if second >= len(self._links) else 0.0
+        self.update({body.name: body.pose for body in scene.free_bodies})
+
+    def _add_held_cubes(self, scene: Scene, geometry: pin.GeometryModel, ground: int) -> None:
+        """Every free cube once more, riding on the hand; checked only while it is held."""
+        tool = self.model.pin.frames[self.model.tool]
+        hand_links = {
+            i for i in self._links if geometry.geometryObjects[i].parentJoint >= tool.parentJoint
+        }
+        self._riding: dict[str, int] = {}
+        self._tool_in_joint = tool.placement
+        for body in scene.free_bodies:
+            rider = pin.GeometryObject(
+                f"held {body.name}",
+                tool.parentJoint,
+                tool.placement,
+                coal.Box(*(edge - 2 * HELD_SLACK * self.scale for edge in body.extents)),
+            )
+            index = geometry.addGeometryObject(rider)
+            self._riding[body.name] = index
+            for link in self._links:
+                if link not in hand_links:
+                    geometry.addCollisionPair(pin.CollisionPair(link, index))
+            for other, obstacle in [*self._bodies.items(), (GROUND, ground)]:
+                if other != body.name:
+                    geometry.addCollisionPair(pin.CollisionPair(index, obstacle))
+
+    def update(self, poses: Mapping[str, Pose]) -> None:
+        """Take over the cubes' present poses in the world."""
+        inverse = self.model.base.inverse()
+        for name, pose in poses.items():
+            shape = self._geometry.geometryObjects[self._bodies[name]]
+            shape.placement = inverse * pin.SE3(pose.matrix())
+        self._activate()
+
+    def attach(self, name: str, in_tool: Pose) -> None:
+        """From now on cube `name` moves with the hand, at `in_tool` in the tool frame."""
+        self.held = name
+        rider = self._geometry.geometryObjects[self._riding[name]]
+        rider.placement = self._tool_in_joint * pin.SE3(in_tool.matrix())
+        self._activate()
+
+    def detach(self) -> None:
+        """The hand is empty again."""
+        self.held = None
+        self._activate()
+
+    @property
+    def held_body(self) -> Body | None:
+        """What is in the hand."""
+        return None if self.held is None else self._free[self.held]
+
+    def front(self, above: float) -> tuple[float, float]:
+        """The face with which the closed hand pushes along its tool frame's x [m]: how far it
+        stands before the tool centre point, and how wide it is.
+
+        Args:
+            above: how far above the tool centre point it may touch what it pushes [m].
+        """
+        model = self.model
+        points = self._hand(model.robot.gripper.closed, above, model.arm)
+        depth = float(points[:, 0].max())
+        face = points[points[:, 0] > depth - FLATNESS, 1]
+        return depth, float(face.max() - face.min())
+
+    def gap(self, opening: float, above: float) -> float:
+        """How far a jaw that turns stands from the plane y = 0 of the tool frame [m], on which the
+        face of the fixed jaw lies; infinite where it is all above.
+
+        Args:
+            opening: position of the jaw [rad].
+            above: how far above the tool centre point what it grasps ends [m].
+        """
+        return float(self._hand(opening, above, self.model.arm + 1)[:, 1].min(initial=np.inf))
+
+    def _hand(self, opening: float, above: float, first: int) -> FloatArray:
+        """Corners of the hand's part at most so far above the tool centre point, in the tool frame,
+        (n, 3).
+
+        Args:
+            opening: position of each finger [m, or rad].
+            above: [m]
+            first: joint that carries the first link of the part.
+        """
+        model = self.model
+        fingers = np.full(len(model.robot.joints) - model.arm, opening)
+        q = np.concatenate([model.robot.column("initial_position")[: model.arm], fingers])
+        pin.updateGeometryPlacements(model.pin, model.data, self._geometry, self._exact, q)
+        tool = pin.updateFramePlacement(model.pin, model.data, model.tool)
+        corners = [
+            _below(tool.actInv(self._exact.oMg[link]), shape.geometry, above)
+            for link in self._links
+            if (shape := self._geometry.geometryObjects[link]).parentJoint >= first
+        ]
+        return np.concatenate(corners)
+
+    def _activate(self, ignored: Iterable[str] = ()) -> None:
+        """Switch off the pairs of ignored bodies, of the held cube's place, of cubes not held."""
+        off = {self._bodies[name] for name in ignored}
+        if self.held is not None:
+            off.add(self._bodies[self.held])
+        off |= {index for name, index in self._riding.items() if name != self.held}
+        active = [first not in off and second not in off for first, second in self._pairs]
+        for data in (self._exact, self._wide):
+            data.activeCollisionPairs = active
+
+    def collision(
+        self, arm: FloatArray, *, ignored: Iterable[str] = (), margin: bool = True
+    ) -> tuple[str, str] | None:
+        """The first two things that touch at arm joints `arm`, or None.
+
+        Args:
+            ignored: bodies that may be touched, the cube to be grasped for instance.
+            margin: keep `MARGIN` from obstacles.
+        """
+        return self.first_collision(np.asarray(arm)[None], ignored=ignored, margin=margin)
+
+    def first_collision(
+        self, path: FloatArray, *, ignored: Iterable[str] = (), margin: bool = True
+    ) -> tuple[str, str] | None:
+        """The same for positions along a path, (n, arm)."""
+        ignored = tuple(ignored)
+        if ignored:
+            self._activate(ignored)
+        try:
+            return self._first(path, self._wide if margin else self._exact)
+        finally:
+            if ignored:
+                self._activate()
+
+    def _first(self, path: FloatArray, data: pin.GeometryData) -> tuple[str, str] | None:
+        model, geometry = self.model, self._geometry
+        fingers = np.full(len(model.robot.joints) - model.arm, self.opening)
+        for arm in path:
+            q = np.concatenate([arm, fingers])
+            if pin.computeCollisions(model.pin, model.data, geometry, data, q, True):
+                for index, (first, second) in enumerate(self._pairs):
+                    if (
+                        data.activeCollisionPairs[index]
+                        and data.collisionResults[index].isCollision()
+                    ):
+                        objects = geometry.geometryObjects
+                        return objects[first].name, objects[second].name
+                return "robot", "obstacle"
+        return None
+
+
+@lru_cache(maxsize=64)
+def _links(robot: Robot, changed: tuple[int, ...]) -> pin.GeometryModel:
+    """The shapes of a robot's links and the pairs to check, made once: each repetition asks for it.
+
+    Args:
+        robot: whose files are sound.
+        changed: see `last_change`.
+    """
+    model = RobotModel(robot).pin
+    urdf = ET.tostring(description_xml(robot), encoding="unicode")
+    geometry = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION, package_dirs=[])
+    for shape in geometry.geometryObjects:
+        if isinstance(shape.geometry, coal.BVHModelBase):
+            shape.geometry = convex_hull(np.asarray(shape.geometry.vertices()))
+    geometry.addAllCollisionPairs()
+    if robot.srdf:
+        pin.removeCollisionPairs(model, geometry, robot.srdf)
+    return geometry
+
+
+def convex_hull(points: FloatArray) -> coal.Convex:
+    """The hull of points as a shape, with the points in its corners alone.
+
+    Coal's own (`buildConvexRepresentation`) keeps those within as corners without neighbours. Its
+    search for the farthest corner ends there: with the UR5's links it missed 119 of 368 contacts.
+
+    Args:
+        points: (n, 3) [m].
+    """
+    hull = ConvexHull(points)
+    number = np.zeros(len(points), dtype=int)
+    number[hull.vertices] = np.arange(len(hull.vertices))
+    corners, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for corner in points[hull.vertices]:
+        corners.append(corner)
+    for face, outward in zip(hull.simplices, hull.equations[:, :3], strict=True):
+        a, b, c = points[face]
+        turned = np.cross(b - a, c - a) @ outward < 0.0
+        faces.append(coal.Triangle(*map(int, number[face[::-1] if turned else face])))
+    return coal.Convex(corners, faces)
+
+
+def _below(placement: pin.SE3, shape: coal.CollisionGeometry, above: float) -> FloatArray:
+    """Corners of the part of a convex shape that lies at most so far above the tool centre point,
+    in the tool frame, whose z points down; (n, 3)."""
+    if isinstance(shape, coal.Box):
+        corners = np.array(list(product((-1, 1), repeat=3))) * shape.halfSide
+    else:
+        corners = np.asarray(shape.points())
+    corners = corners @ placement.rotation.T + placement.translation
+    low = corners[:, 2] >= -above
+    # what cuts the plane between any two corners lies in the shape, and all edges are among them
+    a, b = _segments(corners[low], corners[~low])
+    share = ((-above - a[:, 2]) / (b[:, 2] - a[:, 2]))[:, None]
+    return np.concatenate([corners[low], a + share * (b - a)])
+
+
+def _segments(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """All segments from one set of points to another, their ends (n * m, 3) each."""
+    return np.repeat(first, len(second), axis=0), np.tile(second, (len(first), 1))

@@ -1,0 +1,193 @@
+"""How a hand grasps cubes of some size: two parallel fingers as they are, one jaw in its own way.
+
+The tool frame of a hand with one jaw lies on the face of its fixed jaw, and its y axis points to
+the jaw that turns. To grasp a cube the tool centre point moves to where the cube's centre then is,
+half an edge from the fixed jaw. The hand comes down beside the cube, its jaw open by little more
+than the cube is wide, moves aside until the fixed jaw touches, and closes.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from pytest_simbench.description.robot_files import content_of, keep
+from pytest_simbench.motion.adapting import add_tool
+from pytest_simbench.motion.collision import PlanningScene
+from pytest_simbench.motion.errors import PlanningError, Unreachable
+from pytest_simbench.motion.kinematics import inverse_kinematics
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.scene import FloatArray, Pose, Robot, Scene
+
+CLEARANCE = 0.005
+"""Least space between an open finger and a cube of the study's size [m]; it goes with the scale."""
+
+GRASP_LINK, GRASP_JOINT = "grasp_centre_point", "joint_of_the_grasp_centre_point"
+
+BISECTIONS = 40
+"""Of the jaw's range; it then stands to 1e-12 rad where it should."""
+
+
+@dataclass(frozen=True)
+class Grasp:
+    """How a hand grasps a cube.
+
+    Attributes:
+        touching: position of each finger that touches the cube [m, or rad].
+        opened: position of each finger before and after [m, or rad].
+        beside: how far aside the hand comes down, along minus y of its tool frame [m]; 0 for
+            parallel fingers.
+    """
+
+    touching: float
+    opened: float
+    beside: float = 0.0
+
+
+def grasp_of(robot: Robot, width: float, scale: float) -> Grasp:
+    """How a robot of `grasping`, or one with parallel fingers, grasps a cube.
+
+    Args:
+        width: of the cube [m].
+        scale: of the scene over the study's.
+    """
+    if robot.tool_frame != GRASP_LINK:
+        return Grasp(width / 2, robot.gripper.opened)
+    return Grasp(_jaw_at(robot, width), robot.gripper.opened, CLEARANCE * scale)
+
+
+def grasping(robot: Robot, width: float, scale: float, wide: bool = False) -> Robot:
+    """The robot as it grasps cubes: the tool centre point in the middle of the cube. A hand that is
+    not one jaw stays as it is, and so does a jaw that does not open so wide.
+
+    Args:
+        width: of the cubes [m].
+        scale: of the scene over the study's.
+        wide: the jaw opens as far as it can: nothing stands beside the cube.
+    """
+    model = RobotModel(robot)
+    if not model.has_one_jaw:
+        return robot
+    path, opened = _adapted(robot, width, width + 2 * CLEARANCE * scale)
+    if opened is None:
+        return robot
+    if wide:
+        opened = robot.gripper.opened
+    joints = (*robot.joints[:-1], replace(robot.joints[-1], initial_position=opened))
+    gripper = replace(robot.gripper, opened=opened)
+    return replace(
+        robot, urdf=path, packages={}, tool_frame=GRASP_LINK, joints=joints, gripper=gripper
+    )
+
+
+@cache
+def _adapted(robot: Robot, width: float, gap: float) -> tuple[str, float | None]:
+    """The description with the new tool centre point, and the jaw's position at that gap [rad]."""
+    kept = content_of(robot)
+    urdf = ET.fromstring(kept["urdf"])
+    add_tool(urdf, robot.tool_frame, Pose.at(0.0, width / 2, 0.0), GRASP_LINK, GRASP_JOINT)
+    path = keep(ET.tostring(urdf, encoding="unicode"), kept["meshes"])
+    return str(path), _opening(robot, gap, width / 2)
+
+
+@cache
+def _jaw_at(robot: Robot, width: float) -> float:
+    """Where the jaw of a robot of `grasping` touches a cube [rad]."""
+    found = _opening(robot, width / 2, width / 2)  # the tool centre point is in its middle
+    assert found is not None  # it opens wider
+    return found
+
+
+def _opening(robot: Robot, gap: float, above: float) -> float | None:
+    """Position of the jaw at which it stands so far from y = 0 of the tool frame [rad]; None where
+    it cannot."""
+    planning = PlanningScene(RobotModel(robot), Scene("gap", (), robot))
+    low, high = robot.gripper.closed, robot.gripper.opened
+    if planning.gap(high, above) < gap:
+        return None
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if planning.gap(middle, above) < gap else (low, middle)
+    return high
+
+
+RESTARTS, FURTHER_RESTARTS = 10, 40
+"""Of the search for joint positions: for those nearest to home, and for others where these touch
+something. An arm of six joints has up to eight for a pose, the UR5 many more by whole turns."""
+
+
+class Choice(NamedTuple):
+    """A pose of the tool, and the arm joints above it, (arm,) [rad]."""
+
+    tool: Pose
+    above: FloatArray
+
+
+def choose(
+    scene: PlanningScene,
+    tools: Sequence[Pose],
+    approach: float,
+    home: FloatArray,
+    arm: FloatArray,
+    rng: np.random.Generator,
+    ignored: Sequence[str] = (),
+) -> Choice:
+    """The pose that is free and needs the least joint travel.
+
+    The arm takes the joint positions nearest to home. Where those touch something for all poses, it
+    looks for others.
+
+    Args:
+        tools: equivalent poses of the tool in the world.
+        approach: how far above the pose must be free, too, with the planning scene's margin [m].
+        home: arm joints where the search starts, (arm,) [rad].
+        arm: present arm joints, (arm,) [rad].
+        rng: draws further starts of the search.
+        ignored: bodies that may be touched.
+
+    Raises:
+        PlanningError: none is free, and why the last one is not.
+    """
+    reason: PlanningError = Unreachable("unreachable")
+    for restarts in (RESTARTS, FURTHER_RESTARTS):
+        found = []
+        for tool in tools:
+            try:
+                found.append(_free(scene, tool, approach, home, rng, ignored, restarts))
+            except PlanningError as error:
+                reason = error
+        if found:
+            return min(found, key=lambda choice: float(np.abs(choice.above - arm).max()))
+    raise reason
+
+
+def _free(
+    scene: PlanningScene,
+    tool: Pose,
+    approach: float,
+    home: FloatArray,
+    rng: np.random.Generator,
+    ignored: Sequence[str],
+    restarts: int,
+) -> Choice:
+    """
+    Raises:
+        PlanningError: it is out of reach, or touches something.
+    """
+
+    def wanted(arm: FloatArray) -> bool:
+        return restarts == RESTARTS or scene.collision(arm, ignored=ignored) is None
+
+    over = tool.translated(z=approach)
+    above = inverse_kinematics(scene.model, over, home, rng, restarts, wanted)
+    at = inverse_kinematics(scene.model, tool, above)
+    for arm, margin in ((at, False), (above, True)):
+        touching = scene.collision(arm, ignored=ignored, margin=margin)
+        if touching is not None:
+            raise PlanningError(f"in collision: {' and '.join(touching)}")
+    return Choice(tool, above)

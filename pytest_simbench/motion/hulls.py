@@ -1,0 +1,135 @@
+"""Finely drawn meshes as the convex bodies that engines make of them, with few corners.
+
+Every engine collides the convex hull of a mesh. CAD parts of tens of thousands of triangles have
+hulls of thousands of corners, which take an engine seconds to build and gain nothing. A part that
+is not convex, such as a jaw with a stepped face, may be cut into slices first, each with a hull of
+its own.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping
+from copy import deepcopy
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from pytest_simbench.description.mesh_check import TRIANGLE
+from pytest_simbench.description.robot_files import digest
+from pytest_simbench.description.urdf import pose_of_rpy
+from pytest_simbench.scene import FloatArray
+
+AXES = ("x", "y", "z")
+
+THINNEST = 1e-4
+"""A slice of a mesh that is flatter than this, along the cut axis, is left out [m]: what a plane
+cuts off by rounding."""
+
+
+class Cuts(NamedTuple):
+    """Planes that cut the meshes of a link: across which of its axes, and where [m]."""
+
+    axis: str
+    at: tuple[float, ...]
+
+
+def with_hulls(
+    kept: dict[str, Any], corners: int, cuts: Mapping[str, Cuts] | None = None
+) -> dict[str, Any]:
+    """A description's content (`robot_files.content`) with hulls for its meshes.
+
+    Args:
+        kept: the content.
+        corners: of each hull at most.
+        cuts: of the links whose meshes are cut into slices, by name.
+    """
+    urdf, meshes = ET.fromstring(kept["urdf"]), {}
+    for link in urdf.iter("link"):
+        cut = (cuts or {}).get(link.get("name", ""))
+        for collision in link.findall("collision"):
+            mesh = collision.find("geometry/mesh")
+            if mesh is None:
+                continue
+            at = list(link).index(collision)
+            link.remove(collision)
+            triangles = _triangles(kept["meshes"][mesh.get("filename", "")])
+            for points in _slices(triangles, collision, cut):
+                points = points[ConvexHull(points).vertices]
+                hull = stl(points[extreme(points, corners)])
+                name = f"{digest(hull)}.stl"
+                meshes[name] = hull
+                part = deepcopy(collision)
+                part.find("geometry/mesh").set("filename", name)  # type: ignore[union-attr]
+                link.insert(at, part)
+                at += 1
+    return {"urdf": ET.tostring(urdf, encoding="unicode"), "meshes": meshes}
+
+
+def _triangles(data: bytes) -> FloatArray:
+    """Of a binary STL, (n, 3, 3)."""
+    return np.asarray(np.frombuffer(data, TRIANGLE, offset=84)["corners"], dtype=float)
+
+
+def _slices(triangles: FloatArray, collision: ET.Element, cut: Cuts | None) -> Iterator[FloatArray]:
+    """The points of each slice of a link's mesh, in the mesh's own frame, (n, 3) each."""
+    points = triangles.reshape(-1, 3)
+    if cut is None:
+        yield points
+        return
+    origin = collision.find("origin")
+    attributes = {} if origin is None else origin.attrib
+    frame = pose_of_rpy(*(_three(attributes.get(key, "0 0 0")) for key in ("xyz", "rpy")))
+    axis = AXES.index(cut.axis)
+    height = points @ frame.rotation()[axis] + frame.position[axis]
+    edges = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
+    ends = edges @ frame.rotation()[axis] + frame.position[axis]
+    for low, high in pairwise((-np.inf, *sorted(cut.at), np.inf)):
+        inside = (height >= low) & (height <= high)
+        parts = [points[inside], *(_crossings(edges, ends, plane) for plane in (low, high))]
+        found = np.concatenate(parts)
+        along = found @ frame.rotation()[axis]
+        if len(found) and np.ptp(along) > THINNEST:
+            yield found
+
+
+def _crossings(edges: FloatArray, heights: FloatArray, plane: float) -> FloatArray:
+    """Where edges, (n, 2, 3), with ends at some heights, (n, 2), cross a plane, (m, 3)."""
+    crossing = (heights.min(axis=1) < plane) & (plane < heights.max(axis=1))
+    if not np.isfinite(plane) or not crossing.any():
+        return np.empty((0, 3))
+    (a, b), (low, high) = edges[crossing].transpose(1, 0, 2), heights[crossing].T
+    share = ((plane - low) / (high - low))[:, None]
+    return np.asarray(a + share * (b - a))
+
+
+def _three(text: str) -> tuple[float, float, float]:
+    x, y, z = map(float, text.split())
+    return x, y, z
+
+
+def extreme(points: FloatArray, count: int) -> FloatArray:
+    """Which points, (n, 3), lie farthest out in so many directions, evenly spread; each once.
+
+    Their hull lies in that of all points. On a ball of radius r it stands back by some 4 r / count.
+    """
+    height = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)  # a Fibonacci lattice
+    flat = np.sqrt(1.0 - height**2)
+    directions = np.stack([flat * np.cos(turn), flat * np.sin(turn), height])
+    return np.unique(np.argmax(points @ directions, axis=0))
+
+
+def stl(points: FloatArray) -> bytes:
+    """The convex hull of points, (n, 3), as a binary STL, its faces turned outwards."""
+    hull = ConvexHull(points)
+    triangles = np.zeros(len(hull.simplices), TRIANGLE)
+    corners = hull.points[hull.simplices]
+    normals = hull.equations[:, :3]
+    a, b, c = corners.transpose(1, 0, 2)
+    inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), normals) < 0
+    corners[inwards] = corners[inwards][:, ::-1]
+    triangles["corners"], triangles["normal"] = corners, normals
+    return bytes(80) + np.uint32(len(triangles)).tobytes() + triangles.tobytes()

@@ -1,0 +1,210 @@
+"""Inverse kinematics: of a pose, by damped least squares on Pinocchio, with restarts; of lines and
+paths; and of measured motions of the tool."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pinocchio as pin
+from scipy.optimize import least_squares
+
+from pytest_simbench.motion.errors import Unreachable
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.scene import FloatArray, Pose
+
+TOLERANCE = 1e-6
+"""Largest remaining error of a solution, in [m] and [rad] together."""
+
+TURN_TOLERANCE = 1e-4
+"""Largest remaining turn of a solution of an arm with fewer than 6 joints [rad]. Such an arm turns
+its tool about two axes only. The third one is met as the description has it: its angles are written
+with 5 or 6 digits, and each joint adds an error of that size."""
+
+TURN_WEIGHT = 0.01
+"""Of 1 rad for such an arm, where 1 m counts 1: it meets the position, and turns as it can."""
+
+LIMIT_MARGIN = 0.02
+"""Distance that solutions keep from the joint limits [rad]."""
+
+DOWNWARD = Pose(quaternion=(0.0, 1.0, 0.0, 0.0))
+"""A tool that points down, its y axis (the fingers' opening direction) along minus world y."""
+
+
+def top_down_grasps(cube: Pose) -> list[Pose]:
+    """Tool poses that grasp a cube from above, one for each of its four symmetric turns.
+
+    The cube may lie on any face; its yaw is that of the horizontal body axis nearest to x.
+    """
+    axes = cube.rotation()
+    flat = [axes[:, i] for i in range(3) if abs(axes[2, i]) < np.sqrt(0.5)]
+    yaw = float(np.arctan2(flat[0][1], flat[0][0])) if flat else 0.0
+    return [tool_over(cube, yaw + quarter * np.pi / 2) for quarter in range(-2, 2)]
+
+
+def tool_over(place: Pose, yaw: float) -> Pose:
+    """Downward tool pose at a place's position, turned by `yaw` about the vertical [rad]."""
+    return Pose(place.position, (Pose.at(0, 0, 0, yaw=yaw) * DOWNWARD).quaternion)
+
+
+def inverse_kinematics(
+    model: RobotModel,
+    target: Pose,
+    near: FloatArray,
+    rng: np.random.Generator | None = None,
+    restarts: int = 10,
+    wanted: Callable[[FloatArray], bool] = lambda arm: True,
+) -> FloatArray:
+    """Arm joints (arm,) [rad] that bring the tool to `target`.
+
+    Args:
+        near: where the search starts; solutions near it are found first.
+        rng: draws further starts within the limits; None for no restarts.
+        restarts: how many of them.
+        wanted: whether a solution will do; the first one is returned if none does.
+
+    Raises:
+        Unreachable: no start led to the target.
+    """
+    goal = model.base.actInv(pin.SE3(target.matrix()))
+    starts = [np.asarray(near, dtype=float)]
+    if rng is not None:
+        starts += list(rng.uniform(model.lower, model.upper, (restarts, model.arm)))
+    first: FloatArray | None = None
+    for start in starts:
+        solution = _descend(model, goal, start)
+        if solution is not None and wanted(solution):
+            return solution
+        first = solution if first is None else first
+    if first is not None:
+        return first
+    x, y, z = target.position
+    raise Unreachable(f"unreachable: tool at ({x:.3f}, {y:.3f}, {z:.3f})")
+
+
+def _descend(model: RobotModel, goal: pin.SE3, start: FloatArray) -> FloatArray | None:
+    """Damped least squares from one start; None when it does not arrive within the limits."""
+    low, high = model.lower + LIMIT_MARGIN, model.upper - LIMIT_MARGIN
+    q = np.clip(start, low, high)
+    weights = np.ones(6)
+    if model.arm < 6:
+        weights[3:] = TURN_WEIGHT
+    for _ in range(100):
+        transform = model.base.actInv(model.tool_transform(q))
+        error = pin.log6(transform.actInv(goal)).vector
+        if _arrived(error, model.arm):
+            return q
+        error = weights * error
+        size = float(np.linalg.norm(error))
+        jacobian = pin.Jlog6(transform.actInv(goal)) @ model.tool_jacobian(q)
+        jacobian = weights[:, None] * jacobian
+        damping = 1e-9 + 1e-3 * min(size, 0.1) ** 2
+        step = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + damping * np.eye(6), error)
+        step *= min(1.0, 0.5 / max(float(np.abs(step).max()), 1e-12))
+        q = np.clip(q + step, low, high)
+    return None
+
+
+def _arrived(error: FloatArray, joints: int) -> bool:
+    """Whether so small an error, (6,) [m, rad], will do for an arm of so many joints."""
+    if joints >= 6:
+        return float(np.linalg.norm(error)) < TOLERANCE
+    shift, turn = np.linalg.norm(error[:3]), np.linalg.norm(error[3:])
+    return bool(shift < TOLERANCE and turn < TURN_TOLERANCE)
+
+
+def straight_line(
+    model: RobotModel, start: FloatArray, target: Pose, spacing: float = 0.01
+) -> FloatArray:
+    """Joint positions along the straight tool path from `start` to `target`, (n, arm).
+
+    Args:
+        start: arm joints at the beginning.
+        target: tool pose at the end; the orientation turns evenly on the way.
+        spacing: of the tool positions [m].
+
+    Raises:
+        Unreachable: the line leaves the workspace or jumps to another arm configuration.
+    """
+    first = model.tool_transform(start)
+    last = pin.SE3(target.matrix())
+    turn = pin.log3(first.rotation.T @ last.rotation)
+    length = float(np.linalg.norm(last.translation - first.translation))
+    steps = max(2, int(np.ceil(max(length / spacing, float(np.linalg.norm(turn)) / 0.1))))
+    line = [
+        pin.SE3(
+            first.rotation @ pin.exp3(share * turn),
+            (1 - share) * first.translation + share * last.translation,
+        )
+        for share in np.linspace(0, 1, steps + 1)[1:]
+    ]
+    return _joint_path(model, start, line, "straight line")
+
+
+def tool_path(model: RobotModel, start: FloatArray, poses: Sequence[Pose]) -> FloatArray:
+    """Joint positions along a path of the tool, (n + 1, arm), the first of them `start`.
+
+    Args:
+        start: arm joints at the beginning.
+        poses: tool poses in the world, about 1 cm from each other.
+
+    Raises:
+        Unreachable: the path leaves the workspace or jumps to another arm configuration.
+    """
+    return _joint_path(model, start, [pin.SE3(pose.matrix()) for pose in poses], "path")
+
+
+def _joint_path(
+    model: RobotModel, start: FloatArray, poses: Sequence[pin.SE3], what: str
+) -> FloatArray:
+    path = [np.asarray(start, dtype=float)]
+    for pose in poses:
+        solution = _descend(model, model.base.actInv(pose), path[-1])
+        if solution is None:
+            position = tuple(np.round(pose.translation, 3).tolist())
+            raise Unreachable(f"unreachable: {what} to {position}")
+        path.append(solution)
+    if np.abs(np.diff(np.array(path), axis=0)).max() > 0.5:
+        raise Unreachable(f"unreachable: the {what} needs a jump of the arm's configuration")
+    return np.array(path)
+
+
+POSITION, ROTATION, POSTURE, STEP = 100.0, 0.3, 0.1, 1e-5
+"""Weights of 1 m of position, 1 rad of rotation, 1 rad of posture, and 1 rad from the solution
+before, which chooses among those of an arm with more joints than it needs. The position is met to a
+micrometre. The other two share what is left: near a singularity (a stretched wrist) a hundredth of
+a degree of rotation costs tens of degrees in the joints."""
+
+
+def track(
+    model: RobotModel, targets: Sequence[Pose], near: FloatArray, held: Sequence[int] = ()
+) -> FloatArray:
+    """Arm joints that bring the tool to each target, each solution near the one before, (n, arm).
+
+    Args:
+        targets: tool poses, close to one another.
+        near: where the search for the first one starts (arm,) [rad].
+        held: numbers of joints that were commanded to stay at 0, and are kept near it.
+    """
+    path = np.empty((len(targets), model.arm))
+    joints, indices = np.asarray(near, dtype=float), list(held)
+    for row, target in zip(path, targets, strict=True):
+        inverse = target.inverse()
+
+        def off(
+            arm: FloatArray, inverse: Pose = inverse, before: FloatArray = joints
+        ) -> FloatArray:
+            left = inverse * model.tool_pose(arm)
+            turn = 2.0 * np.sign(left.quaternion[0]) * np.array(left.quaternion[1:])
+            return np.concatenate(
+                [
+                    POSITION * np.array(left.position),
+                    ROTATION * turn,
+                    POSTURE * arm[indices],
+                    STEP * (arm - before),
+                ]
+            )
+
+        joints = least_squares(off, joints, method="lm", xtol=1e-8, ftol=1e-8).x
+        row[:] = joints
+    return path

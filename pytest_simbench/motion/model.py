@@ -1,0 +1,205 @@
+"""Kinematics and dynamics of the robot, by Pinocchio."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from functools import lru_cache
+
+import numpy as np
+import pinocchio as pin
+
+from pytest_simbench.description.links import check_robot
+from pytest_simbench.scene import Body, Box, FloatArray, MotionLimits, Pose, Robot
+from pytest_simbench.simulator import DescriptionError
+
+
+class RobotModel:
+    """The robot's model; joint vectors are in the order of `robot.joints`, arm first.
+
+    Attributes:
+        robot: as described in the scene.
+        arm: number of arm joints.
+        lower, upper: position limits of the arm joints [rad], (arm,).
+        effort_limits: of the arm joints [N m], (arm,).
+
+    Raises:
+        DescriptionError: the URDF cannot be read.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.pin = _checked(robot, last_change(robot)).copy()  # gravity and armature are set in it
+        self.pin.gravity.linear = np.zeros(3)
+        self.data = self.pin.createData()
+        self.arm = len(robot.arm_joints)
+        self.lower = np.array(self.pin.lowerPositionLimit[: self.arm])
+        self.upper = np.array(self.pin.upperPositionLimit[: self.arm])
+        self.tool = self.pin.getFrameId(robot.tool_frame)
+        self.base = pin.SE3(robot.base.matrix())
+        self.pin.armature = robot.column("armature")
+        self._loaded: dict[tuple[object, ...], pin.Model] = {}
+        self.effort_limits = robot.column("effort_limit")[: self.arm]
+        self._fingers = np.array([joint.initial_position for joint in robot.joints[self.arm :]])
+
+    @property
+    def limits(self) -> MotionLimits:
+        """Of the arm's motion.
+
+        Raises:
+            DescriptionError: the robot has none.
+        """
+        if self.robot.limits is None:
+            raise DescriptionError(
+                f"robot {self.robot.name!r} has no limits of motion, which planning needs: give it "
+                "Robot(limits=MotionLimits(...))"
+            )
+        return self.robot.limits
+
+    @property
+    def reach(self) -> float:
+        """How far the tool can be from the axis of the first joint at most [m]: the lengths from
+        joint to joint, and to the tool frame."""
+        ends = [self.pin.jointPlacements[joint] for joint in range(2, self.arm + 1)]
+        ends.append(self.pin.frames[self.tool].placement)
+        return sum(float(np.linalg.norm(end.translation)) for end in ends)
+
+    @property
+    def wrist_reach(self) -> float:
+        """The same up to the last joint, without the hand [m]."""
+        ends = [self.pin.jointPlacements[joint] for joint in range(2, self.arm + 1)]
+        return sum(float(np.linalg.norm(end.translation)) for end in ends)
+
+    @property
+    def has_one_jaw(self) -> bool:
+        """Whether the hand is one jaw that turns, towards a fixed one."""
+        return len(self._fingers) == 1 and self.finger_unit == "rad"
+
+    @property
+    def has_parallel_fingers(self) -> bool:
+        """Whether the hand is two fingers that slide."""
+        kinds = [joint.shortname() for joint in list(self.pin.joints)[self.arm + 1 :]]
+        return len(kinds) == 2 and all(kind.startswith("JointModelP") for kind in kinds)
+
+    @property
+    def finger_unit(self) -> str:
+        """Of the fingers' positions: "m" where they slide, "rad" where one turns."""
+        joints = list(self.pin.joints)[self.arm + 1 :]
+        slide = all(joint.shortname().startswith("JointModelP") for joint in joints)
+        return "m" if slide else "rad"
+
+    @property
+    def finger_lever(self) -> float:
+        """How far a fingertip moves for 1 of its joint's position: 1 [m/m] for fingers that slide;
+        for those that turn, from the axis of the first to the tool centre point [m/rad]."""
+        if self.finger_unit == "m":
+            return 1.0
+        axis = self.pin.jointPlacements[self.arm + 1].translation
+        tip = self.pin.frames[self.tool].placement.translation
+        return float(np.linalg.norm(tip - axis))
+
+    def full(self, arm: FloatArray) -> FloatArray:
+        """Arm joints (arm,) with the fingers at their start appended, (n_joints,)."""
+        return np.concatenate([arm[: self.arm], self._fingers])
+
+    def tool_transform(self, arm: FloatArray) -> pin.SE3:
+        """Tool frame in the world as a Pinocchio transform."""
+        pin.forwardKinematics(self.pin, self.data, self.full(arm))
+        return self.base * pin.updateFramePlacement(self.pin, self.data, self.tool)
+
+    def tool_pose(self, arm: FloatArray) -> Pose:
+        """Pose of the tool centre point in the world."""
+        transform = self.tool_transform(arm)
+        x, y, z, w = pin.Quaternion(transform.rotation).coeffs()
+        px, py, pz = transform.translation
+        return Pose((float(px), float(py), float(pz)), (float(w), float(x), float(y), float(z)))
+
+    def tool_jacobian(self, arm: FloatArray) -> FloatArray:
+        """Jacobian of the tool, its own axes, rows linear then angular, (6, arm)."""
+        jacobian = pin.computeFrameJacobian(
+            self.pin, self.data, self.full(arm), self.tool, pin.ReferenceFrame.LOCAL
+        )
+        return np.asarray(jacobian[:, : self.arm])
+
+    def tool_velocity(self, arm: FloatArray, arm_velocity: FloatArray) -> FloatArray:
+        """Linear velocity of the tool centre point in the world [m/s], (3,)."""
+        rotation = self.tool_transform(arm).rotation
+        return np.asarray(rotation @ (self.tool_jacobian(arm)[:3] @ arm_velocity))
+
+    def inverse_dynamics(
+        self,
+        gravity: FloatArray,
+        q: FloatArray,
+        v: FloatArray,
+        a: FloatArray,
+        held: Body | None = None,
+    ) -> FloatArray:
+        """Joint efforts of a motion, rows of (n, n_joints), rotor inertia included [N m, N].
+
+        Args:
+            gravity: in the world [m/s^2], (3,).
+            q, v, a: positions, velocities and accelerations of all joints, each (n, n_joints).
+            held: a body that the hand carries, its centre at the tool centre point.
+        """
+        model = self.pin if held is None else self._carrying(held)
+        model.gravity.linear = self.base.rotation.T @ np.asarray(gravity, dtype=float)
+        data = self.data if held is None else model.createData()
+        return np.array([pin.rnea(model, data, *row).copy() for row in zip(q, v, a, strict=True)])
+
+    def effort_shares(
+        self,
+        gravity: FloatArray,
+        arm: FloatArray,
+        velocity: FloatArray,
+        acceleration: FloatArray,
+        held: Body | None = None,
+    ) -> FloatArray:
+        """What an arm motion asks of the motors, as signed shares of their limits, (n, arm); the
+        fingers at rest."""
+        still = np.zeros((len(arm), len(self._fingers)))
+        q = np.hstack([arm, still + self._fingers])
+        v, a = np.hstack([velocity, still]), np.hstack([acceleration, still])
+        efforts = self.inverse_dynamics(gravity, q, v, a, held)
+        return np.asarray(efforts[:, : self.arm] / self.effort_limits)
+
+    def _carrying(self, body: Body) -> pin.Model:
+        """The model with a body fixed in the hand."""
+        key = type(body), body.mass, body.extents, *body.inertia().tolist()
+        if key not in self._loaded:
+            model = self.pin.copy()
+            tool = model.frames[self.tool]
+            inertia = pin.Inertia(body.mass, np.zeros(3), np.diag(body.inertia()))
+            if isinstance(body, Box):
+                inertia = pin.Inertia.FromBox(body.mass, *body.size)
+            model.appendBodyToJoint(tool.parentJoint, inertia, tool.placement)
+            self._loaded[key] = model
+        return self._loaded[key]
+
+
+def last_change(robot: Robot) -> tuple[int, ...]:
+    """When the files were written that describe a robot [ns]: what was read before may be stale."""
+    found = []
+    for path in filter(None, (robot.urdf, robot.srdf)):
+        with suppress(OSError):  # whoever reads it tells
+            found.append(os.stat(path).st_mtime_ns)
+    return tuple(found)
+
+
+@lru_cache(maxsize=64)
+def _checked(robot: Robot, changed: tuple[int, ...]) -> pin.Model:
+    """Pinocchio's model of a robot whose files are sound, read once: each repetition asks for it.
+
+    Raises:
+        DescriptionError: the URDF cannot be read.
+    """
+    check_robot(robot)
+    try:
+        model = pin.buildModelFromUrdf(robot.urdf, mimic=False)
+    except TypeError:
+        model = pin.buildModelFromUrdf(robot.urdf)
+    except Exception as error:
+        raise DescriptionError(f"cannot use the robot description {robot.urdf}: {error}") from None
+    names = list(model.names)[1:]
+    if names != list(robot.joint_names):
+        raise DescriptionError(f"{robot.urdf} has joints {names}, not {robot.joint_names}")
+    return model

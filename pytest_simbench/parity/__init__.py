@@ -1,0 +1,1 @@
+"""What an engine built, held against what it was asked for."""

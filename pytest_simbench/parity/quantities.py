@@ -1,0 +1,197 @@
+"""The quantities of a scene: what every engine is asked for, by name, and what it must answer.
+
+    gravity, timestep, gripper/coupled
+    ground/{height, friction, restitution}
+    body/NAME/{pose, boxes, rounds, meshes, friction, restitution, margin, dynamic, touches}
+        and of a body with a mass {mass, com, inertia, damping, gravity, velocity}
+    link/NAME/{pose, boxes, rounds, meshes, friction, restitution, margin, touches}
+        and of a link that moves {mass, com, inertia, damping, gravity}
+    joint/NAME/{axis, limits, effort_limit, stiffness, damping, friction, armature,
+        initial_position}
+    closure/NUMBER/points
+
+Links are those of the prepared robot (`description.urdf`), in which fixed joints are merged; its
+base is the link `base`, whose frame is the world's.
+
+- pose: position and quaternion w, x, y, z of the body's or link's frame in the world, (7,).
+- boxes, rounds, meshes: the reach of each collision shape of that kind (rounds are spheres,
+  cylinders and capsules) in the 26 directions of
+  `shapes.DIRECTIONS`, in the body's or link's frame, (n_shapes, 26) [m]; a mesh counts as its
+  convex hull.
+- com: centre of mass in that frame (3,) [m]; inertia: tensor about it in axes of that frame,
+  (3, 3) [kg m^2].
+- friction: Coulomb's coefficient; restitution: Newton's, 0 of links; margin: the distance from its
+  shape at which it rests on others, 0 [m].
+- damping of a body or link: resistance to its linear and angular motion, (2,) [1/s], 0 of links.
+  A body's own replaces that of the settings.
+- gravity of a body or link: the share of the scene's gravity that it feels, 1.
+- dynamic: 1 if forces can move the body, else 0; a prescribed one is moved by none.
+- velocity: of the centre of mass, then angular, in the world frame, (6,) [m/s, rad/s].
+- touches: the shares of ground, bodies and links that it can collide with, (3,). Links collide
+  with links where the robot has `self_collide`, but for those that one joint joins; what can never
+  meet (fixed things) is left out of count; 0 where nothing is left.
+- axis: velocity of the joint's child link at unit joint speed, angular before linear, in that
+  link's frame, (6,).
+- damping of a joint: of its drive and all else that resists in proportion to velocity; friction:
+  what resists its motion beside that [N m, N], 0.
+- points: of a closure of the robot, by its number from 0 on: those that are held together, each in
+  its link's frame, (2, 3) [m].
+- coupled: 1 if the fingers are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from fnmatch import fnmatchcase
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.description.links import link_poses, links_collide, motion_subspace, reduced
+from pytest_simbench.description.shapes import DIRECTIONS, outlines, reach, shape_points
+from pytest_simbench.description.urdf import ROOT, PreparedRobot
+from pytest_simbench.scene import Box, ConvexMesh, FloatArray, Robot, Scene
+from pytest_simbench.simulator.settings import Settings
+
+MOVING = ("pose", "velocity", "initial_position")
+"""Kinds of quantities that change while a world is stepped."""
+
+
+def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
+    """Every quantity that an engine should report of a scene."""
+    prepared = None if scene.robot is None else PreparedRobot(scene.robot)
+    quantities: dict[str, Any] = {
+        "gravity": scene.gravity,
+        "timestep": settings.timestep,
+        "ground/height": 0.0,
+        "ground/friction": scene.ground_friction,
+        "ground/restitution": scene.ground_restitution,
+    }
+    for body in scene.bodies:
+        quantities |= _named(
+            f"body/{body.name}",
+            pose=body.pose.as_array(),
+            friction=body.friction,
+            restitution=body.restitution,
+            margin=0.0,
+            dynamic=float(body.mass > 0),
+        )
+        kinds: tuple[list[FloatArray], ...] = ([], [], [])
+        flat = {Box.kind: 0, ConvexMesh.kind: 1}
+        kinds[flat.get(body.kind, 2)].append(body.reach(DIRECTIONS))
+        quantities |= outlines(f"body/{body.name}", *kinds)
+        if body.mass:
+            inertia = np.diag(body.inertia())
+            quantities |= _inertial(f"body/{body.name}", body.mass, np.zeros(3), inertia)
+            quantities[f"body/{body.name}/velocity"] = body.velocity
+            quantities[f"body/{body.name}/damping"] = body.damping
+    if prepared is not None:
+        quantities |= _robot_quantities(prepared.robot, prepared)
+    quantities |= touches(scene, prepared, lambda a, b: _collide(prepared, a, b))
+    own = {f"body/{body.name}/damping" for body in scene.free_bodies if body.damping.any()}
+    for pattern, value in settings.quantities().items():
+        named = {name for name in quantities if fnmatchcase(name, pattern)}
+        quantities |= dict.fromkeys(named - own, value)
+    return quantities
+
+
+def constants(names: Iterable[str], scene: Scene) -> list[str]:
+    """Those of the quantities that stay as they are while the world is stepped.
+
+    Places and speeds change, but for the places of fixed bodies and of the robot's base.
+    """
+    still = {f"body/{body.name}/pose" for body in scene.fixed_bodies} | {f"link/{ROOT}/pose"}
+    return [n for n in names if n.rpartition("/")[2] not in MOVING or n in still]
+
+
+def _named(prefix: str, **values: Any) -> dict[str, Any]:
+    return {f"{prefix}/{name}": value for name, value in values.items()}
+
+
+def _inertial(prefix: str, mass: float, com: FloatArray, inertia: FloatArray) -> dict[str, Any]:
+    return _named(prefix, mass=mass, com=com, inertia=inertia, damping=np.zeros(2), gravity=1.0)
+
+
+def _robot_quantities(robot: Robot, prepared: PreparedRobot) -> dict[str, Any]:
+    quantities: dict[str, Any] = {"gripper/coupled": 1.0}
+    axes = {joint.name: motion_subspace(joint) for joint in prepared.joints}
+    for joint in robot.joints:
+        quantities |= _named(
+            f"joint/{joint.name}",
+            axis=axes[joint.name],
+            limits=prepared.limits[joint.name],
+            effort_limit=joint.effort_limit,
+            stiffness=joint.stiffness,
+            damping=joint.damping,
+            friction=0.0,
+            armature=joint.armature,
+            initial_position=joint.initial_position,
+        )
+    for k, closure in enumerate(reduced(prepared)):
+        points = np.array([closure.first_point, closure.second_point])
+        quantities[f"closure/{k}/points"] = points
+    poses = link_poses(prepared, {joint.name: joint.initial_position for joint in robot.joints})
+    moving = {link.name for link in prepared.moving_links}
+    for link in prepared.links.values():
+        prefix = f"link/{link.name}"
+        quantities[f"{prefix}/pose"] = poses[link.name].as_array()
+        quantities |= outlines(
+            prefix,
+            [reach(shape_points(shape)) for shape in link.shapes if shape.size],
+            [reach(shape_points(shape)) for shape in link.shapes if not shape.size],
+        )
+        if link.shapes:
+            quantities |= _named(prefix, friction=robot.friction, restitution=0.0, margin=0.0)
+        if link.name in moving:
+            quantities |= _inertial(prefix, link.mass, link.centre, link.inertia)
+    return quantities
+
+
+def touches(
+    scene: Scene, prepared: PreparedRobot | None, can_touch: Callable[[str, str], Any]
+) -> dict[str, Any]:
+    """The quantities `body/NAME/touches` and `link/NAME/touches`.
+
+    Args:
+        can_touch: whether two of "ground", `body/NAME` and `link/NAME` can collide, as the engine
+            (or, for what is expected, the scene) has it; only asked where one of them can move, and
+            once of each pair.
+    """
+    links = _links(prepared)
+    bodies = [f"body/{body.name}" for body in scene.bodies]
+    still = {"ground", *(f"body/{body.name}" for body in scene.bodies if not body.mass)}
+    if prepared is not None:
+        still.add(f"link/{prepared.root}")
+
+    answers: dict[frozenset[str], bool] = {}
+
+    def touch(a: str, b: str) -> bool:
+        pair = frozenset((a, b))
+        if pair not in answers:
+            answers[pair] = bool(can_touch(a, b))
+        return answers[pair]
+
+    def share(name: str, others: Iterable[str]) -> float:
+        asked = [o for o in others if o != name and not (o in still and name in still)]
+        return sum(touch(name, other) for other in asked) / len(asked) if asked else 0.0
+
+    groups = (["ground"], bodies, links)
+    return {
+        f"{name}/touches": np.array([share(name, group) for group in groups])
+        for name in [*bodies, *links]
+    }
+
+
+def _collide(prepared: PreparedRobot | None, a: str, b: str) -> bool:
+    """Whether two of "ground", `body/NAME` and `link/NAME` are to collide."""
+    first, second = a.removeprefix("link/"), b.removeprefix("link/")
+    if prepared is None or first == a or second == b:
+        return True
+    return links_collide(prepared, first, second)
+
+
+def _links(prepared: PreparedRobot | None) -> list[str]:
+    """The links that have shapes, as `link/NAME`."""
+    if prepared is None:
+        return []
+    return [f"link/{link.name}" for link in prepared.links.values() if link.shapes]

@@ -1,0 +1,146 @@
+"""Links of the reduced robot: where they stand, loops of them, and which of them collide."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from pytest_simbench.description.links import (
+    ends,
+    joined,
+    link_poses,
+    links_collide,
+    motion_subspace,
+    reduced,
+)
+from pytest_simbench.laws.domino import DominoWave
+from pytest_simbench.laws.loops import FourBarClosure
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.parity.quantities import expected_quantities
+from pytest_simbench.scene import Closure, Pose, Robot, Scene, SceneError
+from pytest_simbench.simulator import DescriptionError, NotSupportedError, PreparedRobot
+from pytest_simbench.simulator.info import check_loops, check_self_collision
+from pytest_simbench.simulator.registry import adapter
+from pytest_simbench.simulator.settings import Settings
+
+ROBOT = panda(base=Pose.at(0.2, -0.1, 0.3, yaw=0.7))
+PREPARED, MODEL = PreparedRobot(ROBOT), RobotModel(ROBOT)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_poses_are_pinocchios(seed: int) -> None:
+    q = np.random.default_rng(seed).uniform(-1.0, 1.0, len(ROBOT.joints))
+    poses = link_poses(PREPARED, dict(zip(ROBOT.joint_names, q, strict=True)))
+    data = MODEL.pin.createData()
+    pin.forwardKinematics(MODEL.pin, data, q)
+    for joint in PREPARED.joints:
+        placement = MODEL.base * data.oMi[MODEL.pin.getJointId(joint.name)]
+        np.testing.assert_allclose(poses[joint.child].matrix(), placement.homogeneous, atol=1e-9)
+
+
+def test_axes_are_pinocchios() -> None:
+    q = np.random.default_rng(0).uniform(-1.0, 1.0, len(ROBOT.joints))
+    data = MODEL.pin.createData()
+    for joint in PREPARED.joints:
+        index = MODEL.pin.getJointId(joint.name)
+        jacobian = pin.computeJointJacobian(MODEL.pin, data, q, index)
+        column = jacobian[:, MODEL.pin.joints[index].idx_v]  # linear before angular
+        np.testing.assert_allclose(
+            motion_subspace(joint), np.concatenate([column[3:], column[:3]]), atol=1e-12
+        )
+
+
+def four_bar() -> Robot:
+    robot = FourBarClosure().build().robot
+    assert robot is not None
+    return robot
+
+
+def test_points_of_a_link_that_became_part_of_another_are_in_its_frame() -> None:
+    robot = four_bar()
+    x, y, z = PreparedRobot(robot).links["crank link"].centre  # any point of the crank
+    held = Closure("crank link", "mount", (x, y, z))
+    place, _ = ends(PreparedRobot(robot), reduced(PreparedRobot(robot))[0])
+    prepared = PreparedRobot(replace(robot, closures=()))
+    at = ends(prepared, replace(held, second="base"))[0]
+    anchored = replace(held, second_point=tuple(np.subtract(at, robot.base.position)))
+    (found,) = reduced(PreparedRobot(replace(robot, closures=(anchored,))))
+    assert found.second == "base"
+    assert found.second_point == pytest.approx(at)
+    assert not np.allclose(at, place)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"second": "rod"}, "holds link 'rod', which is none of .*choose from mount, crank link"),
+        ({"first_point": (0.501, 0.0, 0.0)}, "is open by 1 mm at the joints' initial positions"),
+    ],
+)
+def test_a_wrong_closure_is_refused(change: dict[str, object], message: str) -> None:
+    robot = four_bar()
+    wrong = replace(robot.closures[0], **change)
+    with pytest.raises(DescriptionError, match=message):
+        reduced(PreparedRobot(replace(robot, closures=(wrong,))))
+
+
+def test_a_link_is_not_held_at_itself() -> None:
+    with pytest.raises(SceneError, match="a closure holds link 'a' at itself"):
+        Closure("a", "a")
+
+
+def test_who_closes_no_loops_says_so() -> None:
+    info = replace(adapter("mujoco").info, name="mysim", capabilities=frozenset())
+    with pytest.raises(NotSupportedError, match="mysim closes no loops of links, and the robot of"):
+        check_loops(info, FourBarClosure().build())
+    check_loops(info, Scene("empty"))
+
+
+def test_closures_travel_and_robots_without_any_look_as_before() -> None:
+    robot = four_bar()
+    assert Robot.from_wire(robot.to_wire()) == robot
+    assert "closures" not in replace(robot, closures=()).to_wire()
+
+
+def test_who_has_links_pass_through_each_other_says_so() -> None:
+    info = replace(adapter("mujoco").info, name="mysim", capabilities=frozenset())
+    scene = DominoWave().build()
+    message = "mysim has links of a robot pass through each other, and those of scene 'domino_wave'"
+    with pytest.raises(NotSupportedError, match=message):
+        check_self_collision(info, scene)
+    assert scene.robot is not None
+    passing = replace(scene, robot=replace(scene.robot, self_collide=False))
+    check_self_collision(info, passing)
+    check_self_collision(info, Scene("empty"))
+    check_self_collision(adapter("mujoco").info, scene)
+
+
+def test_it_travels_and_other_robots_look_as_before() -> None:
+    colliding = replace(panda(), self_collide=True)
+    assert Robot.from_wire(colliding.to_wire()).self_collide
+    assert not Robot.from_wire(panda().to_wire()).self_collide
+    assert "self_collide" not in panda().to_wire()
+
+
+def test_links_that_one_joint_joins_never_collide() -> None:
+    robot = PreparedRobot(replace(panda(), self_collide=True))
+    assert frozenset(("base", "panda_link1")) in joined(robot)
+    assert not links_collide(robot, "panda_link1", "base")
+    assert links_collide(robot, "base", "panda_link2")
+    assert not links_collide(PreparedRobot(panda()), "base", "panda_link2")
+
+
+def test_shares_of_links_that_can_be_touched() -> None:
+    """Of the Panda's ten links, each but the ends is joined to two others."""
+    colliding = replace(panda(), self_collide=True)
+    found = expected_quantities(Scene("s", (), colliding), Settings())
+    shares = {
+        name: found[f"link/{name}/touches"].tolist() for name in PreparedRobot(colliding).links
+    }
+    assert shares["base"] == [0, 0, pytest.approx(8 / 9)]
+    assert shares["panda_link3"] == [1, 0, pytest.approx(7 / 9)]
+    assert shares["panda_leftfinger"] == [1, 0, pytest.approx(8 / 9)]

@@ -1,0 +1,156 @@
+"""The reduced robot, and how its description travels."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from pytest_simbench.description.robot_files import content_of, folder, received, with_content
+from pytest_simbench.description.shapes import reach, shape_points
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.scene import Pose, Robot, Scene
+from pytest_simbench.simulator import DescriptionError, PreparedRobot
+from pytest_simbench.worker.wire import pack, unpack
+
+
+def test_mass_is_conserved() -> None:
+    robot = panda()
+    masses = [float(m.attrib["value"]) for m in ET.parse(robot.urdf).iter("mass")]
+    prepared = PreparedRobot(robot)
+    assert sum(link.mass for link in prepared.links.values()) == pytest.approx(sum(masses))
+
+
+@pytest.mark.parametrize("base", [Pose(), Pose.at(0.3, -0.2, 0.5, yaw=0.7)])
+def test_dynamics_are_those_of_the_original(base: Pose, tmp_path: Path) -> None:
+    robot = panda(base=base)
+    original = RobotModel(robot)
+    reduced = pin.buildModelFromUrdf(str(PreparedRobot(robot).write_urdf(tmp_path)))
+    data = reduced.createData()
+    rng = np.random.default_rng(0)
+    gravity = np.array([0.0, 0.0, -9.80665])
+    reduced.gravity.linear = gravity
+    for _ in range(20):
+        q = np.concatenate([rng.uniform(original.lower, original.upper), [0.02, 0.02]])
+        v, a = rng.normal(size=(2, 9))
+        expected = original.inverse_dynamics(gravity, q[None], v[None], a[None])[0]
+        rotors = robot.column("armature") * a
+        assert np.allclose(pin.rnea(reduced, data, q, v, a) + rotors, expected, atol=1e-6)
+        pin.forwardKinematics(reduced, data, q)
+        joint = original.pin.getJointId("panda_joint7")
+        pin.forwardKinematics(original.pin, original.data, q)
+        there = original.base * original.data.oMi[joint]
+        assert data.oMi[joint].isApprox(there, 1e-6)
+
+
+def test_lines_are_short_enough_for_bullet() -> None:
+    assert max(map(len, PreparedRobot(panda()).to_urdf().splitlines())) < 1000
+
+
+def test_missing_file_is_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(DescriptionError, match="cannot read the robot description .*nowhere.urdf"):
+        PreparedRobot(replace(panda(), urdf=str(tmp_path / "nowhere.urdf")))
+
+
+def test_malformed_file_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "bad.urdf").write_text("<robot")
+    with pytest.raises(DescriptionError, match="bad.urdf is not valid XML"):
+        PreparedRobot(replace(panda(), urdf=str(tmp_path / "bad.urdf")))
+
+
+def test_a_drive_for_a_joint_that_is_not_there() -> None:
+    robot = panda()
+    joints = (replace(robot.joints[0], name="tail"), *robot.joints[1:])
+    with pytest.raises(DescriptionError, match="disagree about joints panda_joint1, tail"):
+        PreparedRobot(replace(robot, joints=joints))
+
+
+def test_unknown_package() -> None:
+    with pytest.raises(DescriptionError, match="unknown package 'example-robot-data'"):
+        PreparedRobot(replace(panda(), packages={}))
+
+
+def test_limits_are_those_of_the_original(tmp_path: Path) -> None:
+    """Positions and velocities from the description, efforts from the drives."""
+    robot = panda(squeeze=12.0)
+    original = RobotModel(robot).pin
+    reduced = pin.buildModelFromUrdf(str(PreparedRobot(robot).write_urdf(tmp_path)))
+    for name in ("lowerPositionLimit", "upperPositionLimit", "velocityLimit"):
+        assert np.array_equal(getattr(reduced, name), getattr(original, name))
+    assert np.array_equal(reduced.effortLimit, [87.0] * 4 + [12.0] * 5)
+
+
+@pytest.fixture
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Another machine's folder for descriptions."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    folder.cache_clear()
+    yield tmp_path / "cache" / "pytest-simbench" / "robots"
+    folder.cache_clear()
+
+
+def sent() -> dict[str, Any]:
+    scene = Scene("s", robot=panda())
+    wire: dict[str, Any] = unpack(pack(with_content(scene.to_wire(), scene.robot)))
+    return wire
+
+
+def test_no_path_is_sent() -> None:
+    robot = sent()["robot"]
+    meshes = robot["content"].pop("meshes")
+    assert len(meshes) == 9
+    for part in (str(Path(panda().urdf).parents[3]), "package://", "site-packages", ".dae"):
+        assert part not in repr(robot)
+
+
+def test_what_arrives_is_the_same_robot(elsewhere: Path) -> None:
+    there = Scene.from_wire(received(sent())).robot
+    assert there is not None
+    assert Path(there.urdf).parent == elsewhere
+    ours, theirs = PreparedRobot(panda()), PreparedRobot(there)
+    assert list(ours.links) == list(theirs.links)
+    for name, link in ours.links.items():
+        other = theirs.links[name]
+        assert (other.mass, other.inertia.tolist()) == (link.mass, link.inertia.tolist())
+        for one, two in zip(link.shapes, other.shapes, strict=True):
+            assert np.array_equal(reach(shape_points(one)), reach(shape_points(two)))
+    assert ours.limits.keys() == theirs.limits.keys()
+    assert there.joints == panda().joints
+
+
+def test_the_same_description_lies_in_the_same_place(elsewhere: Path) -> None:
+    """Engines keep compiled meshes by path. A damaged file is written anew."""
+    first = received(sent())["robot"]["urdf"]
+    files = {path: path.read_bytes() for path in elsewhere.iterdir()}
+    damaged = next(path for path in files if path.suffix == ".stl")
+    damaged.write_bytes(b"half")
+    assert received(sent())["robot"]["urdf"] == first
+    assert {path: path.read_bytes() for path in elsewhere.iterdir()} == files
+
+
+def test_where_no_cache_can_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    folder.cache_clear()
+    try:
+        assert Path(received(sent())["robot"]["urdf"]).is_file()
+    finally:
+        folder.cache_clear()
+
+
+def test_a_scene_without_a_robot_and_one_with_paths_stay_as_they_are() -> None:
+    for scene in (Scene("s"), Scene("s", robot=panda())):
+        assert Scene.from_wire(received(scene.to_wire())) == scene
+
+
+def test_a_file_that_is_missing_is_named_here() -> None:
+    robot: Robot = replace(panda(), urdf="/nowhere/panda.urdf")
+    with pytest.raises(DescriptionError, match=r"cannot read the robot description /nowhere/panda"):
+        content_of(robot)

@@ -1,0 +1,345 @@
+"""Robots from TOML files, sound and broken ones."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from pytest_simbench.motion.collision import MARGIN
+from pytest_simbench.motion.errors import RobotError
+from pytest_simbench.motion.files import ARMS, read_robot
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.motion.planning import CHECK_SPACING
+from pytest_simbench.motion.registry import BUILT_IN, find
+from pytest_simbench.scene import Pose
+from pytest_simbench.simulator import PreparedRobot
+from tests.motion.small_arm import TOML, URDF, joint, link, small_arm
+
+MOUNTED = ("ur5", "ur10", "xarm7")
+
+
+def test_a_file_says_everything(tmp_path: Path) -> None:
+    robot = read_robot(small_arm(tmp_path))
+    assert robot.name == "small"
+    assert robot.joint_names == ("turn", "lift", "bend", "left_finger", "right_finger")
+    assert robot.column("stiffness").tolist() == [2000, 2000, 2000, 1000, 1000]
+    assert robot.column("damping").tolist() == [200, 200, 150, 40, 40]
+    assert robot.column("effort_limit").tolist() == [80, 80, 80, 20, 20]
+    assert robot.column("armature").tolist() == [0.1] * 5
+    assert robot.column("initial_position").tolist() == [0, 0.4, 1.2, 0.04, 0.04]
+    assert (robot.gripper.opened, robot.gripper.closed, robot.gripper.squeeze) == (0.04, 0, 20)
+    assert robot.tool_frame == "grip"
+    assert robot.base == Pose.at(0.1, 0.0, 0.2)
+    assert robot.friction == 1.0
+    assert not robot.self_collide
+    limits = robot.limits
+    assert limits is not None
+    assert limits.velocity == (2, 2, 2)  # the URDF's
+    assert limits.acceleration == (8, 8, 8)
+    assert limits.jerk == (800, 800, 800)
+    assert limits.finger_speed == 2
+    assert limits.levers == pytest.approx((0.2 + 0.3 + 0.42, 0.3 + 0.42, 0.42))
+
+
+def test_what_a_file_says_besides(tmp_path: Path) -> None:
+    more = TOML.replace(
+        "[arm]",
+        "yaw = 1.5\nfriction = 0.6\nself_collide = true\n[arm]\njerk = 50\nlevers = [1, 0.9, 0.5]",
+    )
+    more = more.replace("[arm]\n", "[arm]\nvelocity = [1, 1.5, 2]\neffort = 40\narmature = 0.02\n")
+    robot = read_robot(small_arm(tmp_path, more.replace("[hand]", "[hand]\nspeed = 0.1")))
+    assert robot.base == Pose.at(0.1, 0.0, 0.2, yaw=1.5)
+    assert robot.friction == 0.6
+    assert robot.self_collide
+    assert robot.column("effort_limit")[:3].tolist() == [40, 40, 40]
+    assert robot.column("armature")[:3].tolist() == [0.02] * 3
+    limits = robot.limits
+    assert limits is not None
+    assert limits.velocity == (1, 1.5, 2)
+    assert limits.jerk == (50, 50, 50)
+    assert limits.levers == (1, 0.9, 0.5)
+    assert limits.finger_speed == 0.1
+
+
+@pytest.mark.parametrize("name", MOUNTED)
+def test_a_built_in_arm_carries_the_pandas_hand(name: str) -> None:
+    robot = find(name)
+    assert robot.name == name
+    assert robot.gripper == panda().gripper
+    assert robot.joints[-2:] == panda().joints[-2:]
+    prepared, whole = PreparedRobot(robot), PreparedRobot(panda())
+    for finger in ("panda_leftfinger", "panda_rightfinger"):
+        ours, theirs = prepared.links[finger], whole.links[finger]
+        assert ours.mass == theirs.mass
+        assert [shape.size for shape in ours.shapes] == [shape.size for shape in theirs.shapes]
+    arm = pin.buildModelFromUrdf(str(read_arm(name)))
+    mass = sum(inertia.mass for inertia in RobotModel(robot).pin.inertias)
+    assert mass == pytest.approx(sum(inertia.mass for inertia in arm.inertias) + 0.73 + 0.03)
+
+
+def read_arm(name: str) -> Path:
+    """The arm's own URDF, as its file names it."""
+    line = next(x for x in (ARMS / f"{name}.toml").read_text().splitlines() if x.startswith("urdf"))
+    folder = panda().packages["example-robot-data"]
+    return Path(folder, line.partition("example-robot-data/")[2].rstrip('"'))
+
+
+@pytest.mark.parametrize("name", MOUNTED)
+def test_the_tool_lies_before_the_flange(name: str) -> None:
+    """The hand's tool centre point is 0.1034 m along the flange's z axis, at any position."""
+    robot = find(name)
+    model = RobotModel(robot)
+    arm = pin.buildModelFromUrdf(str(read_arm(name)))
+    flange = arm.getFrameId("tool0" if name.startswith("ur") else "link_eef")
+    for q in np.random.default_rng(1).uniform(-1, 1, (5, model.arm)):
+        data = arm.createData()
+        pin.framesForwardKinematics(arm, data, q)
+        expected = model.base * data.oMf[flange] * pin.SE3(np.eye(3), np.array([0, 0, 0.1034]))
+        assert np.allclose(model.tool_transform(q).homogeneous, expected.homogeneous, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", sorted(BUILT_IN))
+def test_between_two_checks_no_fingertip_moves_farther_than_twice_the_margin(name: str) -> None:
+    """Distances from the tip of an open finger to each joint's axis, at random positions. The
+    Panda's levers are 14 % short of a stretched arm's."""
+    model = RobotModel(find(name))
+    farthest = np.zeros(model.arm)
+    for arm in np.random.default_rng(5).uniform(model.lower, model.upper, (1000, model.arm)):
+        pin.computeJointJacobians(model.pin, model.data, model.full(arm))
+        tool = model.base.actInv(model.tool_transform(arm))
+        tip = tool.act(np.array([0.009, 0.035 + 0.0152, 0.009]))
+        for k in range(model.arm):
+            away = tip - model.data.oMi[k + 1].translation
+            distance = np.linalg.norm(np.cross(model.data.J[3:, k], away))
+            farthest[k] = max(farthest[k], float(distance))
+    levers = model.limits.column("levers")
+    assert (farthest * CHECK_SPACING <= 2 * MARGIN * levers).all(), farthest
+
+
+def test_the_same_robot_lies_in_the_same_place() -> None:
+    """Engines keep compiled meshes by path; files are named by their content."""
+    first, again = (read_robot(ARMS / "ur5.toml") for _ in range(2))
+    assert first == again
+    assert first.limits == again.limits
+    assert Path(first.urdf).stem == Path(again.urdf).stem != Path(find("ur10").urdf).stem
+
+
+def test_unknown_robots() -> None:
+    with pytest.raises(RobotError, match=r"unknown robot 'ur7'; choose from panda, .*ur5.*\.toml"):
+        find("ur7")
+    with pytest.raises(RobotError, match=r"cannot read the robot file none\.toml: No such file"):
+        find("none.toml")
+
+
+def test_a_file_cannot_take_a_known_name(tmp_path: Path) -> None:
+    path = small_arm(tmp_path, TOML.replace('"small"', '"ur5"', 1))
+    with pytest.raises(RobotError, match="the name 'ur5' is that of a known robot"):
+        find(str(path))
+
+
+def test_a_hand_that_only_touches(tmp_path: Path) -> None:
+    toml = TOML[: TOML.index("[hand]")] + '[hand]\ntool_frame = "grip"\n'
+    fixed = URDF.replace('type="prismatic"', 'type="fixed"')
+    robot = read_robot(small_arm(tmp_path, toml, fixed))
+    assert robot.joint_names == ("turn", "lift", "bend")
+    assert robot.gripper.couplings == ()
+    assert not RobotModel(robot).has_parallel_fingers
+
+
+def test_a_hand_of_three_fingers_and_one_of_one(tmp_path: Path) -> None:
+    third = link("third", "0.01 0.02 0.08", "0.005 0 0.06", 0.05, 0.1)
+    third += joint("third_finger", "lower", "third", "0 0 0.3", "1 0 0", "prismatic")
+    urdf = URDF.replace("</robot>", f"{third}</robot>")
+    toml = TOML.replace('"right_finger"]', '"right_finger", "third_finger"]')
+    robot = read_robot(small_arm(tmp_path, toml, urdf))
+    pairs = (("left_finger", "right_finger"), ("left_finger", "third_finger"))
+    assert robot.gripper.couplings == pairs
+    assert not RobotModel(robot).has_parallel_fingers
+    jaw = URDF.replace(
+        '<joint name="right_finger" type="prismatic">', '<joint name="right_finger" type="fixed">'
+    )
+    toml = TOML.replace(', "right_finger"]', "]")
+    assert read_robot(small_arm(tmp_path, toml, jaw)).gripper.couplings == ()
+
+
+def test_two_parallel_fingers() -> None:
+    assert RobotModel(panda()).has_parallel_fingers
+    assert RobotModel(find("ur5")).has_parallel_fingers
+
+
+Change = Callable[[str], str]
+
+
+def swap(old: str, new: str) -> Change:
+    """Replaces a text that is there."""
+
+    def change(text: str) -> str:
+        assert old in text
+        return text.replace(old, new, 1)
+
+    return change
+
+
+BOMB = '<!DOCTYPE robot [<!ENTITY a "aaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]>\n'
+MESH = '<mesh filename="{}"/>'
+BOX = '<box size="0.05 0.05 0.2"/>'
+LOOP = '<mimic joint="right_finger"/></joint>'
+LOWER = link("lower", "0.05 0.05 0.2", "0 0 0.15")
+SRDF = swap("[arm]", 'srdf = "small.toml"\n[arm]')
+
+IN_TOML = {
+    "not TOML": (swap("[arm]", "[arm"), r"is no TOML file: "),
+    "no name": (swap('name = "small"', ""), r"small\.toml: name is missing"),
+    "a path as name": (swap('"small"', '"../small"'), r"name: use up to 40 letters, digits, _ and"),
+    "a reserved name": (swap('"small"', '"all"'), r"name: use up to 40 letters, .*not all"),
+    "a key nobody knows": (
+        swap("stiffness = 2000.0", "stiffness = 2000.0\nstiffnes = 1"),
+        r"\[arm\]: 'stiffnes' means nothing here; valid: joints, ready, stiffness, damping, effo",
+    ),
+    "no arm": (
+        lambda text: text[: text.index("[arm]")] + text[text.index("[hand]") :],
+        r"\[arm\]: joints is missing",
+    ),
+    "no hand": (lambda text: text[: text.index("[hand]")], r"\[hand\]: tool_frame is missing"),
+    "a number for a table": (swap("[hand]", "[hand_of_it]"), r"\[hand\]: tool_frame is missing"),
+    "no URDF": (swap("small.urdf", "other.urdf"), r"cannot read the robot .*other\.urdf: No such"),
+    "an unknown package": (
+        swap("small.urdf", "package://mine/small.urdf"),
+        r"'package://mine/small.urdf' is in no package of the file; it has example-robot-data",
+    ),
+    "a wrong joint name": (
+        swap('"bend"', '"bent"'),
+        r"joints: 'bent' is no moving joint of the URDF; it has turn, lift, bend, left_finger, r",
+    ),
+    "a joint twice": (swap('"bend"', '"lift"'), r"joints: name each once"),
+    "a joint too few": (
+        lambda text: swap(', "bend"]', "]")(
+            swap("1.2]", "]")(swap("[200.0, 200.0, 150.0]", "200.0")(text))
+        ).replace("0.4, ]", "0.4]"),
+        r"disagree about joints bend",
+    ),
+    "joints in another order": (
+        swap('"turn", "lift"', '"lift", "turn"'),
+        r"has joints \['turn', 'lift', 'bend'.* not \('lift', 'turn'",
+    ),
+    "too few angles": (swap("0.4, 1.2]", "0.4]"), r"ready: give it 3 numbers, or one .*it has 2"),
+    "a stiffness below zero": (swap("2000.0", "-2000.0"), r"stiffness: -2000.0 is no number of at"),
+    "a damping that is no number": (swap("150.0]", "nan]"), r"damping: nan is no number of at le"),
+    "a word for a number": (swap("8.0", '"fast"'), r"acceleration: 'fast' is no number of at leas"),
+    "a word for yes": (
+        swap("[arm]", 'self_collide = "yes"\n[arm]'),
+        r"self_collide: 'yes' is neither true nor false",
+    ),
+    "yes for a number": (swap("8.0", "true"), r"acceleration: True is no number of at least"),
+    "a ready position out of the limits": (
+        swap("0.4, 1.2]", "0.4, 2.6]"),
+        r"joint 'bend' of small starts at 2\.6, .* from -2\.5 to 2\.5",
+    ),
+    "a ready position inside itself": (
+        swap("0.4, 1.2]", "-2.4, -2.4]"),
+        r"in its ready position .* touches .*; change ready, or list two links that may touch",
+    ),
+    "a tool frame that is no link": (
+        swap('"grip"', '"grab"'),
+        r"the tool frame 'grab' of small is no link of .*; choose from foot, column, upper, lowe",
+    ),
+    "a tool frame that the arm does not carry": (
+        swap('"grip"', '"upper"'),
+        r"the tool frame 'upper' hangs on 'lift', not on 'bend', the last joint of the arm",
+    ),
+    "a hand that opens inwards": (
+        swap("closed = 0.0", "closed = 0.05"),
+        r"opened: it must be above closed, which is 0\.05",
+    ),
+    "a hand without a finger of its own": (
+        swap('["left_finger", "right_finger"]', '["left_finger"]'),
+        r"disagree about joints right_finger",
+    ),
+    "fingers of two strengths": (
+        swap("effort = 20.0", "effort = [20.0, 10.0]"),
+        r"effort: give all fingers the same: it is the hand's squeeze",
+    ),
+    "an unknown hand": (
+        lambda text: text[: text.index("[hand]")] + '[hand]\nuse = "robotiq"\nmount = "lower"\n',
+        r'use: the one hand that is known is "panda"',
+    ),
+    "a mount that is no link": (
+        lambda text: text[: text.index("[hand]")] + '[hand]\nuse = "panda"\nmount = "flange"\n',
+        r"the hand is mounted on 'flange', which is no link of the arm; choose from foot, column",
+    ),
+    "a list of pairs that is none": (SRDF, r"list of link pairs .*small\.toml is not valid XML"),
+}  # fmt: skip
+
+IN_URDF = {
+    "not XML": (swap("</robot>", ""), r"small\.urdf is not valid XML"),
+    "an XML bomb": (lambda text: BOMB + text, r"has a document type .*leave it out"),
+    "a missing mesh": (swap(BOX, MESH.format("none.stl")), r"none\.stl, which does not exist"),
+    "a mesh out of the folder": (
+        swap(BOX, MESH.format("../../secret.stl")),
+        r"out of the robot's folders; put the file beside",
+    ),
+    "a mesh of 200 MB": (swap(BOX, MESH.format("huge.stl")), r"huge\.stl: it is larger than 16 MB"),
+    "a mesh that is a text": (swap(BOX, MESH.format("text.stl")), r"holds no binary STL mesh"),
+    "a sphere": (swap(BOX, '<sphere radius="0.1"/>'), r"a collision shape of <sphere>; it must"),
+    "no inertia": (
+        lambda text: text.replace(LOWER, '<link name="lower"/>'),
+        r"link 'lower' is moved by joint 'bend' and has no mass; give it an <inertial>",
+    ),
+    "a mass below zero": (swap('mass value="1"', 'mass value="-1"'), r"has the mass -1 kg"),
+    "a tensor that no body has": (swap('izz="0.01"', 'izz="0.03"'), r"none is larger than the ot"),
+    "limits the wrong way": (
+        swap('lower="-2.5" upper="2.5"', 'lower="2.5" upper="-2.5"'),
+        r"joint 'turn' may go from 2\.5 to -2\.5; lower must be below upper",
+    ),
+    "a negative limit": (swap('effort="80"', 'effort="-80"'), r"has the effort limit '-80'; it"),
+    "no limit of effort": (swap('effort="80"', ""), r"effort: 0.0 is no number of at least 1e-06"),
+    "a mimic loop": (
+        lambda text: text.replace("</joint>", LOOP.replace("right", "left"), 5).replace(
+            '<mimic joint="left_finger"/>', "", 3
+        ),
+        r"follows itself \(<mimic>\); let one of the joints lead",
+    ),
+    "two roots": (swap("</robot>", '<link name="loose"/></robot>'), r"has 2 root links, not one"),
+}  # fmt: skip
+
+
+def refused(path: Path | str, message: str) -> None:
+    with pytest.raises(RobotError, match=message) as refusal:
+        find(str(path))
+    assert "\n" not in str(refusal.value)
+    assert len(str(refusal.value)) < 600
+
+
+@pytest.mark.parametrize("what", IN_TOML)
+def test_a_broken_robot_file(what: str, tmp_path: Path) -> None:
+    change, message = IN_TOML[what]
+    refused(small_arm(tmp_path, change(TOML)), message)
+
+
+@pytest.mark.parametrize("what", IN_URDF)
+def test_a_broken_description(what: str, tmp_path: Path) -> None:
+    change, message = IN_URDF[what]
+    path = small_arm(tmp_path, urdf=change(URDF))
+    (tmp_path / "text.stl").write_text("solid box\nendsolid box\n")
+    with (tmp_path / "huge.stl").open("wb") as file:
+        file.truncate(200 * 2**20)
+    refused(path, message)
+
+
+def test_a_robot_file_that_is_none(tmp_path: Path) -> None:
+    refused(tmp_path, r"unknown robot|it is a folder")
+    pipe = tmp_path / "pipe.toml"
+    os.mkfifo(pipe)
+    refused(pipe, r"cannot read the robot file .*pipe\.toml: it is a pipe")
+    folder = tmp_path / "folder.toml"
+    folder.mkdir()
+    refused(folder, r"cannot read the robot file .*folder\.toml: it is a folder")
+    large = tmp_path / "large.toml"
+    large.write_bytes(b"#" * (2**20 + 1))
+    refused(large, r"larger than 1 MB")

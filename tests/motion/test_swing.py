@@ -1,0 +1,94 @@
+"""Swings for other arms: within the limits, in one plane, to the pyramid, as in their files."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pytest_simbench.motion.collision import PlanningScene
+from pytest_simbench.motion.errors import RobotError
+from pytest_simbench.motion.files import ARMS, read_robot
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.motion.registry import find
+from pytest_simbench.motion.swing import LANDING, THROWN, found_swing, main
+from pytest_simbench.motion.throw import feasible_swing, released, swing_of
+from pytest_simbench.scene import STANDARD_GRAVITY, Pose, Robot, Scene, SceneError
+from tests.motion.small_arm import TOML, small_arm
+
+GRAVITY = np.array(STANDARD_GRAVITY)
+
+
+def throw_of(robot: Robot):  # type: ignore[no-untyped-def]
+    model = RobotModel(robot)
+    timed, duration = feasible_swing(model, *swing_of(robot), GRAVITY, THROWN)
+    return model, released(model, timed, duration, 0.5)
+
+
+@pytest.mark.parametrize("name", ["ur5", "ur10", "xarm7"])
+def test_the_swing_of_a_built_in_arm(name: str) -> None:
+    robot = find(name)
+    model, throw = throw_of(robot)
+    landing = throw.landing(GRAVITY)
+    assert landing == pytest.approx(LANDING, abs=0.01)
+    # straight at the middle of the pyramid, also when the fingers let go 40 ms late
+    for row in (throw.row, throw.row + 10):
+        position = np.array(model.tool_pose(throw.timed.position[row]).position)
+        velocity = model.tool_velocity(throw.timed.position[row], throw.timed.velocity[row])
+        aside = position[1] + velocity[1] * (LANDING - position[0]) / velocity[0]
+        assert aside == pytest.approx(0.0, abs=0.005)
+    # not into the palm, the fingers opening across the flight
+    axes = model.tool_transform(throw.timed.position[throw.row]).rotation
+    assert throw.velocity @ axes[:, 2] >= 0.0
+    assert abs(throw.velocity @ axes[:, 1]) < 0.01
+    scene = PlanningScene(model, Scene("throw", (THROWN,), robot))
+    scene.attach(THROWN.name, Pose())
+    assert scene.first_collision(throw.timed.position[::10], ignored=(THROWN.name,)) is None
+
+
+def test_the_file_has_what_the_command_finds(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["ur5"]) == 0
+    found = capsys.readouterr().out.partition("\n")[2].strip()
+    assert found in (ARMS / "ur5.toml").read_text("utf-8")
+
+
+def test_it_lands_elsewhere_if_asked_to() -> None:
+    robot = find("ur10")
+    start, end = found_swing(robot, THROWN, GRAVITY, 1.2)
+    _, throw = throw_of(replace(robot, swing=(tuple(start.tolist()), tuple(end.tolist()))))
+    assert throw.landing(GRAVITY) == pytest.approx(1.2, abs=0.005)
+
+
+def test_too_far_is_a_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["ur5", "--landing=30"])
+    assert ended.value.code == 1
+    said = "robot 'ur5' cannot throw to x = 30 m: no swing within its limits was found\n"
+    assert capsys.readouterr().err == said
+    with pytest.raises(SystemExit):
+        main(["ur7"])
+    assert "unknown robot 'ur7'; choose from" in capsys.readouterr().err
+
+
+def test_a_file_may_have_a_swing(tmp_path: Path) -> None:
+    swing = "[throw]\nstart = [0.1, 0.2, 0.3]\nend = [0.4, 0.5, 0.6]\n"
+    robot = read_robot(small_arm(tmp_path, TOML + swing))
+    assert robot.swing == ((0.1, 0.2, 0.3), (0.4, 0.5, 0.6))
+    assert Robot.from_wire(robot.to_wire()).swing is None
+    with pytest.raises(RobotError, match=r"\[throw\]: end: give it 3 numbers"):
+        read_robot(small_arm(tmp_path, TOML + swing.replace(", 0.6", "")))
+    with pytest.raises(RobotError, match=r"\[throw\]: 'stop' means nothing here; valid: "):
+        read_robot(small_arm(tmp_path, TOML + swing + "stop = 1\n"))
+    robot = read_robot(small_arm(tmp_path))
+    told = "'small' has no swing for the throw: write one into its file, under [throw]"
+    with pytest.raises(RobotError, match=re.escape(told)):
+        swing_of(robot)
+
+
+def test_a_swing_has_a_number_for_each_joint() -> None:
+    with pytest.raises(SceneError, match=r"the swing \[rad\] of 'panda'"):
+        replace(panda(), swing=((0.0,), (1.0,)))

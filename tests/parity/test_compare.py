@@ -1,0 +1,223 @@
+"""What is compared, what a declared deviation excuses, and what stands in the record."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.parity.compare import check, compare
+from pytest_simbench.parity.readback import one_value
+from pytest_simbench.scene import Cylinder, Gripper, Pose, Scene
+from pytest_simbench.simulator import FOLLOWER, Deviation, ParityError
+
+SOFT = Deviation("", "contacts are soft")
+NO_ROTOR = Deviation("joint/*/armature", "no rotor inertia")
+ROUND = Deviation("link/*/meshes body/*/boxes", "corners are rounded", within=1e-3)
+EXPECTED = {"gravity": [0, 0, -9.8], "joint/a/armature": 0.1, "link/a/meshes": np.ones((1, 26))}
+
+
+def test_equal_values_are_one_number() -> None:
+    assert one_value([87.0, 87.0]) == 87.0
+    assert np.ndim(one_value(np.full((2, 3), 0.5))) == 0
+
+
+def test_different_values_are_all_told() -> None:
+    assert list(one_value([[1.0, 0.5], [1.0, 1.0]])) == [0.5, 1.0]
+
+
+def test_free_text_is_always_told() -> None:
+    assert check(EXPECTED, EXPECTED, (SOFT, NO_ROTOR, ROUND), "sim") == ["contacts are soft"]
+
+
+def test_what_is_not_told_is_told_once_with_its_reason() -> None:
+    expected = {**EXPECTED, "joint/b/armature": 0.1}
+    reported = {k: v for k, v in expected.items() if "armature" not in k}
+    assert check(expected, reported, (NO_ROTOR,), "sim") == [
+        "joint/*/armature: no rotor inertia (not told by the engine)"
+    ]
+
+
+def test_an_excused_difference_is_told_with_both_values() -> None:
+    reported = {**EXPECTED, "joint/a/armature": 0.0}
+    assert check(EXPECTED, reported, (NO_ROTOR,), "sim") == [
+        "joint/*/armature: no rotor inertia (joint/a/armature: scene 0.1, sim 0.)"
+    ]
+
+
+def test_a_difference_is_excused_up_to_its_declared_size() -> None:
+    near = {**EXPECTED, "link/a/meshes": np.full((1, 26), 1.0005)}
+    assert check(EXPECTED, near, (ROUND,), "sim") == [
+        "link/*/meshes body/*/boxes: corners are rounded (differs by at most 0.001)"
+    ]
+    far = {**EXPECTED, "link/a/meshes": np.full((1, 26), 1.002)}
+    with pytest.raises(ParityError, match="differ by up to 0.002.*declared is at most 0.001"):
+        check(EXPECTED, far, (ROUND,), "sim")
+
+
+@pytest.mark.parametrize("shapes", [0, 2])
+def test_another_number_of_shapes_is_never_excused(shapes: int) -> None:
+    reported = {**EXPECTED, "link/a/meshes": np.ones((shapes, 26))}
+    with pytest.raises(ParityError, match="link/a/meshes: scene 1x26 numbers"):
+        check(EXPECTED, reported, (ROUND,), "sim")
+
+
+def test_a_size_does_not_excuse_silence() -> None:
+    reported = {k: v for k, v in EXPECTED.items() if k != "link/a/meshes"}
+    with pytest.raises(ParityError, match="link/a/meshes: sim reports nothing"):
+        check(EXPECTED, reported, (ROUND,), "sim")
+
+
+def test_what_no_scene_asks_for_is_wrong() -> None:
+    assert list(compare(EXPECTED, {**EXPECTED, "link/b/mass": 1.0}, (), "sim").wrong) == [
+        "link/b/mass"
+    ]
+
+
+@pytest.mark.parametrize("value", [np.nan, [0, 0], [0, 0, -9.8, 0]])
+def test_a_value_of_another_kind_differs(value: object) -> None:
+    assert "gravity" in compare(EXPECTED, {**EXPECTED, "gravity": value}, (), "sim").wrong
+
+
+def test_a_tensor_is_compared_as_a_whole() -> None:
+    """Off-diagonal elements near zero may differ by what is nothing to the largest one."""
+    tensor = {"link/a/inertia": np.diag([1.0, 2.0, 3.0])}
+    noisy = {"link/a/inertia": np.diag([1.0, 2.0, 3.0]) + 1e-4}
+    assert not compare(tensor, noisy, (), "sim").wrong
+    turned = {"link/a/inertia": np.diag([2.0, 1.0, 3.0])}
+    assert "link/a/inertia" in compare(tensor, turned, (), "sim").wrong
+
+
+def test_both_signs_of_a_quaternion_are_one_pose() -> None:
+    pose = np.array([1, 2, 3, 0.5, 0.5, 0.5, 0.5])
+    flipped = np.concatenate([pose[:3], -pose[3:]])
+    assert not compare({"body/a/pose": pose}, {"body/a/pose": flipped}, (), "sim").wrong
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "near", "far"),
+    [
+        ("gravity", [0.0, 0.0, -9.8], [0.9e-6, 0.0, -9.8], [1.1e-6, 0.0, -9.8]),
+        ("joint/a/limits", [0.0, 2.0], [0.0, 2.00019], [0.0, 2.0003]),
+        ("body/a/pose", [0, 0, 0, 1, 0, 0, 0], [9e-7, 0, 0, 1, 0, 0, 0], [2e-6, 0, 0, 1, 0, 0, 0]),
+        ("link/a/pose", [0, 0, 0, 1, 0, 0, 0], [9e-6, 0, 0, 1, 0, 0, 0], [2e-5, 0, 0, 1, 0, 0, 0]),
+        ("body/a/boxes", [[0.0, 1.0]], [[9e-6, 1.0]], [[2e-5, 1.0]]),
+        ("body/a/meshes", [[0.0, 1.0]], [[9e-6, 1.0]], [[2e-5, 1.0]]),
+        ("body/a/com", [0.0, 0.0, 0.0], [9e-6, 0.0, 0.0], [2e-5, 0.0, 0.0]),
+        ("joint/a/axis", [0, 0, 1, 0, 0, 0], [9e-6, 0, 1, 0, 0, 0], [2e-5, 0, 1, 0, 0, 0]),
+        ("link/a/mass", 1e-3, 1.00009e-3, 1.0002e-3),
+        ("body/a/mass", 2.0, 2.00019, 2.0003),
+        ("link/a/inertia", [1e-6, 0.0, 1e-7], [1e-6, 9e-11, 1e-7], [1e-6, 2e-10, 1e-7]),
+        ("body/a/inertia", np.zeros((3, 3)), np.full((3, 3), 9e-13), np.full((3, 3), 2e-12)),
+    ],
+)  # fmt: skip
+def test_how_near_is_equal(name: str, value: object, near: object, far: object) -> None:
+    """Up to 1e-4 of the value and 1e-6; 1e-5 m where single precision composes poses."""
+    assert not compare({name: value}, {name: near}, (), "sim").wrong
+    assert name in compare({name: value}, {name: far}, (), "sim").wrong
+
+
+def test_a_pose_at_a_right_angle_is_no_mirror() -> None:
+    """q and -q are one rotation; others whose product is not negative are as they are."""
+    one, other = np.array([0, 0, 0, 1, 0, 0, 0]), np.array([0, 0, 0, 0, 1, 0, 0])
+    assert compare({"body/a/pose": one}, {"body/a/pose": other}, (), "sim").wrong
+    assert not compare({"body/a/pose": one}, {"body/a/pose": one}, (), "sim").wrong
+
+
+def test_what_the_comparison_says_word_by_word() -> None:
+    expected = {
+        "gravity": [0, 0, -9.80665123],
+        "link/a/inertia": np.diag([1.0, 2.0, 3.0]),
+        "link/a/meshes": np.ones((1, 26)),
+        "link/b/meshes": np.ones((1, 26)),
+        "joint/a/armature": 0.1,
+    }
+    reported = {
+        "gravity": [0, 0, -1],
+        "link/a/inertia": np.diag([2.0, 1.0, 3.0]),
+        "link/a/meshes": np.full((1, 26), 1.25),
+        "link/b/meshes": np.ones((2, 26)),
+        "body/z/mass": 1,
+    }
+    found = compare(expected, reported, (SOFT, ROUND), "sim")
+    declared = " (declared is at most 0.001: corners are rounded)"
+    assert found.wrong == {
+        "gravity": "scene [ 0.      ,  0.      , -9.806651], sim [ 0.,  0., -1.]",
+        "link/a/inertia": "scene [[1., 0., 0.], [0., 2., 0.], [0., 0., 3.]], "
+        "sim [[2., 0., 0.], [0., 1., 0.], [0., 0., 3.]]",
+        "link/a/meshes": "scene 1x26 numbers, sim 1x26 numbers, which differ by up to 0.25"
+        + declared,
+        "link/b/meshes": "scene 1x26 numbers, sim 2x26 numbers" + declared,
+        "joint/a/armature": "sim reports nothing, and declares no deviation",
+        "body/z/mass": "reported, but not part of the scene",
+    }
+    assert list(found.untold) == []
+    assert list(found.deviations) == ["contacts are soft"]
+
+
+def test_the_first_ten_differences_are_told() -> None:
+    expected = {f"joint/{k:02}/damping": float(k) for k in range(12)}
+    reported = {name: value + 1 for name, value in expected.items()}
+    with pytest.raises(ParityError) as caught:
+        check(expected, reported, (), "sim")
+    parts = [f"joint/{k:02}/damping: scene {k}., sim {k + 1}." for k in range(10)]
+    start = "sim built another world than the scene describes: "
+    assert str(caught.value) == start + "; ".join(parts) + "; and 2 more"
+    ten = dict(list(expected.items())[:10])
+    with pytest.raises(ParityError) as caught:
+        check(ten, dict(list(reported.items())[:10]), (), "sim")
+    assert str(caught.value) == start + "; ".join(parts)
+
+
+def test_what_is_untold_is_named_and_the_first_difference_stands_for_all() -> None:
+    names = [f"joint/{joint}/armature" for joint in "abc"]
+    expected = dict.fromkeys(names, 0.1)
+    found = compare(expected, {names[1]: 0.2, names[2]: 0.3}, (SOFT, NO_ROTOR), "sim")
+    assert not found.wrong
+    assert list(found.untold) == [names[0]]
+    assert list(found.deviations) == [
+        "contacts are soft",
+        "joint/*/armature: no rotor inertia (not told by the engine; joint/b/armature: "
+        "scene 0.1, sim 0.2)",
+    ]
+
+
+def test_a_difference_of_just_the_declared_size_is_excused() -> None:
+    half = Deviation("gravity", "why not", within=0.5)
+    assert not compare({"gravity": 1.0}, {"gravity": 1.5}, (half,), "sim").wrong
+    assert compare({"gravity": 1.0}, {"gravity": 1.5000001}, (half,), "sim").wrong
+    assert compare({"gravity": 1.0}, {"gravity": 0.0}, (half,), "sim").wrong
+
+
+def test_no_shapes_where_none_are_asked_for() -> None:
+    none = np.zeros((0, 26))
+    assert not compare({"body/a/meshes": none}, {"body/a/meshes": none}, (), "sim").wrong
+
+
+def test_sizes_hold_for_the_robot_they_were_measured_on() -> None:
+    """Another robot may have larger meshes, and fingers of other names."""
+    hull = Deviation("link/*/meshes", "hulls", within=5e-4, elsewhere=1e-3)
+    finger = Deviation(f"joint/{FOLLOWER}/effort_limit", "follows")
+    ur5 = replace(
+        panda(), name="ur5", gripper=Gripper(("panda_joint1", "panda_joint2"), 1.0, 0.0, 1.0)
+    )
+    for robot in (None, panda()):
+        assert hull.with_robot(robot) == hull
+        assert not finger.with_robot(robot).excuses("joint/panda_finger_joint2/effort_limit")
+    assert hull.with_robot(ur5).within == 1e-3
+    assert replace(hull, elsewhere=None).with_robot(ur5).within == 5e-4
+    assert finger.with_robot(ur5).excuses("joint/panda_joint2/effort_limit")
+    assert not finger.with_robot(ur5).excuses("joint/panda_joint1/effort_limit")
+
+
+def test_some_deviations_count_only_where_a_scene_has_their_word() -> None:
+    bouncing = Deviation("", "it does not bounce", only="restitution")
+    rolling = Deviation("", "it does not roll", only="cylinder")
+    can = Cylinder("can", 0.1, 0.1, Pose.at(0.0, 0.0, 0.05), 1.0)
+    scenes = [Scene("s"), Scene("s", (can,)), Scene("s", (can.changed(restitution=0.5),))]
+    assert [bouncing.concerns(scene) for scene in scenes] == [False, False, True]
+    assert [rolling.concerns(scene) for scene in scenes] == [False, True, True]
+    assert all(Deviation("", "always").concerns(scene) for scene in scenes)
+    assert Scene("s", (can.changed(linear_damping=0.1),)).words == {"cylinder", "damping"}

@@ -1,0 +1,67 @@
+"""An adapter can be made to remember another scene, wherever it keeps what it loaded."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from pytest_simbench.parity.memory import remembering
+from pytest_simbench.scene import Pose
+from pytest_simbench.simulator import Capability, PreparedRobot, Settings
+from pytest_simbench.testing.faults import FAULTS, rounds, true_scene
+
+TRUE = true_scene()
+OTHER = replace(TRUE, gravity=(0.0, 0.0, -1.0)).with_pose("cube", Pose.at(0.3, 0.3, 1.0))
+
+
+class Helper:
+    def __init__(self) -> None:
+        assert TRUE.robot is not None
+        self.prepared = PreparedRobot(TRUE.robot)
+        self.cube = TRUE.body("cube")
+
+
+class Adapter:
+    """As far as memories go."""
+
+    def __init__(self) -> None:
+        self.scene: Any = TRUE
+        self.robot: Any = TRUE.robot
+        self.helper = Helper()
+        self.settings = Settings()
+
+
+def test_everything_remembered_is_replaced_and_put_back() -> None:
+    adapter: Any = Adapter()
+    prepared = adapter.helper.prepared
+    with remembering(adapter, OTHER):
+        assert adapter.scene is OTHER
+        assert adapter.robot is OTHER.robot
+        assert adapter.helper.cube is OTHER.body("cube")
+        assert adapter.helper.prepared is not prepared
+    assert adapter.scene is TRUE
+    assert adapter.helper.prepared is prepared
+    assert adapter.helper.cube is TRUE.body("cube")
+
+
+def test_it_is_put_back_after_an_error() -> None:
+    adapter: Any = Adapter()
+    with pytest.raises(KeyError), remembering(adapter, OTHER):
+        raise KeyError("planned")
+    assert adapter.scene is TRUE
+
+
+def test_rounds_hold_every_fault_once_and_no_quantity_twice() -> None:
+    groups = rounds(list(Capability))
+    assert sorted(name for group in groups for name in group) == sorted(FAULTS)
+    for group in groups:
+        quantities = [fault.quantity for fault in group.values()]
+        assert len(quantities) == len(set(quantities))
+    assert len(groups) == 2
+
+
+def test_rounds_leave_out_what_an_engine_cannot_be_wrong_in() -> None:
+    names = {name for group in rounds(()) for name in group}
+    assert set(FAULTS) - names == {"self_collide"}
