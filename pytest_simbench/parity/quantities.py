@@ -78,7 +78,8 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
         )
         kinds: tuple[list[FloatArray], ...] = ([], [], [])
         flat = {Box.kind: 0, ConvexMesh.kind: 1}
-        kinds[flat.get(body.kind, 2)].append(body.reach(DIRECTIONS))
+        for part in body.parts:
+            kinds[flat.get(part.kind, 2)].append(part.reach_placed(DIRECTIONS))
         quantities |= outlines(f"body/{body.name}", *kinds)
         if body.mass:
             inertia = np.diag(body.inertia())

@@ -1,8 +1,10 @@
 """The declarative world: bodies, robot, gravity, friction, gains; frozen, in SI units."""
 
-from pytest_simbench.scene.bodies import Box, Capsule, ConvexMesh, Cylinder, Sphere, penetration
+from pytest_simbench.scene.bodies import Box, Capsule, ConvexMesh, Cylinder, Sphere
 from pytest_simbench.scene.body import Body, Solid, Wrench
 from pytest_simbench.scene.checks import SceneError
+from pytest_simbench.scene.compound import Compound
+from pytest_simbench.scene.penetration import penetration
 from pytest_simbench.scene.polytope import Polytope, principal
 from pytest_simbench.scene.pose import FloatArray, Pose, Quaternion, Vector3, rotation_matrix
 from pytest_simbench.scene.robot import Closure, Gripper, Joint, MotionLimits, Robot
@@ -15,6 +17,7 @@ __all__ = [
     "Box",
     "Capsule",
     "Closure",
+    "Compound",
     "ConvexMesh",
     "Cylinder",
     "FloatArray",

@@ -1,16 +1,15 @@
-"""The kinds of rigid bodies, and how deep two of them overlap."""
+"""The kinds of rigid bodies of one shape."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
 from pytest_simbench.scene.body import WOOD, Body, Colour, Solid
 from pytest_simbench.scene.checks import SceneError, check_number, check_numbers
-from pytest_simbench.scene.overlap import Corners, Hull, distance, overlaps, parted
+from pytest_simbench.scene.overlap import Corners, Hull
 from pytest_simbench.scene.polytope import EVEN, MOST, Polytope, polytope
 from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
 
@@ -247,34 +246,3 @@ class ConvexMesh(Body, kind="convex_mesh"):
 
     def core(self, share: float) -> tuple[Corners, float]:
         return Corners(np.array(self.vertices)), 0.0
-
-
-def penetration(a: Body, b: Body, share: float = 0.1) -> float:
-    """How deep two bodies overlap [m]; 0 or less when they are apart or touch.
-
-    Exact among boxes and meshes, and among spheres and capsules. A box or cylinder beside one of
-    these, and two cylinders, count as if their edges were rounded by `share` of their shortest half
-    edge: two bodies that do not overlap are never said to. The depth is then at most those radii.
-    """
-    offset = np.subtract(b.pose.position, a.pose.position)
-    half_a, half_b = np.asarray(a.extents) / 2, np.asarray(b.extents) / 2
-    if np.linalg.norm(offset) > np.linalg.norm(half_a) + np.linalg.norm(half_b):
-        return 0.0
-    turn_a, turn_b = a.pose.rotation(), b.pose.rotation()
-    flat_a, flat_b = _flat(a), _flat(b)
-    if (isinstance(a, ConvexMesh) or isinstance(b, ConvexMesh)) and flat_a and flat_b:
-        return parted(offset, turn_a, flat_a, turn_b, flat_b)
-    if not (isinstance(a, Box) and isinstance(b, Box)):
-        (core_a, depth_a), (core_b, depth_b) = a.core(share), b.core(share)
-        return depth_a + depth_b - distance(offset, core_a, turn_a, core_b, turn_b)
-    return float(overlaps(offset[None], turn_a[None], half_a[None], turn_b[None], half_b[None])[0])
-
-
-def _flat(body: Body) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """Corners, normals of faces and directions of edges of a body that has only flat faces."""
-    if isinstance(body, ConvexMesh):
-        return body.hull.points, body.hull.normals, body.hull.edges
-    if isinstance(body, Box):
-        corners = np.array(list(product((-0.5, 0.5), repeat=3))) * body.size
-        return corners, np.eye(3), np.eye(3)
-    return None

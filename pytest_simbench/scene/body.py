@@ -106,8 +106,8 @@ class Body(_Placed):
         name: unique in its scene.
         pose: of its centre, which is its centre of mass, in the world.
         mass: [kg], spread evenly; 0 fixes the body in the world.
-        friction: Coulomb coefficient mu of its surface, sliding. Every surface of a scene has the
-            same one, so that the engines' different rules for combining two do not matter.
+        friction: Coulomb coefficient mu of its surface, sliding; of two surfaces that differ the
+            scene's rule makes one (`scene.friction`).
         colour: red, green, blue, alpha in 0..1.
         linear_velocity: of its centre at the start, in the world frame [m/s].
         angular_velocity: of the body at the start, in the world frame [rad/s].
@@ -134,7 +134,7 @@ class Body(_Placed):
     prescribed: bool = False
     wrenches: tuple[Wrench, ...] = ()
 
-    optional = (
+    optional: ClassVar[tuple[str, ...]] = (
         "linear_velocity", "angular_velocity", "restitution", "linear_damping", "angular_damping",
         "moments", "prescribed", "wrenches",
     )  # fmt: skip
@@ -185,6 +185,13 @@ class Body(_Placed):
         return self.mass == 0.0 and not self.prescribed
 
     @property
+    def parts(self) -> tuple[Body, ...]:
+        """The convex shapes that it is made of, as fixed bodies whose poses are in its frame."""
+        still = {"linear_velocity": STILL, "angular_velocity": STILL, "wrenches": ()}
+        alone = {"linear_damping": 0.0, "angular_damping": 0.0, "moments": None}
+        return (self.changed(pose=Pose(), mass=0.0, prescribed=False, **still, **alone),)
+
+    @property
     def velocity(self) -> FloatArray:
         """Linear, then angular velocity at the start, as in body states, (6,) [m/s, rad/s]."""
         return np.array([*self.linear_velocity, *self.angular_velocity])
@@ -231,9 +238,17 @@ class Body(_Placed):
         found: FloatArray = hull.reach(directions) + depth * np.linalg.norm(directions, axis=1)
         return found
 
+    def reach_placed(self, directions: FloatArray) -> FloatArray:
+        """The same from the origin of the frame that its pose is given in, in its directions."""
+        turned = self.reach(directions @ self.pose.rotation())
+        return np.asarray(turned + directions @ np.asarray(self.pose.position))
+
     def changed(self, **values: Any) -> Self:
         """The same body with some of its fields replaced."""
         return replace(self, **values)
+
+    def with_friction(self, friction: float) -> Self:
+        return self.changed(friction=friction)
 
     def moved_to(self, pose: Pose) -> Self:
         return self.changed(pose=pose)

@@ -13,8 +13,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.scene.bodies import Box, penetration
+from pytest_simbench.scene.bodies import Box
 from pytest_simbench.scene.overlap import overlaps, rotations
+from pytest_simbench.scene.penetration import penetration
 from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
 from pytest_simbench.scene.scene import Scene
 

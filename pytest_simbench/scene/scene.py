@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
-from pytest_simbench.scene.bodies import penetration
 from pytest_simbench.scene.body import Body
 from pytest_simbench.scene.checks import (
     RESERVED,
@@ -14,6 +13,8 @@ from pytest_simbench.scene.checks import (
     check_number,
     check_numbers,
 )
+from pytest_simbench.scene.friction import RULES
+from pytest_simbench.scene.penetration import penetration
 from pytest_simbench.scene.pose import Pose, Vector3
 from pytest_simbench.scene.robot import Robot
 from pytest_simbench.scene.wire import Wire
@@ -41,13 +42,14 @@ class Scene(Wire):
         room: how far it goes from the origin to each side in x and in y, and up [m]. A free body
             that leaves it has diverged (`plausibility`); 1e6 for a side without a wall.
         ground_restitution: Newton's coefficient of the ground plane, as `Body.restitution`.
+        friction_rule: what the friction of two surfaces is, one of `friction.RULES`.
 
     Raises:
         SceneError: two bodies share a name or overlap, one has the name of what is in every
             scene, a free one is outside the room, or a number is none.
     """
 
-    optional = ("ground_restitution",)
+    optional = ("ground_restitution", "friction_rule")
 
     name: str
     bodies: tuple[Body, ...] = ()
@@ -56,6 +58,7 @@ class Scene(Wire):
     ground_friction: float = 1.0
     room: Vector3 = field(default=ROOM)
     ground_restitution: float = 0.0
+    friction_rule: str = "maximum"
 
     def __post_init__(self) -> None:
         check_name(self.name, "a scene")
@@ -64,6 +67,11 @@ class Scene(Wire):
         check_numbers(self.room, 3, f"the room [m] of scene {self.name!r}", 0.0, above=True)
         what = f"the ground's restitution in scene {self.name!r}"
         check_number(self.ground_restitution, what, 0.0, 1.0)
+        if self.friction_rule not in RULES:
+            raise SceneError(
+                f"scene {self.name!r}: there is no rule {self.friction_rule!r} for the friction of "
+                f"two surfaces; there are {', '.join(RULES)}"
+            )
         names = [body.name for body in self.bodies]
         for name in names:
             if name.lower() in RESERVED:
@@ -110,10 +118,12 @@ class Scene(Wire):
 
     @property
     def words(self) -> frozenset[str]:
-        """What is in it: `box`, `sphere`, `cylinder`, `capsule`, `convex_mesh`, `restitution`,
-        `damping`, `wrench`, `prescribed`, `loop`, `self_collide`."""
+        """What is in it: `box`, `sphere`, `cylinder`, `capsule`, `convex_mesh`, `compound`,
+        `frictions` (several), `restitution`, `damping`, `wrench`, `prescribed`, `loop`,
+        `self_collide`."""
         bodies = self.bodies
         found = {
+            "frictions": len(self.frictions) > 1,
             "restitution": self.ground_restitution or any(body.restitution for body in bodies),
             "damping": any(body.damping.any() for body in bodies),
             "wrench": any(body.wrenches for body in bodies),
@@ -121,8 +131,14 @@ class Scene(Wire):
             "loop": self.robot is not None and bool(self.robot.closures),
             "self_collide": self.robot is not None and self.robot.self_collide,
         }
-        kinds = {body.kind for body in bodies}
+        kinds = {part.kind for body in bodies for part in (body, *body.parts)}
         return frozenset(kinds | {word for word, there in found.items() if there})
+
+    @property
+    def frictions(self) -> frozenset[float]:
+        """Of all surfaces: the ground, the bodies, the robot."""
+        robot = () if self.robot is None else (self.robot.friction,)
+        return frozenset((self.ground_friction, *robot, *(body.friction for body in self.bodies)))
 
     def body(self, name: str) -> Body:
         """The body of that name.

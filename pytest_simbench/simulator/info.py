@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from pytest_simbench.ground.errors import NotSupportedError, SimulatorError
 from pytest_simbench.ground.versions import BUILD, VersionedName, release_numbers
 from pytest_simbench.scene import Robot, Scene
+from pytest_simbench.scene.friction import combined
 
 
 class Capability(StrEnum):
@@ -23,6 +24,8 @@ class Capability(StrEnum):
     """A restored run equals, bit for bit, the one that was neither saved nor restored."""
     CONTACT_COUNT = "contact_count"
     CONTACT_FORCES = "contact_forces"
+    COMPOUND = "compound"
+    """A body may have several shapes, see `scene.Compound`."""
     LOOPS = "loops"
     """Links may close loops, see `scene.Closure`."""
     SELF_COLLIDE = "self_collide"
@@ -140,6 +143,9 @@ class SimulatorInfo:
         environment: variables to be set before a headless engine is imported, unless the user did.
         install_size_mb: what installing it adds on disk, rounded [MB].
         language: in which the engine is written.
+        friction_rule: what the engine, as its adapter sets it, makes of the frictions of two
+            surfaces: one of `scene.friction.RULES`; empty: not known, and scenes of several
+            frictions are refused.
     """
 
     name: str
@@ -163,6 +169,7 @@ class SimulatorInfo:
     environment: Mapping[str, str] = field(default_factory=dict)
     language: str = "unknown"
     oldest_version: str = ""
+    friction_rule: str = ""
 
     def of_version(self, name: VersionedName) -> SimulatorInfo:
         """Of a release or a build of the engine.
@@ -227,6 +234,31 @@ class SimulatorInfo:
     @property
     def modes(self) -> tuple[str, ...]:
         return ("headless", "gui") if Capability.WINDOW in self.capabilities else ("headless",)
+
+
+def check_shapes(info: SimulatorInfo, scene: Scene) -> None:
+    """Raise `NotSupportedError` for a body of several shapes on a simulator that has none."""
+    if "compound" in scene.words and Capability.COMPOUND not in info.capabilities:
+        raise NotSupportedError(
+            f"{info.name} has bodies of one shape alone, and scene {scene.name!r} has one of more"
+        )
+
+
+def with_friction_rule(info: SimulatorInfo, scene: Scene) -> tuple[Scene, list[str]]:
+    """The scene with frictions for the simulator's rule, and what that leaves wrong.
+
+    Raises:
+        NotSupportedError: the scene has several frictions, and the rule is not known.
+    """
+    if not info.friction_rule:
+        if len(scene.frictions) == 1:
+            return scene, []
+        raise NotSupportedError(
+            f"{info.name} does not say what the friction of two different surfaces is, and scene "
+            f"{scene.name!r} has several"
+        )
+    made, problem = combined(scene, info.friction_rule)
+    return made, [problem] if problem else []
 
 
 def check_loops(info: SimulatorInfo, scene: Scene) -> None:

@@ -33,7 +33,9 @@ from pytest_simbench.simulator.info import (
     alternatives,
     check_loops,
     check_self_collision,
+    check_shapes,
     importable,
+    with_friction_rule,
 )
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.worker.acting import Acting
@@ -147,13 +149,14 @@ class Server:
         check_names(world)
         check_loops(simulator.info, world)
         check_self_collision(simulator.info, world)
+        check_shapes(simulator.info, world)
+        world, excused = with_friction_rule(simulator.info, world)
         simulator.load(world)
         self.scene = world
         acting = Acting.of(simulator, world)
         self.stepper = Stepper(simulator, world, lambda at: self.send({"alive": at}), acting)
         self.stepper.real_time = self.real_time
         check_start(simulator, world)
-        excused: list[str] = []
         self.compared = None
         if parity:
             expected, reported = (
@@ -163,7 +166,7 @@ class Server:
             info = simulator.info
             counting = (deviation for deviation in info.deviations if deviation.concerns(world))
             declared = [deviation.with_robot(world.robot) for deviation in counting]
-            excused = check(expected, reported, declared, info.name)
+            excused += check(expected, reported, declared, info.name)
             self.compared = expected, reported
         if simulator.gui:
             simulator.refresh_window()

@@ -50,14 +50,20 @@ class MuJoCo(Simulator):
         engine="MuJoCo",
         language="C, C++",
         tested_version="4.0.0",
+        friction_rule="maximum",
         oldest_version="3.2.4",  # before it `MjSpec` tells Python no lists of geoms and joints
         capabilities=Capability.named(
-            "window offscreen save_restore exact_restore contact_count contact_forces loops "
-            "self_collide joint_wrenches deterministic"
+            "window offscreen save_restore exact_restore contact_count contact_forces compound "
+            "loops self_collide joint_wrenches deterministic"
         ),
         deviations=(
             Deviation("", "contacts are soft by design: cubes sink in and creep a little"),
             Deviation("", BOUNCES, only="restitution"),
+            Deviation(
+                "",
+                "a round shape has a contact's friction its own, whatever it touches",
+                only="frictions",
+            ),
         ),
         install_size_mb=60,
         environment=DISABLED,
@@ -109,7 +115,13 @@ class MuJoCo(Simulator):
         model, prepared = self.model, self.prepared
         return Numbers(
             model.geom("ground").id,
-            {box.name: model.geom(box.name).id for box in self.scene.bodies},
+            {
+                body.name: [
+                    model.geom(f"{body.name}/{k}" if k else body.name).id
+                    for k in range(len(body.parts))
+                ]
+                for body in self.scene.bodies
+            },
             {} if prepared is None else {name: model.body(name).id for name in prepared.links},
             {}
             if prepared is None

@@ -33,13 +33,13 @@ class Numbers:
 
     Attributes:
         ground: of its geom.
-        boxes: geom of each body.
+        boxes: geoms of each body.
         links: body of each link.
         joints: joint of each driven joint.
     """
 
     ground: int
-    boxes: Mapping[str, int]
+    boxes: Mapping[str, list[int]]
     links: Mapping[str, int]
     joints: Mapping[str, int]
 
@@ -77,13 +77,15 @@ class ReadBack(readback.ReadBack):
         return all(map(self._coupled, pairs))
 
     def body(self, prefix: str, name: str) -> dict[str, Any]:
-        """A body, whose frame is its shape's: a fixed one may have no body of its own."""
-        model, geom = self.model, self.at.boxes[name]
-        body = int(model.geom_bodyid[geom])
-        place, turn = self._frame(geom)
+        """A body. A fixed one may have none of its own: its frame is then its shape's."""
+        model, geoms = self.model, self.at.boxes[name]
+        body = int(model.geom_bodyid[geoms[0]])
+        place, turn = self.data.xpos[body], self.data.xmat[body].reshape(3, 3)
+        if body == 0:
+            place, turn = self._frame(geoms[0])
         light = self.model.body_mass[body] < heavy(self.scene)  # else it moves as prescribed
         free = light and self._can_move(body)
-        found = self._surface(prefix, [geom], place, turn)
+        found = self._surface(prefix, geoms, place, turn)
         found[f"{prefix}/dynamic"] = float(free)
         if model.body_dofnum[body] and light:
             found |= self._inertial(prefix, body, place, turn)
@@ -236,7 +238,7 @@ class ReadBack(readback.ReadBack):
         if kind == "ground":
             return [self.at.ground]
         if kind == "body":
-            return [self.at.boxes[rest]]
+            return self.at.boxes[rest]
         return np.flatnonzero(self.model.geom_bodyid == self.at.links[rest]).tolist()
 
     def joint(self, prefix: str, name: str) -> dict[str, Any]:
@@ -302,7 +304,9 @@ def _flag(flags: int, name: str) -> bool:
 
 def contact_forces(model: Any, data: Any, at: Numbers) -> Iterator[tuple[str, str, FloatArray]]:
     """Both names of each contact, and the wrench on the first about the world's origin."""
-    names = {at.ground: "ground"} | {geom: f"body/{name}" for name, geom in at.boxes.items()}
+    names = {at.ground: "ground"} | {
+        geom: f"body/{name}" for name, geoms in at.boxes.items() for geom in geoms
+    }
     links = {body: f"link/{name}" for name, body in at.links.items()}
     local = np.empty(6)
     for k in range(data.ncon):

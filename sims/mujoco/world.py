@@ -107,33 +107,46 @@ def _add_body(spec: Any, part: Body, settings: MuJoCoSettings, most: float) -> N
     body = spec.worldbody.add_body(
         name=part.name, pos=part.pose.position, quat=part.pose.quaternion
     )
-    kind, size = _geom(part)
-    mesh = {}
-    if isinstance(part, ConvexMesh):
-        spec.add_mesh(name=f"{part.name}/mesh", uservert=np.ravel(part.vertices))
-        mesh = {"meshname": f"{part.name}/mesh"}
-    geom = body.add_geom(
-        name=part.name,
-        type=getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"),
-        size=[*size, 0.0, 0.0, 0.0][:3],
-        rgba=part.colour,
-        **mesh,
-    )
-    _set_surface(geom, settings, part.friction, part.restitution, WORLD, WORLD | ROBOT)
-    if not isinstance(part, Box | ConvexMesh):
-        # contacts of a round shape neither roll nor spin with friction
-        geom.condim, geom.priority = 3, 1
+    geoms = [
+        _add_shape(spec, body, f"{part.name}/{k}" if k else part.name, shape, settings)
+        for k, shape in enumerate(part.parts)
+    ]
     if part.prescribed:
-        geom.contype, geom.conaffinity = LED, ROBOT
+        for geom in geoms:
+            geom.contype, geom.conaffinity = LED, ROBOT
         _set_inertia(body, most, (most,) * 3)
         body.gravcomp = 1.0
         body.add_freejoint(name=f"{part.name}/free")
     elif not part.fixed:
-        geom.conaffinity |= LED
-        geom.mass = part.mass
-        if part.moments is not None or mesh:
+        for geom in geoms:
+            geom.conaffinity |= LED
+        geoms[0].mass = part.mass
+        if part.moments is not None or isinstance(part, ConvexMesh):
             _set_inertia(body, part.mass, part.inertia().tolist())
         body.add_freejoint(name=f"{part.name}/free")
+
+
+def _add_shape(spec: Any, body: Any, name: str, shape: Body, settings: MuJoCoSettings) -> Any:
+    """The geom of one shape of a body, at its place in the body's frame."""
+    kind, size = _geom(shape)
+    mesh = {}
+    if isinstance(shape, ConvexMesh):
+        spec.add_mesh(name=f"{name}/mesh", uservert=np.ravel(shape.vertices))
+        mesh = {"meshname": f"{name}/mesh"}
+    geom = body.add_geom(
+        name=name,
+        type=getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"),
+        size=[*size, 0.0, 0.0, 0.0][:3],
+        pos=shape.pose.position,
+        quat=shape.pose.quaternion,
+        rgba=shape.colour,
+        **mesh,
+    )
+    _set_surface(geom, settings, shape.friction, shape.restitution, WORLD, WORLD | ROBOT)
+    if not isinstance(shape, Box | ConvexMesh):
+        # contacts of a round shape neither roll nor spin with friction
+        geom.condim, geom.priority = 3, 1
+    return geom
 
 
 def _geom(body: Body) -> tuple[str, list[float]]:

@@ -196,7 +196,7 @@ class Newton(Simulator):
         joints = () if prepared is None else prepared.robot.joint_names
         return Numbers(
             self._geom("ground"),
-            {box.name: self._geom(box.name) for box in self.scene.bodies},
+            {box.name: [self._geom(box.name)] for box in self.scene.bodies},
             {name: bodies.index(labels.index(name)) for name in links},
             dict(zip(joints, self._mujoco_joints(), strict=True)),
         )
