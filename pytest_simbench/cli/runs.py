@@ -20,6 +20,7 @@ from typing import Any
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.ground.text import for_terminal
+from pytest_simbench.measure.settling import TASK as SETTLING
 from pytest_simbench.records.folder import RECORDS, TASKS, Reading, RunFolder
 from pytest_simbench.records.merging import Merged, MergeError, merge, merge_tasks
 from pytest_simbench.records.paths import FolderError, new_name, opened, whole
@@ -47,7 +48,7 @@ from pytest_simbench.report.terminal.parts import (
     sweep_lines,
 )
 from pytest_simbench.report.terminal.progress import Progress
-from pytest_simbench.report.terminal.run import render_brief, render_run
+from pytest_simbench.report.terminal.run import render_brief, render_run, render_section
 
 RUNS = ".simbench"
 """Where runs lie for which no folder is given."""
@@ -224,9 +225,12 @@ def sections(written: Report, width: int, verbose: bool) -> Iterator[tuple[str, 
         width: of the terminal, in columns.
         verbose: for whole tables.
     """
+    for scene in written.scenes:
+        yield scene.title.lower(), for_terminal(render_section(scene, width, titled=False))
     if written.summaries or written.sweeps:
         claims = [claim_lines(written.claims, width), ""] if written.claims else []
-        table = (render_run if verbose else render_brief)(written.summaries, width)
+        brief = [s for s in written.summaries if s.task != SETTLING or not written.settled]
+        table = render_run(written.summaries, width) if verbose else render_brief(brief, width)
         yield "simulator comparison", "\n".join([*claims, table])
     if written.sweeps:
         yield sweep.TITLE, for_terminal("\n".join(sweep_lines(written.sweeps, width, verbose)))

@@ -277,6 +277,18 @@ def data_set(request: pytest.FixtureRequest) -> Callable[[str], Any]:
     return lambda name: data.read_or_skip(request.config, name)
 
 
+@pytest.fixture
+def scene_file(request: pytest.FixtureRequest, output_path: Path) -> Callable[..., Scene]:
+    """A scene of a file: `scene_file("kitchen.xml", starts="starts.npz")`.
+
+    Paths are relative to the test's file; without any it is the file of `--sim-scene`. What of the
+    file was carried, and what not, is written into the run folder.
+    """
+    from pytest_simbench.plugin.scene_files import load
+
+    return lambda path=None, starts=None: load(request, output_path, path, starts)
+
+
 @pytest.fixture(scope="session")
 def robot(simbench_robot: Robot) -> Robot:
     """The robot of `--robot`, the Panda by default: `Scene("s", (), robot)`."""

@@ -29,6 +29,9 @@ OVERLAP_TOLERANCE = 1e-4
 """Bodies may overlap this deep at the start [m]: resting contacts are given to rounding."""
 
 
+Start = tuple[tuple[str, Pose], ...]
+
+
 @dataclass(frozen=True)
 class Scene(Wire):
     """Bodies, robot and gravity above an endless ground plane at z = 0.
@@ -42,6 +45,9 @@ class Scene(Wire):
         room: how far it goes from the origin to each side in x and in y, and up [m]. A free body
             that leaves it has diverged (`plausibility`); 1e6 for a side without a wall.
         ground_restitution: Newton's coefficient of the ground plane, as `Body.restitution`.
+        starts: poses of free bodies, in the frames that a file gives them (`Compound.file_frame`),
+            for tasks that go through several; one tuple of names and poses each. A worker does not
+            get them.
         friction_rule: what the friction of two surfaces is, one of `friction.RULES`.
 
     Raises:
@@ -50,6 +56,7 @@ class Scene(Wire):
     """
 
     optional = ("ground_restitution", "friction_rule")
+    unwritten = ("starts",)
 
     name: str
     bodies: tuple[Body, ...] = ()
@@ -59,6 +66,7 @@ class Scene(Wire):
     room: Vector3 = field(default=ROOM)
     ground_restitution: float = 0.0
     friction_rule: str = "maximum"
+    starts: tuple[Start, ...] = ()
 
     def __post_init__(self) -> None:
         check_name(self.name, "a scene")

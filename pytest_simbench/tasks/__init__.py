@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.arm_pushing import ArmPushing
     from pytest_simbench.tasks.base import Jitter, Moment, Outcome, Task
     from pytest_simbench.tasks.pushing import CurvePushing, Pushing
+    from pytest_simbench.tasks.settling import Settling, rests_on
     from pytest_simbench.tasks.stacking import Stacking
     from pytest_simbench.tasks.throwing import Throwing
     from pytest_simbench.tasks.tossing import Tossing
@@ -18,7 +19,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ArmFollowing", "ArmPushing", "CorrectedArmFollowing", "CurvePushing", "Jitter",
-    "LeaningTowers", "Moment", "Outcome", "Pushing", "Stacking", "Task", "Throwing", "Tossing",
+    "LeaningTowers", "Moment", "Outcome", "Pushing", "Settling", "Stacking", "Task", "Throwing",
+    "Tossing",
+    "rests_on",
 ]  # fmt: skip
 
 _MODULES = {
@@ -26,6 +29,7 @@ _MODULES = {
     "arm_pushing": ("ArmPushing",),
     "base": ("Jitter", "Moment", "Outcome", "Task"),
     "pushing": ("CurvePushing", "Pushing"),
+    "settling": ("Settling", "rests_on"),
     "stacking": ("Stacking",),
     "throwing": ("Throwing",),
     "tossing": ("Tossing",),

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 from pytest_simbench.measure.history import History, histories
 from pytest_simbench.measure.law_history import LawHistory, law_histories
+from pytest_simbench.measure.settling import Settled, settlings
 from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.model import sweep, tables, truth
+from pytest_simbench.report.model import settling, sweep, tables, truth
 from pytest_simbench.report.model.claims import Claims, claims_of
 from pytest_simbench.report.model.document import Section
 from pytest_simbench.report.model.outcome import Compared
@@ -28,6 +29,7 @@ class Report:
         records: that all was made of, in order.
         histories: of simulators of which there are several releases.
         sweeps: laws over time steps.
+        settled: users' scenes, beside their noise.
         claims: what the tests claimed, and what came of it, which comes first.
         comparison: with a baseline, where there is one.
     """
@@ -36,6 +38,7 @@ class Report:
     records: Sequence[Record] = ()
     histories: Sequence[AnyHistory] = ()
     sweeps: Sequence[Swept] = ()
+    settled: Sequence[Settled] = ()
     claims: Claims | None = None
     comparison: Compared | None = None
 
@@ -47,6 +50,7 @@ class Report:
             in_order(reading.records),
             histories_of(reading),
             sweep.of_run(reading),
+            settlings(reading.records),
             claims_of(reading, comparison[1] if comparison else None),
             comparison,
         )
@@ -58,10 +62,15 @@ class Report:
 
     @property
     def sections(self) -> list[Section]:
-        """Laws, time steps, tasks, and releases."""
+        """Users' scenes, laws, time steps, tasks, and releases."""
         laws = filter(None, [truth.section(self.summaries), sweep.section(self.sweeps)])
         told = [Section(f"History: {one.title}", one.sentences()) for one in self.histories]
-        return [*laws, *map(tables.section, self.tasks), *told]
+        return [*self.scenes, *laws, *map(tables.section, self.tasks), *told]
+
+    @property
+    def scenes(self) -> list[Section]:
+        """Users' scenes, whose first sentences are the answer."""
+        return [settling.section(one) for one in self.settled]
 
 
 def histories_of(reading: Reading) -> list[AnyHistory]:

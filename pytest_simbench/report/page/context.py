@@ -55,10 +55,15 @@ def page(
     return {
         "claims": report.claims,
         "title": " and ".join(subjects) or ("time steps" if report.sweeps else "repeatability"),
-        "answer": [*truth.sentences(summaries), *headline(tasks)],
+        "answer": [
+            *(sentence for scene in report.scenes for sentence in scene.sentences),
+            *truth.sentences(summaries),
+            *headline(tasks),
+        ],
         # What could not be shown, each once.
         "problems": dict.fromkeys(filter(None, [*(why for _, why in drawn), *problems, problem])),
         "filters": {name: found for name, found in choices.items() if len(found) > 1},
+        "scenes": report.scenes,
         "truth": truth.section(summaries),
         "sweep": sweep.section(report.sweeps),
         "swept": swept,

@@ -1,0 +1,186 @@
+"""Where a scene's bodies end in each simulator, beside the noise of the scene itself.
+
+One trajectory is no verdict: before two simulators or releases are called different, the start is
+moved a little within each, and the time step made finer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.series import grouped, settled
+
+TASK = "settling"
+"""The task whose records these are (`tasks.settling`)."""
+
+ALIKE = 1.0
+"""Two ends are alike where no body lies farther apart [mm]: what tables print of a length."""
+
+Who = tuple[str, str, str]
+"""Simulator as named, mode, profile."""
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Where the bodies of some repetitions ended.
+
+    Attributes:
+        places: of the bodies' origins [mm], (repetitions, bodies, 3).
+        crashed: how many repetitions besides did not finish.
+        premises: share of the premises that hold, mean of the repetitions; None without any.
+    """
+
+    places: NDArray[np.float64]
+    crashed: int
+    premises: float | None
+
+    @property
+    def mean(self) -> NDArray[np.float64]:
+        return np.asarray(self.places.mean(axis=0))
+
+
+@dataclass(frozen=True)
+class Settled:
+    """One scene in several simulators.
+
+    Attributes:
+        scene: its name.
+        bodies: names of its free bodies.
+        written: of each simulator what became of the scene as it is written.
+        moved: the same with starts moved by at most so much [m], smallest first.
+        finer: the same with time steps so many times as fine.
+        cost: CPU seconds for a simulated second, of the scene as it is written.
+    """
+
+    scene: str
+    bodies: Sequence[str]
+    written: Mapping[Who, Ends]
+    moved: Mapping[float, Mapping[Who, Ends]]
+    finer: Mapping[int, Mapping[Who, Ends]]
+    cost: Mapping[Who, float | None]
+
+    def apart(self, a: Ends, b: Ends) -> tuple[float, str]:
+        """How far apart the body lies that two ends have farthest apart [mm], and its name."""
+        gaps = np.linalg.norm(a.mean - b.mean, axis=1)
+        worst = int(gaps.argmax())
+        return float(gaps[worst]), self.bodies[worst]
+
+    def noise(self, who: Who, moved: float) -> float | None:
+        """How far any body ends from where it ends as written, with starts moved by so much [mm];
+        None where that was not tried."""
+        own, others = self.written[who], self.moved.get(moved, {}).get(who)
+        if others is None or not len(others.places):
+            return None
+        return float(np.linalg.norm(others.places - own.mean, axis=2).max())
+
+    def change(self, who: Who, finer: int) -> float | None:
+        """How far any body ends from where it ends as written, with a step so many times as fine
+        [mm]; None where that was not tried."""
+        other = self.finer.get(finer, {}).get(who)
+        if other is None or not len(other.places):
+            return None
+        return self.apart(self.written[who], other)[0]
+
+    def places(self, ends: Mapping[Who, Ends]) -> list[list[Who]]:
+        """Simulators by where the bodies end: two that are alike are in one group, also through a
+        third one. The largest group comes first."""
+        groups: list[list[Who]] = []
+        for who in (who for who, found in ends.items() if len(found.places)):
+            near = [g for g in groups if any(self._alike(ends, who, other) for other in g)]
+            groups = [g for g in groups if g not in near]
+            groups.append([*(other for g in near for other in g), who])
+        return sorted(groups, key=len, reverse=True)
+
+    def _alike(self, ends: Mapping[Who, Ends], a: Who, b: Who) -> bool:
+        return self.apart(ends[a], ends[b])[0] <= ALIKE
+
+    def explained(self, a: Who, b: Who) -> float | None:
+        """The smallest tried move of the start that moves an end of one of two simulators as far as
+        theirs are apart [m]; None where no move does, or none was tried."""
+        gap = self.apart(self.written[a], self.written[b])[0]
+        for moved in self.moved:
+            if max(self.noise(who, moved) or 0.0 for who in (a, b)) >= gap:
+                return moved
+        return None
+
+
+def settlings(records: Iterable[Record]) -> list[Settled]:
+    """The scenes of a run that were left to themselves in two simulators at least, or moved."""
+    own = [record for record in settled(records) if record.task == TASK]
+    found = []
+    for scene in grouped(own, _scene).values():
+        if made := _settled(scene):
+            found.append(made)
+    return found
+
+
+def _scene(record: Record) -> tuple[object, ...]:
+    """What scene it is; starts that were moved are the same scene."""
+    keys = ("task.scene_digest", "task.seconds", "task.starts")
+    return (record.settings.get("task.scene"), *(record.settings.get(key) for key in keys))
+
+
+def _settled(records: Sequence[Record]) -> Settled | None:
+    done = next((record for record in records if record.ok and "places" in record.details), None)
+    if done is None:
+        return None
+    bodies = list(done.details["places"])
+    steps: dict[Who, float] = {}
+    for record in records:
+        if _moved(record) == 0:
+            steps[_who(record)] = max(steps.get(_who(record), 0.0), _step(record))
+    written: dict[Who, Ends] = {}
+    moved: dict[float, dict[Who, Ends]] = {}
+    finer: dict[int, dict[Who, Ends]] = {}
+    cost: dict[Who, float | None] = {}
+    groups = grouped(records, lambda r: (_who(r), _moved(r), _step(r)))
+    for (who, amount, step), group in groups.items():
+        if who not in steps:
+            continue
+        ends, times = _ends(group, bodies), round(steps[who] / step) if step else 1
+        if amount:
+            moved.setdefault(amount, {})[who] = ends
+        elif times > 1:
+            finer.setdefault(times, {})[who] = ends
+        else:
+            written[who] = ends
+            cost[who] = next((c for r in group if (c := r.cost("cpu_cost")) is not None), None)
+    written = {who: ends for who, ends in written.items() if len(ends.places)}
+    if len(written) < 2 and not moved:
+        return None
+    return Settled(
+        str(done.settings.get("task.scene")), bodies, written,
+        dict(sorted(moved.items())), dict(sorted(finer.items())), cost,
+    )  # fmt: skip
+
+
+def _ends(records: Sequence[Record], bodies: Sequence[str]) -> Ends:
+    places = []
+    for record in records:
+        told = record.details.get("places")
+        if record.ok and isinstance(told, Mapping) and list(told) == list(bodies):
+            places.append([np.multiply(told[name][:3], 1000.0) for name in bodies])
+    shares = [record.metrics.get("premises") for record in records if record.ok]
+    known = [share for share in shares if share is not None]
+    return Ends(
+        np.array(places, dtype=float).reshape(-1, len(bodies), 3),
+        sum(record.status == "failed" for record in records),
+        float(np.mean(known)) if known else None,
+    )
+
+
+def _who(record: Record) -> Who:
+    return record.simulator, record.mode, record.profile
+
+
+def _moved(record: Record) -> float:
+    return float(record.settings.get("task.moved") or 0.0)
+
+
+def _step(record: Record) -> float:
+    return float(record.settings.get("timestep") or 0.0)

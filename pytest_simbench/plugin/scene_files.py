@@ -1,0 +1,76 @@
+"""`--sim-scene` and the fixture `scene_file`: users' scenes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from pytest_simbench.plugin import options
+from pytest_simbench.plugin.session import session_of
+
+if TYPE_CHECKING:
+    from pytest_simbench.scene import Scene
+
+ACCOUNT = "carried.md"
+"""Of the run folder: what of the scenes' files was carried."""
+
+
+def run_suite(config: pytest.Config) -> None:
+    """Where `--sim-scene` stands alone on the command line, collect the suite of scenes."""
+    if config.args_source is config.ArgsSource.ARGS or not options.given(config, "sim_scene"):
+        return
+    spec = find_spec("pytest_simbench.suites")
+    if spec is not None and spec.submodule_search_locations:
+        config.args = [str(Path(spec.submodule_search_locations[0]) / "test_scene.py")]
+
+
+def load(
+    request: pytest.FixtureRequest,
+    folder: Path,
+    path: str | Path | None = None,
+    starts: str | Path | None = None,
+) -> Scene:
+    """The scene of a file, and its account in the run folder; what is wrong ends the run.
+
+    Args:
+        request: of the test, whose folder paths are relative to.
+        folder: of the run.
+        path: of the scene; None for that of `--sim-scene`.
+        starts: of a file of starts (.npz), see `description.starts`.
+    """
+    from pytest_simbench.description.carried import as_lines, as_markdown
+    from pytest_simbench.description.starts import distinct, read_starts
+    from pytest_simbench.experiment.scene_file import read_scene_file
+    from pytest_simbench.records.paths import write_whole
+    from pytest_simbench.scene import SceneError
+    from pytest_simbench.simulator import SimulatorError
+
+    given = options.value(request.config, "sim_scene")
+    if path is None and not given:
+        raise pytest.UsageError(
+            "scene_file() needs a file: name one, or run pytest with --sim-scene FILE"
+        )
+    at = Path(given) if path is None else request.path.parent / path
+    run = session_of(request.config).run
+    try:
+        found = read_scene_file(at)
+        scene = found.scene
+        if starts is not None:
+            rows = read_starts(request.path.parent / starts, scene)
+            scene = replace(scene, starts=rows)
+            different = distinct(rows)
+            if different < len(rows):
+                run.tell(
+                    f"{starts}: {len(rows)} starts, of which {different} differ in how the bodies "
+                    f"lie to each other: what they say is worth {different} repetitions"
+                )
+    except (SimulatorError, SceneError) as error:
+        pytest.exit(str(error), returncode=pytest.ExitCode.USAGE_ERROR)
+    write_whole(folder, ACCOUNT, as_markdown(at.name, found.account).encode())
+    for line in as_lines(at.name, found.account):
+        run.tell(line)
+    return scene

@@ -1,0 +1,141 @@
+"""A user's scene in several simulators: do they differ, and by more than the scene's own noise?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+from pytest_simbench.measure.settling import ALIKE, Ends, Settled, Who
+from pytest_simbench.records.metrics import significant
+from pytest_simbench.report.model import cells
+from pytest_simbench.report.model.document import Column, Section, Table, listed, names
+
+NAMED = 4
+"""How many simulators of a group a sentence names."""
+
+READING = (
+    "Each number is how far a body ends from where it ends in the same simulator as the scene is "
+    "written, in millimetres, of the body that ends farthest; before it the share of the premises "
+    "that hold."
+)
+
+
+def section(found: Settled) -> Section:
+    """The answer, and the numbers that it stands on."""
+    table = Table("the scene's noise", _table(found), READING)
+    return Section(f"Scene {found.scene}", sentences(found), [table])
+
+
+def sentences(found: Settled) -> list[str]:
+    """Which differ as the scene is written, whether a moved start explains it, and whether it
+    survives a finer step."""
+    known = dict(zip(found.written, names(list(found.written)), strict=True))
+    groups = found.places(found.written)
+    if len(groups) < 2:
+        return [_alike(found, known), *_alone(found)]
+    pairs = [(a, b) for first, second in combinations(groups, 2) for a in first for b in second]
+    widest = max(pairs, key=lambda pair: found.apart(*(found.written[who] for who in pair))[0])
+    gap, body = found.apart(*(found.written[who] for who in widest))
+    told = [
+        f"As written, {found.scene} ends in {len(groups)} ways: "
+        + "; ".join(_some([known[who] for who in group]) for group in groups)
+        + f". They differ by up to {_mm(gap)} ({body}, {known[widest[0]]} and {known[widest[1]]})."
+    ]
+    return [*told, _noise(found, pairs), _finer(found, known)]
+
+
+def _alike(found: Settled, known: dict[Who, str]) -> str:
+    if len(known) < 2:
+        return f"{found.scene} ran in {''.join(known.values())} alone, so nothing is compared."
+    return f"As written, {found.scene} ends alike in all {len(known)}, within {_mm(ALIKE)}."
+
+
+def _alone(found: Settled) -> list[str]:
+    """What a moved start does where all end alike."""
+    most = {
+        moved: max((found.noise(who, moved) or 0.0 for who in found.written), default=0.0)
+        for moved in found.moved
+    }
+    wide = [moved for moved, noise in most.items() if noise > max(ALIKE, 2000 * moved)]
+    if not wide:
+        return []
+    return [
+        f"But a start moved by {_mm(1000 * wide[0])} moves an end by up to {_mm(most[wide[0]])}: "
+        "equal ends of one start are no sign that the simulators agree."
+    ]
+
+
+def _noise(found: Settled, pairs: Sequence[tuple[Who, Who]]) -> str:
+    if not found.moved:
+        return "No moved start was tried, so nobody knows whether this is more than noise."
+    explained = [moved for pair in pairs if (moved := found.explained(*pair)) is not None]
+    if len(explained) == len(pairs):
+        return (
+            f"A start moved by {_mm(1000 * max(explained))} moves the end within one simulator as "
+            "far: the difference is the scene's own noise, and no cause can be told from it."
+        )
+    largest = max(found.moved)
+    if not explained:
+        return (
+            f"Starts moved by up to {_mm(1000 * largest)} move no end so far: the difference is "
+            "more than the start's noise."
+        )
+    return (
+        f"Of {len(pairs)} pairs that differ, moved starts explain {len(explained)}; the others "
+        f"differ by more than starts moved by up to {_mm(1000 * largest)} do."
+    )
+
+
+def _finer(found: Settled, known: dict[Who, str]) -> str:
+    if not found.finer:
+        return "No finer step was tried, so nobody knows whether an end is converged."
+    finest = max(found.finer)
+    ends = found.finer[finest]
+    groups = found.places(ends)
+    moving = [
+        known[who]
+        for who in found.written
+        if (change := found.change(who, finest)) is not None and change > ALIKE
+    ]
+    text = "they all end alike" if len(groups) == 1 else f"they still end in {len(groups)} ways"
+    text = f"With steps {finest} times as fine {text}"
+    if not moving:
+        return f"{text}, where they ended before: the step is not to blame."
+    return f"{text}; the end of {_some(moving)} depends on the step, so it is not converged."
+
+
+def _some(texts: Sequence[str]) -> str:
+    return listed(texts, NAMED)
+
+
+def _mm(value: float) -> str:
+    return f"{significant(value, 2)} mm"
+
+
+def _table(found: Settled) -> list[Column]:
+    who = list(found.written)
+    columns = [
+        Column("simulator", names(who), left=True),
+        Column("as written", [_ends(found.written[one], "") for one in who]),
+    ]
+    for moved, ends in found.moved.items():
+        told = [_ends(ends.get(one), _number(found.noise(one, moved))) for one in who]
+        columns.append(Column(f"moved by {_mm(1000 * moved)}", told))
+    for finer, ends in found.finer.items():
+        told = [_ends(ends.get(one), _number(found.change(one, finer))) for one in who]
+        columns.append(Column(f"step / {finer}", told))
+    cost = [found.cost.get(one) for one in who]
+    told = [cells.MISSING if c is None else cells.number(c, 2) for c in cost]
+    return [*columns, Column("CPU s/sim s", told)]
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else significant(value, 2)
+
+
+def _ends(ends: Ends | None, number: str) -> str:
+    if ends is None:
+        return cells.MISSING
+    crashed = f"{ends.crashed} crashed" if ends.crashed else ""
+    share = "" if ends.premises is None else f"{100 * ends.premises:.0f} %"
+    return " ".join(filter(None, [share, number, crashed])) or "ended"

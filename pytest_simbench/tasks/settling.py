@@ -1,0 +1,210 @@
+"""A user's scene is left to itself: where do its free bodies come to rest, and how calmly?"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pytest_simbench.client.world import Motion, World
+from pytest_simbench.records.metrics import Metric
+from pytest_simbench.scene import Body, Compound, FloatArray, Pose, Scene, SceneError
+from pytest_simbench.scene.penetration import penetration
+from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task
+
+RESTLESS = 0.5
+"""The last seconds over which it is measured how calmly the bodies rest [s]."""
+
+LOG_PERIOD = 0.01
+"""Between two samples of them [s]."""
+
+
+@dataclass(frozen=True)
+class RestsOn:
+    """A premise: a body ends on another one.
+
+    Attributes:
+        body, support: names of two free bodies.
+        within: largest distance of their origins in the plane [m].
+        tilt: largest angle by which the body has turned away from the vertical [deg].
+    """
+
+    body: str
+    support: str
+    within: float
+    tilt: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.body} rests on {self.support} (within {1000 * self.within:g} mm, tilt at most "
+            f"{self.tilt:g} deg)"
+        )
+
+
+def rests_on(body: str, support: str, *, within: float = 0.02, tilt: float = 20.0) -> RestsOn:
+    """The premise that a body ends on another one, see `RestsOn`."""
+    return RestsOn(body, support, within, tilt)
+
+
+@dataclass(frozen=True)
+class Settling(Task):
+    """Leave a scene to itself and see where its free bodies end.
+
+    `--jitter` does not count here: the scene starts as it is written, or moved by `moved`.
+
+    Attributes:
+        world: the scene, of a file (`scene_file`) or made by hand. Repetitions go through its
+            `starts`, if it has some.
+        premises: what should be true at the end.
+        seconds: simulated time [s].
+        moved: each free body starts elsewhere by at most this in x and in y, by chance [m].
+    """
+
+    name: ClassVar[str] = "settling"
+    study_timeout: ClassVar[float] = 600.0
+    references: ClassVar[Mapping[str, float]] = {"premises": 1.0}
+    shares_worker: ClassVar[bool] = True
+
+    world: Scene
+    premises: Sequence[RestsOn] = ()
+    seconds: float = 2.5
+    moved: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "premises", tuple(self.premises))
+        if self.world.robot is not None or not self.world.free_bodies:
+            raise SceneError(
+                f"scene {self.world.name!r} has {_what(self.world)}; Settling takes scenes of free "
+                "bodies without a robot"
+            )
+        names = {body.name for body in self.world.free_bodies}
+        for premise in self.premises:
+            for name in (premise.body, premise.support):
+                if name not in names:
+                    raise SceneError(
+                        f"the premise {str(premise)!r} names {name!r}, which is no free body of "
+                        f"scene {self.world.name!r}; it has {', '.join(sorted(names))}"
+                    )
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]:
+        told = "; ".join(map(str, self.premises))
+        return (
+            *(Metric("premises", "premises that hold", kind="share", of=len(self.premises),
+                     doc=f"share of what should be true at the end: {told}")
+              for _ in self.premises[:1]),
+            Metric("farthest", "farthest from the start", unit="mm", better=None, least=0,
+                   doc="of the free body that is farthest from where it started, at the end"),
+            Metric("tilt", "largest tilt", unit="deg", better=None, least=0,
+                   doc="of the free body that has turned most from the vertical since the start"),
+            Metric("sunk", "deepest overlap", unit="mm", least=0, better="lower",
+                   doc="of two bodies, or of a body and the ground, at the end"),
+            Metric("restless", "restless", unit="mm/s", least=0, better="lower",
+                   doc=f"root mean square speed of the bodies in the last {RESTLESS:g} s"),
+        )  # fmt: skip
+
+    def smoke(self) -> Settling:
+        return replace(self, seconds=min(self.seconds, 1.0))
+
+    def parameters(self) -> dict[str, Any]:
+        """The scene by its digest."""
+        wire = json.dumps(self.world.to_wire(), sort_keys=True, default=float).encode()
+        return {
+            "task.scene": self.world.name,
+            "task.scene_digest": hashlib.sha256(wire).hexdigest()[:16],
+            "task.premises": [str(premise) for premise in self.premises],
+            "task.seconds": self.seconds,
+            "task.moved": self.moved,
+            "task.starts": len(self.world.starts),
+        }
+
+    def scene(self, seed: int, jitter: Jitter) -> Scene:
+        scene, rng = self.world, np.random.default_rng(seed)
+        if scene.starts:
+            for name, pose in scene.starts[seed % len(scene.starts)]:
+                scene = scene.with_pose(name, pose * _file_frame(scene.body(name)).inverse())
+        if self.moved:
+            for body in scene.free_bodies:
+                x, y = rng.uniform(-self.moved, self.moved, 2)
+                scene = scene.with_pose(body.name, body.pose.translated(float(x), float(y)))
+        return scene
+
+    def perform(self, world: World, seed: int, count: Count) -> Outcome:
+        free = world.scene.free_bodies
+        with world.phase("settle"):
+            world.wait(max(self.seconds - RESTLESS, RESTLESS))
+        with world.phase("rest"):
+            rest = world.wait(RESTLESS, log_period=LOG_PERIOD)
+        assert rest is not None  # a log was asked for
+        ends = {body.name: body.moved_to(world.pose(body.name)) for body in free}
+        starts = {body.name: body for body in free}
+        ways = {
+            name: float(np.linalg.norm(np.subtract(_origin(end), _origin(starts[name]))))
+            for name, end in ends.items()
+        }
+        tilts = {name: tilted(starts[name].pose, end.pose) for name, end in ends.items()}
+        failed = [str(p) for p in self.premises if not _holds(p, ends, tilts)]
+        metrics: dict[str, float | None] = {
+            "farthest": 1000 * max(ways.values()),
+            "tilt": max(tilts.values()),
+            "sunk": 1000 * deepest(world.scene, ends),
+            "restless": 1000 * _speed(rest),
+        }
+        if self.premises:
+            metrics["premises"] = 1 - len(failed) / len(self.premises)
+        details = {
+            "places": {name: _place(end).as_array().tolist() for name, end in ends.items()},
+            "ways": {name: round(1000 * way, 4) for name, way in ways.items()},
+            "tilts": {name: round(tilt, 4) for name, tilt in tilts.items()},
+        }
+        return Outcome(metrics, details, reasons=tuple(f"not: {text}" for text in failed))
+
+
+def _what(scene: Scene) -> str:
+    return "no free body" if scene.robot is None else "a robot"
+
+
+def _file_frame(body: Body) -> Pose:
+    return body.file_frame if isinstance(body, Compound) else Pose()
+
+
+def _place(body: Body) -> Pose:
+    """Of the frame that its file gives it, in the world."""
+    return body.pose * _file_frame(body)
+
+
+def _origin(body: Body) -> FloatArray:
+    return np.array(_place(body).position)
+
+
+def tilted(before: Pose, after: Pose) -> float:
+    """By what angle that direction of a body which was vertical has turned away from it [deg]."""
+    upright = after.rotation() @ before.rotation().T
+    return float(np.degrees(np.arccos(np.clip(upright[2, 2], -1.0, 1.0))))
+
+
+def _holds(premise: RestsOn, ends: Mapping[str, Body], tilts: Mapping[str, float]) -> bool:
+    body, support = _origin(ends[premise.body]), _origin(ends[premise.support])
+    beside = float(np.hypot(*(body - support)[:2]))
+    above = body[2] > support[2]
+    return bool(beside <= premise.within and above and tilts[premise.body] <= premise.tilt)
+
+
+def deepest(scene: Scene, ends: Mapping[str, Body]) -> float:
+    """How deep any free body is in another body or in the ground [m]; 0 where none is."""
+    bodies = [*ends.values(), *scene.fixed_bodies]
+    down = np.array([[0.0, 0.0, -1.0]])
+    depths = [0.0]
+    for k, body in enumerate(ends.values()):
+        depths.append(float(body.reach_placed(down)[0]))
+        depths += [penetration(body, other) for other in bodies[k + 1 :]]
+    return max(depths)
+
+
+def _speed(motion: Motion) -> float:
+    """Root mean square of the speeds of all bodies in a motion [m/s]."""
+    return float(np.sqrt(np.mean(np.sum(motion.bodies[:, :, 7:10] ** 2, axis=2))))
