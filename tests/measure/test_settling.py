@@ -1,0 +1,114 @@
+"""The noise of a scene: which simulators differ, whether moved starts explain it, which ends hold
+with finer steps; from planted records, and the sentences made of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from pytest_simbench.measure.settling import Settled, settlings
+from pytest_simbench.records.record import Record
+from pytest_simbench.report.model.settling import section, sentences
+from tests.records.build import made
+
+
+def end(
+    simulator: str, x: float, step: float = 0.002, moved: float = 0.0, seed: int = 1, **given: Any
+) -> Record:
+    """A repetition in which the bowl ends at x [mm]."""
+    place = [x / 1000, 0.0, 0.9, 1.0, 0.0, 0.0, 0.0]
+    return made(
+        {
+            "test": f"test_scene[{simulator}-headless]",
+            "task": "settling",
+            "simulator": simulator,
+            "mode": "headless",
+            "profile": "tuned",
+            "repetition": seed,
+            "seed": seed,
+            "status": "ok",
+            "metrics": {"premises": float(x < 20)},
+            "details": {"places": {"bowl": place}},
+            "settings": {
+                "timestep": step, "task.scene": "bowl", "task.scene_digest": "d",
+                "task.seconds": 2.5, "task.moved": moved, "task.starts": 0,
+            },
+            **given,
+        }
+    )  # fmt: skip
+
+
+def one(*records: Record) -> Settled:
+    (found,) = settlings(records)
+    return found
+
+
+def test_ends_within_a_millimetre_are_alike_also_through_a_third() -> None:
+    found = one(end("a", 0.0), end("b", 0.9), end("c", 1.8), end("d", 5.0))
+    assert [[who[0] for who in group] for group in found.places(found.written)] == [
+        ["a", "b", "c"], ["d"],
+    ]  # fmt: skip
+    assert sentences(found)[0] == (
+        "As written, bowl ends in 2 ways: a, b and c; d. They differ by up to 5 mm (bowl, a and d)."
+    )
+    assert sentences(one(end("a", 0.0), end("b", 0.9))) == [
+        "As written, bowl ends alike in all 2, within 1 mm."
+    ]
+
+
+def test_a_difference_that_a_moved_start_makes_too_is_noise() -> None:
+    apart = [end("a", 0.0), end("b", 10.0)]
+    still = [end(who, at, moved=1e-4, seed=k) for who, at in (("a", 0), ("b", 10)) for k in (1, 2)]
+    assert "more than the start's noise" in sentences(one(*apart, *still))[1]
+    found = one(*apart, *still, end("b", 21.0, moved=1e-3))
+    assert found.noise(("b", "headless", "tuned"), 1e-3) == pytest.approx(11.0)
+    assert found.noise(("a", "headless", "tuned"), 1e-3) is None
+    assert sentences(found)[1] == (
+        "A start moved by 1 mm moves the end within one simulator as far: the difference is the "
+        "scene's own noise, and no cause can be told from it."
+    )
+    third = one(*apart, *still, end("b", 21.0, moved=1e-3), end("c", 100.0))
+    assert "Of 3 pairs that differ, moved starts explain 1" in sentences(third)[1]
+
+
+def test_without_moved_starts_or_finer_steps_nobody_knows() -> None:
+    told = sentences(one(end("a", 0.0), end("b", 10.0)))
+    assert told[1].startswith("No moved start was tried")
+    assert told[2].startswith("No finer step was tried")
+
+
+def test_a_finer_step_says_whether_the_difference_survives_and_who_is_not_converged() -> None:
+    apart = [end("a", 0.0), end("b", 10.0), end("a", 0.1, 0.0005), end("b", 10.2, 0.0005)]
+    found = one(*apart)
+    assert found.change(("b", "headless", "tuned"), 4) == pytest.approx(0.2)
+    assert "they still end in 2 ways, where they ended before" in sentences(found)[2]
+    found = one(*apart, end("a", 0.1, 0.00025), end("b", 0.3, 0.00025))
+    assert sentences(found)[2] == (
+        "With steps 8 times as fine they all end alike; the end of b depends on the step, so it is "
+        "not converged."
+    )
+
+
+def test_equal_ends_of_one_start_that_is_unstable_are_no_agreement() -> None:
+    found = one(end("a", 0.0), end("b", 0.5), end("a", 25.0, moved=1e-4))
+    assert sentences(found)[1].startswith("But a start moved by 0.1 mm moves an end by up to 25 mm")
+
+
+def test_a_crash_is_told_and_other_scenes_stay_apart() -> None:
+    other = {"settings": {**end("a", 0).settings, "task.scene": "cup"}}
+    records = [
+        end("a", 0.0), end("b", 9.0), end("a", 0.0, moved=1e-3),
+        end("a", 0.0, moved=1e-3, seed=2, status="failed", details={}, metrics={}),
+        end("a", 3.0, **other), end("b", 3.0, **other),
+    ]  # fmt: skip
+    bowl, cup = settlings(records)
+    assert (bowl.scene, cup.scene) == ("bowl", "cup")
+    heads = [column.heading for column in section(bowl).tables[0].columns]
+    assert heads == ["simulator", "as written", "moved by 1 mm", "CPU s/sim s"]
+    moved = section(bowl).tables[0].columns[2]
+    assert [cell.text for cell in moved.cells] == ["100 % 0 1 crashed", "-"]
+
+
+def test_one_simulator_without_moved_starts_is_no_comparison() -> None:
+    assert settlings([end("a", 0.0)]) == []

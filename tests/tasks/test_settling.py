@@ -1,0 +1,97 @@
+"""A scene that is left to itself: what is measured, and what moved starts do."""
+
+from __future__ import annotations
+
+import math
+from contextlib import closing
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.executor import LocalExecutor
+from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.scene import Box, Compound, Pose, Scene, SceneError
+from pytest_simbench.tasks import Jitter, Settling, rests_on
+from pytest_simbench.tasks.settling import deepest, tilted
+from tests.conftest import case_of
+
+NONE = Jitter(0.0, 0.0)
+FRAME = Pose((0.0, 0.0, -0.05), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0))
+SLAB = Box("slab", (0.3, 0.3, 0.1), Pose.at(0, 0, 0.05), 1.0)
+LEGS = tuple(Box(str(x), (0.02, 0.02, 0.1), Pose.at(x, 0, 0)) for x in (-0.05, 0.05))
+STOOL = Compound("stool", LEGS, Pose.at(0, 0, 0.16), 0.5, moments=(1e-3,) * 3, file_frame=FRAME)
+SCENE = Scene("stool on slab", (SLAB, STOOL))
+
+
+def test_a_tilt_is_that_of_what_was_upright() -> None:
+    start = Pose.at(0, 0, 1, yaw=0.3) * Pose(quaternion=FRAME.quaternion)
+    for angle in (0.0, 0.2, 1.0, 3.0):
+        turn = Pose(quaternion=(math.cos(angle / 2), math.sin(angle / 2), 0.0, 0.0))
+        after = Pose.at(1, 0, 0, yaw=1.0) * turn * start
+        assert tilted(start, after) == pytest.approx(math.degrees(angle), abs=1e-6)
+
+
+def test_the_deepest_overlap_is_that_of_bodies_or_of_the_ground() -> None:
+    ends = {body.name: body for body in SCENE.bodies}
+    assert deepest(SCENE, ends) == pytest.approx(0.0, abs=1e-9)
+    lower = ends | {"stool": STOOL.moved_to(Pose.at(0, 0, 0.147))}
+    assert deepest(SCENE, lower) == pytest.approx(0.003)
+    sunk = ends | {"slab": SLAB.moved_to(Pose.at(0, 0, 0.045))}
+    assert deepest(SCENE, sunk) == pytest.approx(0.005)
+
+
+def test_starts_are_moved_on_request_alone_and_by_the_seed() -> None:
+    assert Settling(SCENE).scene(3, Jitter()) == SCENE
+    moved = Settling(SCENE, moved=0.001)
+    first, again, other = (moved.scene(seed, NONE) for seed in (3, 3, 4))
+    assert first == again != other
+    for body in first.free_bodies:
+        way = np.subtract(body.pose.position, SCENE.body(body.name).pose.position)
+        assert 0 < np.abs(way[:2]).max() <= 0.001
+        assert way[2] == 0
+
+
+def test_repetitions_go_through_starts_which_are_in_the_file_s_frames() -> None:
+    starts = tuple((("stool", Pose.at(0.1 * k, 0, 0.2)),) for k in range(3))
+    task = Settling(replace(SCENE, starts=starts))
+    for seed in range(6):
+        pose = task.scene(seed, NONE).body("stool").pose * FRAME
+        assert pose.position == pytest.approx((0.1 * (seed % 3), 0.0, 0.2))
+    assert task.parameters()["task.starts"] == 3
+    assert "starts" not in task.scene(0, NONE).to_wire()
+
+
+@pytest.mark.parametrize(
+    ("scene", "premises", "message"),
+    [
+        (Scene("empty"), [], "has no free body"),
+        (Scene("arm", (SLAB,), panda()), [], "has a robot"),
+        (
+            SCENE,
+            [rests_on("chair", "slab")],
+            "'chair', which is no free body .* has slab, stool",
+        ),
+    ],
+)
+def test_what_it_cannot_do_is_one_sentence(scene: Scene, premises: list[Any], message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        Settling(scene, premises)
+
+
+@pytest.mark.engine
+def test_a_stool_rests_on_a_slab_and_a_premise_that_fails_says_so(case: Case) -> None:
+    premises = [rests_on("stool", "slab"), rests_on("slab", "stool")]
+    experiment = Experiment(case_of(case, "mujoco"), Settling(SCENE, premises))
+    with closing(LocalExecutor()) as executor:
+        record, _ = executor.repetition(experiment, 1).run()
+    assert record.ok, record.error
+    assert record.metrics["premises"] == 0.5
+    assert record.reasons == ("not: slab rests on stool (within 20 mm, tilt at most 20 deg)",)
+    assert record.metrics["farthest"] == pytest.approx(10.0, abs=1.0)
+    assert record.metrics["tilt"] < 1.0
+    assert record.metrics["restless"] < 1.0
+    assert record.details["places"]["stool"][2] == pytest.approx(0.15 - 0.05, abs=1e-3)
