@@ -29,6 +29,12 @@ class Loaded(State):
     timestep: float
 
 
+class FileRead(TypedDict):
+    scene: dict[str, Any]
+    account: list[dict[str, Any]]
+    timestep: float
+
+
 class Moved(State):
     """`aside`: wall time of readings that are no part of the motion [s]."""
 
@@ -45,6 +51,7 @@ ANSWERS: dict[str, Any] = {
     "hello": Hello,
     "construct": Constructed,
     "compile": None,
+    "read_file": FileRead,
     "load": Loaded,
     "watch": None,
     "read_again": None,

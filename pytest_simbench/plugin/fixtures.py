@@ -286,7 +286,8 @@ def scene_file(request: pytest.FixtureRequest, output_path: Path) -> Callable[..
     """
     from pytest_simbench.plugin.scene_files import load
 
-    return lambda path=None, starts=None: load(request, output_path, path, starts)
+    tell = session_of(request.config).run.tell
+    return lambda path=None, starts=None: load(request, output_path, tell, path, starts)
 
 
 @pytest.fixture(scope="session")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -10,7 +11,6 @@ from typing import TYPE_CHECKING
 import pytest
 
 from pytest_simbench.plugin import options
-from pytest_simbench.plugin.session import session_of
 
 if TYPE_CHECKING:
     from pytest_simbench.scene import Scene
@@ -28,9 +28,27 @@ def run_suite(config: pytest.Config) -> None:
         config.args = [str(Path(spec.submodule_search_locations[0]) / "test_scene.py")]
 
 
+def check(config: pytest.Config) -> None:
+    """Complain of the file of `--sim-scene` before anything runs.
+
+    Raises:
+        pytest.UsageError: it cannot be read; one sentence.
+    """
+    if not options.given(config, "sim_scene"):
+        return
+    from pytest_simbench.experiment.scene_file import read_scene_file
+    from pytest_simbench.simulator import SimulatorError
+
+    try:
+        read_scene_file(options.value(config, "sim_scene"))
+    except SimulatorError as error:
+        raise pytest.UsageError(f"--sim-scene: {error}") from None
+
+
 def load(
     request: pytest.FixtureRequest,
     folder: Path,
+    tell: Callable[[str], None],
     path: str | Path | None = None,
     starts: str | Path | None = None,
 ) -> Scene:
@@ -39,6 +57,7 @@ def load(
     Args:
         request: of the test, whose folder paths are relative to.
         folder: of the run.
+        tell: prints what a user should know, at the end of the run.
         path: of the scene; None for that of `--sim-scene`.
         starts: of a file of starts (.npz), see `description.starts`.
     """
@@ -55,7 +74,6 @@ def load(
             "scene_file() needs a file: name one, or run pytest with --sim-scene FILE"
         )
     at = Path(given) if path is None else request.path.parent / path
-    run = session_of(request.config).run
     try:
         found = read_scene_file(at)
         scene = found.scene
@@ -64,7 +82,7 @@ def load(
             scene = replace(scene, starts=rows)
             different = distinct(rows)
             if different < len(rows):
-                run.tell(
+                tell(
                     f"{starts}: {len(rows)} starts, of which {different} differ in how the bodies "
                     f"lie to each other: what they say is worth {different} repetitions"
                 )
@@ -72,5 +90,5 @@ def load(
         pytest.exit(str(error), returncode=pytest.ExitCode.USAGE_ERROR)
     write_whole(folder, ACCOUNT, as_markdown(at.name, found.account).encode())
     for line in as_lines(at.name, found.account):
-        run.tell(line)
+        tell(line)
     return scene

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench.plugin import cluster, data, options, recording
+from pytest_simbench.plugin import cluster, data, options, recording, scene_files
 
 if TYPE_CHECKING:
     from pytest_simbench.plugin.compare import Comparison
@@ -94,6 +94,8 @@ class SimSession:
         """Complain of a bad baseline, limit, threshold or folder before anything runs."""
         config = self.config
         data.check(config)
+        if not self.in_worker:
+            scene_files.check(config)
         if options.given(config, "sim_threshold"):
             from pytest_simbench.plugin.thresholds import bad_value, typed
 

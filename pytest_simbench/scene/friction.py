@@ -1,23 +1,16 @@
 """Friction of pairs: each engine makes that of two surfaces by a rule of its own.
 
 Every rule is a mean: of two equal frictions it makes the same one. A scene of one friction is
-therefore the same by every rule. For other scenes `combined` finds the frictions of the surfaces
-with which an engine's rule gives each pair what the scene's rule gives it, or nearly so.
+therefore the same by every rule; for others there is `pair_friction`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pytest_simbench.scene.pose import FloatArray
-
-if TYPE_CHECKING:
-    from pytest_simbench.scene.scene import Scene
 
 LEAST = 1e-6
 """Stands for no friction where a rule cannot have it."""
@@ -59,7 +52,7 @@ RULES: dict[str, Callable[[FloatArray, FloatArray], FloatArray]] = {
 """What a rule makes of the frictions of two surfaces. An engine that takes their product is given
 the roots, and is `geometric`."""
 
-_SOLVED: dict[str, Callable[[FloatArray, FloatArray, int], FloatArray]] = {
+SOLVED: dict[str, Callable[[FloatArray, FloatArray, int], FloatArray]] = {
     "maximum": _of_largest,
     "minimum": _of_smallest,
     "mean": _of_means,
@@ -68,45 +61,4 @@ _SOLVED: dict[str, Callable[[FloatArray, FloatArray, int], FloatArray]] = {
         lambda mu: 1 / np.maximum(mu, LEAST), lambda r: 1 / np.maximum(r, LEAST)
     ),
 }
-
-
-def combined(scene: Scene, rule: str) -> tuple[Scene, str]:
-    """The scene with frictions for an engine that has another rule.
-
-    Args:
-        scene: whose pairs have friction by `Scene.friction_rule`.
-        rule: the engine's, one of `RULES`.
-
-    Returns:
-        The scene as the engine is to have it, and a sentence on the pair whose friction is farthest
-        from the one asked for; empty where all are right to 0.001.
-    """
-    names = ["the ground", *(body.name for body in scene.bodies)]
-    own = [scene.ground_friction, *(body.friction for body in scene.bodies)]
-    still = [True, *(body.fixed for body in scene.bodies)]
-    if scene.robot is not None:
-        names.append(scene.robot.name)
-        own.append(scene.robot.friction)
-        still.append(False)
-    if rule == scene.friction_rule or len(scene.frictions) == 1:
-        return scene, ""
-    found = [(a, b) for a, b in combinations(range(len(own)), 2) if not (still[a] and still[b])]
-    pairs, frictions = np.array(found, dtype=int).reshape(-1, 2), np.array(own)
-    first, second = pairs.T
-    asked = RULES[scene.friction_rule](frictions[first], frictions[second])
-    solved = np.maximum(_SOLVED[rule](pairs, asked, len(own)), 0.0)
-    solved = np.where(np.isfinite(solved), solved, frictions)  # of what can touch nothing
-    gaps = np.abs(RULES[rule](solved[first], solved[second]) - asked)
-    ground, *others = solved.tolist()
-    robot = scene.robot and replace(scene.robot, friction=others.pop())
-    bodies = tuple(body.with_friction(mu) for body, mu in zip(scene.bodies, others, strict=True))
-    made = replace(scene, bodies=bodies, robot=robot, ground_friction=ground, friction_rule=rule)
-    if not len(gaps) or gaps.max() < 1e-3:
-        return made, ""
-    worst = int(gaps.argmax())
-    a, b = found[worst]
-    return made, (
-        f"the friction of pairs is nearly that of the scene: of {names[a]} and {names[b]} it is "
-        f"off by {gaps[worst]:.2g}, of no pair by more (the engine takes the {rule} of two "
-        "surfaces)"
-    )
+"""By rule: numbers of which each pair (n, 2) is, by the rule, the number asked for, or nearly so."""

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_simbench.description.carried import Carried
 from pytest_simbench.ground.errors import NotSupportedError
 from pytest_simbench.records.choices import Seen
 from pytest_simbench.scene import FloatArray, Scene, Vector3
@@ -162,6 +163,16 @@ class Simulator(ABC):
     @abstractmethod
     def joint_state(self) -> FloatArray:
         """Positions and velocities of the driven joints, (2, n_joints)."""
+
+    @classmethod
+    def read_file(cls, path: str) -> tuple[Scene, tuple[Carried, ...], float]:
+        """The scene of a file of a kind in `SimulatorInfo.reads`, what of the file it has and has
+        not, and the time step that the file asks for [s].
+
+        Raises:
+            DescriptionError: the file cannot be read, or says what no scene has; one sentence.
+        """
+        raise NotSupportedError(f"{cls.info.name} reads no scenes")
 
     def save(self) -> Any:
         """The whole state of the world, to be given to `restore` in this process."""

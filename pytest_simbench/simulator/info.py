@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pytest_simbench.ground.errors import NotSupportedError, SimulatorError
 from pytest_simbench.ground.versions import BUILD, VersionedName, release_numbers
 from pytest_simbench.scene import Robot, Scene
-from pytest_simbench.scene.friction import combined
+from pytest_simbench.scene.pair_friction import combined
 
 
 class Capability(StrEnum):
@@ -146,6 +146,7 @@ class SimulatorInfo:
         friction_rule: what the engine, as its adapter sets it, makes of the frictions of two
             surfaces: one of `scene.friction.RULES`; empty: not known, and scenes of several
             frictions are refused.
+        reads: endings of scenes' files that it reads (`Simulator.read_file`).
     """
 
     name: str
@@ -170,6 +171,7 @@ class SimulatorInfo:
     language: str = "unknown"
     oldest_version: str = ""
     friction_rule: str = ""
+    reads: tuple[str, ...] = ()
 
     def of_version(self, name: VersionedName) -> SimulatorInfo:
         """Of a release or a build of the engine.

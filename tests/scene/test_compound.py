@@ -21,7 +21,8 @@ from pytest_simbench.scene import (
     Sphere,
     penetration,
 )
-from pytest_simbench.scene.friction import RULES, combined
+from pytest_simbench.scene.friction import RULES
+from pytest_simbench.scene.pair_friction import combined
 
 SHAPES = (
     Box("wall", (0.02, 0.1, 0.2), Pose.at(0.05, 0, 0)),
