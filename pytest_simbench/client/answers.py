@@ -36,6 +36,13 @@ class Moved(State):
     aside: NotRequired[float]
 
 
+class FileRead(TypedDict):
+    """A scene, and the lines of the account of what was carried, as they cross the boundary."""
+
+    scene: dict[str, Any]
+    account: list[dict[str, str]]
+
+
 class Stats(TypedDict):
     stepping: dict[str, float]
     peak_rss_mb: float | None
@@ -44,6 +51,7 @@ class Stats(TypedDict):
 ANSWERS: dict[str, Any] = {
     "hello": Hello,
     "construct": Constructed,
+    "read_file": FileRead,
     "compile": None,
     "load": Loaded,
     "watch": None,

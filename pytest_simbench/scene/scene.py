@@ -43,13 +43,14 @@ class Scene(Wire):
             that leaves it has diverged (`plausibility`); 1e6 for a side without a wall.
         ground_restitution: Newton's coefficient of the ground plane, as `Body.restitution`.
         friction_rule: what the friction of two surfaces is, one of `friction.RULES`.
+        file: that it was read from, an absolute path; empty: none.
 
     Raises:
         SceneError: two bodies share a name or overlap, one has the name of what is in every
             scene, a free one is outside the room, or a number is none.
     """
 
-    optional = ("ground_restitution", "friction_rule")
+    optional = ("ground_restitution", "friction_rule", "file")
 
     name: str
     bodies: tuple[Body, ...] = ()
@@ -59,6 +60,7 @@ class Scene(Wire):
     room: Vector3 = field(default=ROOM)
     ground_restitution: float = 0.0
     friction_rule: str = "maximum"
+    file: str = ""
 
     def __post_init__(self) -> None:
         check_name(self.name, "a scene")

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_simbench.description.carried import Carried
 from pytest_simbench.ground.errors import NotSupportedError
 from pytest_simbench.records.choices import Seen
 from pytest_simbench.scene import FloatArray, Scene, Vector3
@@ -100,6 +101,16 @@ class Simulator(ABC):
     def __init__(self, settings: Settings, *, gui: bool = False) -> None:
         self.settings = settings
         self.gui = gui
+
+    def read_file(self, path: str) -> tuple[Scene, tuple[Carried, ...]]:
+        """A file of the engine's own format as a scene, and what was carried of it.
+
+        Only called for files with an ending in `info.reads`; nothing is loaded.
+
+        Raises:
+            DescriptionError: something in the file that cannot be, or that no scene can hold.
+        """
+        raise self._missing("reader of files")
 
     def compile(self, scene: Scene) -> None:  # noqa: B027 - most engines have nothing to compile
         """Have ready what `load` of this scene needs compiled; called just before it.

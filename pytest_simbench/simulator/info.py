@@ -146,6 +146,7 @@ class SimulatorInfo:
         friction_rule: what the engine, as its adapter sets it, makes of the frictions of two
             surfaces: one of `scene.friction.RULES`; empty: not known, and scenes of several
             frictions are refused.
+        reads: endings of the files that it makes scenes of, see `Simulator.read_file`.
     """
 
     name: str
@@ -170,6 +171,7 @@ class SimulatorInfo:
     language: str = "unknown"
     oldest_version: str = ""
     friction_rule: str = ""
+    reads: tuple[str, ...] = ()
 
     def of_version(self, name: VersionedName) -> SimulatorInfo:
         """Of a release or a build of the engine.

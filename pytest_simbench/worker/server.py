@@ -140,6 +140,10 @@ class Server:
             "untested": self.simulator.untested(),
         }
 
+    def do_read_file(self, path: str) -> dict[str, Any]:
+        scene, account = self._constructed().read_file(path)
+        return {"scene": scene.to_wire(), "account": [line.to_wire() for line in account]}
+
     def do_compile(self, scene: dict[str, Any]) -> None:
         self._constructed().compile(Scene.from_wire(received(scene)))
 

@@ -1,0 +1,76 @@
+"""The account of what a reader carried of somebody's file, and what not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from pytest_simbench.scene.wire import Wire
+
+CARRIED, APPROXIMATED, NOT_CARRIED = STATES = ("carried", "approximated", "not carried")
+"""The scene holds it as the file has it; nearly so; not at all."""
+
+MOST_NAMED = 3
+"""Elements that a line names, and quantities that the terminal names."""
+
+
+@dataclass(frozen=True)
+class Carried(Wire):
+    """What became of one quantity of a file.
+
+    Attributes:
+        quantity: in the words of the file.
+        state: one of `STATES`.
+        reason: how it is carried or approximated, and by how much; or why it is not, and what that
+            may change.
+        where: names of the elements, shortened when they are many; empty: of the whole file.
+
+    Raises:
+        ValueError: there is no such state.
+    """
+
+    quantity: str
+    state: str
+    reason: str
+    where: str = ""
+
+    def __post_init__(self) -> None:
+        if self.state not in STATES:
+            raise ValueError(f"{self.quantity}: no state {self.state!r}; choose from {STATES}")
+
+
+def named(names: Iterable[str]) -> str:
+    """Names of elements, the first few of many: "a, b, c and 62 more"."""
+    every = list(names)
+    shown, rest = ", ".join(every[:MOST_NAMED]), len(every) - MOST_NAMED
+    return f"{shown} and {rest} more" if rest > 0 else shown
+
+
+def markdown(title: str, account: Sequence[Carried]) -> str:
+    """The page `carried.md`: what is not carried first."""
+    lines = [
+        f"# What was carried of {_cell(title)}",
+        "",
+        "| quantity | state | how, or why not | where |",
+        "|---|---|---|---|",
+    ]
+    for line in sorted(account, key=lambda line: -STATES.index(line.state)):
+        cells = (line.quantity, line.state, line.reason, line.where)
+        lines.append(f"| {' | '.join(map(_cell, cells))} |")
+    return "\n".join(lines) + "\n"
+
+
+def terminal_lines(account: Sequence[Carried]) -> list[str]:
+    """One line for each state that occurs: how many quantities, and the names of some."""
+    found = []
+    for state in STATES:
+        quantities = [line.quantity for line in account if line.state == state]
+        if quantities:
+            found.append(f"{state} ({len(quantities)}): {named(quantities)}")
+    return found
+
+
+def _cell(text: str) -> str:
+    """Text of somebody's file that leaves a table a table."""
+    plain = "".join(c if c.isprintable() else " " for c in text)
+    return plain.replace("\\", "\\\\").replace("|", "\\|").replace("<", "&lt;").replace("`", "'")

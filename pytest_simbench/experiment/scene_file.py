@@ -1,0 +1,103 @@
+"""A user's file as a scene: read by the engine whose format it is, in a worker of that engine."""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+
+from pytest_simbench.client.environments import Environment, interpreter, missing
+from pytest_simbench.client.errors import Where, WorkerError
+from pytest_simbench.client.launch import Launch
+from pytest_simbench.client.process import WorkerProcess
+from pytest_simbench.description.carried import Carried
+from pytest_simbench.description.mjcf_check import check_mjcf
+from pytest_simbench.ground.errors import DescriptionError
+from pytest_simbench.scene import Scene
+from pytest_simbench.simulator.info import SimulatorInfo
+from pytest_simbench.simulator.registry import adapter, address, registered
+
+NOT_YET = (".sdf", ".world", ".usd", ".usda", ".usdc", ".usdz")
+"""Endings of scenes that nobody here reads yet."""
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """A file that was read.
+
+    Attributes:
+        path: absolute.
+        scene: what was carried of it.
+        account: what became of each quantity.
+    """
+
+    path: Path
+    scene: Scene
+    account: tuple[Carried, ...]
+
+
+_read: dict[tuple[Path, int, int], SceneFile] = {}
+_lock = threading.Lock()
+
+
+def read_scene_file(path: str | Path) -> SceneFile:
+    """Read a file by the first engine here that reads such files.
+
+    What was read is kept, until the file changes. (Files that it includes and meshes are not
+    looked at for that.)
+
+    Raises:
+        DescriptionError: no such file, something in it that cannot be, or no engine here that reads
+            it; one sentence with the file, and its line where that is known.
+    """
+    whole = Path(path).absolute()
+    info = _reader(whole)
+    check_mjcf(str(whole))
+    status = whole.stat()
+    key = (whole, status.st_size, status.st_mtime_ns)
+    with _lock:
+        if key not in _read:
+            _read[key] = _ask(info, whole)
+        return _read[key]
+
+
+def _reader(path: Path) -> SimulatorInfo:
+    """The facts of the engine that reads files of that ending."""
+    ending = path.suffix.lower()
+    infos = [adapter(name).info for name in registered()]
+    reading = [info for info in infos if ending in info.reads]
+    here = [info for info in reading if missing(info) is None]
+    if here:
+        return here[0]
+    if reading:
+        raise DescriptionError(
+            f"{path} is read by {reading[0].title}, which is not here: {reading[0].install}"
+        )
+    known = ", ".join(sorted({ending for info in infos for ending in info.reads}))
+    if ending in NOT_YET:
+        raise DescriptionError(
+            f"{path}: {ending} files are not read yet; convert it to MJCF ({known})"
+        )
+    raise DescriptionError(f"{path}: no engine here reads {ending or 'such'} files; give {known}")
+
+
+def _ask(info: SimulatorInfo, path: Path) -> SceneFile:
+    with tempfile.NamedTemporaryFile(prefix="simbench-reader-", suffix=".log") as log:
+        launch = Launch(
+            address(info.name) or "",
+            python=interpreter(info),
+            environment=Environment.of(info).variables(),
+            log=Path(log.name),
+        )
+        try:
+            process = WorkerProcess(launch, Where(info.name, "headless", phase="reading"))
+            try:
+                process.construct("default")
+                answer = process.request("read_file", path=str(path))
+            finally:
+                process.close()
+        except WorkerError as error:
+            raise DescriptionError(error.what) from None
+    account = tuple(Carried.from_wire(line) for line in answer["account"])
+    return SceneFile(path, Scene.from_wire(answer["scene"]), account)
