@@ -1,4 +1,4 @@
-"""Whether an MJCF file of somebody else's may be given to a parser: no entities, no files out of its
+"""Whether somebody's MJCF file may be given to a parser: no entities, no files out of its
 folder, no more than a worker can hold."""
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_simbench.description.carried import Carried
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.simulator import (
@@ -31,6 +32,7 @@ from pytest_simbench.simulator import (
 from .bounces import BOUNCES
 from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack, contact_forces, joint_wrenches
+from .reading import Reading
 from .settings import CHOSEN_ON, PROFILES, MuJoCoSettings
 from .world import build, leave_out
 
@@ -51,6 +53,7 @@ class MuJoCo(Simulator):
         language="C, C++",
         tested_version="4.0.0",
         friction_rule="maximum",
+        reads=(".xml", ".mjcf"),
         oldest_version="3.2.4",  # before it `MjSpec` tells Python no lists of geoms and joints
         capabilities=Capability.named(
             "window offscreen save_restore exact_restore contact_count contact_forces compound "
@@ -107,6 +110,10 @@ class MuJoCo(Simulator):
         self._renderer: Any = None
         if self.gui:
             self._open_window()
+
+    def read_file(self, path: str) -> tuple[Scene, tuple[Carried, ...]]:
+        found = Reading(path)
+        return found.scene, tuple(found.account)
 
     def read_back(self) -> dict[str, Any]:
         return ReadBack(self, self.model, self.data, self._numbers()).all()
