@@ -275,7 +275,7 @@ class Reading:
         hull = ConvexMesh("hull", corners_, Pose()).volume
         if hull > CONCAVE * volume:
             reason = (
-                f"it is concave, and its hull has {hull / max(volume, 1e-12):.3g} times its volume; "
+                f"it is concave: its hull has {hull / max(volume, 1e-12):.3g} times its volume; "
                 "MuJoCo collides the hull, too; coacd splits a mesh into convex ones"
             )
             self.tell("geom mesh (concave)", APPROXIMATED, reason, [where])
