@@ -29,17 +29,18 @@ class Loaded(State):
     timestep: float
 
 
-class FileRead(TypedDict):
-    scene: dict[str, Any]
-    account: list[dict[str, Any]]
-    timestep: float
-
-
 class Moved(State):
     """`aside`: wall time of readings that are no part of the motion [s]."""
 
     log: dict[str, np.ndarray]
     aside: NotRequired[float]
+
+
+class FileRead(TypedDict):
+    """A scene, and the lines of the account of what was carried, as they cross the boundary."""
+
+    scene: dict[str, Any]
+    account: list[dict[str, str]]
 
 
 class Stats(TypedDict):
@@ -50,8 +51,8 @@ class Stats(TypedDict):
 ANSWERS: dict[str, Any] = {
     "hello": Hello,
     "construct": Constructed,
-    "compile": None,
     "read_file": FileRead,
+    "compile": None,
     "load": Loaded,
     "watch": None,
     "read_again": None,

@@ -1,66 +1,76 @@
-"""What of a scene's file was carried into the scene, and what was not."""
+"""The account of what a reader carried of somebody's file, and what not."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
-from pytest_simbench.ground.text import for_markdown
 from pytest_simbench.scene.wire import Wire
 
-State = Literal["carried", "approximated", "not carried"]
+CARRIED, APPROXIMATED, NOT_CARRIED = STATES = ("carried", "approximated", "not carried")
+"""The scene holds it as the file has it; nearly so; not at all."""
 
-STATES: tuple[State, ...] = ("not carried", "approximated", "carried")
-"""What changes most comes first."""
-
-NAMED = 3
-"""How many elements a row names."""
+MOST_NAMED = 3
+"""Elements that a line names, and quantities that the terminal names."""
 
 
 @dataclass(frozen=True)
 class Carried(Wire):
-    """One quantity of a file.
+    """What became of one quantity of a file.
 
     Attributes:
-        quantity: in the words of the file: `geom solref`.
-        state: whether the scene has it.
-        reason: how, or why not and what that may change; one sentence.
-        where: the elements that have it, by name.
+        quantity: in the words of the file.
+        state: one of `STATES`.
+        reason: how it is carried or approximated, and by how much; or why it is not, and what that
+            may change.
+        where: names of the elements, shortened when they are many; empty: of the whole file.
+
+    Raises:
+        ValueError: there is no such state.
     """
 
     quantity: str
-    state: State
+    state: str
     reason: str
-    where: tuple[str, ...] = ()
+    where: str = ""
+
+    def __post_init__(self) -> None:
+        if self.state not in STATES:
+            raise ValueError(f"{self.quantity}: no state {self.state!r}; choose from {STATES}")
 
 
-def in_order(account: Sequence[Carried]) -> list[Carried]:
-    """What was not carried first."""
-    return sorted(account, key=lambda row: STATES.index(row.state))
+def named(names: Iterable[str]) -> str:
+    """Names of elements, the first few of many: "a, b, c and 62 more"."""
+    every = list(names)
+    shown, rest = ", ".join(every[:MOST_NAMED]), len(every) - MOST_NAMED
+    return f"{shown} and {rest} more" if rest > 0 else shown
 
 
-def as_markdown(name: str, account: Sequence[Carried]) -> str:
-    """The account of a file as a page."""
-    rows = [
-        f"| {for_markdown(row.quantity)} | {row.state} | {for_markdown(row.reason)} | "
-        f"{for_markdown(_places(row.where))} |"
-        for row in in_order(account)
+def markdown(title: str, account: Sequence[Carried]) -> str:
+    """The page `carried.md`: what is not carried first."""
+    lines = [
+        f"# What was carried of {_cell(title)}",
+        "",
+        "| quantity | state | how, or why not | where |",
+        "|---|---|---|---|",
     ]
-    head = "| of the file | | how, or why not | where |\n| --- | --- | --- | --- |"
-    return "\n".join([f"# What was carried of {for_markdown(name)}", "", head, *rows, ""])
+    for line in sorted(account, key=lambda line: -STATES.index(line.state)):
+        cells = (line.quantity, line.state, line.reason, line.where)
+        lines.append(f"| {' | '.join(map(_cell, cells))} |")
+    return "\n".join(lines) + "\n"
 
 
-def as_lines(name: str, account: Sequence[Carried]) -> list[str]:
-    """The same in a line for each state but `carried`, which all expect."""
-    told = []
-    for state in STATES[:-1]:
-        quantities = [row.quantity for row in account if row.state == state]
+def terminal_lines(account: Sequence[Carried]) -> list[str]:
+    """One line for each state that occurs: how many quantities, and the names of some."""
+    found = []
+    for state in STATES:
+        quantities = [line.quantity for line in account if line.state == state]
         if quantities:
-            told.append(f"{name}: {state}: {', '.join(quantities)} (carried.md says why)")
-    return told
+            found.append(f"{state} ({len(quantities)}): {named(quantities)}")
+    return found
 
 
-def _places(where: Sequence[str]) -> str:
-    more = f" and {len(where) - NAMED} more" if len(where) > NAMED else ""
-    return ", ".join(where[:NAMED]) + more
+def _cell(text: str) -> str:
+    """Text of somebody's file that leaves a table a table."""
+    plain = "".join(c if c.isprintable() else " " for c in text)
+    return plain.replace("\\", "\\\\").replace("|", "\\|").replace("<", "&lt;").replace("`", "'")

@@ -1,31 +1,25 @@
-"""Users' scenes: a file is read by the engine whose format it is, in a worker of its own."""
+"""A user's file as a scene: read by the engine whose format it is, in a worker of that engine."""
 
 from __future__ import annotations
 
 import tempfile
-import time
-from contextlib import suppress
+import threading
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
-from pytest_simbench.client.environments import missing
+from pytest_simbench.client.environments import Environment, interpreter, missing
 from pytest_simbench.client.errors import Where, WorkerError
+from pytest_simbench.client.launch import Launch
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.description.carried import Carried
-from pytest_simbench.description.urdf_check import read_xml
-from pytest_simbench.experiment.case import Case
+from pytest_simbench.description.mjcf_check import check_mjcf
 from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.scene import Scene
-from pytest_simbench.simulator.registry import adapter, registered
+from pytest_simbench.simulator.info import SimulatorInfo
+from pytest_simbench.simulator.registry import adapter, address, registered
 
-TIMEOUT = 120.0
-"""For reading a file [s]."""
-
-NOT_YET = {
-    ".sdf": "SDF", ".world": "SDF", ".usd": "USD", ".usda": "USD", ".usdc": "USD", ".usdz": "USD",
-}  # fmt: skip
-"""Formats that are known and not read."""
+NOT_YET = (".sdf", ".world", ".usd", ".usda", ".usdc", ".usdz")
+"""Endings of scenes that nobody here reads yet."""
 
 
 @dataclass(frozen=True)
@@ -34,66 +28,76 @@ class SceneFile:
 
     Attributes:
         path: absolute.
-        scene: that it describes.
-        account: what of the file the scene has, and what not.
-        timestep: that the file asks for [s].
+        scene: what was carried of it.
+        account: what became of each quantity.
     """
 
     path: Path
     scene: Scene
     account: tuple[Carried, ...]
-    timestep: float
+
+
+_read: dict[tuple[Path, int, int], SceneFile] = {}
+_lock = threading.Lock()
 
 
 def read_scene_file(path: str | Path) -> SceneFile:
-    """The scene of a file, as it is now; a file that did not change is read once.
+    """Read a file by the first engine here that reads such files.
+
+    What was read is kept, until the file changes. (Files that it includes and meshes are not
+    looked at for that.)
 
     Raises:
-        DescriptionError: it cannot be read; one sentence with file and, where known, line.
+        DescriptionError: no such file, something in it that cannot be, or no engine here that reads
+            it; one sentence with the file, and its line where that is known.
     """
-    at = Path(path).absolute()
-    reader = _reader(at)
-    read_xml(str(at), "the scene")  # sizes, entities, what is no XML at all
-    status = at.stat()
-    return _read(at, reader, status.st_mtime_ns, status.st_size)
+    whole = Path(path).absolute()
+    info = _reader(whole)
+    check_mjcf(str(whole))
+    status = whole.stat()
+    key = (whole, status.st_size, status.st_mtime_ns)
+    with _lock:
+        if key not in _read:
+            _read[key] = _ask(info, whole)
+        return _read[key]
 
 
-def _reader(path: Path) -> str:
-    """The simulator that reads such a file."""
+def _reader(path: Path) -> SimulatorInfo:
+    """The facts of the engine that reads files of that ending."""
     ending = path.suffix.lower()
-    endings: dict[str, str] = {}
-    for name in registered():
-        endings |= dict.fromkeys(adapter(name).info.reads, name)
-    if ending in endings:
-        name = endings[ending]
-        if absent := missing(adapter(name).info):
-            raise DescriptionError(f"{path} is read by {name}, and {absent}")
-        return name
-    known = NOT_YET.get(ending)
-    what = f"{known} is not read yet; convert it" if known else "no such scenes are read"
-    raise DescriptionError(f"{path}: {what}; known endings: {', '.join(sorted(endings))}")
-
-
-@lru_cache(maxsize=32)
-def _read(path: Path, reader: str, _changed: int, _size: int) -> SceneFile:
-    where = Where(reader, "headless")
-    with tempfile.TemporaryDirectory() as folder:
-        case = Case.of(
-            reader, test="scene_file", mode="headless", profile="default", folder=Path(folder)
+    infos = [adapter(name).info for name in registered()]
+    reading = [info for info in infos if ending in info.reads]
+    here = [info for info in reading if missing(info) is None]
+    if here:
+        return here[0]
+    if reading:
+        raise DescriptionError(
+            f"{path} is read by {reading[0].title}, which is not here: {reading[0].install}"
         )
-        process = WorkerProcess(case.launch("scene"), where)
+    known = ", ".join(sorted({ending for info in infos for ending in info.reads}))
+    if ending in NOT_YET:
+        raise DescriptionError(
+            f"{path}: {ending} files are not read yet; convert it to MJCF ({known})"
+        )
+    raise DescriptionError(f"{path}: no engine here reads {ending or 'such'} files; give {known}")
+
+
+def _ask(info: SimulatorInfo, path: Path) -> SceneFile:
+    with tempfile.NamedTemporaryFile(prefix="simbench-reader-", suffix=".log") as log:
+        launch = Launch(
+            address(info.name) or "",
+            python=interpreter(info),
+            environment=Environment.of(info).variables(),
+            log=Path(log.name),
+        )
         try:
-            process.deadline = time.monotonic() + TIMEOUT
-            process.construct(case.profile, {}, gui=False)
-            answer = process.request("read_file", path=str(path))
+            process = WorkerProcess(launch, Where(info.name, "headless", phase="reading"))
+            try:
+                process.construct("default")
+                answer = process.request("read_file", path=str(path))
+            finally:
+                process.close()
         except WorkerError as error:
             raise DescriptionError(error.what) from None
-        finally:
-            with suppress(WorkerError):
-                process.close(timeout=5.0)
-    return SceneFile(
-        path,
-        Scene.from_wire(answer["scene"]),
-        tuple(map(Carried.from_wire, answer["account"])),
-        float(answer["timestep"]),
-    )
+    account = tuple(Carried.from_wire(line) for line in answer["account"])
+    return SceneFile(path, Scene.from_wire(answer["scene"]), account)

@@ -61,7 +61,7 @@ def load(
         path: of the scene; None for that of `--sim-scene`.
         starts: of a file of starts (.npz), see `description.starts`.
     """
-    from pytest_simbench.description.carried import as_lines, as_markdown
+    from pytest_simbench.description.carried import markdown, terminal_lines
     from pytest_simbench.description.starts import distinct, read_starts
     from pytest_simbench.experiment.scene_file import read_scene_file
     from pytest_simbench.records.paths import write_whole
@@ -88,7 +88,7 @@ def load(
                 )
     except (SimulatorError, SceneError) as error:
         pytest.exit(str(error), returncode=pytest.ExitCode.USAGE_ERROR)
-    write_whole(folder, ACCOUNT, as_markdown(at.name, found.account).encode())
-    for line in as_lines(at.name, found.account):
-        tell(line)
+    write_whole(folder, ACCOUNT, markdown(at.name, found.account).encode())
+    for line in terminal_lines(found.account):
+        tell(f"{at.name}: {line} ({ACCOUNT})")
     return scene

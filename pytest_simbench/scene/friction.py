@@ -61,4 +61,4 @@ SOLVED: dict[str, Callable[[FloatArray, FloatArray, int], FloatArray]] = {
         lambda mu: 1 / np.maximum(mu, LEAST), lambda r: 1 / np.maximum(r, LEAST)
     ),
 }
-"""By rule: numbers of which each pair (n, 2) is, by the rule, the number asked for, or nearly so."""
+"""By rule: numbers of which it makes of each pair (n, 2) the one asked for, or nearly so."""

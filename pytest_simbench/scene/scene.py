@@ -49,14 +49,15 @@ class Scene(Wire):
             for tasks that go through several; one tuple of names and poses each. A worker does not
             get them.
         friction_rule: what the friction of two surfaces is, one of `friction.RULES`.
+        file: that it was read from, an absolute path; empty: none.
 
     Raises:
         SceneError: two bodies share a name or overlap, one has the name of what is in every
             scene, a free one is outside the room, or a number is none.
     """
 
-    optional = ("ground_restitution", "friction_rule")
     unwritten = ("starts",)
+    optional = ("ground_restitution", "friction_rule", "file")
 
     name: str
     bodies: tuple[Body, ...] = ()
@@ -67,6 +68,7 @@ class Scene(Wire):
     ground_restitution: float = 0.0
     friction_rule: str = "maximum"
     starts: tuple[Start, ...] = ()
+    file: str = ""
 
     def __post_init__(self) -> None:
         check_name(self.name, "a scene")
@@ -127,10 +129,11 @@ class Scene(Wire):
     @property
     def words(self) -> frozenset[str]:
         """What is in it: `box`, `sphere`, `cylinder`, `capsule`, `convex_mesh`, `compound`,
-        `frictions` (several), `restitution`, `damping`, `wrench`, `prescribed`, `loop`,
-        `self_collide`."""
+        `file` (read from one), `frictions` (several), `restitution`, `damping`, `wrench`,
+        `prescribed`, `loop`, `self_collide`."""
         bodies = self.bodies
         found = {
+            "file": bool(self.file),
             "frictions": len(self.frictions) > 1,
             "restitution": self.ground_restitution or any(body.restitution for body in bodies),
             "damping": any(body.damping.any() for body in bodies),

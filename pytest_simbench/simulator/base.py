@@ -102,6 +102,16 @@ class Simulator(ABC):
         self.settings = settings
         self.gui = gui
 
+    def read_file(self, path: str) -> tuple[Scene, tuple[Carried, ...]]:
+        """A file of the engine's own format as a scene, and what was carried of it.
+
+        Only called for files with an ending in `info.reads`; nothing is loaded.
+
+        Raises:
+            DescriptionError: something in the file that cannot be, or that no scene can hold.
+        """
+        raise self._missing("reader of files")
+
     def compile(self, scene: Scene) -> None:  # noqa: B027 - most engines have nothing to compile
         """Have ready what `load` of this scene needs compiled; called just before it.
 
@@ -163,16 +173,6 @@ class Simulator(ABC):
     @abstractmethod
     def joint_state(self) -> FloatArray:
         """Positions and velocities of the driven joints, (2, n_joints)."""
-
-    @classmethod
-    def read_file(cls, path: str) -> tuple[Scene, tuple[Carried, ...], float]:
-        """The scene of a file of a kind in `SimulatorInfo.reads`, what of the file it has and has
-        not, and the time step that the file asks for [s].
-
-        Raises:
-            DescriptionError: the file cannot be read, or says what no scene has; one sentence.
-        """
-        raise NotSupportedError(f"{cls.info.name} reads no scenes")
 
     def save(self) -> Any:
         """The whole state of the world, to be given to `restore` in this process."""

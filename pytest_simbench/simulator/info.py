@@ -146,7 +146,7 @@ class SimulatorInfo:
         friction_rule: what the engine, as its adapter sets it, makes of the frictions of two
             surfaces: one of `scene.friction.RULES`; empty: not known, and scenes of several
             frictions are refused.
-        reads: endings of scenes' files that it reads (`Simulator.read_file`).
+        reads: endings of the files that it makes scenes of, see `Simulator.read_file`.
     """
 
     name: str

@@ -140,13 +140,12 @@ class Server:
             "untested": self.simulator.untested(),
         }
 
+    def do_read_file(self, path: str) -> dict[str, Any]:
+        scene, account = self._constructed().read_file(path)
+        return {"scene": scene.to_wire(), "account": [line.to_wire() for line in account]}
+
     def do_compile(self, scene: dict[str, Any]) -> None:
         self._constructed().compile(Scene.from_wire(received(scene)))
-
-    def do_read_file(self, path: str) -> dict[str, Any]:
-        scene, account, timestep = self._constructed().read_file(path)
-        rows = [row.to_wire() for row in account]
-        return {"scene": scene.to_wire(), "account": rows, "timestep": timestep}
 
     def do_load(self, scene: dict[str, Any], parity: bool) -> dict[str, Any]:
         simulator = self._constructed()

@@ -102,7 +102,10 @@ class Watch:
         self._joints = () if scene.robot is None else scene.robot.joint_names
         self._led = np.array([body.prescribed for body in scene.free_bodies], dtype=bool)
         pushed = np.array([bool(body.wrenches) for body in scene.free_bodies], dtype=bool)
-        self._free = ~self._led & ~pushed
+        # What an engine loads from the user's own file has whatever damping the file says.
+        own = [d for d in declared if d.only == "file"]
+        damped = [any(d.excuses(f"body/{name}/damping") for d in own) for name in self._names]
+        self._free = ~self._led & ~pushed & ~np.array(damped, dtype=bool)
         self._radius = np.array([np.linalg.norm(body.extents) / 2 for body in scene.free_bodies])
         self._damping = np.array(
             [expected.get(f"body/{name}/damping", np.zeros(2))[0] for name in self._names]

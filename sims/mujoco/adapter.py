@@ -10,6 +10,7 @@ What was learnt stands in docs/engines/mujoco.md.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -30,10 +31,11 @@ from pytest_simbench.simulator import (
 )
 
 from .bounces import BOUNCES
+from .own_file import FileReadBack, OwnFile
 from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack, contact_forces, joint_wrenches
-from .reading import read
-from .settings import CHOSEN_ON, PROFILES, MuJoCoSettings
+from .reading import Reading
+from .settings import CHOSEN_ON, PROFILES, FileSettings, MuJoCoSettings
 from .world import build, leave_out
 
 mujoco = lazy_import("mujoco")
@@ -75,10 +77,32 @@ class MuJoCo(Simulator):
     chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
     settings: MuJoCoSettings
 
+    prepared: PreparedRobot | None
+    _own_file: OwnFile | None = None
+
     def load(self, scene: Scene) -> None:
+        self._viewer: Any = None
+        self._renderer: Any = None
+        if isinstance(self.settings, FileSettings):
+            self._load_file(scene)
+        else:
+            self._build(scene)
+        self.model.vis.global_.offwidth, self.model.vis.global_.offheight = 1920, 1080
+        if self.gui:
+            self._open_window()
+
+    def _load_file(self, scene: Scene) -> None:
+        self._own_file = own = OwnFile(scene, self.settings.timestep)
+        self.scene, self.model, self.data = scene, own.model, own.data
+        self.prepared = None
+        self._q = self._v = np.array([], dtype=int)
+        self._body_ids = own.roots
+        deviations = (*self.info.deviations, *own.deviations())
+        vars(self)["info"] = replace(self.info, deviations=deviations)  # of this world alone
+
+    def _build(self, scene: Scene) -> None:
         self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         self.model = model = build(scene, self.prepared, self.settings)
-        model.vis.global_.offwidth, model.vis.global_.offheight = 1920, 1080
         self.data = data = mujoco.MjData(model)
         self.scene = scene
 
@@ -106,19 +130,19 @@ class MuJoCo(Simulator):
         mujoco.mj_forward(model, data)
         if len(self._led):
             leave_out(model, self._body_v[self._led, 0])
-        self._viewer: Any = None
-        self._renderer: Any = None
-        if self.gui:
-            self._open_window()
 
-    @classmethod
-    def read_file(cls, path: str) -> tuple[Scene, tuple[Carried, ...], float]:
-        return read(path)
+    def read_file(self, path: str) -> tuple[Scene, tuple[Carried, ...]]:
+        found = Reading(path)
+        return found.scene, tuple(found.account)
 
     def read_back(self) -> dict[str, Any]:
+        if self._own_file is not None:
+            return FileReadBack(self, self._own_file).all()
         return ReadBack(self, self.model, self.data, self._numbers()).all()
 
     def _numbers(self) -> Numbers:
+        if self._own_file is not None:
+            return self._own_file.numbers()
         model, prepared = self.model, self.prepared
         return Numbers(
             model.geom("ground").id,
@@ -155,6 +179,8 @@ class MuJoCo(Simulator):
         return float(self.data.time)
 
     def body_state(self) -> FloatArray:
+        if self._own_file is not None:
+            return self._own_file.body_state()
         state = np.empty((len(self._body_q), 13))
         state[:, :7] = self.data.qpos[self._body_q]
         state[:, 7:10] = self.data.qvel[self._body_v]
@@ -176,6 +202,8 @@ class MuJoCo(Simulator):
         mujoco.mj_forward(self.model, self.data)
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        if self._own_file is not None:
+            return self._own_file.contact_forces()
         return contact_forces(self.model, self.data, self._numbers())
 
     def joint_wrenches(self) -> FloatArray:

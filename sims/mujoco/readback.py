@@ -77,12 +77,8 @@ class ReadBack(readback.ReadBack):
         return all(map(self._coupled, pairs))
 
     def body(self, prefix: str, name: str) -> dict[str, Any]:
-        """A body. A fixed one may have none of its own: its frame is then its shape's."""
         model, geoms = self.model, self.at.boxes[name]
-        body = int(model.geom_bodyid[geoms[0]])
-        place, turn = self.data.xpos[body], self.data.xmat[body].reshape(3, 3)
-        if body == 0:
-            place, turn = self._frame(geoms[0])
+        body, place, turn = self._placed(name)
         light = self.model.body_mass[body] < heavy(self.scene)  # else it moves as prescribed
         free = light and self._can_move(body)
         found = self._surface(prefix, geoms, place, turn)
@@ -97,6 +93,15 @@ class ReadBack(readback.ReadBack):
                 passive[3:].max() / model.body_inertia[body].max(),
             ]
         return found
+
+    def _placed(self, name: str) -> tuple[int, FloatArray, FloatArray]:
+        """Number, place and turn of a scene's body. A fixed one may have none of its own: its frame
+        is then its shape's."""
+        geom = self.at.boxes[name][0]
+        body = int(self.model.geom_bodyid[geom])
+        if body == 0:
+            return body, *self._frame(geom)
+        return body, self.data.xpos[body], self.data.xmat[body].reshape(3, 3)
 
     def _frame(self, geom: int) -> tuple[FloatArray, FloatArray]:
         """Place and turn of a body's frame: its shape's, but for a mesh, whose corners MuJoCo moves

@@ -1,21 +1,20 @@
-"""MJCF files as scenes, read by MuJoCo's own parser: includes, classes, defaults, frames and
-keyframes mean what they mean to MuJoCo.
+"""A file of MuJoCo's own format as a scene, and the account of what was carried of it.
 
-Shapes, places, masses and inertias are those of the compiled model. For the account each element is
-held against a new one of its kind: an attribute that differs from MuJoCo's default is carried,
-approximated, or told. So an attribute that a later MuJoCo adds is told too.
+MuJoCo compiles the file; all is read from the compiled model, so defaults, classes, frames and
+includes mean what MuJoCo means. A field of the model that differs from that of a plain ball, and of
+which the tables here know nothing, is told as not carried: later releases may have more of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.carried import Carried
-from pytest_simbench.ground.errors import DescriptionError
+from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED, Carried, named
 from pytest_simbench.scene import (
     Body,
     Box,
@@ -23,371 +22,452 @@ from pytest_simbench.scene import (
     Compound,
     ConvexMesh,
     Cylinder,
+    FloatArray,
     Pose,
     Scene,
     SceneError,
     Sphere,
     principal,
 )
+from pytest_simbench.scene.checks import FORBIDDEN, RESERVED
 from pytest_simbench.scene.polytope import MOST
+from pytest_simbench.scene.pose import quaternion_of
 from pytest_simbench.scene.scene import ROOM
-from pytest_simbench.simulator import lazy_import
+from pytest_simbench.simulator import DescriptionError, lazy_import
+
+from .told import DERIVED, OBJECTS, OPTIONS, SOLVER, TOLD
 
 mujoco = lazy_import("mujoco")
 
-MOST_BODIES, MOST_GEOMS = 2_000, 20_000
+CLOSE = 1e-6
+"""Share by which a body's centre and moments may be off those of its one shape."""
+
+CONCAVE = 1.02
+"""Volume of a hull over that of its mesh from which the mesh is told to be concave."""
+
+PLAIN = '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>'
 
 
-def _words(text: str) -> frozenset[str]:
-    return frozenset(text.split())
+@dataclass(frozen=True)
+class Placed:
+    """Where a body of the scene is in the model.
+
+    Attributes:
+        body: of the scene.
+        root: number of the model's body that moves it; 0: the world.
+        geoms: numbers of its shapes.
+        frame: the scene's frame of the body in that of `root`.
+    """
+
+    body: Body
+    root: int
+    geoms: list[int]
+    frame: Pose
 
 
-COMPILED: Mapping[str, frozenset[str]] = {
-    "geom": _words(
-        "type size pos quat alt fromto density mass typeinertia meshname fitscale frame contype "
-        "conaffinity friction"
-    ),
-    "body": _words(
-        "pos quat alt frame mass ipos iquat ialt inertia fullinertia explicitinertial geoms joints"
-    ),
-    "joint": _words("type pos frame damping"),
-    "option": _words("gravity"),
-}
-"""Attributes that the scene has from the compiled model, or that have rows of their own."""
+class Reading:
+    """A file that was read.
 
-NO_PHYSICS: Mapping[str, frozenset[str]] = {
-    "geom": _words(
-        "name classname id info material rgba group userdata parent compiler signature castshadow "
-        "fluid_coefs"
-    ),
-    "body": _words(
-        "name classname childclass id info userdata parent compiler signature simple sleep bodies "
-        "cameras frames lights sites"
-    ),
-    "joint": _words(
-        "name classname id info group userdata parent compiler signature axis align range limited "
-        "ref solref_limit solimp_limit actfrclimited actfrcrange actgravcomp springref margin"
-    ),
-    "option": _words("sleep_tolerance"),
-}
-"""What moves no body: names, looks, and what a free joint does not have."""
+    Args:
+        path: absolute.
 
-ENGINE = "a matter of the engine's settings: the profile has them, for each engine its own"
-SOFT = (
-    "how soft a contact is is an engine's own matter: its profile has it. Compare the profile "
-    "`file`, and finer steps"
-)
-REASONS: Mapping[str, str] = {
-    "geom solref": SOFT,
-    "geom solimp": SOFT,
-    "geom solmix": SOFT,
-    "geom condim": "contacts slide with friction here; rolling and spinning are the profile's",
-    "geom priority": "the larger friction of two counts, whatever has priority",
-    "geom margin": "contacts begin where shapes touch",
-    "geom gap": "contacts begin where shapes touch",
-    "body gravcomp": "every body feels the whole gravity",
-    "body mocap": "it stays where it is; nobody moves it",
-    "joint armature": "a free body has its own inertia alone",
-    "joint frictionloss": "a free body has no friction of its joint",
-    "joint stiffness": "a free body has no spring",
-    "option density": "no air: drag and buoyancy are left out",
-    "option viscosity": "no air: drag and buoyancy are left out",
-    "option wind": "no air",
-}
-LISTS: Mapping[str, str] = {
-    "equalities": "what they hold together moves apart here",
-    "tendons": "there are none here",
-    "actuators": "nothing drives a free body here",
-    "pairs": "contacts of these pairs are like all others here",
-    "excludes": "these pairs touch here",
-    "flexes": "soft bodies are left out",
-    "skins": "looks alone",
-    "plugins": "no plug-in runs here",
-    "keys": "the scene starts as the bodies are placed in the file; take a file of starts instead",
-    "sensors": "nothing is measured by them",
-}
-LOOKS = frozenset({"skins", "sensors"})
-
-
-def read(path: str) -> tuple[Scene, tuple[Carried, ...], float]:
-    """The scene of an MJCF file, the account of it, and the time step that it asks for [s].
+    Attributes:
+        model, data: compiled, at its start.
+        ground: number of the plane that is the ground; None: the file has none.
+        lift: height by which the scene is moved up [m].
+        placed: all bodies of the scene.
+        scene: that the file makes.
+        account: of what was carried.
 
     Raises:
-        DescriptionError: no such file, not to be parsed, or a body that no scene can have.
+        DescriptionError: one sentence.
     """
-    try:
-        spec = mujoco.MjSpec.from_file(path)
-    except ValueError as error:
-        raise DescriptionError(f"{path}: {_one_line(error)}") from None
-    return of_spec(spec, path)
 
-
-def of_spec(spec: Any, path: str) -> tuple[Scene, tuple[Carried, ...], float]:
-    """The same of a parsed file."""
-    account = _told(spec)
-    for body in spec.bodies:
-        moving = [_name(j, "joint") for j in body.joints if j.type != mujoco.mjtJoint.mjJNT_FREE]
-        if moving:
-            raise DescriptionError(
-                f"{path}: body {body.name!r} moves by the joint {moving[0]!r}, and only bodies "
-                "with a free joint or none are read so far"
-            )
-    try:
-        model = spec.compile()
-    except ValueError as error:
-        raise DescriptionError(f"{path}: {_one_line(error)}") from None
-    if model.nbody > MOST_BODIES or model.ngeom > MOST_GEOMS:
-        raise DescriptionError(
-            f"{path} has {model.nbody} bodies and {model.ngeom} shapes; at most {MOST_BODIES} and "
-            f"{MOST_GEOMS} are read"
-        )
-    reader = _Reader(model, path)
-    try:
-        scene = reader.scene(Path(path).stem)
-    except SceneError as error:
-        raise DescriptionError(f"{path}: {error}") from None
-    return scene, (*account, *reader.account), float(model.opt.timestep)
-
-
-class _Reader:
-    """Makes a scene of a compiled model."""
-
-    def __init__(self, model: Any, path: str) -> None:
-        self.model, self.path = model, path
-        self.data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, self.data)
+    def __init__(self, path: str) -> None:
+        self.path = path
         self.account: list[Carried] = []
-        self.colliding = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+        try:
+            self.model = model = mujoco.MjSpec.from_file(path).compile()
+        except (ValueError, RuntimeError, OSError) as error:
+            raise DescriptionError(f"{path}: {' '.join(str(error).split())}") from None
+        self.data = data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        self._names: dict[str, int] = {}
+        self._refuse_joints()
+        masks = model.geom_contype | model.geom_conaffinity
+        self.solid = np.flatnonzero(masks).tolist()
+        self.ground = self._find_ground()
+        try:
+            placed = [self._placed(*group) for group in self._groups()]
+            self._place(placed)
+        except SceneError as error:
+            raise DescriptionError(f"{path}: {error}") from None
+        self._tell_shapes()
+        self._tell_options()
+        self._tell_fields()
+        self._tell_objects()
 
-    def scene(self, name: str) -> Scene:
-        model, kinds = self.model, self.model.geom_type
-        planes = np.flatnonzero(self.colliding & (kinds == mujoco.mjtGeom.mjGEOM_PLANE))
-        height, friction = self._ground(planes.tolist())
-        bodies: list[Body] = []
-        for body in range(model.nbody):
-            own = np.flatnonzero(self.colliding & (model.geom_bodyid == body)).tolist()
-            geoms = [geom for geom in own if geom not in planes]
-            if body == 0:
-                bodies += [self._body(self._geom_name(g), 0, [g]) for g in geoms]
-            elif geoms or model.body_dofnum[body]:
-                bodies.append(self._body(self._body_name(body), body, geoms))
-        self._tell(geoms=int((~self.colliding).sum()), bodies=bodies)
-        placed = [body.moved_to(body.pose.translated(z=-height)) for body in bodies]
-        far = np.max([np.abs(body.pose.position) for body in placed], axis=0, initial=0.0)
-        room = tuple(max(wall, 2 * float(at)) for wall, at in zip(ROOM, far, strict=True))
-        return Scene(
-            name,
-            tuple(placed),
-            gravity=tuple(model.opt.gravity.tolist()),
-            ground_friction=friction,
-            room=(room[0], room[1], room[2]),
-        )
+    def tell(self, quantity: str, state: str, reason: str, where: Iterable[str] = ()) -> None:
+        self.account.append(Carried(quantity, state, reason, named(where)))
 
-    def _ground(self, planes: list[int]) -> tuple[float, float]:
-        """Height [m] and friction of the ground."""
-        if not planes:
-            self._add(
-                "ground", "approximated", "the file has none, and every scene has one at z = 0"
+    def refuse(self, why: str) -> DescriptionError:
+        return DescriptionError(f"{self.path}: {why}")
+
+    def name(self, kind: str, number: int) -> str:
+        return getattr(self.model, kind)(number).name or f"{kind} {number}"
+
+    # What there is
+
+    def _refuse_joints(self) -> None:
+        kinds = self.model.jnt_type
+        held = np.flatnonzero(kinds != mujoco.mjtJoint.mjJNT_FREE).tolist()
+        if held:
+            names = named(self.name("joint", number) for number in held)
+            raise self.refuse(
+                f"bodies move on joints that are not free ({names}), which no scene holds yet; "
+                "read a scene of fixed and free bodies"
             )
-            return 0.0, 1.0
-        heights = {round(float(self.data.geom_xpos[k][2]), 9) for k in planes}
-        level = all(abs(self.data.geom_xmat[k][8] - 1) < 1e-6 for k in planes)
-        if len(heights) > 1 or not level:
-            raise DescriptionError(
-                f"{self.path} has planes that are not level or at several heights; a scene has one "
-                "level ground: make the others boxes"
-            )
-        (height,) = heights
-        reason = "the plane, endless" if not height else f"the scene is moved down by {height:g} m"
-        self._add("ground", "carried", reason)
-        return height, float(max(self.model.geom_friction[k][0] for k in planes))
 
-    def _body(self, name: str, body: int, geoms: list[int]) -> Body:
-        """A body: where its inertia has its frame if it is free, else where the file has it."""
+    def _root(self, body: int) -> int:
+        """The free body that a body is a part of; 0: none, it is fixed."""
+        root = int(self.model.body_weldid[body])
+        return root if self.model.body_dofnum[root] else 0
+
+    def _find_ground(self) -> int | None:
+        planes = [g for g in self.solid if self.model.geom_type[g] == mujoco.mjtGeom.mjGEOM_PLANE]
+        for plane in planes:
+            if self.data.geom_xmat[plane].reshape(3, 3)[2, 2] < 1 - CLOSE**2:
+                raise self.refuse(
+                    f"the plane {self.name('geom', plane)} is not level, and a scene has one level "
+                    "ground; make it a box"
+                )
+        planes.sort(key=lambda plane: self.data.geom_xpos[plane, 2])
+        self.solid = [geom for geom in self.solid if geom not in planes]
+        if len(planes) > 1:
+            lower = (self.name("geom", plane) for plane in planes[:-1])
+            self.tell("geom plane", NOT_CARRIED, "only the highest is the ground", lower)
+        return planes[-1] if planes else None
+
+    def _groups(self) -> list[tuple[str, int, list[int]]]:
+        """Name, root and shapes of each body; of the world's own shapes each is a body."""
+        model = self.model
+        found: dict[tuple[int, int], list[int]] = {}
+        for geom in self.solid:
+            body = int(model.geom_bodyid[geom])
+            root = self._root(body)
+            key = (root, root or body) if body else (0, -1 - geom)
+            found.setdefault(key, []).append(geom)
+        empty = [b for b in range(1, model.nbody) if self._root(b) == b and (b, b) not in found]
+        if empty:
+            names = named(self.name("body", body) for body in empty)
+            raise self.refuse(f"free bodies have no shape that collides: {names}")
+        return [
+            (self._own_name("body", key) if key > 0 else self._own_name("geom", -1 - key), root, g)
+            for (root, key), g in found.items()
+        ]
+
+    def _own_name(self, kind: str, number: int) -> str:
+        """Its name in the file, without what a scene's names must not have."""
+        told = self.name(kind, number)
+        name = "".join("_" if c in FORBIDDEN or not c.isprintable() else c for c in told)
+        name = name.strip(" .")[:90] or kind
+        if name.lower() in RESERVED or name in self._names:
+            name = f"{name} {kind} {number}"
+        self._names[name] = number
+        if name != told:
+            self.tell(f"{kind} name", APPROXIMATED, f"it is {name!r} in the scene", [told])
+        return name
+
+    # Bodies
+
+    def _placed(self, name: str, root: int, geoms: list[int]) -> Placed:
         model, data = self.model, self.data
-        free, own = bool(model.body_dofnum[body]), Pose()
-        if body:
-            at = Pose.from_array([*data.xpos[body], *data.xquat[body]])
-        else:
-            at = _pose(data.geom_xpos[geoms[0]], data.geom_xmat[geoms[0]])
-        if free:
-            own = Pose.from_array([*model.body_ipos[body], *model.body_iquat[body]])
-        surface: dict[str, Any] = {"friction": self._friction(name, geoms)}
+        base = _pose(data.xpos[root], data.xquat[root])
+        friction = float(model.geom_friction[geoms, 0].max())
+        if model.geom_friction[geoms, 0].min() < friction:
+            self.tell(
+                "geom friction (sliding)",
+                APPROXIMATED,
+                f"a body has one friction: the largest of {_values(model.geom_friction[geoms, 0])}",
+                [name],
+            )
         shapes = []
         for k, geom in enumerate(geoms):
-            place = Pose.from_array([*model.geom_pos[geom], *model.geom_quat[geom]])
-            local = own.inverse() * place if body else Pose()
-            shapes.append(self._shape(str(k), geom, local, surface))
-        if not shapes:
-            raise DescriptionError(
-                f"{self.path}: body {name!r} has no shape that can touch anything"
-            )
-        mass = float(model.body_mass[body]) if free else 0.0
-        moments = tuple(model.body_inertia[body].tolist()) if free else None
-        alone = shapes[0]
-        given: dict[str, Any] = {"mass": mass, "moments": moments, **self._damping(body, free)}
-        if len(shapes) == 1 and alone.pose == Pose():
-            return alone.changed(name=name, pose=at * own, **given)
-        return Compound(
-            name, tuple(shapes), at * own, colour=alone.colour, file_frame=own.inverse(),
-            **surface, **given,
-        )  # fmt: skip
+            place = base.inverse() * _pose(data.geom_xpos[geom], _quaternion(data.geom_xmat[geom]))
+            shape, own = self._shape(geom, str(k), friction)
+            shapes.append(shape.moved_to(place * own))
+        if not root:
+            if len(shapes) == 1:
+                return Placed(shapes[0].changed(name=name), 0, geoms, shapes[0].pose)
+            whole = Compound(name, tuple(shapes), Pose(), friction=friction)
+            return Placed(whole, 0, geoms, Pose())
+        mass, centre, tensor = self.inertial(root)
+        if len(shapes) == 1:
+            axes = shapes[0].pose.rotation()
+            turned = axes.T @ tensor @ axes
+            off = np.linalg.norm(centre - shapes[0].pose.position)
+            aside = np.abs(turned - np.diag(np.diag(turned))).max()
+            even = off < CLOSE * max(shapes[0].extents) and aside < CLOSE * np.trace(turned)
+            if even and np.allclose(shapes[0].pose.as_array(), Pose().as_array(), atol=CLOSE):
+                body = shapes[0].changed(name=name, mass=mass)
+                if not np.allclose(np.diag(turned), body.even_inertia(), rtol=CLOSE, atol=0):
+                    body = body.changed(moments=_triple(np.diag(turned)))
+                return Placed(self._damped(body, root, centre), root, geoms, shapes[0].pose)
+        moments, axes = np.linalg.eigh(tensor)
+        axes[:, 0] *= np.sign(np.linalg.det(axes))
+        frame = _pose(centre, quaternion_of(axes))
+        inverse = frame.inverse()
+        body = Compound(
+            name,
+            tuple(shape.moved_to(inverse * shape.pose) for shape in shapes),
+            Pose(),
+            mass=mass,
+            friction=friction,
+            moments=_triple(moments),
+            file_frame=inverse,
+        )
+        return Placed(self._damped(body, root, centre), root, geoms, frame)
 
-    def _shape(self, name: str, geom: int, pose: Pose, surface: Mapping[str, float]) -> Body:
-        model = self.model
-        x, y, z = model.geom_size[geom].tolist()
-        r, g, b, a = (min(max(c, 0.0), 1.0) for c in model.geom_rgba[geom].tolist())
-        given: dict[str, Any] = {"colour": (r, g, b, a), **surface}
-        match mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_"):
-            case "BOX":
-                return Box(name, (2 * x, 2 * y, 2 * z), pose, **given)
-            case "SPHERE":
-                return Sphere(name, x, pose, **given)
-            case "CYLINDER":
-                return Cylinder(name, x, 2 * y, pose, **given)
-            case "CAPSULE":
-                return Capsule(name, x, 2 * y, pose, **given)
-            case "MESH":
-                return self._mesh(name, geom, pose, given)
-            case other:
-                own = self._geom_name(geom)
-                raise DescriptionError(f"{self.path}: {own!r} is a {other.lower()}: not read yet")
-
-    def _mesh(self, name: str, geom: int, pose: Pose, given: dict[str, Any]) -> Body:
-        """The convex hull, as MuJoCo collides it."""
-        model, mesh = self.model, int(self.model.geom_dataid[geom])
-        first = model.mesh_vertadr[mesh]
-        points = model.mesh_vert[first : first + model.mesh_vertnum[mesh]]
-        graph = int(model.mesh_graphadr[mesh])
-        if graph >= 0:  # numbers of the hull's corners, see MuJoCo's `mesh_graph`
-            count = int(model.mesh_graph[graph])
-            points = points[model.mesh_graph[graph + 2 + count : graph + 2 + 2 * count]]
-        if len(points) > MOST:
-            raise DescriptionError(
-                f"{self.path}: the hull of {self._geom_name(geom)!r} has {len(points)} corners; at "
-                f"most {MOST} are read: simplify it, or split it into convex parts (coacd)"
-            )
-        vertices, frame = principal(points.astype(float))
-        return ConvexMesh(name, vertices, pose * frame, **given)
-
-    def _friction(self, name: str, geoms: list[int]) -> float:
-        """The sliding friction of a body."""
-        model = self.model
-        own = model.geom_friction[geoms, 0]
-        if len(np.unique(own)) > 1:
-            reason = "a body has one: the largest of its shapes is taken"
-            self._add("geom friction (several on one body)", "approximated", reason, name)
-        rest = model.geom_friction[geoms, 1:]
-        usual = np.array([0.005, 0.0001])
-        if len(rest) and not np.allclose(rest, usual):
-            reason = "spinning and rolling friction are the profile's"
-            self._add("geom friction (spinning, rolling)", "not carried", reason, name)
-        return float(own.max(initial=0.0)) if len(own) else 1.0
-
-    def _damping(self, body: int, free: bool) -> dict[str, float]:
-        """Of a free joint: force and torque per velocity, as rates of the body."""
-        model = self.model
-        if not free:
-            return {}
-        dof = model.body_dofadr[body] + np.arange(6)
-        damping = float(np.ravel(model.dof_damping[dof])[0])
-        if not damping:
-            return {}
-        moments = model.body_inertia[body]
-        reason = "exact along, and about the axes one rate, that of their mean moment, for all"
-        self._add("joint damping", "approximated", reason, self._body_name(body))
-        return {
-            "linear_damping": damping / float(model.body_mass[body]),
-            "angular_damping": damping / float(moments.mean()),
+    def _shape(self, geom: int, name: str, friction: float) -> tuple[Body, Pose]:
+        """A shape, and its frame in that of its geom."""
+        model, kinds = self.model, mujoco.mjtGeom
+        a, b, c = (float(value) for value in model.geom_size[geom])
+        look: dict[str, Any] = {
+            "friction": friction,
+            "colour": tuple(map(float, model.geom_rgba[geom])),
         }
+        match model.geom_type[geom]:
+            case kinds.mjGEOM_BOX:
+                return Box(name, (2 * a, 2 * b, 2 * c), Pose(), **look), Pose()
+            case kinds.mjGEOM_SPHERE:
+                return Sphere(name, a, Pose(), **look), Pose()
+            case kinds.mjGEOM_CYLINDER:
+                return Cylinder(name, a, 2 * b, Pose(), **look), Pose()
+            case kinds.mjGEOM_CAPSULE:
+                return Capsule(name, a, 2 * b, Pose(), **look), Pose()
+            case kinds.mjGEOM_MESH:
+                vertices, frame = self._hull(geom)
+                return ConvexMesh(name, vertices, Pose(), **look), frame
+        kind = kinds(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
+        raise self.refuse(
+            f"{self.name('geom', geom)} is of type {kind}, which no scene holds; make it a box, "
+            "sphere, cylinder, capsule or mesh"
+        )
 
-    def _tell(self, geoms: int, bodies: list[Body]) -> None:
-        self._add("bodies", "carried", f"{len(bodies)} with shapes, masses, inertias and places")
-        self._add("geom friction (sliding)", "carried", "of two surfaces the larger one, as here")
-        if geoms:
-            self._add(
-                "geom without contact", "not carried", f"{geoms} that nothing can touch: looks"
+    def _hull(self, geom: int) -> tuple[Any, Pose]:
+        """The corners of a mesh's convex hull in their frame, and that in the geom's."""
+        model, mesh, where = self.model, int(self.model.geom_dataid[geom]), self.name("geom", geom)
+        first = model.mesh_vertadr[mesh]
+        vertices = model.mesh_vert[first : first + model.mesh_vertnum[mesh]].astype(float)
+        points, graph = vertices, int(model.mesh_graphadr[mesh])
+        if graph >= 0:
+            count = int(model.mesh_graph[graph])
+            points = vertices[model.mesh_graph[graph + 2 + count : graph + 2 + 2 * count]]
+        if len(points) > MOST:
+            ways = _directions(400)
+            corners = {int(k) for k in np.argmax(_directions(MOST - 6) @ points.T, axis=1)}
+            corners |= {int(k) for sign in (1, -1) for k in np.argmax(sign * points, axis=0)}
+            kept = points[sorted(corners)[:MOST]]
+            gap = float(((ways @ points.T).max(axis=1) - (ways @ kept.T).max(axis=1)).max())
+            reason = f"{len(kept)} of {len(points)} corners; up to {1000 * gap:.2g} mm smaller"
+            self.tell("geom mesh (hull)", APPROXIMATED, reason, [where])
+            points = kept
+        corners_, frame = principal(points)
+        first = model.mesh_faceadr[mesh]
+        faces = vertices[model.mesh_face[first : first + model.mesh_facenum[mesh]]]
+        volume = abs(float(np.linalg.det(faces - vertices.mean(axis=0)).sum()) / 6)
+        hull = ConvexMesh("hull", corners_, Pose()).volume
+        if hull > CONCAVE * volume:
+            reason = (
+                f"it is concave: its hull has {hull / max(volume, 1e-12):.3g} times its volume; "
+                "MuJoCo collides the hull, too; coacd splits a mesh into convex ones"
             )
-        own = np.unique(
-            np.column_stack([self.model.geom_contype, self.model.geom_conaffinity])[self.colliding],
-            axis=0,
+            self.tell("geom mesh (concave)", APPROXIMATED, reason, [where])
+        return corners_, frame
+
+    def inertial(self, root: int) -> tuple[float, FloatArray, FloatArray]:
+        """Mass [kg], centre of mass [m] and tensor of inertia about it [kg m^2] of a body and all
+        that is fixed on it, in its frame."""
+        model, data = self.model, self.data
+        own = [b for b in range(1, model.nbody) if self._root(b) == root]
+        masses, turn = model.body_mass[own], data.xmat[root].reshape(3, 3)
+        centres = (data.xipos[own] - data.xpos[root]) @ turn
+        mass = float(masses.sum())
+        centre = masses @ centres / mass
+        tensor = np.zeros((3, 3))
+        for body, m, away in zip(own, masses, centres - centre, strict=True):
+            axes = turn.T @ data.ximat[body].reshape(3, 3)
+            tensor += axes @ np.diag(model.body_inertia[body]) @ axes.T
+            tensor += m * (away @ away * np.eye(3) - np.outer(away, away))
+        return mass, centre, tensor
+
+    def _damped(self, body: Body, root: int, centre: FloatArray) -> Body:
+        """With the damping of its free joint."""
+        first = int(self.model.body_dofadr[root])
+        damping = float(self.model.dof_damping[first])
+        if not damping:
+            return body
+        moments = body.inertia()
+        mean = float(moments.mean())
+        off = float(np.abs(mean / moments - 1).max())
+        away = 1000 * float(np.linalg.norm(centre))
+        reason = (
+            f"{damping:g} is {damping / body.mass:.4g} /s of linear and {damping / mean:.4g} /s of "
+            f"angular velocity (of single axes up to {off:.0%} off: the mean moment is taken); in "
+            f"the file it acts {away:.2g} mm from the centre of mass"
         )
-        if not all((a[0] & b[1]) or (b[0] & a[1]) for a in own for b in own):
-            reason = "all bodies touch each other and the ground here"
-            self._add("geom contype, conaffinity", "not carried", reason)
+        self.tell("joint damping (free)", APPROXIMATED, reason, [body.name])
+        return body.changed(linear_damping=damping / body.mass, angular_damping=damping / mean)
 
-    def _add(self, quantity: str, state: Any, reason: str, where: str = "") -> None:
-        names = (where,) if where else ()
-        for k, row in enumerate(self.account):
-            if (row.quantity, row.reason) == (quantity, reason):
-                self.account[k] = Carried(quantity, state, reason, (*row.where, *names))
-                return
-        self.account.append(Carried(quantity, state, reason, names))
-
-    def _body_name(self, body: int) -> str:
-        return self.model.body(body).name or f"body{body}"
-
-    def _geom_name(self, geom: int) -> str:
-        return self.model.geom(geom).name or f"geom{geom}"
-
-
-def _told(spec: Any) -> list[Carried]:
-    """Rows for what elements have beside MuJoCo's defaults, and for lists of other elements."""
-    fresh = mujoco.MjSpec()
-    body = fresh.worldbody.add_body()
-    rows: dict[str, list[str]] = {}
-    for kind, elements, usual in (
-        ("geom", spec.geoms, body.add_geom()),
-        ("body", [b for b in spec.bodies if b.name != "world"], body),
-        ("joint", spec.joints, body.add_freejoint()),
-        ("option", [spec.option], fresh.option),
-    ):
-        known = COMPILED[kind] | NO_PHYSICS[kind]
-        names = [n for n in dir(usual) if not n.startswith("_") and n not in known]
-        for element in elements:
-            for name in names:
-                own, default = getattr(element, name), getattr(usual, name)
-                if not callable(own) and not _same(own, default):
-                    rows.setdefault(f"{kind} {name}", []).append(_name(element, kind))
-    told = [
-        Carried(
-            what,
-            "not carried",
-            REASONS.get(what, ENGINE),
-            tuple(dict.fromkeys(filter(None, where))),
+    def _place(self, placed: list[Placed]) -> None:
+        """Put the bodies where they are, above the ground, into a scene."""
+        model, data = self.model, self.data
+        moved = [
+            replace(p, body=p.body.moved_to(_pose(data.xpos[p.root], data.xquat[p.root]) * p.frame))
+            for p in placed
+        ]
+        down = np.array([[0.0, 0.0, -1.0]])
+        if self.ground is not None:
+            self.lift = -float(data.geom_xpos[self.ground, 2])
+            friction = float(model.geom_friction[self.ground, 0])
+        else:
+            lowest = [-float(p.body.reach_placed(down)[0]) for p in moved if p.root]
+            self.lift = max(0.0, -min(lowest, default=0.0))
+            friction = max((p.body.friction for p in placed), default=1.0)
+            reason = "the file has none; a level ground at z = 0 is there in addition"
+            self.tell("geom plane", APPROXIMATED, reason)
+        if self.lift:
+            reason = f"all is moved up by {self.lift:g} m, so that the ground is at z = 0"
+            self.tell("height", APPROXIMATED, reason)
+        self.placed = [
+            replace(p, body=p.body.moved_to(p.body.pose.translated(z=self.lift))) for p in moved
+        ]
+        free = [p.body.pose.position for p in self.placed if p.root]
+        room = np.maximum(ROOM, 2 * np.abs(free).max(axis=0, initial=0.0) if free else 0.0)
+        off = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
+        self.scene = Scene(
+            Path(self.path).stem.strip(" .") or "scene",
+            tuple(p.body for p in self.placed),
+            gravity=(0.0, 0.0, 0.0) if off else _triple(model.opt.gravity),
+            ground_friction=friction,
+            room=_triple(room),
+            file=self.path,
         )
-        for what, where in rows.items()
-    ]
-    for name, reason in LISTS.items():
-        found = list(getattr(spec, name, ()))
-        if found and name not in LOOKS:
-            where = tuple(_name(item, name) for item in found)
-            told.append(Carried(name, "not carried", reason, where))
-    return told
+
+    # The account
+
+    def _tell_shapes(self) -> None:
+        model, bodies = self.model, [p.body for p in self.placed]
+        self.tell("body mass, inertia, pos, quat", CARRIED, "as compiled, in full digits")
+        self.tell("geom type, size, pos, quat", CARRIED, f"{len(self.solid)} shapes that collide")
+        self.tell("option gravity", CARRIED, f"{_values(np.array([self.scene.gravity]))} m/s^2")
+        self.tell(
+            "geom friction (sliding)",
+            CARRIED,
+            f"{_values(np.array([b.friction for b in bodies]))}; of two surfaces the larger counts",
+        )
+        seen = [
+            g for g in range(model.ngeom) if not (model.geom_contype | model.geom_conaffinity)[g]
+        ]
+        if seen:
+            names = (self.name("geom", geom) for geom in seen)
+            self.tell("geom (visual)", NOT_CARRIED, "it cannot collide; its mass counts", names)
+        fixed = [g for g in [*self.solid, self.ground] if g is not None]
+        masks = {(int(model.geom_contype[g]), int(model.geom_conaffinity[g])) for g in fixed}
+        moving = {
+            (int(model.geom_contype[g]), int(model.geom_conaffinity[g]))
+            for p in self.placed if p.root for g in p.geoms
+        }  # fmt: skip
+        if any(not (a[0] & b[1] or a[1] & b[0]) for a in moving for b in masks):
+            self.tell(
+                "geom contype, conaffinity",
+                NOT_CARRIED,
+                "some pairs do not collide in the file; here all bodies collide with each other: "
+                f"{_values(np.array(sorted(masks)))}",
+            )
+
+    def _tell_options(self) -> None:
+        option, plain = self.model.opt, mujoco.MjModel.from_xml_string(PLAIN).opt
+        told = {name: _values(np.array([getattr(option, name)])) for name in SOLVER}
+        self.tell(
+            "option " + ", ".join(SOLVER),
+            NOT_CARRIED,
+            "each engine has the options of its profile; in the file: "
+            + ", ".join(f"{name} {value}" for name, value in told.items()),
+        )
+        for name in dir(plain):
+            if name.startswith("_") or name in (*SOLVER, "gravity"):
+                continue
+            value = np.array([getattr(option, name)])
+            if not np.array_equal(value, [getattr(plain, name)]):
+                reason = OPTIONS.get(name, "each engine has the options of its profile")
+                self.tell(f"option {name}", NOT_CARRIED, f"{reason}; in the file: {_values(value)}")
+
+    def _tell_fields(self) -> None:
+        """What a plain ball on a free joint has not."""
+        model, plain = self.model, mujoco.MjModel.from_xml_string(PLAIN)
+        roots = [p.root for p in self.placed if p.root]
+        geoms = self.solid if self.ground is None else [*self.solid, self.ground]
+        joints = [int(model.body_jntadr[root]) for root in roots]
+        dofs = [int(model.body_dofadr[root]) + k for root in roots for k in range(6)]
+        rows = {"geom": geoms, "body": [*range(1, model.nbody)], "jnt": joints, "dof": dofs}
+        for kind, numbers in rows.items():
+            for field in dir(plain) if numbers else ():
+                if not field.startswith(f"{kind}_") or field in DERIVED:
+                    continue
+                found = np.asarray(getattr(model, field))[numbers]
+                usual = np.asarray(getattr(plain, field))[-1]
+                if field == "geom_friction":
+                    found, usual = found[:, 1:], usual[1:]
+                quantity, reason, always = TOLD.get(
+                    field, (field.replace("_", " ", 1), "no scene holds it", False)
+                )
+                odd = np.any(np.reshape(found != usual, (len(found), -1)), axis=1)
+                if odd.any() or always:
+                    own = [n for n, differs in zip(numbers, odd, strict=True) if differs]
+                    names = self._owners(kind, own)
+                    self.tell(quantity, NOT_CARRIED, f"{reason}; {_values(found)}", names)
+
+    def _owners(self, kind: str, numbers: list[int]) -> list[str]:
+        if kind == "dof":
+            numbers = sorted({int(self.model.dof_jntid[number]) for number in numbers})
+        return [self.name("joint" if kind in ("dof", "jnt") else kind, n) for n in numbers]
+
+    def _tell_objects(self) -> None:
+        for count, (kind, reason) in OBJECTS.items():
+            number = int(getattr(self.model, count, 0))
+            if number:
+                names = [
+                    getattr(self.model, kind)(k).name if hasattr(self.model, kind) else ""
+                    for k in range(number)
+                ]
+                where = [name or f"{kind} {k}" for k, name in enumerate(names)]
+                self.tell(kind, NOT_CARRIED, reason, where)
 
 
-def _name(element: Any, kind: str) -> str:
-    """Its own, or whose it is."""
-    if kind == "option":
-        return ""
-    parent = getattr(getattr(element, "parent", None), "name", "")
-    return element.name or (f"a {kind} of {parent}" if parent else f"a {kind}")
+def _pose(place: Any, quaternion: Any) -> Pose:
+    return Pose.from_array([*place, *np.divide(quaternion, np.linalg.norm(quaternion))])
 
 
-def _same(a: Any, b: Any) -> bool:
-    """Whether two attributes of elements are equal."""
-    if isinstance(a, float | np.ndarray):
-        return bool(np.array_equal(a, b, equal_nan=True))
-    if hasattr(a, "active"):  # a plug-in
-        return bool(a.active == b.active)
-    return bool(a == b)
+def _quaternion(matrix: FloatArray) -> FloatArray:
+    found = np.empty(4)
+    mujoco.mju_mat2Quat(found, np.ravel(matrix))
+    return found
 
 
-def _pose(position: Any, matrix: Any) -> Pose:
-    quaternion = np.empty(4)
-    mujoco.mju_mat2Quat(quaternion, np.ravel(matrix))
-    return Pose.from_array([*position, *quaternion])
+def _triple(values: Any) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in values)
+    return (x, y, z)
 
 
-def _one_line(error: ValueError) -> str:
-    return " ".join(str(error).split())
+def _directions(count: int) -> FloatArray:
+    """Unit vectors, spread evenly over all directions (a spiral), (count, 3)."""
+    z = 1 - (2 * np.arange(count) + 1) / count
+    angle, flat = np.pi * (3 - np.sqrt(5)) * np.arange(count), np.sqrt(1 - z**2)
+    return np.stack([flat * np.cos(angle), flat * np.sin(angle), z], axis=1)
+
+
+def _values(values: FloatArray) -> str:
+    """The different rows that there are, the first few of many."""
+    rows = np.unique(np.reshape(values, (len(values), -1)), axis=0)
+    return named(" ".join(f"{value:.7g}" for value in row.tolist()) for row in rows)

@@ -35,6 +35,17 @@ class MuJoCoSettings(Settings):
     noslip_iterations: int = 0
 
 
+@dataclass(frozen=True)
+class FileSettings(Settings):
+    """The scene's own file, with its own options.
+
+    Attributes:
+        timestep: replaces the file's [s].
+    """
+
+    timestep: float = 0.002
+
+
 TUNED = MuJoCoSettings(
     timestep=0.001,
     cone="elliptic",
@@ -47,6 +58,7 @@ PROFILES: Mapping[str, Settings] = {
     "default": MuJoCoSettings(),
     "tuned": TUNED,
     "real": replace(TUNED, solref=(0.004, 2.0)),
+    "file": FileSettings(),
 }
 
 CHOSEN_ON = chosen_on(Seen.seeds("throwing", 1, 1), Seen.seeds("stacking", 1, 1))

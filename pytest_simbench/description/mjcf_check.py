@@ -1,0 +1,92 @@
+"""Whether somebody's MJCF file may be given to a parser: no entities, no files out of its
+folder, no more than a worker can hold."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+from pytest_simbench.description.urdf_check import read_xml
+from pytest_simbench.ground.errors import DescriptionError
+
+MOST = {"body": 2000, "geom": 20_000}
+"""Elements of a scene."""
+
+FOLDERS = {"mesh": "meshdir", "hfield": "meshdir", "skin": "meshdir", "texture": "texturedir"}
+"""Elements that name a file, and what names its folder."""
+
+
+def check_mjcf(path: str) -> None:
+    """Look at a file and all that it includes.
+
+    Raises:
+        DescriptionError: one sentence with the file and the line.
+    """
+    main = Path(path)
+    root = main.parent.resolve()
+    lines: dict[ET.Element, tuple[Path, int]] = {}
+    elements = _included(main, root, (), lines)
+    folders: dict[str, str] = {}
+    count = dict.fromkeys(MOST, 0)
+    for element in elements:
+        if element.tag == "compiler":
+            assets = element.get("assetdir")
+            for folder in FOLDERS.values():
+                told = element.get(folder, assets)
+                if told is not None:
+                    folders[folder] = told
+        if element.tag in count:
+            count[element.tag] += 1
+            if count[element.tag] > MOST[element.tag]:
+                raise DescriptionError(
+                    f"{path} has more than {MOST[element.tag]} elements <{element.tag}>; read a "
+                    "smaller scene"
+                )
+    for element in elements:
+        folder = folders.get(FOLDERS.get(element.tag, ""), "")
+        for key in ("file", "content"):
+            if element.tag in FOLDERS and element.get(key):
+                _inside(str(Path(folder) / element.get(key, "")), root, lines[element])
+
+
+def _included(
+    path: Path,
+    root: Path,
+    above: tuple[Path, ...],
+    lines: dict[ET.Element, tuple[Path, int]],
+) -> list[ET.Element]:
+    """All elements of a file and of those that it includes, in order."""
+    own: dict[ET.Element, int] = {}
+    xml = read_xml(str(path), "the scene", own)
+    if xml.tag not in ("mujoco", "mujocoinclude"):
+        raise DescriptionError(f"{path} is no MJCF: it holds <{xml.tag}>, not the root of one")
+    lines.update({element: (path, line) for element, line in own.items()})
+    found: list[ET.Element] = []
+    for element in xml.iter():
+        if element.tag != "include":
+            found.append(element)
+            continue
+        other = _inside(element.get("file", ""), root, lines[element])
+        if other in (*above, path.resolve()):
+            raise DescriptionError(
+                f"{path}, line {own[element]}: <include> of {other.name} runs in a circle"
+            )
+        if len(lines) > 5 * MOST["geom"]:
+            raise DescriptionError(f"{path}, line {own[element]}: too much is included")
+        found += _included(other, root, (*above, path.resolve()), lines)
+    return found
+
+
+def _inside(name: str, root: Path, at: tuple[Path, int]) -> Path:
+    """A file that one in the folder `root` names, which lies below that folder."""
+    where = f"{at[0]}, line {at[1]}: the file {name!r:.200}"
+    try:
+        path = (root / name).resolve()
+        there = path.is_file()
+    except (OSError, ValueError, RuntimeError):
+        raise DescriptionError(f"{where} is no path") from None
+    if not path.is_relative_to(root):
+        raise DescriptionError(f"{where} lies out of the scene's folder {root}; put it there")
+    if not there:
+        raise DescriptionError(f"{where} is not there")
+    return path

@@ -1,0 +1,167 @@
+"""The profile `file`: MuJoCo's own model of the scene's file, told in the frames of the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.description.carried import CARRIED
+from pytest_simbench.scene import Compound, FloatArray, Pose, Scene
+from pytest_simbench.scene.overlap import rotations
+from pytest_simbench.scene.pose import quaternion_product
+from pytest_simbench.simulator import Deviation, NotSupportedError, lazy_import
+
+from .readback import Numbers, ReadBack, contact_forces
+from .reading import Reading
+
+mujoco = lazy_import("mujoco")
+
+EXCUSED = {
+    "geom plane": "ground/* body/*/touches",
+    "geom friction (sliding)": "body/*/friction",
+    "geom solref": "body/*/restitution ground/restitution",
+    "geom margin": "body/*/margin",
+    "geom mesh (hull)": "body/*/meshes",
+    "geom contype, conaffinity": "body/*/touches",
+    "exclude": "body/*/touches",
+    "pair": "body/*/friction ground/friction",
+    "body gravcomp": "body/*/gravity",
+    "joint damping (free)": "body/*/damping",
+    "option density": "body/*/damping",
+    "option viscosity": "body/*/damping",
+    "option wind": "body/*/damping",
+    "option disableflags": "body/*/touches",
+}
+"""Quantities in which the file may differ from its scene, by those of the account."""
+
+
+class OwnFile:
+    """The model of a scene's file, with the scene's bodies at their places.
+
+    Args:
+        scene: that was read from a file, its bodies perhaps moved.
+        timestep: that replaces the file's [s].
+
+    Raises:
+        NotSupportedError: the scene is of no file, or has other bodies than its file.
+        DescriptionError: as `Reading`.
+    """
+
+    def __init__(self, scene: Scene, timestep: float) -> None:
+        if not scene.file:
+            raise NotSupportedError(
+                f"scene {scene.name!r} was read from no file, and the profile `file` loads files; "
+                "choose another profile"
+            )
+        self.reading = reading = Reading(scene.file)
+        names = {body.name for body in scene.bodies}
+        fixed = {body.name: body.fixed for body in scene.bodies}
+        if scene.robot or fixed != {body.name: body.fixed for body in reading.scene.bodies}:
+            raise NotSupportedError(
+                f"scene {scene.name!r} has other bodies than its file {scene.file}, which the "
+                "profile `file` loads; choose another profile"
+            )
+        self.model, self.data = reading.model, mujoco.MjData(reading.model)
+        self.model.opt.timestep = timestep
+        self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        self.placed = {p.body.name: p for p in reading.placed if p.body.name in names}
+        for body in scene.free_bodies:
+            if isinstance(body, Compound):  # the frame of the release that read the file
+                frame = body.file_frame.inverse()
+                self.placed[body.name] = replace(self.placed[body.name], frame=frame)
+        free = [self.placed[body.name] for body in scene.free_bodies]
+        self.roots = np.array([p.root for p in free], dtype=int)
+        joints = self.model.body_jntadr[self.roots]
+        self._q = self.model.jnt_qposadr[joints][:, None] + np.arange(7)
+        self._v = self.model.jnt_dofadr[joints][:, None] + np.arange(3)
+        self._centres = np.array([p.frame.position for p in free]).reshape(-1, 3)
+        self._turns = [p.frame.quaternion for p in free]
+        for k, (body, placed) in enumerate(zip(scene.free_bodies, free, strict=True)):
+            root = body.pose.translated(z=-reading.lift) * placed.frame.inverse()
+            self.data.qpos[self._q[k]] = root.as_array()
+            turn, spin = root.rotation(), np.asarray(body.angular_velocity)
+            away = np.cross(spin, turn @ self._centres[k])
+            self.data.qvel[self._v[k]] = body.linear_velocity - away
+            self.data.qvel[self._v[k] + 3] = turn.T @ spin
+        mujoco.mj_forward(self.model, self.data)
+
+    def deviations(self) -> tuple[Deviation, ...]:
+        """In what the file may differ from the scene, as the account has it."""
+        lines = [line for line in self.reading.account if line.state != CARRIED]
+        return tuple(
+            Deviation(EXCUSED[line.quantity], f"as the file has it: {line.reason}", only="file")
+            for line in lines
+            if line.quantity in EXCUSED
+        )
+
+    def body_state(self) -> FloatArray:
+        """As `Simulator.body_state`."""
+        state = np.empty((len(self.roots), 13))
+        root = self.data.qpos[self._q]
+        turns = rotations(root[:, 3:])
+        arms = np.einsum("nij,nj->ni", turns, self._centres)
+        state[:, :3] = root[:, :3] + arms
+        state[:, 2] += self.reading.lift
+        for row, quaternion, own in zip(state, root[:, 3:], self._turns, strict=True):
+            row[3:7] = quaternion_product(quaternion, own)
+        spins = np.einsum("nij,nj->ni", turns, self.data.qvel[self._v + 3])
+        state[:, 7:10] = self.data.qvel[self._v] + np.cross(spins, arms)
+        state[:, 10:] = spins
+        return state
+
+    def numbers(self) -> Numbers:
+        ground = self.reading.ground
+        boxes = {name: p.geoms for name, p in self.placed.items()}
+        return Numbers(-1 if ground is None else ground, boxes, {}, {})
+
+    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        """As `Simulator.contact_forces`; about the scene's origin."""
+        arm = np.array([0.0, 0.0, self.reading.lift])
+        for first, second, wrench in contact_forces(self.model, self.data, self.numbers()):
+            yield first, second, wrench + np.concatenate([np.zeros(3), np.cross(arm, wrench[:3])])
+
+
+class FileReadBack(ReadBack):
+    """Reads the quantities of a scene from its file's model."""
+
+    def __init__(self, simulator: Any, own: OwnFile) -> None:
+        super().__init__(simulator, own.model, own.data, own.numbers())
+        self.own = own
+
+    def world(self) -> dict[str, Any]:
+        found = super().world()
+        if self.own.reading.ground is None:
+            return {name: value for name, value in found.items() if "ground/" not in name}
+        found["ground/height"] += self.own.reading.lift
+        return found
+
+    def body(self, prefix: str, name: str) -> dict[str, Any]:
+        found = super().body(prefix, name)
+        found[f"{prefix}/pose"][2] += self.own.reading.lift
+        return found
+
+    def _placed(self, name: str) -> tuple[int, FloatArray, FloatArray]:
+        placed = self.own.placed[name]
+        root = Pose.from_array([*self.data.xpos[placed.root], *self.data.xquat[placed.root]])
+        frame = root * placed.frame
+        return placed.root, np.asarray(frame.position), frame.rotation()
+
+    def _inertial(
+        self, prefix: str, body: int, place: FloatArray, turn: FloatArray
+    ) -> dict[str, Any]:
+        """Of the body and all that is fixed on it."""
+        found = super()._inertial(prefix, body, place, turn)
+        mass, centre, tensor = self.own.reading.inertial(body)
+        axes = turn.T @ self.data.xmat[body].reshape(3, 3)
+        away = self.data.xpos[body] - place
+        return found | {
+            f"{prefix}/mass": mass,
+            f"{prefix}/com": axes @ centre + turn.T @ away,
+            f"{prefix}/inertia": axes @ tensor @ axes.T,
+        }
+
+    def _geoms(self, name: str) -> list[int]:
+        return [] if name == "ground" and self.at.ground < 0 else super()._geoms(name)
