@@ -70,6 +70,7 @@ class Reading:
 
     Args:
         path: absolute.
+        spec: what the file says; None: it is read.
 
     Attributes:
         model, data: compiled, at its start.
@@ -83,11 +84,11 @@ class Reading:
         DescriptionError: one sentence.
     """
 
-    def __init__(self, path: str) -> None:
+    def __init__(self, path: str, spec: Any = None) -> None:
         self.path = path
         self.account: list[Carried] = []
         try:
-            self.model = model = mujoco.MjSpec.from_file(path).compile()
+            self.model = model = (spec or mujoco.MjSpec.from_file(path)).compile()
         except (ValueError, RuntimeError, OSError) as error:
             raise DescriptionError(f"{path}: {' '.join(str(error).split())}") from None
         self.data = data = mujoco.MjData(model)

@@ -1,0 +1,355 @@
+"""MuJoCo's files as scenes: nothing is dropped in silence, and what is carried is the same world."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+mujoco = pytest.importorskip("mujoco")
+
+from pytest_simbench.sims.mujoco.adapter import MuJoCo  # noqa: E402
+from pytest_simbench.sims.mujoco.reading import Reading  # noqa: E402
+
+from pytest_simbench.parity.compare import compare  # noqa: E402
+from pytest_simbench.parity.quantities import expected_quantities  # noqa: E402
+from pytest_simbench.scene import Box, Compound, ConvexMesh, Pose, Scene, Sphere  # noqa: E402
+from pytest_simbench.simulator import DescriptionError, NotSupportedError  # noqa: E402
+from pytest_simbench.simulator.settings import changed  # noqa: E402
+
+SMALL = """
+<mujoco model="small">
+  <option timestep="0.001" integrator="implicitfast"/>
+  <default><geom solref="0.02 1"/></default>
+  <asset><mesh name="wedge" vertex="0 0 0  .1 0 0  0 .1 0  .1 .1 0  0 0 .06  0 .1 .06"/></asset>
+  <worldbody>
+    <geom name="floor" type="plane" size="1 1 .1" friction=".7"/>
+    <body name="post" pos="1 0 .2"><geom type="cylinder" size=".05 .2"/></body>
+    <body name="box" pos="0 0 .3" euler="10 20 30">
+      <freejoint name="f"/><geom name="g" type="box" size=".05 .04 .03" friction=".6"/>
+    </body>
+    <body name="ball" pos="0 .4 .3"><freejoint/><geom size=".05"/></body>
+    <body name="rock" pos="0 .8 .3"><freejoint/><geom type="mesh" mesh="wedge"/></body>
+    <body name="tool" pos="0 -.4 .5" euler="40 0 0">
+      <freejoint/><geom type="box" size=".1 .02 .02"/>
+      <geom type="capsule" size=".02 .05" pos=".1 0 .03" density="3000"/>
+      <body pos="-.1 0 .04"><geom type="sphere" size=".03"/></body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+"""A ground, a fixed body, and free ones: of one shape each, a mesh, and of three shapes."""
+
+Read = tuple[Scene, list[Any]]
+
+
+def read(path: Path, text: str = SMALL) -> Reading:
+    path = path / "scene.xml"
+    path.write_text(text)
+    return Reading(str(path))
+
+
+def test_each_body_is_the_simplest_that_it_can_be(tmp_path: Path) -> None:
+    scene = read(tmp_path).scene
+    kinds = {body.name: type(body) for body in scene.bodies}
+    assert [kinds[name] for name in ("box", "ball", "rock", "tool")] == [
+        Box, Sphere, ConvexMesh, Compound,
+    ]  # fmt: skip
+    assert scene.body("post").fixed and scene.ground_friction == 0.7
+    assert scene.body("box").friction == 0.6 and scene.body("box").moments is None
+
+
+@pytest.mark.parametrize("profile", ["default", "file"])
+def test_masses_and_the_accelerations_of_a_step_are_those_of_the_file(
+    tmp_path: Path, profile: str
+) -> None:
+    """In the air under a wrench, where all was carried."""
+    reading = read(tmp_path)
+    scene = reading.scene
+    settings = changed(MuJoCo.profiles[profile], {"timestep": 0.001}, "mujoco")
+    simulator = MuJoCo(settings)
+    simulator.load(scene)
+    for body in scene.free_bodies:
+        assert body.mass == pytest.approx(float(reading.model.body(body.name).subtreemass[0]))
+    rows = np.zeros((len(scene.free_bodies), 6))
+    rows[:, 3:] = 0.01, 0.02, 0.03
+    simulator.push(rows)
+    simulator.step()
+    state = simulator.body_state()
+    for body, row in zip(scene.free_bodies, state, strict=True):
+        turn = body.pose.rotation()
+        spin = turn @ (turn.T @ (0.01, 0.02, 0.03) / body.inertia()) * 0.001
+        assert row[7:10] == pytest.approx([0, 0, -9.81e-3], rel=1e-6, abs=1e-9)
+        if body.name != "tool" or profile == "default":  # a force acts on the root's own centre
+            assert row[10:] == pytest.approx(spin, rel=1e-3)
+    simulator.close()
+
+
+def test_file_and_carried_scene_accelerate_alike_in_contact(tmp_path: Path) -> None:
+    """A box, a ball and a compound on the plane, all of it carried: 1e-6 in accelerations."""
+    text = SMALL.replace("0 0 .3", "0 0 .03").replace(' euler="10 20 30"', "")
+    text = text.replace("0 .4 .3", "0 .4 .05").replace("0 -.4 .5", "0 -.4 .0199")
+    text = text.replace(' euler="40 0 0"', "").replace('pos="-.1 0 .04"', 'pos="-.1 0 .011"')
+    text = text.replace('friction=".7"', "").replace("0 .8 .3", "0 .8 .0")
+    reading = read(tmp_path, text)
+    found = {}
+    for profile in ("default", "file"):
+        settings = changed(MuJoCo.profiles[profile], {"timestep": 0.001}, "mujoco")
+        simulator = MuJoCo(settings)
+        simulator.load(reading.scene)
+        before = simulator.body_state()[:, 7:]
+        simulator.step()
+        found[profile] = (simulator.body_state()[:, 7:] - before) / 0.001
+        assert simulator.contact_count() > 0
+        simulator.close()
+    assert found["file"] == pytest.approx(found["default"], rel=1e-6, abs=1e-5)
+
+
+@pytest.mark.parametrize("profile", ["default", "tuned", "file"])
+def test_the_scene_passes_parity(tmp_path: Path, profile: str) -> None:
+    check_parity(read(tmp_path).scene, profile)
+
+
+def test_a_scene_without_a_ground_below_zero_is_moved_up(tmp_path: Path) -> None:
+    text = SMALL.replace('<geom name="floor" type="plane"', '<geom name="floor" type="box"')
+    reading = read(tmp_path, text.replace("0 .4 .3", "0 .4 -.3").replace("1 1 .1", "1 1 .01"))
+    assert reading.lift == pytest.approx(0.35)
+    assert {"geom plane", "height"} <= {line.quantity for line in reading.account}
+    check_parity(reading.scene, "file")
+
+
+def test_a_raised_ground_moves_the_scene(tmp_path: Path) -> None:
+    text = SMALL.replace('type="plane"', 'type="plane" pos="0 0 -.2"')
+    reading = read(tmp_path, text)
+    assert reading.lift == pytest.approx(0.2)
+    assert reading.scene.body("ball").pose.position == pytest.approx((0, 0.4, 0.5))
+    check_parity(reading.scene, "file")
+
+
+def check_parity(scene: Scene, profile: str) -> None:
+    simulator = MuJoCo(MuJoCo.profiles[profile])
+    simulator.load(scene)
+    declared = [d for d in simulator.info.deviations if d.concerns(scene)]
+    expected = expected_quantities(scene, simulator.settings)
+    assert not compare(expected, simulator.read_back(), declared, "mujoco").wrong
+    poses = [body.pose.as_array() for body in scene.free_bodies]
+    state = simulator.body_state()
+    assert state[:, :3] == pytest.approx(np.array(poses)[:, :3])
+    simulator.close()
+
+
+def test_the_file_starts_where_the_scene_has_its_bodies(tmp_path: Path) -> None:
+    scene = read(tmp_path).scene.with_pose("tool", Pose.at(0.5, 0.5, 0.7, yaw=1.0))
+    check_parity(scene, "file")
+
+
+@pytest.mark.parametrize("scene", [Scene("none"), Scene("other", file="x.xml")])
+def test_the_profile_file_needs_a_file(scene: Scene) -> None:
+    with pytest.raises((NotSupportedError, DescriptionError), match="file|x.xml"):
+        MuJoCo(MuJoCo.profiles["file"]).load(scene)
+
+
+REFUSED = {
+    "joints that are not free .hinge 1.": ('<freejoint name="f"/>', '<joint name="hinge 1"/>'),
+    "no shape that collides: box": ('name="g"', 'contype="0" conaffinity="0"'),
+    "is not level": ('type="plane"', 'type="plane" euler="10 0 0"'),
+    "type ellipsoid": ('type="box" size=".05 .04', 'type="ellipsoid" size=".05 .04'),
+    "overlap": ("0 .4 .3", "0 .02 .3"),
+    "(?i)mass and inertia.*line": ('name="g"', 'mass="0"'),
+    "XML parse error": ("</mujoco>", ""),
+}
+
+
+@pytest.mark.parametrize(("why", "change"), REFUSED.items())
+def test_what_no_scene_holds_is_refused_in_one_sentence(
+    tmp_path: Path, why: str, change: tuple[str, str]
+) -> None:
+    text = SMALL.replace(*change)
+    assert text != SMALL
+    with pytest.raises(DescriptionError, match=why) as error:
+        read(tmp_path, text)
+    assert "scene.xml: " in str(error.value) and "\n" not in str(error.value)
+
+
+CONCAVE = SMALL.replace(
+    "</asset>",
+    '<mesh name="notch" vertex="0 0 0 .1 0 0 .1 .1 0 0 .1 0 .05 .05 .02 .05 .05 .1" face="'
+    '0 4 1 1 4 2 2 4 3 3 4 0 0 1 5 1 2 5 2 3 5 3 0 5"/></asset>',
+).replace('mesh="wedge"', 'mesh="notch"')
+
+TOLD = {
+    "geom mesh (concave)": CONCAVE,
+    "actuator": SMALL.replace(
+        "</worldbody>", '</worldbody><actuator><motor joint="f"/></actuator>'
+    ),
+    "equality": SMALL.replace(
+        "</worldbody>",
+        '</worldbody><equality><weld body1="box" body2="ball"/></equality>',
+    ),
+    "exclude": SMALL.replace(
+        "</worldbody>",
+        '</worldbody><contact><exclude body1="box" body2="ball"/></contact>',
+    ),
+    "key": SMALL.replace("</worldbody>", '</worldbody><keyframe><key name="k"/></keyframe>'),
+    "geom contype, conaffinity": SMALL.replace('name="g"', 'contype="2" conaffinity="4"'),
+    "geom (visual)": SMALL.replace(
+        '<geom name="g"', '<geom type="sphere" size=".1" contype="0" conaffinity="0"/><geom'
+    ),
+    "geom friction (sliding)": SMALL.replace('density="3000"', 'friction=".2"'),
+    "body name": SMALL.replace('name="ball"', 'name="my/ball"'),
+}
+
+
+@pytest.mark.parametrize(("quantity", "text"), TOLD.items())
+def test_what_is_not_carried_is_told(tmp_path: Path, quantity: str, text: str) -> None:
+    told = {line.quantity for line in read(tmp_path, text).account if line.state != "carried"}
+    before = {line.quantity for line in read(tmp_path).account if line.state != "carried"}
+    assert quantity in told - before
+
+
+NO_PHYSICS = {
+    "geom": "alt castshadow classname compiler frame group id info material name parent plugin "
+    "rgba signature userdata hfieldname set_frame",
+    "body": "alt childclass classname compiler default frame frames id info name parent plugin "
+    "signature simple userdata ialt sleep fuse first_body",
+    "joint": "alt axis classname compiler frame group id info name parent signature userdata pos "
+    "range ref margin limited solref_limit solimp_limit springref springdamper actfrclimited "
+    "actfrcrange actgravcomp align springyield",
+    "option": "apirate",
+    "mesh": "classname compiler content_type file id info material name plugin signature "
+    "smoothnormal usernormal usertexcoord userfacetexcoord userfacenormal needsdf octree_maxdepth "
+    "userface usernode usertet",
+}
+"""Attributes that are no physics, that MuJoCo's free joints do not heed, or that only say how the
+text of the file is to be read; lists of children and objects."""
+
+VALUES: dict[str, Any] = {
+    "geom.type": 3, "geom.fromto": None, "geom.meshname": None, "geom.condim": 4,
+    "geom.contype": 2, "geom.conaffinity": 2, "geom.typeinertia": 1, "geom.mass": 3.0,
+    "geom.fluid_ellipsoid": 1.0, "geom.fluid_coefs": None, "geom.fitscale": None,
+    "geom.solmix": 2.0, "geom.solref": [0.05, 1.0], "geom.solimp": [0.8, 0.9, 0.01, 0.5, 2.0],
+    "body.explicitinertial": None, "body.fullinertia": None, "body.inertia": None,
+    "body.mass": None, "body.ipos": None, "body.iquat": None, "body.mocap": None,
+    "joint.type": None, "joint.solref_friction": None, "joint.solimp_friction": None,
+    "option.integrator": 1, "option.o_friction": None, "mesh.inertia": 2,
+    "option.disableflags": 1 << 4, "option.enableflags": 1, "mesh.maxhullvert": 4,
+    "mesh.uservert": None,
+}  # fmt: skip
+"""Values that are another one and allowed; None: it needs others with it, see `TOGETHER`."""
+
+TOGETHER: dict[str, Any] = {
+    "geom.fromto": lambda s: setattr_(s.geom("g"), fromto=[0, 0, 0, 0, 0, 0.2], type=3),
+    "geom.meshname": lambda s: setattr_(s.geom("g"), meshname="wedge", type=7),
+    "geom.fitscale": lambda s: setattr_(s.geom("g"), meshname="wedge", type=6, fitscale=0.5),
+    "geom.fluid_coefs": lambda s: setattr_(
+        s.geom("g"), fluid_ellipsoid=1.0, fluid_coefs=[0.1] * 5
+    ),
+    "body.mass": lambda s: inertial(s),
+    "body.inertia": lambda s: inertial(s, inertia=[0.02, 0.02, 0.03]),
+    "body.ipos": lambda s: inertial(s, ipos=[0.01, 0, 0]),
+    "body.iquat": lambda s: inertial(s, iquat=[0.8, 0.6, 0, 0], inertia=[0.02, 0.02, 0.03]),
+    "body.fullinertia": lambda s: setattr_(
+        s.body("box"), mass=1.0, ipos=[0, 0, 0], explicitinertial=True,
+        fullinertia=[0.01, 0.01, 0.01, 0.001, 0, 0],
+    ),
+    "joint.solref_friction": lambda s: setattr_(
+        s.joint("f"), frictionloss=0.1, solref_friction=[0.05, 1]
+    ),
+    "joint.solimp_friction": lambda s: setattr_(
+        s.joint("f"), frictionloss=0.1, solimp_friction=[0.8, 0.9, 0.01, 0.5, 2]
+    ),
+    "option.o_friction": lambda s: setattr_(s.option, o_friction=[0.5, 0.5, 0.1, 0.1, 0.1]),
+    "mesh.uservert": lambda s: setattr_(
+        s.mesh("wedge"), uservert=[0, 0, 0, 0.1, 0, 0, 0, 0.1, 0, 0, 0, 0.1]
+    ),
+    **{
+        f"compiler.{name}": (lambda s, n=name, v=value: setattr_(s.compiler, **{n: v}))
+        for name, value in {
+            "boundmass": 5.0, "boundinertia": 0.1, "settotalmass": 20.0, "inertiafromgeom": 1,
+            "inertiagrouprange": [3, 4],
+        }.items()
+    },
+}  # fmt: skip
+
+
+def setattr_(thing: Any, **values: Any) -> None:
+    for name, value in values.items():
+        setattr(thing, name, value)
+
+
+def inertial(spec: Any, **values: Any) -> None:
+    own = {"mass": 1.0, "ipos": [0, 0, 0], "inertia": [0.01] * 3, "explicitinertial": True}
+    setattr_(spec.body("box"), **own | values)
+
+
+def subject(spec: Any, kind: str) -> Any:
+    name = {"geom": "g", "body": "box", "joint": "f", "mesh": "wedge"}.get(kind)
+    return getattr(spec, kind) if name is None else getattr(spec, kind)(name)
+
+
+def attributes(kind: str) -> list[str]:
+    """Of an element, that hold a value and are physics."""
+    thing = subject(mujoco.MjSpec.from_string(SMALL), kind)
+    names = [name for name in dir(thing) if not name.startswith("_")]
+    plain = (bool, int, float, str, np.ndarray)
+    return [
+        name
+        for name in names
+        if name not in NO_PHYSICS[kind].split()
+        and not callable(getattr(thing, name))
+        and (isinstance(getattr(thing, name), plain) or hasattr(getattr(thing, name), "value"))
+    ]
+
+
+def another(value: Any) -> Any:
+    """Another value of an attribute."""
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, np.ndarray):
+        return value + np.linspace(0.1, 0.2, value.size).reshape(value.shape)
+    if isinstance(value, float):
+        return value * 1.5 + 0.01
+    return type(value)(int(value) + 1)
+
+
+CHANGES = [
+    f"{kind}.{name}" for kind in NO_PHYSICS for name in attributes(kind)
+    if VALUES.get(f"{kind}.{name}", 0) is not None
+] + list(TOGETHER)  # fmt: skip
+
+
+@pytest.mark.skipif(not hasattr(mujoco.MjSpec, "geom"), reason="of a release that names elements")
+@pytest.mark.parametrize("change", CHANGES)
+def test_nothing_is_dropped_in_silence(change: str) -> None:
+    """A physical attribute that is changed changes the scene or a line of its account."""
+    plain, spec = mujoco.MjSpec.from_string(SMALL), mujoco.MjSpec.from_string(SMALL)
+    if change in TOGETHER:
+        if change.partition(".")[2] in ("inertia", "ipos", "iquat"):
+            inertial(plain)
+        if change.startswith("joint.sol"):
+            setattr_(plain.joint("f"), frictionloss=0.1)
+        if change == "geom.fluid_coefs":
+            setattr_(plain.geom("g"), fluid_ellipsoid=1.0)
+        if change == "geom.fitscale":
+            setattr_(plain.geom("g"), meshname="wedge", type=6)
+        TOGETHER[change](spec)
+    else:
+        kind, _, name = change.partition(".")
+        thing = subject(spec, kind)
+        setattr(thing, name, VALUES.get(change, another(getattr(thing, name))))
+    before, after = Reading("a.xml", plain), Reading("a.xml", spec)
+    same = before.scene == after.scene and before.account == after.account
+    assert not same, f"{change} is dropped in silence"
+
+
+def test_the_bowl_reads_whole() -> None:
+    path = Path(os.environ.get("SIMBENCH_DATA", "")) / "libero_bowl" / "bowl_on_ramekin.xml"
+    if not path.is_file():
+        pytest.skip("the data set libero_bowl is not here ($SIMBENCH_DATA)")
+    scene = Reading(str(path)).scene
+    assert [len(body.parts) for body in scene.bodies] == [1, 25, 40]
+    check_parity(scene, "tuned")
+    check_parity(scene, "file")
