@@ -1,4 +1,4 @@
-"""MuJoCo's files as scenes: nothing is dropped in silence, and what is carried is the same world."""
+"""MuJoCo's files as scenes: nothing is dropped in silence, and what is carried is the same."""
 
 from __future__ import annotations
 
@@ -58,8 +58,10 @@ def test_each_body_is_the_simplest_that_it_can_be(tmp_path: Path) -> None:
     assert [kinds[name] for name in ("box", "ball", "rock", "tool")] == [
         Box, Sphere, ConvexMesh, Compound,
     ]  # fmt: skip
-    assert scene.body("post").fixed and scene.ground_friction == 0.7
-    assert scene.body("box").friction == 0.6 and scene.body("box").moments is None
+    assert scene.body("post").fixed
+    assert scene.ground_friction == 0.7
+    assert scene.body("box").friction == 0.6
+    assert scene.body("box").moments is None
 
 
 @pytest.mark.parametrize("profile", ["default", "file"])
@@ -171,7 +173,8 @@ def test_what_no_scene_holds_is_refused_in_one_sentence(
     assert text != SMALL
     with pytest.raises(DescriptionError, match=why) as error:
         read(tmp_path, text)
-    assert "scene.xml: " in str(error.value) and "\n" not in str(error.value)
+    assert "scene.xml: " in str(error.value)
+    assert "\n" not in str(error.value)
 
 
 CONCAVE = SMALL.replace(
