@@ -58,8 +58,9 @@ class DART(Simulator):
         language="C++",
         tested_version="6.20.0",
         oldest_version="6.20.0",  # older ones have neither the detector nor the solver of `tuned`
+        friction_rule="minimum",
         capabilities=Capability.named(
-            "window save_restore contact_count contact_forces loops self_collide "
+            "window save_restore contact_count contact_forces compound loops self_collide "
             "joint_wrenches deterministic"
         ),
         deviations=(

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.description.shapes import write_obj
-from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, Sphere
+from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, Pose, Sphere
 from pytest_simbench.simulator import NotSupportedError, lazy_import
 
 dartpy = lazy_import("dartpy")
@@ -48,9 +48,7 @@ def add_body(world: Any, box: Body) -> Any:
     """The body of a skeleton of its own, made in the world."""
     dynamics = dartpy.dynamics
     skeleton = dynamics.Skeleton(box.name)
-    place = dartpy.math.Isometry3()
-    place.set_translation(np.array(box.pose.position))
-    place.set_rotation(box.pose.rotation())
+    place = _isometry(box.pose)
     if box.fixed:
         joint, body = skeleton.createWeldJointAndBodyNodePair()
         joint.setTransformFromParentBodyNode(place)
@@ -70,11 +68,21 @@ def add_body(world: Any, box: Body) -> Any:
             joint.setDampingCoefficient(k, value)
         joint.setLinearVelocity(np.array(box.linear_velocity))
         joint.setAngularVelocity(np.array(box.angular_velocity))
-    shape = body.createShapeNode(_shape(box))
-    shape.createVisualAspect().setColor(list(box.colour))
-    set_surface(shape, box.friction, box.restitution)
+    for part in box.parts:
+        shape = body.createShapeNode(_shape(part))
+        shape.setRelativeTransform(_isometry(part.pose))
+        shape.createVisualAspect().setColor(list(box.colour))
+        set_surface(shape, box.friction, box.restitution)
     world.addSkeleton(skeleton)
     return body
+
+
+def _isometry(pose: Pose) -> Any:
+    """DART's transform of a pose."""
+    place = dartpy.math.Isometry3()
+    place.set_translation(np.array(pose.position))
+    place.set_rotation(pose.rotation())
+    return place
 
 
 def _shape(body: Body) -> Any:

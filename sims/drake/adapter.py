@@ -71,9 +71,10 @@ class Drake(Simulator):
         language="C++",
         tested_version="1.51.1",
         oldest_version=OLDEST,
+        friction_rule="harmonic",
         capabilities=Capability.named(
-            "window offscreen save_restore exact_restore contact_count contact_forces loops "
-            "self_collide joint_wrenches deterministic"
+            "window offscreen save_restore exact_restore contact_count contact_forces compound "
+            "loops self_collide joint_wrenches deterministic"
         ),
         deviations=(
             Deviation(

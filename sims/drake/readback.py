@@ -21,7 +21,7 @@ from pytest_simbench.parity.readback import one_value
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.simulator import heavy, lazy_import
 
-from .world import World
+from .world import World, transform
 
 geometry = lazy_import("pydrake.geometry")
 math = lazy_import("pydrake.math")
@@ -53,7 +53,8 @@ class ReadBack(readback.ReadBack):
         free = body.index() != self.plant.world_body().index()
         frame = math.RigidTransform()
         if not free:
-            frame = self.inspector.GetPoseInFrame(self.made.shapes[name][0])
+            first = transform(self.scene.body(name).parts[0].pose)
+            frame = self.inspector.GetPoseInFrame(self.made.shapes[name][0]) @ first.inverse()
         pose = self.plant.EvalBodyPoseInWorld(self.context, body)
         found = self._part(prefix, name, pose, frame)
         light = body.default_mass() < heavy(self.scene)  # else it moves as prescribed
@@ -104,13 +105,13 @@ class ReadBack(readback.ReadBack):
         }
         kinds: dict[Any, list[FloatArray]] = {}
         for made in shapes:
-            kind = type(self.inspector.GetShape(made))
+            corner = made in self.made.spheres
+            kind = "corner" if corner else type(self.inspector.GetShape(made))
             kinds.setdefault(kind, []).append(self._reach(made, frame))
-        boxes, spheres = kinds.pop(geometry.Box, []), kinds.pop(geometry.Sphere, [])
-        rounds = [*kinds.pop(geometry.Cylinder, []), *kinds.pop(geometry.Capsule, [])]
+        boxes, spheres = kinds.pop(geometry.Box, []), kinds.pop("corner", [])
+        round_kinds = geometry.Sphere, geometry.Cylinder, geometry.Capsule
+        rounds = list(chain(*(kinds.pop(kind, []) for kind in round_kinds)))
         meshes = list(chain(*kinds.values()))
-        if not (boxes or meshes):
-            rounds, spheres = [*rounds, *spheres], []
         boxes, meshes = _merged(boxes, meshes, spheres)
         found |= outlines(prefix, boxes, meshes, rounds)
         if shapes:
@@ -169,9 +170,7 @@ class ReadBack(readback.ReadBack):
     def _shapes(self, name: str) -> Sequence[Any]:
         """All but the spheres in corners, which do not collide with each other."""
         made = self.made.shapes.get(name.partition("/")[2] or name, [])
-        if len(made) == 1:
-            return made
-        return [m for m in made if not isinstance(self.inspector.GetShape(m), geometry.Sphere)]
+        return [m for m in made if m not in self.made.spheres]
 
 
 def _merged(

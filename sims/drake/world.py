@@ -15,6 +15,7 @@ from pytest_simbench.scene import (
     Body,
     Box,
     Capsule,
+    Compound,
     ConvexMesh,
     Cylinder,
     FloatArray,
@@ -63,7 +64,7 @@ class World:
         self.scene_graph.set_config(self._surfaces())
         self.plant.mutable_gravity_field().set_gravity_vector(scene.gravity)
         self.shapes: dict[str, list[Any]] = {}
-        self._spheres: list[Any] = []
+        self.spheres: list[Any] = []
         world, plane = self.plant.world_body(), geometry.HalfSpace()
         self._add_shape(world, "ground", "plane", plane, Pose(), scene.ground_friction)
         slab = geometry.Box(10.0, 10.0, 0.02)
@@ -133,10 +134,10 @@ class World:
             pose = Pose((float(x), float(y), float(z)))
             sphere = geometry.Sphere(radius)
             made = self._add_shape(body, name, f"sphere{k}", sphere, pose, friction)
-            self._spheres.append(made)
+            self.spheres.append(made)
 
     def _add_body(self, part: Body) -> Any:
-        solid, weighted, arguments = _solid(part)
+        solid, weighted, arguments = _solid(part.parts[0])
         if part.fixed:
             body, pose = self.plant.world_body(), part.pose
         elif part.prescribed:
@@ -153,6 +154,12 @@ class World:
             body, pose = self.plant.AddRigidBody(part.name, own, inertia), Pose()
             if part.damping.any():
                 self._damp(body, part)
+        if isinstance(part, Compound):  # without spheres in corners: its walls may be thin
+            for k, shape in enumerate(part.parts):
+                made, at = _solid(shape)[0], pose * shape.pose
+                self._add_shape(body, part.name, f"part{k}", made, at, part.friction)
+                self._add_picture(body, f"{part.name}/{k}", made, at, part.colour)
+            return body
         core = solid
         if isinstance(part, Box) and part.mass and self.settings.corner_radius:
             core = self._add_corners(body, part)
@@ -245,8 +252,8 @@ class World:
                 bodies = [self.links[name].index() for name in group]
                 frames = [self.plant.GetBodyFrameIdOrThrow(index) for index in bodies]
                 apart.append(geometry.GeometrySet(frames))
-        if self._spheres:  # they carry flat faces; one on top of another would roll off
-            apart.append(geometry.GeometrySet(self._spheres))
+        if self.spheres:  # they carry flat faces; one on top of another would roll off
+            apart.append(geometry.GeometrySet(self.spheres))
         led = [made for body in self.scene.prescribed_bodies for made in self.shapes[body.name]]
         if led:  # they touch what they can move
             still = [body.name for body in self.scene.bodies if not body.mass]

@@ -100,7 +100,9 @@ class ReadBack(readback.ReadBack):
         geom = self.at.boxes[name][0]
         body = int(self.model.geom_bodyid[geom])
         if body == 0:
-            return body, *self._frame(geom)
+            place, turn = self._frame(geom)
+            first = self.scene.body(name).parts[0].pose.inverse()
+            return body, place + turn @ first.position, turn @ first.rotation()
         return body, self.data.xpos[body], self.data.xmat[body].reshape(3, 3)
 
     def _frame(self, geom: int) -> tuple[FloatArray, FloatArray]:

@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.scene import FloatArray, Scene, rotation_matrix
+from pytest_simbench.scene import Body, FloatArray, Scene, rotation_matrix
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
@@ -37,7 +37,7 @@ from ..mujoco.pictures import DISABLED, camera, renderer
 from ..mujoco.readback import Numbers, ReadBack, contact_forces, joint_wrenches
 from ..mujoco.world import leave_out
 from .settings import CHOSEN_ON, PROFILES, NewtonSettings
-from .world import build_model, make_solver, names
+from .world import build_model, make_solver, names, shape_label
 
 LED = 1 << 20
 """Collision group of prescribed bodies, which Newton gives nobody."""
@@ -61,8 +61,9 @@ class Newton(Simulator):
         language="Python (Warp), C",
         tested_version="1.8.0",
         oldest_version="1.8.0",  # older ones have no `newton.solvers.mujoco`: no actuators
+        friction_rule="maximum",
         capabilities=Capability.named(
-            "window offscreen save_restore exact_restore contact_count contact_forces "
+            "window offscreen save_restore exact_restore contact_count contact_forces compound "
             "joint_wrenches loops self_collide deterministic"
         ),
         deviations=(
@@ -129,23 +130,23 @@ class Newton(Simulator):
     def _set_mujoco(self, scene: Scene) -> None:
         """Restitution and damping of bodies, which only MuJoCo's own model holds."""
         model = self.solver.mj_model
-        surfaces = {body.name: body.restitution for body in scene.bodies}
-        surfaces["ground"] = scene.ground_restitution
-        for name, restitution in surfaces.items():
+        bouncing = [(self._geoms(body), body.restitution) for body in scene.bodies]
+        for geoms, restitution in [*bouncing, ([self._geom("ground")], scene.ground_restitution)]:
             if restitution:
-                model.geom_solref[self._geom(name)] = direct(restitution, self.settings.timestep)
+                model.geom_solref[geoms] = direct(restitution, self.settings.timestep)
         for body in scene.free_bodies:
             if body.damping.any():
                 at = model.body_dofadr[model.geom_bodyid[self._geom(body.name)]]
                 model.dof_damping[at : at + 3] = body.linear_damping * body.mass
                 model.dof_damping[at + 3 : at + 6] = body.angular_damping * body.inertia()
 
-        if led := [body.name for body in scene.prescribed_bodies]:
-            geoms = [self._geom(name) for name in led]
+        if led := scene.prescribed_bodies:
+            geoms = [geom for body in led for geom in self._geoms(body)]
             moving = model.body_dofnum[model.geom_bodyid] > 0
             model.geom_conaffinity[moving] |= LED  # they touch what they can move
             model.geom_contype[geoms], model.geom_conaffinity[geoms] = LED, 0
-            leave_out(model, [model.body_dofadr[model.geom_bodyid[geom]] for geom in geoms])
+            heavy_bodies = dict.fromkeys(model.geom_bodyid[geoms].tolist())
+            leave_out(model, [model.body_dofadr[body] for body in heavy_bodies])
 
     def _show_mujoco_the_start(self) -> None:
         """Newton hands its state to MuJoCo only in `step`; it may be looked at before."""
@@ -196,10 +197,14 @@ class Newton(Simulator):
         joints = () if prepared is None else prepared.robot.joint_names
         return Numbers(
             self._geom("ground"),
-            {box.name: [self._geom(box.name)] for box in self.scene.bodies},
+            {box.name: self._geoms(box) for box in self.scene.bodies},
             {name: bodies.index(labels.index(name)) for name in links},
             dict(zip(joints, self._mujoco_joints(), strict=True)),
         )
+
+    def _geoms(self, body: Body) -> list[int]:
+        """MuJoCo's numbers of the shapes of a body."""
+        return [self._geom(shape_label(body, k)) for k in range(len(body.parts))]
 
     def _geom(self, label: str) -> int:
         """MuJoCo's number of Newton's shape with this label."""

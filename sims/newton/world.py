@@ -40,11 +40,12 @@ def build_model(scene: Scene, prepared: PreparedRobot | None, settings: NewtonSe
     # What MuJoCo needs of a contact beyond Newton's own parameters.
     model.mujoco.condim.fill_(settings.condim)
     for body in scene.bodies:
-        if not isinstance(body, Box | ConvexMesh):
-            # contacts of a round shape neither roll nor spin with friction
-            shape = model.shape_label.index(body.name)
-            model.mujoco.condim.numpy()[shape] = 3
-            model.mujoco.geom_priority.numpy()[shape] = 1
+        for k, part in enumerate(body.parts):
+            if not isinstance(part, Box | ConvexMesh):
+                # contacts of a round shape neither roll nor spin with friction
+                shape = model.shape_label.index(shape_label(body, k))
+                model.mujoco.condim.numpy()[shape] = 3
+                model.mujoco.geom_priority.numpy()[shape] = 1
     model.mujoco.geom_solimp.numpy()[:] = (*settings.solimp, 0.5, 2.0)
     return model
 
@@ -114,7 +115,7 @@ def _add_robot(builder: Any, prepared: PreparedRobot, surface: Any) -> None:
 
 
 def _add_body(builder: Any, part: Body, surface: Any, most: float) -> None:
-    pose, body = _transform(part.pose), -1
+    pose, body = part.pose, -1
     if not part.fixed:
         inertial: dict[str, Any] = {}
         if part.prescribed:
@@ -123,10 +124,22 @@ def _add_body(builder: Any, part: Body, surface: Any, most: float) -> None:
             surface.density = part.mass / part.volume
         else:
             inertial = {"mass": part.mass, "inertia": wp.mat33(np.diag(part.inertia()))}
-        body, pose = builder.add_body(xform=pose, label=part.name, **inertial), None
+        body = builder.add_body(xform=_transform(pose), label=part.name, **inertial)
+        pose = Pose()
         start = builder.joint_qd_start[builder.joint_child.index(body)]
         builder.joint_qd[start : start + 6] = map(float, part.velocity)
-    given = {"xform": pose, "cfg": surface, "color": part.colour[:3], "label": part.name}
+    for k, shape in enumerate(part.parts):
+        _add_shape(builder, body, shape, pose * shape.pose, surface, shape_label(part, k))
+
+
+def shape_label(body: Body, k: int) -> str:
+    """Of a body's shape with this number."""
+    return f"{body.name}/{k}" if k else body.name
+
+
+def _add_shape(builder: Any, body: int, part: Body, pose: Pose, surface: Any, label: str) -> None:
+    at = None if pose == Pose() else _transform(pose)
+    given = {"xform": at, "cfg": surface, "color": part.colour[:3], "label": label}
     match part:
         case Box():
             hx, hy, hz = (edge / 2 for edge in part.size)

@@ -81,9 +81,10 @@ class ODE(Simulator):
         engine="ODE",
         language="C++",
         tested_version="1.2.0.dev15",
+        friction_rule="minimum",
         capabilities=Capability.named(
-            "save_restore contact_count contact_forces loops self_collide joint_wrenches "
-            "deterministic"
+            "save_restore contact_count contact_forces compound loops self_collide "
+            "joint_wrenches deterministic"
         ),
         deviations=(
             Deviation("joint/*/friction", "ODE's joints have no friction"),

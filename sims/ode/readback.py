@@ -64,7 +64,8 @@ class ReadBack(readback.ReadBack):
 
     def body(self, prefix: str, name: str) -> dict[str, Any]:
         part = self.bodies[name]
-        found = self._part(prefix, part)
+        first = self.scene.body(name).parts[0].pose
+        found = self._part(prefix, part, first)
         free = part.body is not None and not part.body.isKinematic()
         if free:
             found[f"{prefix}/velocity"] = [*part.body.getLinearVel(), *part.body.getAngularVel()]
@@ -81,9 +82,12 @@ class ReadBack(readback.ReadBack):
     def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
         return bool(self.drives.pinion.holds if self.drives.pinion else not pairs)
 
-    def _part(self, prefix: str, part: Part) -> dict[str, Any]:
-        """Pose, shapes, surface and inertia of a body or link."""
+    def _part(self, prefix: str, part: Part, first: Pose | None = None) -> dict[str, Any]:
+        """Pose, shapes, surface and inertia of a body or link; `first`: of a body, the pose of its
+        first shape in its frame."""
         frame = self._frame(part)
+        if part.body is None and first is not None:
+            frame *= first.inverse()
         found: dict[str, Any] = {f"{prefix}/pose": frame.as_array()}
         meshes = [self._measured(geom, frame) for geom in part.geoms if isinstance(geom, _FACETED)]
         boxes = [

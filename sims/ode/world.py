@@ -22,6 +22,7 @@ from pytest_simbench.scene import (
     Box,
     Capsule,
     Closure,
+    Compound,
     ConvexMesh,
     Cylinder,
     FloatArray,
@@ -46,11 +47,12 @@ def add_ground(space: Any, friction: float, restitution: float) -> Part:
 
 def add_body(world: Any, space: Any, box: Body, timestep: float) -> Part:
     """A body, fixed or free, in a world with this time step [s]."""
-    geom = _solid(space, box)
     part = Part(Surface(None, box.friction, box.restitution))
-    part.add(geom, FREE if box.mass else FIXED)
+    for shape in box.parts:
+        part.add(_solid(space, shape), FREE if box.mass else FIXED)
     if box.fixed:
-        place(geom, box.pose)
+        for geom, shape in zip(part.geoms, box.parts, strict=True):
+            place(geom, box.pose * shape.pose)
         return part
     weight = (1.0, np.eye(3)) if box.prescribed else (box.mass, np.diag(box.inertia()))
     part.surface.body = _body(world, *weight, box.pose)
@@ -59,7 +61,11 @@ def add_body(world: Any, space: Any, box: Body, timestep: float) -> Part:
     set_damping(part.body, box.damping * timestep)
     part.body.setLinearVel(box.linear_velocity)
     part.body.setAngularVel(box.angular_velocity)
-    geom.setBody(part.body)
+    for geom, shape in zip(part.geoms, box.parts, strict=True):
+        if isinstance(box, Compound):
+            place(geom, shape.pose, part.body)
+        else:
+            geom.setBody(part.body)
     return part
 
 

@@ -59,9 +59,10 @@ class SAPIEN(Simulator):
         tested_version="3.0.3",
         oldest_version="3.0.0",
         companions={"3.0.0": ("numpy", "setuptools<81")},  # pkg_resources
+        friction_rule="mean",
         capabilities=Capability.named(
-            "window offscreen save_restore contact_count contact_forces loops self_collide "
-            "joint_wrenches deterministic"
+            "window offscreen save_restore contact_count contact_forces compound loops "
+            "self_collide joint_wrenches deterministic"
         ),
         deviations=(
             Deviation("gripper/coupled", "SAPIEN does not report its tendons"),

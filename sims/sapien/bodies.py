@@ -32,7 +32,8 @@ def add_body(world: Any, box: Body, angular_damping: float) -> Any:
     """The component of a body, made in the world; `angular_damping` [1/s] where it has none."""
     builder = world.create_actor_builder()
     material = physx.PhysxMaterial(box.friction, box.friction, box.restitution)
-    _add_shape(builder, box, material)
+    for part in box.parts:
+        _add_shape(builder, part, material)
     builder.collision_groups = [WORLD, WORLD | ROBOT, 0, 0]
     builder.initial_pose = sapien.Pose(box.pose.position, box.pose.quaternion)
     if box.fixed:
@@ -45,8 +46,9 @@ def add_body(world: Any, box: Body, angular_damping: float) -> Any:
         builder.set_mass_and_inertia(box.mass, sapien.Pose(), box.inertia())
         entity = builder.build(box.name)
         body = entity.find_component_by_type(physx.PhysxRigidDynamicComponent)
-    if isinstance(box, ConvexMesh):
-        body.attach(_mesh(box, material, builder.collision_groups))
+    for part in box.parts:
+        if isinstance(part, ConvexMesh):
+            body.attach(_mesh(part, material, builder.collision_groups))
     if not box.mass:
         return body
     body.angular_damping = angular_damping
@@ -57,18 +59,17 @@ def add_body(world: Any, box: Body, angular_damping: float) -> Any:
 
 
 def _add_shape(builder: Any, body: Body, material: Any) -> None:
-    """The collision shape of a body. Cylinders and capsules of SAPIEN lie along x."""
+    """A collision shape of a body. Cylinders and capsules of SAPIEN lie along x."""
+    place, upright = to_sapien(body.pose), to_sapien(body.pose * UPRIGHT)
     match body:
         case Box():
             half = [edge / 2 for edge in body.size]
-            builder.add_box_collision(half_size=half, material=material)
+            builder.add_box_collision(place, half, material)
         case Sphere():
-            builder.add_sphere_collision(radius=body.radius, material=material)
+            builder.add_sphere_collision(place, body.radius, material)
         case Cylinder():
-            upright = to_sapien(UPRIGHT)
             builder.add_cylinder_collision(upright, body.radius, body.length / 2, material)
         case Capsule():
-            upright = to_sapien(UPRIGHT)
             builder.add_capsule_collision(upright, body.radius, body.length / 2, material)
 
 
@@ -77,4 +78,5 @@ def _mesh(body: ConvexMesh, material: Any, groups: list[int]) -> Any:
     corners = np.array(body.vertices, dtype=np.float32)
     shape = physx.PhysxCollisionShapeConvexMesh(corners, np.ones(3, dtype=np.float32), material)
     shape.set_collision_groups(groups)
+    shape.local_pose = to_sapien(body.pose)
     return shape
