@@ -74,9 +74,10 @@ class Genesis(Simulator):
         engine="Genesis",
         tested_version="1.2.3",
         oldest_version=OLDEST,
+        friction_rule="maximum",
         capabilities=Capability.named(
-            "window offscreen save_restore exact_restore contact_count contact_forces loops "
-            "self_collide deterministic"
+            "window offscreen save_restore exact_restore contact_count contact_forces compound "
+            "loops self_collide deterministic"
         ),
         deviations=(
             Deviation("link/*/damping", "Genesis has no damping of links"),

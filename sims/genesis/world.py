@@ -12,7 +12,8 @@ import numpy as np
 
 from pytest_simbench.description.links import reduced
 from pytest_simbench.description.shapes import write_obj
-from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, Scene, Sphere
+from pytest_simbench.description.urdf import write_origin
+from pytest_simbench.scene import Body, Box, Capsule, Compound, ConvexMesh, Cylinder, Scene, Sphere
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, lazy_import
 from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
 
@@ -64,7 +65,7 @@ def add_body(world: Any, body: Body, most: float) -> Any:
     stuff = {"gravity_compensation": 1.0} if body.prescribed else {}
     if body.prescribed:
         body = body.changed(prescribed=False, mass=most, moments=(most,) * 3)
-    uneven = body.moments is not None or isinstance(body, ConvexMesh)
+    uneven = body.moments is not None or isinstance(body, Compound | ConvexMesh)
     density = None if body.fixed or uneven else body.mass / body.volume
     surface = genesis.surfaces.Default(color=body.colour)
     with tempfile.TemporaryDirectory() as folder:  # of a mesh, which Genesis takes from a file
@@ -112,7 +113,10 @@ def _described(body: Body, folder: Path) -> Any:
         xx, yy, zz = (repr(float(moment)) for moment in body.inertia())
         ET.SubElement(inertial, "inertia", ixx=xx, iyy=yy, izz=zz, ixy="0", ixz="0", iyz="0")
     for kind in ("visual", "collision"):
-        _shape(ET.SubElement(ET.SubElement(link, kind), "geometry"), body, folder)
+        for k, part in enumerate(body.parts):
+            element = ET.SubElement(link, kind)
+            write_origin(element, part.pose)
+            _shape(ET.SubElement(element, "geometry"), part, folder / f"{k}.obj")
     return genesis.morphs.URDF(
         file=ET.tostring(root, encoding="unicode"),
         pos=body.pose.position,
@@ -123,8 +127,8 @@ def _described(body: Body, folder: Path) -> Any:
     )
 
 
-def _shape(geometry: ET.Element, body: Body, folder: Path) -> None:
-    """A body's shape in a URDF; files go into the folder."""
+def _shape(geometry: ET.Element, body: Body, file: Path) -> None:
+    """A body's shape in a URDF; a mesh goes into the file."""
     match body:
         case Box():
             ET.SubElement(geometry, "box", size=" ".join(repr(float(edge)) for edge in body.size))
@@ -134,7 +138,7 @@ def _shape(geometry: ET.Element, body: Body, folder: Path) -> None:
             size = {"radius": repr(float(body.radius)), "length": repr(float(body.length))}
             ET.SubElement(geometry, "cylinder", size)
         case ConvexMesh():
-            mesh = write_obj(folder / "mesh.obj", body.hull)
+            mesh = write_obj(file, body.hull)
             ET.SubElement(geometry, "mesh", filename=str(mesh))
         case _:
             raise NotSupportedError(

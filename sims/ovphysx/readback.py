@@ -61,13 +61,17 @@ class ReadBack(readback.ReadBack):
     def body(self, prefix: str, name: str) -> dict[str, Any]:
         box, values = self.scene.body(name), self.bodies
         path = usd.body_path(self.scene.bodies.index(box))
-        pose, shape = _pose(values, path), f"{path}/shape"
+        pose = _pose(values, path)
         if isinstance(box, Box):  # rays tell the size of a box more exactly
-            outline = outlines(prefix, [reach(box_corners(self.session.size(shape, pose)))], [])
+            size = self.session.size(f"{path}/{usd.shape_name(0)}", pose)
+            outline = outlines(prefix, [reach(box_corners(size))], [])
         else:
-            swept = [self.session.reach(shape, pose, Pose())]
-            mesh = isinstance(box, ConvexMesh)
-            outline = outlines(prefix, [], swept if mesh else [], [] if mesh else swept)
+            kinds: tuple[list[FloatArray], ...] = ([], [], [])
+            flat = {Box.kind: 0, ConvexMesh.kind: 1}
+            for k, part in enumerate(box.parts[: int(values["shapeCount"][path])]):
+                swept = self.session.reach(f"{path}/{usd.shape_name(k)}", pose, part.pose)
+                kinds[flat.get(part.kind, 2)].append(swept)
+            outline = outlines(prefix, *kinds)
         found = _part(values, path, prefix) | outline
         if box.mass:
             found |= _inertial(values, path, prefix)

@@ -46,6 +46,11 @@ def body_path(index: int) -> str:
     return f"/World/body_{index}"
 
 
+def shape_name(number: int) -> str:
+    """Prim of a body's shape of that number, within the body's."""
+    return f"shape_{number}" if number else "shape"
+
+
 def link_path(index: int) -> str:
     """Prim of the prepared robot's link of that index; 0 is the root."""
     return f"/World/link_{index}"
@@ -141,11 +146,11 @@ class Stage:
 
     def _body(self, index: int, box: Body) -> str:
         """A rigid body; kinematic where it has no mass: PhysX reports nothing of static ones."""
-        kind, size = _solid(box)
-        collider = _COLLIDER if kind != "Mesh" else _HULL
-        shape = usd.prim(
-            kind, "shape", collider, [*size, *self._surface(box.friction, box.restitution)]
-        )
+        surface, shapes = self._surface(box.friction, box.restitution), []
+        for k, part in enumerate(box.parts):
+            kind, size = _solid(part)
+            collider = _COLLIDER if kind != "Mesh" else _HULL
+            shapes.append(usd.prim(kind, shape_name(k), collider, [*size, *surface]))
         lines = [*usd.placed(box.pose), *self._rigid(box)]
         schemas: tuple[str, ...] = _BODY
         if reports_contacts(self.scene):
@@ -157,7 +162,7 @@ class Stage:
             spin = np.degrees(box.angular_velocity)
             lines.append(f"vector3f physics:velocity = {usd.numbers(box.linear_velocity)}")
             lines.append(f"vector3f physics:angularVelocity = {usd.numbers(spin)}")
-        return usd.prim("Xform", f"body_{index}", schemas, lines, [shape])
+        return usd.prim("Xform", f"body_{index}", schemas, lines, shapes)
 
     def _rigid(self, body: Body) -> list[str]:
         """The engine's settings of a body, and its own damping where it has one."""
@@ -213,18 +218,19 @@ class Stage:
 
 
 def _solid(body: Body) -> tuple[str, list[str]]:
-    """USD's kind of a body's shape, and the lines of its size; along z where it has an axis."""
+    """USD's kind of a shape, and the lines of its place and size; along z where it has an axis."""
+    at = [] if body.pose == Pose() else usd.placed(body.pose)
     match body:
         case Box():
-            return "Cube", usd.cube(body.size)
+            return "Cube", usd.cube(body.size, body.pose)
         case Sphere():
-            return "Sphere", [f"double radius = {float(body.radius)!r}"]
+            return "Sphere", [*at, f"double radius = {float(body.radius)!r}"]
         case Cylinder() | Capsule():
             radius, length = float(body.radius), float(body.length)
             lines = [f"double radius = {radius!r}", f"double height = {length!r}"]
-            return type(body).__name__, [*lines, 'uniform token axis = "Z"']
+            return type(body).__name__, [*at, *lines, 'uniform token axis = "Z"']
         case ConvexMesh():
-            return "Mesh", usd.hull(body.hull.points, np.array(body.hull.triangles))
+            return "Mesh", [*at, *usd.hull(body.hull.points, np.array(body.hull.triangles))]
     raise NotSupportedError(f"ovphysx has no {type(body).__name__}")
 
 

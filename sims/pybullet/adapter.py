@@ -56,9 +56,10 @@ class PyBullet(Simulator):
         tested_version="3.2.7",
         oldest_version="3.2.2",  # before 3.2.6 there are no wheels for Python 3.11
         companions={"3.2.2": ("numpy<2",), "3.2.7": ("numpy",)},  # what it was compiled for
+        friction_rule="geometric",
         capabilities=Capability.named(
-            "window offscreen save_restore exact_restore contact_count contact_forces loops "
-            "self_collide joint_wrenches deterministic"
+            "window offscreen save_restore exact_restore contact_count contact_forces compound "
+            "loops self_collide joint_wrenches deterministic"
         ),
         deviations=(
             Deviation("joint/*/armature", "Bullet has no rotor inertia"),

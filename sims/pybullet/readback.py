@@ -134,7 +134,9 @@ class ReadBack(readback.ReadBack):
         """Radius of a sphere or capsule, which are a point and a line to Bullet, their margin the
         rest [m]; else 0."""
         data = pybullet.getCollisionShapeData(body, link, physicsClientId=self.c)
-        kind, size = data[0][2:4]
+        kind, size, _, place, turn = data[0][2:7]
+        if len(data) > 1 or any([*place, *turn[:3]]):  # Bullet tells the margin of the compound
+            return 0.0
         if kind == pybullet.GEOM_SPHERE:
             return float(size[0])
         return float(size[1]) if kind == pybullet.GEOM_CAPSULE else 0.0

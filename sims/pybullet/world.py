@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import math
+import tempfile
+import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.shapes import write_obj
+from pytest_simbench.description.urdf import INERTIA, write_origin
 from pytest_simbench.scene import (
     Body,
     Box,
     Capsule,
     Closure,
+    Compound,
     ConvexMesh,
     Cylinder,
     FloatArray,
@@ -38,20 +44,8 @@ def _single(number: float) -> float:
 def add_body(client: int, box: Body, settings: PyBulletSettings, most: float) -> int:
     """A body; Bullet's number of it. A prescribed one weighs `most` [kg]."""
     c = client
-    kind, size, length = _shape(box)
-    lengths: dict[str, Any] = {} if length is None else {"height": length}
-    shape = pybullet.createCollisionShape(kind, **size, **lengths, physicsClientId=c)
-    lengths = {} if length is None else {"length": length}
-    if isinstance(box, ConvexMesh):
-        lengths = {"indices": np.ravel(box.hull.triangles).tolist()}
-    picture = pybullet.createVisualShape(
-        kind, **size, **lengths, rgbaColor=box.colour, physicsClientId=c
-    )
-    w, x, y, z = box.pose.quaternion
     mass = most if box.prescribed else box.mass
-    body: int = pybullet.createMultiBody(
-        mass, shape, picture, box.pose.position, [x, y, z, w], physicsClientId=c
-    )
+    body = _load_compound(c, box, mass) if isinstance(box, Compound) else _make_body(c, box, mass)
     set_surface(c, body, settings, box.friction, box.restitution, box.damping)
     # Bullet takes a capsule for the box around it.
     if box.moments is not None or box.prescribed or not isinstance(box, Box):
@@ -64,6 +58,64 @@ def add_body(client: int, box: Body, settings: PyBulletSettings, most: float) ->
             body, box.linear_velocity, box.angular_velocity, physicsClientId=c
         )
     return body
+
+
+def _make_body(c: int, box: Body, mass: float) -> int:
+    """A body of one shape."""
+    kind, size, length = _shape(box)
+    lengths: dict[str, Any] = {} if length is None else {"height": length}
+    shape = pybullet.createCollisionShape(kind, **size, **lengths, physicsClientId=c)
+    lengths = {} if length is None else {"length": length}
+    if isinstance(box, ConvexMesh):
+        lengths = {"indices": np.ravel(box.hull.triangles).tolist()}
+    picture = pybullet.createVisualShape(
+        kind, **size, **lengths, rgbaColor=box.colour, physicsClientId=c
+    )
+    w, x, y, z = box.pose.quaternion
+    body: int = pybullet.createMultiBody(
+        mass, shape, picture, box.pose.position, [x, y, z, w], physicsClientId=c
+    )
+    return body
+
+
+def _load_compound(c: int, body: Compound, mass: float) -> int:
+    """A body of several shapes, by a URDF: of a list PyBullet takes 16, and drops the others."""
+    root = ET.Element("robot", name="compound")
+    link = ET.SubElement(root, "link", name="compound")
+    inertial = ET.SubElement(link, "inertial")
+    ET.SubElement(inertial, "mass", value=repr(float(mass)))
+    ET.SubElement(
+        inertial, "inertia", {name: "1" if name[1] == name[2] else "0" for name in INERTIA}
+    )
+    w, x, y, z = body.pose.quaternion
+    with tempfile.TemporaryDirectory() as folder:
+        for k, part in enumerate(body.parts):
+            for kind in ("collision", "visual"):
+                element = ET.SubElement(link, kind)
+                write_origin(element, part.pose)
+                _describe(ET.SubElement(element, "geometry"), part, Path(folder) / f"{k}.obj")
+            colour = ET.SubElement(element, "material", name=str(k))
+            ET.SubElement(colour, "color", rgba=" ".join(map(str, body.colour)))
+        ET.ElementTree(root).write(f"{folder}/compound.urdf")
+        made: int = pybullet.loadURDF(
+            f"{folder}/compound.urdf",
+            body.pose.position,
+            [x, y, z, w],
+            useFixedBase=not mass,
+            flags=pybullet.URDF_USE_IMPLICIT_CYLINDER,
+            physicsClientId=c,
+        )
+    return made
+
+
+def _describe(geometry: ET.Element, shape: Body, mesh: Path) -> None:
+    """A shape in a URDF; a mesh goes to a file of its own."""
+    if isinstance(shape, ConvexMesh):
+        ET.SubElement(geometry, "mesh", filename=str(write_obj(mesh, shape.hull)))
+    else:
+        size = {n: getattr(shape, n) for n in ("size", "radius", "length") if hasattr(shape, n)}
+        written = {n: " ".join(map(repr, np.atleast_1d(v).tolist())) for n, v in size.items()}
+        ET.SubElement(geometry, shape.kind, written)
 
 
 def set_surface(
