@@ -77,6 +77,7 @@ class MuJoCo(Simulator):
     chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
     settings: MuJoCoSettings
 
+    prepared: PreparedRobot | None = None
     _own_file: OwnFile | None = None
 
     def load(self, scene: Scene) -> None:
@@ -92,10 +93,12 @@ class MuJoCo(Simulator):
 
     def _load_file(self, scene: Scene) -> None:
         self._own_file = own = OwnFile(scene, self.settings.timestep)
-        self.scene, self.prepared, self.model, self.data = scene, None, own.model, own.data
+        self.scene, self.model, self.data = scene, own.model, own.data
         self._q = self._v = np.array([], dtype=int)
         self._body_ids = own.roots
-        self.info = replace(self.info, deviations=(*self.info.deviations, *own.deviations()))
+        # Of this world alone: another file differs elsewhere.
+        declared = (*self.info.deviations, *own.deviations())
+        self.info = replace(self.info, deviations=declared)  # type: ignore[misc]
 
     def _build(self, scene: Scene) -> None:
         self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)

@@ -232,7 +232,10 @@ class Reading:
         """A shape, and its frame in that of its geom."""
         model, kinds = self.model, mujoco.mjtGeom
         a, b, c = (float(value) for value in model.geom_size[geom])
-        look = {"friction": friction, "colour": tuple(map(float, model.geom_rgba[geom]))}
+        look: dict[str, Any] = {
+            "friction": friction,
+            "colour": tuple(map(float, model.geom_rgba[geom])),
+        }
         match model.geom_type[geom]:
             case kinds.mjGEOM_BOX:
                 return Box(name, (2 * a, 2 * b, 2 * c), Pose(), **look), Pose()
