@@ -204,8 +204,8 @@ class Reading:
             return Placed(whole, 0, geoms, Pose())
         mass, centre, tensor = self.inertial(root)
         if len(shapes) == 1:
-            own = shapes[0].pose.rotation()
-            turned = own.T @ tensor @ own
+            way = shapes[0].pose.rotation()
+            turned = way.T @ tensor @ way
             off = np.linalg.norm(centre - shapes[0].pose.position)
             aside = np.abs(turned - np.diag(np.diag(turned))).max()
             if off < CLOSE * max(shapes[0].extents) and aside < CLOSE * np.trace(turned):

@@ -23,7 +23,7 @@ PUBLISHED = {
         "tuned": "e78c49da",
         "real": "851260d7",
         "file": "aeed4602",
-    },  # fmt: skip
+    },
     "newton": {"default": "f383bffb", "tuned": "a5b7dbbe", "real": "b00c1176"},
     "ode": {"default": "f1f2c655", "tuned": "7c840eea", "real": "85bf7f2e"},
     "ovphysx": {"default": "0791bbcb", "tuned": "d65af419", "real": "e9c2722b"},
