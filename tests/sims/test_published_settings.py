@@ -18,7 +18,12 @@ PUBLISHED = {
     "drake": {"default": "09441a8f", "tuned": "cf3c33e5", "real": "d8e9fec8"},
     "gazebo": {"default": "3def4e2e", "tuned": "93d12aae"},
     "genesis": {"default": "de5dd03b", "tuned": "22a5088c", "real": "22a5088c"},
-    "mujoco": {"default": "547fd8a1", "tuned": "e78c49da", "real": "851260d7"},
+    "mujoco": {
+        "default": "547fd8a1",
+        "tuned": "e78c49da",
+        "real": "851260d7",
+        "file": "aeed4602",
+    },
     "newton": {"default": "f383bffb", "tuned": "a5b7dbbe", "real": "b00c1176"},
     "ode": {"default": "f1f2c655", "tuned": "7c840eea", "real": "85bf7f2e"},
     "ovphysx": {"default": "0791bbcb", "tuned": "d65af419", "real": "e9c2722b"},
