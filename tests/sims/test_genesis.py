@@ -23,7 +23,7 @@ from pytest_simbench.client.errors import EngineFailed
 from pytest_simbench.scene import Gripper, Joint, Robot, Scene, Trajectory
 from pytest_simbench.testing import scenes
 
-from ..simulator.test_urdf_check import TRIANGLE
+from ..description.test_urdf_check import TRIANGLE
 from .worlds import Worlds
 
 EGG = """<robot name="egg">
