@@ -19,11 +19,12 @@ FINER = (4, 8)
 
 
 @pytest.fixture
-def sim_settings(request, sim_case):
-    """The time step of the test: the profile's own, or a part of it."""
-    finer = request.node.callspec.params.get("finer", 1)
+def sim_settings(request, sim_case, scene_file):
+    """The time step of the test: the profile's own (in `file` the file's), or a part of it."""
     own = settings_of(sim_case.simulator, sim_case.profile, {}).timestep
-    return {} if finer == 1 else {"timestep": own / finer}
+    if sim_case.profile == "file":
+        own = scene_file().file_timestep
+    return {"timestep": own / request.node.callspec.params.get("finer", 1)}
 
 
 @pytest.mark.reps(1)

@@ -50,6 +50,7 @@ class Scene(Wire):
             get them.
         friction_rule: what the friction of two surfaces is, one of `friction.RULES`.
         file: that it was read from, an absolute path; empty: none.
+        file_timestep: time step that the file asks for [s]; 0: none.
 
     Raises:
         SceneError: two bodies share a name or overlap, one has the name of what is in every
@@ -57,7 +58,7 @@ class Scene(Wire):
     """
 
     unwritten = ("starts",)
-    optional = ("ground_restitution", "friction_rule", "file")
+    optional = ("ground_restitution", "friction_rule", "file", "file_timestep")
 
     name: str
     bodies: tuple[Body, ...] = ()
@@ -69,6 +70,7 @@ class Scene(Wire):
     friction_rule: str = "maximum"
     starts: tuple[Start, ...] = ()
     file: str = ""
+    file_timestep: float = 0.0
 
     def __post_init__(self) -> None:
         check_name(self.name, "a scene")

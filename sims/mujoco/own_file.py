@@ -91,7 +91,10 @@ class OwnFile:
     def deviations(self) -> tuple[Deviation, ...]:
         """In what the file may differ from the scene, as the account has it."""
         lines = [line for line in self.reading.account if line.state != CARRIED]
-        return tuple(
+        steps = self.reading.scene.file_timestep, float(self.model.opt.timestep)
+        told = "the file asks for steps of {:g} s, and these are of {:g} s".format(*steps)
+        other = [Deviation("", told, only="file")] if steps[0] != steps[1] else []
+        return *other, *(
             Deviation(EXCUSED[line.quantity], f"as the file has it: {line.reason}", only="file")
             for line in lines
             if line.quantity in EXCUSED

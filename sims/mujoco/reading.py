@@ -353,6 +353,7 @@ class Reading:
             ground_friction=friction,
             room=_triple(room),
             file=self.path,
+            file_timestep=float(model.opt.timestep),
         )
 
     # The account
