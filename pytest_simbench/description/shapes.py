@@ -79,7 +79,15 @@ def outlines(
 
 def _ordered(reaches: Iterable[FloatArray]) -> FloatArray:
     rows = np.array(list(reaches), dtype=float).reshape(-1, len(DIRECTIONS))
-    return np.asarray(rows[np.argsort(rows @ _ORDER)])
+    return np.asarray(rows[order_of(rows)])
+
+
+def order_of(reaches: Sequence[FloatArray] | FloatArray) -> list[int]:
+    """The order that `outlines` puts shapes in, by their numbers. Who measures with an error that
+    may change it orders by what the scene has."""
+    rows = np.reshape(reaches, (-1, len(DIRECTIONS)))
+    found: list[int] = np.argsort(rows @ _ORDER).tolist()
+    return found
 
 
 def box_corners(size: Sequence[float] | FloatArray) -> FloatArray:
