@@ -58,8 +58,8 @@ def _included(
     """All elements of a file and of those that it includes, in order."""
     own: dict[ET.Element, int] = {}
     xml = read_xml(str(path), "the scene", own)
-    if xml.tag not in ("mujoco", "mujocoinclude"):
-        raise DescriptionError(f"{path} is no MJCF: it holds <{xml.tag}>, not the root of one")
+    if xml.tag == "robot":
+        raise DescriptionError(f"{path} is a URDF, no MJCF; robots are given as --robot")
     lines.update({element: (path, line) for element, line in own.items()})
     found: list[ET.Element] = []
     for element in xml.iter():

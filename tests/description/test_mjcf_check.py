@@ -11,7 +11,7 @@ from pytest_simbench.ground.errors import DescriptionError
 REFUSED = {
     "cannot read the scene .*: No such file": None,
     "not valid XML: .*line 1": "<mujoco><body></mujoco>",
-    "is no MJCF: it holds <robot>": "<robot/>",
+    "is a URDF": "<robot/>",
     "line 1: the scene has a document type": '<!DOCTYPE m [<!ENTITY a "b">]><mujoco>&a;</mujoco>',
     "line 2: <include> of a.xml runs in a circle": '<mujoco>\n<include file="a.xml"/></mujoco>',
     "line 1: the file 'b.xml' is not there": '<mujoco><include file="b.xml"/></mujoco>',
