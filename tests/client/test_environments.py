@@ -86,6 +86,8 @@ def test_two_that_make_the_same_wait_for_each_other(info: SimulatorInfo) -> None
 def test_what_is_there_and_removing_it(info: SimulatorInfo) -> None:
     assert list(existing()) == []
     environment = half_made(info)
+    (environment.folder / "large").write_bytes(bytes(3_000_000))
+    assert environments.size_mb(environment.folder) == pytest.approx(3.0, abs=0.1)
     with environments.alone(environment.folder, print):
         assert list(existing()) == [environment.folder]
     remove(environment.folder)

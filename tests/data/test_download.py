@@ -13,7 +13,7 @@ import pytest
 
 from pytest_simbench.data import DataError, DataMissing, read, tosses
 from pytest_simbench.data.download import digest, download
-from pytest_simbench.data.sets import SETS, DataSet, data_set
+from pytest_simbench.data.sets import SETS, DataSet, data_set, default_folder
 from tests.data.samples import archive, falling, source_file
 
 FILES = {f"data/tosses_processed/{k}.pt": source_file(falling(10 + k)) for k in (0, 1, 10)}
@@ -102,3 +102,11 @@ def test_a_set_is_pinned(name: str) -> None:
     assert len(bytes.fromhex(pinned.commit)) == 20
     assert len(bytes.fromhex(pinned.sha256)) == 32
     assert pinned.commit in pinned.url
+
+
+def test_the_users_folder_comes_first(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv("SIMBENCH_DATA", str(tmp_path / "mine"))
+    assert default_folder() == tmp_path / "mine"
+    monkeypatch.delenv("SIMBENCH_DATA")
+    assert default_folder() == tmp_path / "cache" / "pytest-simbench" / "data"

@@ -13,6 +13,7 @@ import pytest
 from pytest_simbench.client.environments import missing
 from pytest_simbench.laws import LAWS, Law, Reading
 from pytest_simbench.laws.base import Watched
+from pytest_simbench.laws.hands import PushTurns
 from pytest_simbench.laws.mechanisms import MOUNT, Part, mechanism
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
 from pytest_simbench.records.phenomena import PHENOMENA, PHENOMENON
@@ -130,3 +131,18 @@ def test_parts_hang_on_the_one_before_or_on_a_named_one() -> None:
 def test_a_part_that_hangs_on_none_there_is_is_refused() -> None:
     with pytest.raises(ValueError, match="'a' hangs on 'b'; choose from mount"):
         mechanism("tree", Part("a", Y, on="b"), Part("b", Y))
+
+
+def test_a_pushed_prism_turns_as_its_acceleration_says() -> None:
+    """Rate and acceleration are the derivatives of the angle."""
+    seconds = PushTurns().seconds
+    angle, rate, pulled = PushTurns().exact(seconds)
+    times = np.linspace(0.0, seconds, angle.size)
+    for value, change in ((angle, rate), (rate, pulled)):
+        off = np.abs(np.gradient(value, times) - change)[1:-1]
+        assert off.max() < 0.02 * np.abs(change).max()
+
+
+def test_a_short_run_of_a_long_pendulum_has_four_periods() -> None:
+    law = BY_NAME["pendulum_energy_drift"]
+    assert law.smoke().seconds == pytest.approx(law.seconds / 25)

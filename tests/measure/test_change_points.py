@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from pytest_simbench.measure.change_points import change_points
+from pytest_simbench.measure.change_points import PERMUTATIONS, _chance, change_points
 
 Row = list[dict[int, float]]
 
@@ -66,3 +66,9 @@ def test_what_never_varies_has_none_and_what_is_missing_is_left_out() -> None:
     for k, seed in ((0, 3), (2, 7), (5, 0), (7, 9)):
         del found[k][seed]
     assert places(found) == [4]
+
+
+def test_a_chance_is_a_share_of_all_orders_with_the_one_seen() -> None:
+    part = np.arange(12.0).reshape(-1, 1)
+    always, never = _chance(part, -np.inf), _chance(part, np.inf)
+    assert (always, never) == (1.0, 1 / (PERMUTATIONS + 1))

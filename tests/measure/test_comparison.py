@@ -297,3 +297,11 @@ def test_one_failure_in_ten_thousand_is_no_difference() -> None:
     seven[:7] = 1.0
     assert compare(none, one, paired=True).p_value == 1.0
     assert 0.01 < compare(none, seven, paired=True).p_value < 0.02  # 2 / 2**7, exactly
+
+
+@pytest.mark.parametrize(
+    ("parts", "number"), [([3.0, -3.0, 3.0], 3), ([2.0, 1.0], 25 / 17), ([0.0, 0.0], 2)]
+)
+def test_how_many_equal_values_carry_as_much(parts: list[float], number: float) -> None:
+    """The square of the sum of squares over the sum of fourth powers."""
+    assert comparison._carrying(np.array(parts)) == pytest.approx(number)

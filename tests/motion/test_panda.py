@@ -46,3 +46,9 @@ def test_limits_are_the_descriptions_and_the_data_sheets() -> None:
         assert found.finger_speed == float(limits[joint.name]["velocity"])
     assert found.acceleration == (15, 7.5, 10, 12.5, 15, 20, 20)
     assert found.jerk == (7500, 3750, 5000, 6250, 7500, 10000, 10000)
+
+
+def test_its_drives_are_stiff_and_damped_by_a_tenth() -> None:
+    arm = [(joint.stiffness, joint.damping) for joint in panda().arm_joints]
+    stiffness = [4500.0, 4500.0, 3500.0, 3500.0, 2000.0, 2000.0, 2000.0]
+    assert arm == [(k, k / 10) for k in stiffness]

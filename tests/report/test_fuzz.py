@@ -261,7 +261,9 @@ def test_arrays_of_other_kinds(data: st.DataObject) -> None:
     """Traces, pictures and motions, and the JSON in them."""
     name = data.draw(st.sampled_from([name for name in names() if name.endswith(".npz")]))
     arrays = dict(np.load(folder() / name))
-    for key in data.draw(st.lists(st.sampled_from(sorted(arrays)), min_size=1, max_size=2)):
+    for key in data.draw(
+        st.lists(st.sampled_from(sorted(arrays)), min_size=1, max_size=2, unique=True)
+    ):
         if key in ("about", "facts") and data.draw(st.booleans()):
             text = arrays[key].tobytes() if key == "about" else str(arrays[key])
             told = json.dumps(spoil(json.loads(text), data))

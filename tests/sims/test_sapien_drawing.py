@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pytest_simbench.sims.sapien.adapter import SAPIEN
 
-from pytest_simbench.scene import FloatArray, Pose, Scene
+from pytest_simbench.scene import ConvexMesh, FloatArray, Pose, Scene
 from pytest_simbench.simulator import UnavailableError
 from pytest_simbench.testing import scenes
 
@@ -62,3 +62,10 @@ def test_the_robot_is_in_the_picture() -> None:
         changed = np.abs(with_arm - simulator.render(WIDTH, HEIGHT)).sum(axis=2) > 60
     assert changed[pixel(elbow)]
     assert 0.01 < changed.mean() < 0.5
+
+
+def test_a_mesh_is_in_the_picture() -> None:
+    corners = tuple((x, y, z) for x in (-0.05, 0.05) for y in (-0.05, 0.05) for z in (-0.05, 0.05))
+    mesh = ConvexMesh("mesh", corners, Pose.at(0.5, 0.0, 0.9), 0.1, colour=RED)
+    with drawn(Scene("mesh", bodies=(mesh,))) as simulator:
+        assert red_at(simulator, simulator.body_state()[0, :3])
