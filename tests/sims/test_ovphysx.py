@@ -32,6 +32,7 @@ SCENE = Scene(
     ),
     robot=scenes.arm(),
     ground_friction=0.7,
+    friction_rule="mean",  # the engine's own, so that its stage has these numbers
 )
 
 
