@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pytest_simbench.sims.sapien.adapter import SAPIEN
 
-from pytest_simbench.scene import ConvexMesh, FloatArray, Pose, Scene
+from pytest_simbench.scene import ConvexMesh, Cylinder, FloatArray, Pose, Scene
 from pytest_simbench.simulator import UnavailableError
 from pytest_simbench.testing import scenes
 
@@ -64,8 +64,14 @@ def test_the_robot_is_in_the_picture() -> None:
     assert 0.01 < changed.mean() < 0.5
 
 
-def test_a_mesh_is_in_the_picture() -> None:
+@pytest.mark.parametrize("shape", ["mesh", "cylinder"])
+def test_a_body_of_any_shape_is_in_the_picture(shape: str) -> None:
+    place = Pose.at(0.5, 0.0, 0.9)
     corners = tuple((x, y, z) for x in (-0.05, 0.05) for y in (-0.05, 0.05) for z in (-0.05, 0.05))
-    mesh = ConvexMesh("mesh", corners, Pose.at(0.5, 0.0, 0.9), 0.1, colour=RED)
-    with drawn(Scene("mesh", bodies=(mesh,))) as simulator:
+    body = (
+        ConvexMesh("b", corners, place, 0.1, colour=RED)
+        if shape == "mesh"
+        else Cylinder("b", 0.05, 0.1, place, 0.1, colour=RED)
+    )
+    with drawn(Scene(shape, bodies=(body,))) as simulator:
         assert red_at(simulator, simulator.body_state()[0, :3])
