@@ -34,7 +34,7 @@ PATHS = BAD.keys() - {"empty", "blank", "long", "long list", "NUL", "half a word
 FINE = {
     "sim_jitter": {"zero"}, "sim_seed": {"zero"},
     "sim_output": PATHS, "sim_baseline": PATHS, "sim_resume": PATHS, "sim_badge": PATHS,
-    "sim_data": PATHS,
+    "sim_data": PATHS, "sim_scene": PATHS,
     "sim_gui": {"zero"}, "sim_headless": {"zero"}, "sim_fresh": {"zero"}, "sim_pictures": {"zero"},
     "sim_install_missing": {"zero"},
     "sim_strict": {"zero"}, "sim_crashes": {"zero"},
