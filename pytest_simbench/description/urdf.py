@@ -267,6 +267,8 @@ def write_origin(element: ET.Element, pose: Pose) -> None:
     r = pose.rotation()
     pitch = np.arcsin(np.clip(-r[2, 0], -1.0, 1.0))
     roll, yaw = np.arctan2(r[2, 1], r[2, 2]), np.arctan2(r[1, 0], r[0, 0])
+    if np.hypot(r[0, 0], r[1, 0]) < 1e-7:  # pitched by 90 degrees both turn about one axis
+        roll, yaw = 0.0, np.arctan2(-r[0, 1], r[1, 1])
     ET.SubElement(element, "origin", xyz=_spaced(pose.position), rpy=_spaced((roll, pitch, yaw)))
 
 

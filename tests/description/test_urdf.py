@@ -14,6 +14,7 @@ import pytest
 
 from pytest_simbench.description.robot_files import content_of, folder, received, with_content
 from pytest_simbench.description.shapes import reach, shape_points
+from pytest_simbench.description.urdf import write_origin
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Pose, Robot, Scene
@@ -154,3 +155,18 @@ def test_a_file_that_is_missing_is_named_here() -> None:
     robot: Robot = replace(panda(), urdf="/nowhere/panda.urdf")
     with pytest.raises(DescriptionError, match=r"cannot read the robot description /nowhere/panda"):
         content_of(robot)
+
+
+@pytest.mark.parametrize("pitch", [-90.0, -89.9, 0.0, 45.0, 90.0])
+@pytest.mark.parametrize("yaw", [-170.0, -40.0, 0.0, 25.0, 90.0])
+def test_an_origin_is_written_as_the_pose_that_it_is(pitch: float, yaw: float) -> None:
+    """Also where the pose is pitched by 90 degrees, and roll and yaw turn about one axis."""
+    half = np.deg2rad(pitch) / 2
+    pose = Pose.at(1.0, 2.0, 3.0, yaw=np.deg2rad(yaw)) * Pose(
+        quaternion=(float(np.cos(half)), 0.0, float(np.sin(half)), 0.0)
+    )
+    element = ET.Element("collision")
+    write_origin(element, pose)
+    roll, pitched, turned = map(float, element[0].attrib["rpy"].split())
+    read = pin.rpy.rpyToMatrix(roll, pitched, turned)
+    assert read == pytest.approx(pose.rotation(), abs=1e-6)
