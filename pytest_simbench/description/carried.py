@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from pytest_simbench.ground.text import for_markdown
 from pytest_simbench.scene.wire import Wire
 
 CARRIED, APPROXIMATED, NOT_CARRIED = STATES = ("carried", "approximated", "not carried")
@@ -49,14 +50,14 @@ def named(names: Iterable[str]) -> str:
 def markdown(title: str, account: Sequence[Carried]) -> str:
     """The page `carried.md`: what is not carried first."""
     lines = [
-        f"# What was carried of {_cell(title)}",
+        f"# What was carried of {for_markdown(title)}",
         "",
         "| quantity | state | how, or why not | where |",
         "|---|---|---|---|",
     ]
     for line in sorted(account, key=lambda line: -STATES.index(line.state)):
         cells = (line.quantity, line.state, line.reason, line.where)
-        lines.append(f"| {' | '.join(map(_cell, cells))} |")
+        lines.append(f"| {' | '.join(for_markdown(text, cell=True) for text in cells)} |")
     return "\n".join(lines) + "\n"
 
 
@@ -68,9 +69,3 @@ def terminal_lines(account: Sequence[Carried]) -> list[str]:
         if quantities:
             found.append(f"{state} ({len(quantities)}): {named(quantities)}")
     return found
-
-
-def _cell(text: str) -> str:
-    """Text of somebody's file that leaves a table a table."""
-    plain = "".join(c if c.isprintable() else " " for c in text)
-    return plain.replace("\\", "\\\\").replace("|", "\\|").replace("<", "&lt;").replace("`", "'")

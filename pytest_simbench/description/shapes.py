@@ -114,6 +114,15 @@ def write_obj(path: Path, mesh: Polytope) -> Path:
     return path
 
 
+def write_stl(path: Path, mesh: Polytope) -> Path:
+    """Write a hull as a binary STL file; the path."""
+    triangles = np.zeros(len(mesh.triangles), TRIANGLE)
+    triangles["corners"] = mesh.points[np.array(mesh.triangles)]
+    count = np.uint32(len(triangles)).tobytes()
+    path.write_bytes(bytes(HEADER - len(count)) + count + triangles.tobytes())
+    return path
+
+
 def mesh_points(path: str) -> FloatArray:
     """The distinct corners of a mesh, (n, 3) [m].
 

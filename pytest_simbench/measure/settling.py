@@ -31,17 +31,21 @@ class Ends:
 
     Attributes:
         places: of the bodies' origins [mm], (repetitions, bodies, 3).
+        starts: number of the stored start of each, (repetitions,); 0 where there are none.
         crashed: how many repetitions besides did not finish.
         premises: share of the premises that hold, mean of the repetitions; None without any.
     """
 
     places: NDArray[np.float64]
+    starts: NDArray[np.int64]
     crashed: int
     premises: float | None
 
     @property
-    def mean(self) -> NDArray[np.float64]:
-        return np.asarray(self.places.mean(axis=0))
+    def means(self) -> dict[int, NDArray[np.float64]]:
+        """By start, (bodies, 3): ends of different starts are never held against each other."""
+        numbers = np.unique(self.starts).tolist()
+        return {k: self.places[self.starts == k].mean(axis=0) for k in numbers}
 
 
 @dataclass(frozen=True)
@@ -65,18 +69,27 @@ class Settled:
     cost: Mapping[Who, float | None]
 
     def apart(self, a: Ends, b: Ends) -> tuple[float, str]:
-        """How far apart the body lies that two ends have farthest apart [mm], and its name."""
-        gaps = np.linalg.norm(a.mean - b.mean, axis=1)
-        worst = int(gaps.argmax())
-        return float(gaps[worst]), self.bodies[worst]
+        """How far apart the body lies that two ends have farthest apart [mm], and its name; 0 where
+        they have no start in common."""
+        first, second = a.means, b.means
+        gaps = [np.linalg.norm(first[k] - second[k], axis=1) for k in first.keys() & second.keys()]
+        widest = np.max(gaps, axis=0) if gaps else np.zeros(len(self.bodies))
+        worst = int(widest.argmax())
+        return float(widest[worst]), self.bodies[worst]
 
     def noise(self, who: Who, moved: float) -> float | None:
         """How far any body ends from where it ends as written, with starts moved by so much [mm];
         None where that was not tried."""
         own, others = self.written[who], self.moved.get(moved, {}).get(who)
-        if others is None or not len(others.places):
+        if others is None:
             return None
-        return float(np.linalg.norm(others.places - own.mean, axis=2).max())
+        means = own.means
+        ways = [
+            float(np.linalg.norm(place - means[start], axis=1).max())
+            for place, start in zip(others.places, others.starts.tolist(), strict=True)
+            if start in means
+        ]
+        return max(ways, default=None)
 
     def change(self, who: Who, finer: int) -> float | None:
         """How far any body ends from where it ends as written, with a step so many times as fine
@@ -151,7 +164,7 @@ def _settled(records: Sequence[Record]) -> Settled | None:
             written[who] = ends
             cost[who] = next((c for r in group if (c := r.cost("cpu_cost")) is not None), None)
     written = {who: ends for who, ends in written.items() if len(ends.places)}
-    if len(written) < 2 and not moved:
+    if not written or (len(written) < 2 and not moved):
         return None
     return Settled(
         str(done.settings.get("task.scene")), bodies, written,
@@ -160,15 +173,17 @@ def _settled(records: Sequence[Record]) -> Settled | None:
 
 
 def _ends(records: Sequence[Record], bodies: Sequence[str]) -> Ends:
-    places = []
+    places, starts = [], []
     for record in records:
         told = record.details.get("places")
         if record.ok and isinstance(told, Mapping) and list(told) == list(bodies):
             places.append([np.multiply(told[name][:3], 1000.0) for name in bodies])
+            starts.append(record.seed % int(record.settings.get("task.starts") or 1))
     shares = [record.metrics.get("premises") for record in records if record.ok]
     known = [share for share in shares if share is not None]
     return Ends(
         np.array(places, dtype=float).reshape(-1, len(bodies), 3),
+        np.array(starts, dtype=int),
         sum(record.status == "failed" for record in records),
         float(np.mean(known)) if known else None,
     )

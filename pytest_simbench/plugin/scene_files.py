@@ -83,8 +83,8 @@ def load(
             different = distinct(rows)
             if different < len(rows):
                 tell(
-                    f"{starts}: {len(rows)} starts, of which {different} differ in how the bodies "
-                    f"lie to each other: what they say is worth {different} repetitions"
+                    f"{starts}: {len(rows)} starts, and {different} different in how the bodies "
+                    f"lie to each other: as evidence they count as {different}"
                 )
     except (SimulatorError, SceneError) as error:
         pytest.exit(str(error), returncode=pytest.ExitCode.USAGE_ERROR)

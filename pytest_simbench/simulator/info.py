@@ -144,8 +144,8 @@ class SimulatorInfo:
         install_size_mb: what installing it adds on disk, rounded [MB].
         language: in which the engine is written.
         friction_rule: what the engine, as its adapter sets it, makes of the frictions of two
-            surfaces: one of `scene.friction.RULES`; empty: not known, and scenes of several
-            frictions are refused.
+            surfaces: one of `scene.friction.RULES`; empty: not known, which is told of scenes
+            of several frictions.
         reads: endings of the files that it makes scenes of, see `Simulator.read_file`.
     """
 
@@ -249,16 +249,11 @@ def check_shapes(info: SimulatorInfo, scene: Scene) -> None:
 def with_friction_rule(info: SimulatorInfo, scene: Scene) -> tuple[Scene, list[str]]:
     """The scene with frictions for the simulator's rule, and what that leaves wrong.
 
-    Raises:
-        NotSupportedError: the scene has several frictions, and the rule is not known.
+    Without a rule each surface has its own, and that the pairs are not known is told.
     """
     if not info.friction_rule:
-        if len(scene.frictions) == 1:
-            return scene, []
-        raise NotSupportedError(
-            f"{info.name} does not say what the friction of two different surfaces is, and scene "
-            f"{scene.name!r} has several"
-        )
+        unknown = "what the friction of two surfaces is where they differ, the adapter does not say"
+        return scene, [unknown] if len(scene.frictions) > 1 else []
     made, problem = combined(scene, info.friction_rule)
     return made, [problem] if problem else []
 

@@ -137,11 +137,12 @@ class ReadBack(readback.ReadBack):
 
     def _measured(self, mesh: Mesh | Convex, frame: Pose) -> FloatArray:
         """The reach of a mesh in a frame: how far a plane stands off when it just touches."""
-        origin, reaches = np.asarray(frame.position), []
+        origin, centre = np.asarray(frame.position), np.asarray(pose_of(mesh).position)
+        reaches = []
         for direction in DIRECTIONS @ frame.rotation().T:
-            normal, offset = -direction, origin @ direction
+            normal, offset = -direction, centre @ direction
             if isinstance(mesh, Mesh):  # from outside: every corner is below such a plane
-                offset -= 10.0  # a hull touches none of those, and its frame is within
+                offset -= 10.0  # a hull touches none of those, and its own centre is within
             while True:
                 self.probe.setParams(tuple(normal), -offset)
                 depths = [c.getContactGeomParams()[2] for c in ode.collide(mesh, self.probe)]

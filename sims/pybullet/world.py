@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.shapes import write_obj
+from pytest_simbench.description.shapes import write_stl
 from pytest_simbench.description.urdf import INERTIA, write_origin
 from pytest_simbench.scene import (
     Body,
@@ -93,7 +93,7 @@ def _load_compound(c: int, body: Compound, mass: float) -> int:
             for kind in ("collision", "visual"):
                 element = ET.SubElement(link, kind)
                 write_origin(element, part.pose)
-                _describe(ET.SubElement(element, "geometry"), part, Path(folder) / f"{k}.obj")
+                _describe(ET.SubElement(element, "geometry"), part, Path(folder) / f"{k}.stl")
             colour = ET.SubElement(element, "material", name=str(k))
             ET.SubElement(colour, "color", rgba=" ".join(map(str, body.colour)))
         ET.ElementTree(root).write(f"{folder}/compound.urdf")
@@ -109,9 +109,10 @@ def _load_compound(c: int, body: Compound, mass: float) -> int:
 
 
 def _describe(geometry: ET.Element, shape: Body, mesh: Path) -> None:
-    """A shape in a URDF; a mesh goes to a file of its own."""
+    """A shape in a URDF; a mesh goes to a file, an STL: Bullet tells no corners of an OBJ among
+    other shapes."""
     if isinstance(shape, ConvexMesh):
-        ET.SubElement(geometry, "mesh", filename=str(write_obj(mesh, shape.hull)))
+        ET.SubElement(geometry, "mesh", filename=str(write_stl(mesh, shape.hull)))
     else:
         size = {n: getattr(shape, n) for n in ("size", "radius", "length") if hasattr(shape, n)}
         written = {n: " ".join(map(repr, np.atleast_1d(v).tolist())) for n, v in size.items()}

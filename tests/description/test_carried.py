@@ -30,7 +30,7 @@ def test_the_page_has_a_row_each_and_first_what_is_not_carried() -> None:
     rows = markdown("my|file", ACCOUNT).splitlines()
     assert rows[0] == "# What was carried of my\\|file"
     assert rows[4:] == [
-        "| geom margin | not carried | a \\| b | g&lt;1> |",
+        "| geom margin | not carried | a \\| b | g\\<1\\> |",
         "| geom gap | not carried | why |  |",
         "| damping | approximated | by 3 % |  |",
         "| option gravity | carried | 0 0 -9.81 |  |",

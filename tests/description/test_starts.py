@@ -20,15 +20,11 @@ def rows(*places: tuple[float, float, float]) -> np.ndarray:
     return np.array([[*place, 1.0, 0.0, 0.0, 0.0] for place in places])
 
 
-def write(path: Path, **arrays: np.ndarray) -> Path:
-    np.savez(path / "starts.npz", **arrays)
-    return path / "starts.npz"
-
-
 def test_equal_starts_elsewhere_on_the_table_are_one(tmp_path: Path) -> None:
     a = rows((0, 0, 1), (0.5, 0, 1), (0, 0, 1))
     b = rows((0, 0, 2), (0.5, 0, 2), (0, 0.1, 2))
-    starts = read_starts(write(tmp_path, a=a, b=b), SCENE)
+    np.savez(tmp_path / "starts.npz", a=a, b=b)
+    starts = read_starts(tmp_path / "starts.npz", SCENE)
     assert [dict(start)["b"].position for start in starts] == [(0, 0, 2), (0.5, 0, 2), (0, 0.1, 2)]
     assert distinct(starts) == 2
     assert distinct(starts[:2]) == 1
@@ -48,8 +44,9 @@ def test_equal_starts_elsewhere_on_the_table_are_one(tmp_path: Path) -> None:
 def test_bad_starts_are_one_sentence(
     arrays: dict[str, np.ndarray], message: str, tmp_path: Path
 ) -> None:
+    np.savez(tmp_path / "starts.npz", **arrays)
     with pytest.raises(DescriptionError, match=message):
-        read_starts(write(tmp_path, **arrays), SCENE)
+        read_starts(tmp_path / "starts.npz", SCENE)
 
 
 def test_no_such_file_is_one_sentence(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from pytest_simbench.description.urdf import write_origin
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Pose, Robot, Scene
+from pytest_simbench.scene.pose import quaternion_of
 from pytest_simbench.simulator import DescriptionError, PreparedRobot
 from pytest_simbench.worker.wire import pack, unpack
 
@@ -161,12 +162,8 @@ def test_a_file_that_is_missing_is_named_here() -> None:
 @pytest.mark.parametrize("yaw", [-170.0, -40.0, 0.0, 25.0, 90.0])
 def test_an_origin_is_written_as_the_pose_that_it_is(pitch: float, yaw: float) -> None:
     """Also where the pose is pitched by 90 degrees, and roll and yaw turn about one axis."""
-    half = np.deg2rad(pitch) / 2
-    pose = Pose.at(1.0, 2.0, 3.0, yaw=np.deg2rad(yaw)) * Pose(
-        quaternion=(float(np.cos(half)), 0.0, float(np.sin(half)), 0.0)
-    )
+    turn = pin.rpy.rpyToMatrix(0.0, *np.deg2rad([pitch, yaw]))
     element = ET.Element("collision")
-    write_origin(element, pose)
-    roll, pitched, turned = map(float, element[0].attrib["rpy"].split())
-    read = pin.rpy.rpyToMatrix(roll, pitched, turned)
-    assert read == pytest.approx(pose.rotation(), abs=1e-6)
+    write_origin(element, Pose.from_array([1.0, 2.0, 3.0, *quaternion_of(turn)]))
+    read = pin.rpy.rpyToMatrix(*map(float, element[0].attrib["rpy"].split()))
+    assert read == pytest.approx(turn, abs=1e-6)

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.experiment import scene_file
 from pytest_simbench.experiment.scene_file import read_scene_file
 from pytest_simbench.ground.errors import DescriptionError
 
@@ -51,4 +50,3 @@ def test_what_the_engine_refuses_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(DescriptionError, match=r"zero.xml: .*mass.*line 2") as error:
         read_scene_file(path)
     assert "\n" not in str(error.value)
-    assert not scene_file._read.get((path, 0, 0))

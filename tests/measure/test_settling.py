@@ -112,3 +112,20 @@ def test_a_crash_is_told_and_other_scenes_stay_apart() -> None:
 
 def test_one_simulator_without_moved_starts_is_no_comparison() -> None:
     assert settlings([end("a", 0.0)]) == []
+
+
+def test_stored_starts_are_held_against_themselves_alone() -> None:
+    """Two starts that are 500 mm apart on the table are no noise of 500 mm."""
+
+    def at(who: str, seed: int, x: float, moved: float = 0.0) -> Record:
+        own = {**end(who, 0.0).settings, "task.starts": 2, "task.moved": moved}
+        return end(who, x, seed=seed, settings=own)
+
+    apart = [at("a", 2, 0.0), at("a", 3, 500.0), at("b", 2, 0.0), at("b", 3, 510.0)]
+    moved = [at("a", 2, 0.1, 1e-4), at("a", 3, 500.2, 1e-4)]
+    found = one(*apart, *moved)
+    a, b = found.written
+    assert found.apart(found.written[a], found.written[b]) == (pytest.approx(10.0), "bowl")
+    assert found.noise(a, 1e-4) == pytest.approx(0.2)
+    lost = one(*apart[:3], *moved)  # b has one start: the other one is not compared
+    assert lost.apart(lost.written[a], lost.written[b])[0] == pytest.approx(0.0)

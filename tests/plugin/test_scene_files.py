@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+from tests.plugin.inner import records
 
 SCENE = """
 <mujoco model="blocks">
@@ -38,10 +39,6 @@ def blocks(pytester: pytest.Pytester) -> Path:
     return path
 
 
-def records(folder: Path) -> list[dict]:
-    return [json.loads(line) for line in (folder / "records.jsonl").read_text().splitlines()]
-
-
 @pytest.mark.engine
 def test_alone_it_runs_the_suite_and_says_whether_a_difference_is_noise(
     pytester: pytest.Pytester, blocks: Path
@@ -58,11 +55,8 @@ def test_alone_it_runs_the_suite_and_says_whether_a_difference_is_noise(
     assert "| geom solref | not carried |" in account
     assert "| geom type, size, pos, quat | carried |" in account
     steps = {(r["profile"], r["settings"]["timestep"]) for r in records(pytester.path / "run")}
-    assert steps == {
-        (profile, step / times)
-        for profile, step in (("tuned", 0.001), ("file", 0.004))
-        for times in (1, 4, 8)
-    }
+    own = {"tuned": 0.001, "file": 0.004}
+    assert steps == {(name, own[name] / times) for name in own for times in (1, 4, 8)}
     page = (pytester.path / "run" / "report.html").read_text()
     assert page.index("ends alike in all 2") < page.index("Scene blocks")
 
@@ -76,7 +70,7 @@ def test_a_premise_of_stored_starts_that_are_all_alike(
     np.savez(pytester.path / "starts.npz", lower=rows[::2], upper=rows[1::2])
     found = pytester.runpytest_subprocess("--sim", "mujoco", "--sim-output=run")
     found.assert_outcomes(passed=1)
-    assert "5 starts, of which 1 differ" in found.stdout.str()
+    assert "5 starts, and 1 different" in found.stdout.str()
     ends = [r["details"]["places"]["upper"] for r in records(pytester.path / "run")]
     assert sorted(end[0] for end in ends) == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4], abs=1e-3)
     assert [end[2] for end in ends] == pytest.approx([0.25] * 5, abs=1e-3)
@@ -112,9 +106,7 @@ def test_a_scene_of_joints_is_refused_by_name(pytester: pytest.Pytester, blocks:
     found.stderr.fnmatch_lines(["ERROR: --sim-scene:*hinge*"])
 
 
-def test_without_a_file_the_test_is_skipped_with_the_option_s_name(
-    pytester: pytest.Pytester,
-) -> None:
+def test_without_a_file_the_test_is_skipped_and_says_so(pytester: pytest.Pytester) -> None:
     pytester.makepyfile("def test_it(sim_case, scene_file): scene_file()")
     found = pytester.runpytest("--sim", "mujoco", "-rs")
     found.assert_outcomes(skipped=1)

@@ -14,7 +14,16 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.parity.compare import compare
 from pytest_simbench.parity.quantities import expected_quantities
-from pytest_simbench.scene import Box, Compound, Cylinder, Pose, Scene, Sphere
+from pytest_simbench.scene import (
+    Box,
+    Compound,
+    ConvexMesh,
+    Cylinder,
+    Pose,
+    Scene,
+    Sphere,
+    principal,
+)
 from pytest_simbench.scene.pair_friction import combined
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter
@@ -34,7 +43,9 @@ SHAPES = (
 MOMENTS = (1.0e-3, 1.2e-3, 1.1e-3)
 
 THING = Compound("thing", SHAPES, Pose.at(0.1, 0.2, 0.09, yaw=0.5), 0.5, moments=MOMENTS)
-POST = Compound("post", SHAPES[:2], Pose.at(0.5, 0.2, 0.06))
+ROCK, OWN = principal([(0, 0, 0), (0.06, 0, 0), (0, 0.06, 0), (0, 0, 0.06), (0.05, 0.05, 0.05)])
+MESH = ConvexMesh("rock", ROCK, Pose.at(0, 0, 0.08) * OWN)
+POST = Compound("post", (*SHAPES[:2], MESH), Pose.at(0.5, 0.2, 0.06))
 
 SCENE = Scene("compounds", (THING, POST))
 

@@ -92,6 +92,8 @@ def _finer(found: Settled, known: dict[Who, str]) -> str:
     finest = max(found.finer)
     ends = found.finer[finest]
     groups = found.places(ends)
+    if not groups:
+        return f"With steps {finest} times as fine no repetition finished."
     moving = [
         known[who]
         for who in found.written
