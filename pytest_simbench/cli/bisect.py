@@ -6,6 +6,8 @@ not run again.
 
 Which folder that is depends on all options, and on the ini file. So the command starts pytest,
 whose plugin knows them and calls `bisect`.
+
+With `ends` in place of a metric it is about a user's scene (bisect_ends.py).
 """
 
 from __future__ import annotations
@@ -35,6 +37,9 @@ from pytest_simbench.records.metrics import Metric, UnknownMetric
 from pytest_simbench.records.series import series
 from pytest_simbench.simulator.registry import adapter
 
+ENDS = "ends"
+"""In place of a metric: where the bodies of a scene end."""
+
 
 def bisect(wanted: Span, metric_name: str, folder: Path, arguments: Sequence[str]) -> int:
     """Find it, say so, and return the exit code: 1 where the bad release is not worse.
@@ -56,6 +61,10 @@ def bisect(wanted: Span, metric_name: str, folder: Path, arguments: Sequence[str
         f"bisecting {len(releases)} releases of {wanted.name}: {steps(len(releases))} steps, and "
         "the ends"
     )
+    if metric_name == ENDS:
+        from pytest_simbench.cli.bisect_ends import bisect_ends
+
+        return bisect_ends(search)
     search.run(0, last)
     metric = search.metric()
     good, bad = search.result(0), search.result(last)
@@ -132,7 +141,7 @@ class Search:
 
     def run(self, *places: int) -> None:
         """Run the tests on some of the releases, unless the folder holds that."""
-        names = ",".join(self._name(place) for place in places)
+        names = ",".join(self.named(place) for place in places)
         keep = "--sim-resume" if RunFolder(self.folder).holds_run else "--sim-output"
         command = [
             *(sys.executable, "-m", "pytest", *self.arguments, f"{keep}={self.folder}"),
@@ -177,7 +186,7 @@ class Search:
             row
             for task in reading.metrics
             for row in series(r for r in reading.records if r.task == task)
-            if row.key.simulator == self._name(place)
+            if row.key.simulator == self.named(place)
         ]
         if len(rows) > 1:
             names = {task: [m.name for m in known] for task, known in reading.metrics.items()}
@@ -186,7 +195,7 @@ class Search:
             what = "no test" if not rows else "more than one test"
             raise BadInput(
                 f"{what} with {shown(self.metric_name)} has run on "
-                f"{self._name(place)}; choose one test, with its file or with -k"
+                f"{self.named(place)}; choose one test, with its file or with -k"
             )
         records = rows[0].records
         return ResultSet(records, reading.metrics[records[0].task])
@@ -200,5 +209,6 @@ class Search:
             return f"{self.releases[place]} {name} {mean}{crashed}"
         return f"{self.releases[place]} {len(result.crashed)} of {len(result)} crashed"
 
-    def _name(self, place: int) -> str:
+    def named(self, place: int) -> str:
+        """A release as a simulator's name."""
         return f"{self.simulator}=={self.releases[place]}"

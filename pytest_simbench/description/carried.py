@@ -40,10 +40,10 @@ class Carried(Wire):
             raise ValueError(f"{self.quantity}: no state {self.state!r}; choose from {STATES}")
 
 
-def named(names: Iterable[str]) -> str:
+def named(names: Iterable[str], between: str = ", ") -> str:
     """Names of elements, the first few of many: "a, b, c and 62 more"."""
     every = list(names)
-    shown, rest = ", ".join(every[:MOST_NAMED]), len(every) - MOST_NAMED
+    shown, rest = between.join(every[:MOST_NAMED]), len(every) - MOST_NAMED
     return f"{shown} and {rest} more" if rest > 0 else shown
 
 
@@ -65,7 +65,7 @@ def terminal_lines(account: Sequence[Carried]) -> list[str]:
     """One line for each state that occurs: how many quantities, and the names of some."""
     found = []
     for state in STATES:
-        quantities = [line.quantity for line in account if line.state == state]
+        quantities = dict.fromkeys(line.quantity for line in account if line.state == state)
         if quantities:
-            found.append(f"{state} ({len(quantities)}): {named(quantities)}")
+            found.append(f"{state} ({len(quantities)}): {named(quantities, '; ')}")
     return found

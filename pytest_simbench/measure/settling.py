@@ -7,7 +7,7 @@ moved a little within each, and the time step made finer.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +67,19 @@ class Settled:
     moved: Mapping[float, Mapping[Who, Ends]]
     finer: Mapping[int, Mapping[Who, Ends]]
     cost: Mapping[Who, float | None]
+
+    def only(self, chosen: Sequence[Who]) -> Settled:
+        """The same of some simulators alone."""
+
+        def among(ends: Mapping[Who, Ends]) -> dict[Who, Ends]:
+            return {who: ends[who] for who in chosen if who in ends}
+
+        return replace(
+            self,
+            written=among(self.written),
+            moved={amount: among(ends) for amount, ends in self.moved.items()},
+            finer={times: among(ends) for times, ends in self.finer.items()},
+        )
 
     def apart(self, a: Ends, b: Ends) -> tuple[float, str]:
         """How far apart the body lies that two ends have farthest apart [mm], and its name; 0 where

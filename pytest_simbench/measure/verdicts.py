@@ -86,6 +86,13 @@ class Judgement:
             return f"a claim needs {FEWEST} repetitions or more"
         if self.further is not None:
             return f"about {self.further} more repetitions needed"
+        if self.claim.value in (0, 1) and self.claim.value == self.interval.mean:
+            low = self.claim.relation == "at least"
+            shown = self.interval.low if low else self.interval.high
+            return (
+                f"all {self.interval.n} repetitions are at the threshold, which no number of them "
+                f"proves; these prove {self.claim.relation} {shown:.3g}"
+            )
         return "the mean is too close to the threshold for any number of repetitions"
 
 

@@ -22,7 +22,7 @@ FOLDER = ".simbench/history"
 SETTINGS = (
     "sim_robot", "sim_gui", "sim_headless", "sim_protocol", "sim_jitter", "sim_seed", "sim_timeout",
     "sim_stall_timeout", "sim_profile", "sim_set", "sim_sweep",
-    "sim_memory_limit",
+    "sim_memory_limit", "sim_scene",
 )  # fmt: skip
 """Options that make another history: results with other values are not comparable."""
 

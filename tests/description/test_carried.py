@@ -41,6 +41,6 @@ def test_the_terminal_has_a_line_for_each_state() -> None:
     assert terminal_lines(ACCOUNT) == [
         "carried (1): option gravity",
         "approximated (1): damping",
-        "not carried (2): geom margin, geom gap",
+        "not carried (2): geom margin; geom gap",
     ]
     assert terminal_lines(()) == []

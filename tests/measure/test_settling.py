@@ -12,6 +12,8 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.report.model.settling import section, sentences
 from tests.records.build import made
 
+MODE = ("headless", "tuned")
+
 
 def end(
     simulator: str, x: float, step: float = 0.002, moved: float = 0.0, seed: int = 1, **given: Any
@@ -82,7 +84,10 @@ def test_a_finer_step_says_whether_the_difference_survives_and_who_is_not_conver
     apart = [end("a", 0.0), end("b", 10.0), end("a", 0.1, 0.0005), end("b", 10.2, 0.0005)]
     found = one(*apart)
     assert found.change(("b", "headless", "tuned"), 4) == pytest.approx(0.2)
-    assert "they still end in 2 ways, where they ended before" in sentences(found)[2]
+    assert (
+        "they still end in 2 ways, up to 10 mm apart, where they ended before"
+        in sentences(found)[2]
+    )
     found = one(*apart, end("a", 0.1, 0.00025), end("b", 0.3, 0.00025))
     assert sentences(found)[2] == (
         "With steps 8 times as fine they all end alike; the end of b depends on the step, so it is "
@@ -129,3 +134,22 @@ def test_stored_starts_are_held_against_themselves_alone() -> None:
     assert found.noise(a, 1e-4) == pytest.approx(0.2)
     lost = one(*apart[:3], *moved)  # b has one start: the other one is not compared
     assert lost.apart(lost.written[a], lost.written[b])[0] == pytest.approx(0.0)
+
+
+def test_releases_are_told_as_spans_with_the_move_that_does_what_each_boundary_does() -> None:
+    ends = {"1.10": 30.0, "1.8": 0.0, "1.9": 0.3, "1.11": 30.1, "2.0": 90.0}
+    records = [end(f"sim=={release}", x) for release, x in ends.items()]
+    records += [end(f"sim=={release}", x + 35, moved=1e-4) for release, x in ends.items()]
+    records += [end(f"sim=={release}", x, 0.0005) for release, x in ends.items()]
+    records += [end("sim==1.9", 9.0, 0.00025)]
+    told = sentences(one(*records))
+    assert told[0].startswith(
+        "As written, bowl ends in 3 ways: sim==1.8 to 1.9; sim==1.10 to 1.11; sim==2.0. "
+    )
+    assert told[1:3] == [
+        "1.10 moves the end by 30 mm: a start moved by 0.1 mm does so within one release.",
+        "2.0 moves the end by 60 mm: no start that was moved does so.",
+    ]
+    assert told[-1].endswith("the end of sim==1.9 depends on the step, so it is not converged.")
+    alone = one(*records).only([("sim==1.9", *MODE), ("sim==1.10", *MODE)])
+    assert sentences(alone)[0].startswith("As written, bowl ends in 2 ways: sim==1.9; sim==1.10. ")

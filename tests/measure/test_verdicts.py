@@ -55,6 +55,15 @@ def test_the_advice_admits_what_no_number_decides() -> None:
     assert "too close" in judge(at_least(0.85), between(0.8, 0.9)).advice
 
 
+def test_the_advice_says_what_perfect_repetitions_prove() -> None:
+    assert judge(at_least(1.0), interval([1.0] * 20, SHARE)).advice == (
+        "all 20 repetitions are at the threshold, which no number of them proves; these prove at "
+        "least 0.8"
+    )
+    assert judge(at_most(0.0), proportion(0, 20, 0.9)).advice.endswith("prove at most 0.139")
+    assert judge(at_least(1.0), interval([1.0] * 19 + [0.0], SHARE)).verdict is Verdict.REFUTED
+
+
 @pytest.mark.parametrize("n", [0, 1, 4])
 def test_fewer_than_five_repetitions_are_not_judged(n: int) -> None:
     for value in (0.0, 1.0):

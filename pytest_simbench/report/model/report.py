@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from pytest_simbench.measure.history import History, histories
 from pytest_simbench.measure.law_history import LawHistory, law_histories
+from pytest_simbench.measure.settling import TASK as SETTLING
 from pytest_simbench.measure.settling import Settled, settlings
 from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.records.folder import Reading
@@ -74,8 +75,10 @@ class Report:
 
 
 def histories_of(reading: Reading) -> list[AnyHistory]:
-    """The releases of simulators: of each test, and of all laws."""
-    return [*histories(reading.records, reading.metrics), *law_histories(reading.records)]
+    """The releases of simulators: of each test, and of all laws. A scene that is left to itself has
+    a section of its own, which holds its releases against its noise."""
+    tests = [record for record in reading.records if record.task != SETTLING]
+    return [*histories(tests, reading.metrics), *law_histories(reading.records)]
 
 
 def summaries_of(reading: Reading, looks: int = 1) -> list[TaskSummary]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import combinations
+from collections.abc import Mapping, Sequence
+from itertools import combinations, pairwise
 
+from pytest_simbench.ground.versions import RELEASE, VersionedName, release_numbers
 from pytest_simbench.measure.settling import ALIKE, Ends, Settled, Who
 from pytest_simbench.records.metrics import significant
 from pytest_simbench.report.model import cells
@@ -30,18 +31,70 @@ def sentences(found: Settled) -> list[str]:
     """Which differ as the scene is written, whether a moved start explains it, and whether it
     survives a finer step."""
     known = dict(zip(found.written, names(list(found.written)), strict=True))
+    releases = _releases(found)
     groups = found.places(found.written)
+    if releases:
+        groups = sorted(groups, key=lambda group: min(releases.index(who) for who in group))
     if len(groups) < 2:
         return [_alike(found, known), *_alone(found)]
-    pairs = [(a, b) for first, second in combinations(groups, 2) for a in first for b in second]
+    pairs = _between(groups)
     widest = max(pairs, key=lambda pair: found.apart(*(found.written[who] for who in pair))[0])
     gap, body = found.apart(*(found.written[who] for who in widest))
     told = [
         f"As written, {found.scene} ends in {len(groups)} ways: "
-        + "; ".join(_some([known[who] for who in group]) for group in groups)
+        + "; ".join(_some(_spans(group, releases, known)) for group in groups)
         + f". They differ by up to {_mm(gap)} ({body}, {known[widest[0]]} and {known[widest[1]]})."
     ]
-    return [*told, _noise(found, pairs), _finer(found, known)]
+    return [*told, *_boundaries(found, releases), _noise(found, pairs), _finer(found, known)]
+
+
+def _between(groups: Sequence[Sequence[Who]]) -> list[tuple[Who, Who]]:
+    """Each two that are in different groups."""
+    return [(a, b) for first, second in combinations(groups, 2) for a in first for b in second]
+
+
+def _releases(found: Settled) -> list[Who]:
+    """Who is compared, oldest first, where all are releases of one simulator; else nobody."""
+    named = [VersionedName.of(who[0]) for who in found.written]
+    alone = len({name.base for name in named}) == len({who[1:] for who in found.written}) == 1
+    if len(named) < 2 or not alone or {name.kind for name in named} != {RELEASE}:
+        return []
+    return sorted(found.written, key=lambda who: release_numbers(VersionedName.of(who[0]).which))
+
+
+def _spans(group: Sequence[Who], releases: Sequence[Who], known: Mapping[Who, str]) -> list[str]:
+    """Names of a group; of releases without a gap the first and the last one."""
+    if not releases:
+        return [known[who] for who in group]
+    spans: list[list[Who]] = []
+    for before, who in zip([None, *releases], releases, strict=False):
+        if who in group:
+            if not spans or before not in group:
+                spans.append([])
+            spans[-1].append(who)
+    return [
+        " to ".join(dict.fromkeys([known[span[0]], VersionedName.of(span[-1][0]).which]))
+        if len(span) > 1
+        else known[span[0]]
+        for span in spans
+    ]
+
+
+def _boundaries(found: Settled, releases: Sequence[Who]) -> list[str]:
+    """Where the end moves from one release to the next, and what moved start does the same."""
+    told = []
+    for before, after in pairwise(releases):
+        gap, _ = found.apart(found.written[before], found.written[after])
+        if gap > ALIKE:
+            moved = found.explained(before, after)
+            cause = (
+                "no start that was moved does so"
+                if moved is None
+                else f"a start moved by {_mm(1000 * moved)} does so within one release"
+            )
+            which = VersionedName.of(after[0]).which
+            told.append(f"{which} moves the end by {_mm(gap)}: {cause}.")
+    return told
 
 
 def _alike(found: Settled, known: dict[Who, str]) -> str:
@@ -95,15 +148,19 @@ def _finer(found: Settled, known: dict[Who, str]) -> str:
     if not groups:
         return f"With steps {finest} times as fine no repetition finished."
     moving = [
-        known[who]
+        who
         for who in found.written
         if (change := found.change(who, finest)) is not None and change > ALIKE
     ]
     text = "they all end alike" if len(groups) == 1 else f"they still end in {len(groups)} ways"
+    if len(groups) > 1:
+        gap = max(found.apart(ends[a], ends[b])[0] for a, b in _between(groups))
+        text += f", up to {_mm(gap)} apart"
     text = f"With steps {finest} times as fine {text}"
     if not moving:
         return f"{text}, where they ended before: the step is not to blame."
-    return f"{text}; the end of {_some(moving)} depends on the step, so it is not converged."
+    told = _some(_spans(moving, _releases(found), known))
+    return f"{text}; the end of {told} depends on the step, so it is not converged."
 
 
 def _some(texts: Sequence[str]) -> str:

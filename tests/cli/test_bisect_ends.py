@@ -1,0 +1,71 @@
+"""The first release in which a scene's bodies end elsewhere, from planted records."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pytest_simbench.cli.bisect import Search
+from pytest_simbench.cli.bisect_ends import bisect_ends
+from pytest_simbench.cli.values import BadInput
+from pytest_simbench.records.folder import RunFolder
+from tests.measure.test_settling import end
+
+RELEASES = ("1.8", "1.9", "1.10", "1.11", "1.12")
+
+
+class Recorded(Search):
+    """A search in a folder that holds all runs."""
+
+    def run(self, *places: int) -> None:
+        pass
+
+
+def search(folder: Path, *ends: float, moved: float | None = None) -> Search:
+    """The bowl ends there [mm] in each release; by so much elsewhere where its start is moved."""
+    run = RunFolder(folder)
+    for release, x in zip(RELEASES, ends, strict=True):
+        run.append(end(f"sim=={release}", x))
+        if moved is not None:
+            run.append(end(f"sim=={release}", x + moved, moved=1e-4))
+    return Recorded("sim", "ends", RELEASES, folder, [])
+
+
+def test_the_first_release_that_ends_elsewhere(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert bisect_ends(search(tmp_path, 0.0, 0.4, 30.0, 31.0, 30.5, moved=2.0)) == 0
+    told = capsys.readouterr().out
+    assert "the first release that ends elsewhere is 1.10\n" in told
+    assert "1.10 moves the end by 30 mm: no start that was moved does so." in told
+    assert "1.11 ends 31 mm from 1.8" not in told  # halving does not ask it
+    assert "cause" not in told
+
+
+@pytest.mark.parametrize(
+    ("moved", "said"), [(40.0, "the scene's own noise"), (None, "No moved start was tried")]
+)
+def test_what_the_scene_s_noise_explains_has_no_cause(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], moved: float | None, said: str
+) -> None:
+    assert bisect_ends(search(tmp_path, 0.0, 0.4, 30.0, 31.0, 30.5, moved=moved)) == 1
+    told = capsys.readouterr().out
+    assert said in told
+    assert "so 1.10 is not shown to be the cause\n" in told
+
+
+def test_ends_that_are_alike_need_no_search(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert bisect_ends(search(tmp_path, 0.0, 50.0, 50.0, 50.0, 0.9)) == 1
+    assert capsys.readouterr().out == "1.8 and 1.12 end alike, within 1 mm\n"
+
+
+def test_a_release_that_crashed_and_a_scene_that_is_missing_are_told(tmp_path: Path) -> None:
+    known = search(tmp_path, 0.0, 1.0, 2.0, 3.0, 40.0)
+    with pytest.raises(BadInput, match=r"1.8 and sim==2 need one end of bowl each, and have 1"):
+        bisect_ends(Recorded("sim", "ends", ("1.8", "2"), known.folder, []))
+    (tmp_path / "records.jsonl").write_text("")
+    with pytest.raises(BadInput, match=r"no scenes were left to themselves on sim==1.8 and sim=="):
+        bisect_ends(known)
