@@ -37,9 +37,11 @@ class Moved(State):
 
 
 class FileRead(TypedDict):
-    """A scene, and the lines of the account of what was carried, as they cross the boundary."""
+    """A scene, its keyframes, and the lines of the account of what was carried, as they cross the
+    boundary."""
 
     scene: dict[str, Any]
+    starts: list[list[tuple[str, np.ndarray]]]
     account: list[dict[str, str]]
 
 

@@ -19,7 +19,7 @@ LARGEST = 64 * 2**20
 
 def read_starts(path: str | Path, scene: Scene) -> tuple[Start, ...]:
     """The starts in a `.npz` file: for each body named in it an array (n, 7), position [m] and
-    quaternion w, x, y, z of the frame that the scene's file gives it.
+    quaternion w, x, y, z of the frame that the scene's file gives it, in the file's world.
 
     Raises:
         DescriptionError: no such file, no free body of such a name, no such arrays; one sentence.
@@ -51,7 +51,11 @@ def read_starts(path: str | Path, scene: Scene) -> tuple[Start, ...]:
             )
     rows = range(counts.pop())
     return tuple(
-        tuple((name, Pose.from_array(arrays[name][row])) for name in sorted(arrays)) for row in rows
+        tuple(
+            (name, Pose.from_array(arrays[name][row]).translated(z=scene.file_lift))
+            for name in sorted(arrays)
+        )
+        for row in rows
     )
 
 

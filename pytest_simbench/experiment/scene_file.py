@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pytest_simbench.client.environments import Environment, interpreter, missing
@@ -14,7 +14,7 @@ from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.description.carried import Carried
 from pytest_simbench.description.mjcf_check import check_mjcf
 from pytest_simbench.ground.errors import DescriptionError
-from pytest_simbench.scene import Scene
+from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.registry import adapter, address, registered
 
@@ -28,7 +28,7 @@ class SceneFile:
 
     Attributes:
         path: absolute.
-        scene: what was carried of it.
+        scene: what was carried of it, with its keyframes as starts.
         account: what became of each quantity.
     """
 
@@ -100,4 +100,8 @@ def _ask(info: SimulatorInfo, path: Path) -> SceneFile:
         except WorkerError as error:
             raise DescriptionError(error.what) from None
     account = tuple(Carried.from_wire(line) for line in answer["account"])
-    return SceneFile(path, Scene.from_wire(answer["scene"]), account)
+    keyframes = tuple(
+        tuple((name, Pose.from_array(pose)) for name, pose in start) for start in answer["starts"]
+    )
+    scene = replace(Scene.from_wire(answer["scene"]), starts=keyframes)
+    return SceneFile(path, scene, account)

@@ -279,7 +279,8 @@ def data_set(request: pytest.FixtureRequest) -> Callable[[str], Any]:
 
 @pytest.fixture
 def scene_file(request: pytest.FixtureRequest, output_path: Path) -> Callable[..., Scene]:
-    """A scene of a file: `scene_file("kitchen.xml", starts="starts.npz")`.
+    """A scene of a file: `scene_file("kitchen.xml", starts="starts.npz")`, or
+    `starts="keyframes"` for those in the file itself.
 
     Paths are relative to the test's file; without any it is the file of `--sim-scene`. What of the
     file was carried, and what not, is written into the run folder.

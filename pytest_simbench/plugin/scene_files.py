@@ -14,9 +14,13 @@ from pytest_simbench.plugin import options
 
 if TYPE_CHECKING:
     from pytest_simbench.scene import Scene
+    from pytest_simbench.scene.scene import Start
 
 ACCOUNT = "carried.md"
 """Of the run folder: what of the scenes' files was carried."""
+
+KEYFRAMES = "keyframes"
+"""In place of a file of starts: those that the scene's file holds."""
 
 
 def run_suite(config: pytest.Config) -> None:
@@ -61,7 +65,8 @@ def load(
         folder: of the run.
         tell: prints what a user should know, at the end of the run.
         path: of the scene; None for that of `--sim-scene`.
-        starts: of a file of starts (.npz), see `description.starts`.
+        starts: of a file of starts (.npz), see `description.starts`, or `KEYFRAMES`; None: the
+            scene starts as it is written.
     """
     from pytest_simbench.description.carried import markdown, terminal_lines
     from pytest_simbench.description.starts import distinct, read_starts
@@ -77,9 +82,15 @@ def load(
     try:
         found = read_scene_file(at)
         scene = found.scene
-        if starts is not None:
+        rows: tuple[Start, ...] = ()
+        if starts == KEYFRAMES:
+            rows = scene.starts
+            if not rows:
+                raise SceneError(f"{at} has no keyframes; name a file of starts, or none")
+        elif starts is not None:
             rows = read_starts(request.path.parent / starts, scene)
-            scene = replace(scene, starts=rows)
+        scene = replace(scene, starts=rows)
+        if rows:
             different = distinct(rows)
             if different < len(rows):
                 tell(

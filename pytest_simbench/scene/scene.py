@@ -46,11 +46,12 @@ class Scene(Wire):
             that leaves it has diverged (`plausibility`); 1e6 for a side without a wall.
         ground_restitution: Newton's coefficient of the ground plane, as `Body.restitution`.
         starts: poses of free bodies, in the frames that a file gives them (`Compound.file_frame`),
-            for tasks that go through several; one tuple of names and poses each. A worker does not
-            get them.
+            for tasks that go through several; one tuple of names and poses each. Right after a file
+            was read they are its keyframes. A worker does not get them.
         friction_rule: what the friction of two surfaces is, one of `friction.RULES`.
         file: that it was read from, an absolute path; empty: none.
         file_timestep: time step that the file asks for [s]; 0: none.
+        file_lift: height by which all stands higher here than in the file [m].
 
     Raises:
         SceneError: two bodies share a name or overlap, one has the name of what is in every
@@ -58,7 +59,7 @@ class Scene(Wire):
     """
 
     unwritten = ("starts",)
-    optional = ("ground_restitution", "friction_rule", "file", "file_timestep")
+    optional = ("ground_restitution", "friction_rule", "file", "file_timestep", "file_lift")
 
     name: str
     bodies: tuple[Body, ...] = ()
@@ -71,6 +72,7 @@ class Scene(Wire):
     starts: tuple[Start, ...] = ()
     file: str = ""
     file_timestep: float = 0.0
+    file_lift: float = 0.0
 
     def __post_init__(self) -> None:
         check_name(self.name, "a scene")

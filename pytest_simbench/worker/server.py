@@ -142,7 +142,9 @@ class Server:
 
     def do_read_file(self, path: str) -> dict[str, Any]:
         scene, account = self._constructed().read_file(path)
-        return {"scene": scene.to_wire(), "account": [line.to_wire() for line in account]}
+        starts = [[(name, pose.as_array()) for name, pose in start] for start in scene.starts]
+        lines = [line.to_wire() for line in account]
+        return {"scene": scene.to_wire(), "starts": starts, "account": lines}
 
     def do_compile(self, scene: dict[str, Any]) -> None:
         self._constructed().compile(Scene.from_wire(received(scene)))

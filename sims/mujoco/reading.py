@@ -32,7 +32,7 @@ from pytest_simbench.scene import (
 from pytest_simbench.scene.checks import FORBIDDEN, RESERVED
 from pytest_simbench.scene.polytope import MOST
 from pytest_simbench.scene.pose import quaternion_of
-from pytest_simbench.scene.scene import ROOM
+from pytest_simbench.scene.scene import ROOM, Start
 from pytest_simbench.simulator import DescriptionError, lazy_import
 
 from .told import DERIVED, OBJECTS, OPTIONS, SOLVER, TOLD
@@ -353,7 +353,19 @@ class Reading:
             ground_friction=friction,
             room=_triple(room),
             file=self.path,
+            starts=tuple(self._start(key) for key in model.key_qpos),
             file_timestep=float(model.opt.timestep),
+            file_lift=self.lift,
+        )
+
+    def _start(self, qpos: FloatArray) -> Start:
+        """A keyframe's poses of the free bodies, in the frames of the file."""
+        joints = [int(self.model.jnt_qposadr[self.model.body_jntadr[p.root]])
+                  for p in self.placed if p.root]  # fmt: skip
+        free = [p.body.name for p in self.placed if p.root]
+        return tuple(
+            (name, _pose(qpos[k : k + 3], qpos[k + 3 : k + 7]).translated(z=self.lift))
+            for name, k in zip(free, joints, strict=True)
         )
 
     # The account

@@ -83,7 +83,10 @@ OBJECTS = {
     "neq": ("equality", HELD),
     "nflex": ("flex", "soft bodies are left out"),
     "nplugin": ("plugin", HELD),
-    "nkey": ("key", "the scene starts as the model does"),
+    "nkey": (
+        "key",
+        "tests may take its poses as starts; its velocities and controls are not read",
+    ),
     "nsensor": ("sensor", "nothing reads it"),
     "npair": ("pair", "pairs have the friction of their surfaces"),
     "nexclude": ("exclude", "the two bodies collide in the scene"),

@@ -76,6 +76,40 @@ def test_a_premise_of_stored_starts_that_are_all_alike(
     assert [end[2] for end in ends] == pytest.approx([0.25] * 5, abs=1e-3)
 
 
+@pytest.mark.engine
+def test_starts_are_where_the_file_has_them_though_its_ground_is_elsewhere(
+    pytester: pytest.Pytester, blocks: Path
+) -> None:
+    """The floor lies at z = 0.5 m in the file, at 0 in a scene."""
+    places = "{x} 0 .6 1 0 0 0  {x} 0 .755 1 0 0 0"
+    keys = "".join(f'<key qpos="{places.format(x=x)}"/>' for x in (0.3, 0.4))
+    floor = SCENE.replace('<geom name="floor"', '<geom name="floor" pos="0 0 .5"')
+    lifted = floor.replace("0 0 0.1", "0 0 0.6").replace("0 0 0.255", "0 0 0.755")
+    blocks.write_text(lifted.replace("</mujoco>", f"<keyframe>{keys}</keyframe></mujoco>"))
+    stored = {"lower": [[0.5, 0, 0.6, 1, 0, 0, 0]], "upper": [[0.5, 0, 0.755, 1, 0, 0, 0]]}
+    np.savez(pytester.path / "starts.npz", **stored)
+    own = TESTS.replace("test_upper_sits", "test_own").replace("starts.npz", "keyframes")
+    pytester.makepyfile(TESTS + own.replace("import pytest", ""))
+    found = pytester.runpytest_subprocess(
+        "--sim", "mujoco", "--sim-profile", "tuned,file", "--sim-output=run", "--reps=2"
+    )
+    found.assert_outcomes(passed=4)
+    ends = [r["details"]["places"]["upper"] for r in records(pytester.path / "run")]
+    assert sorted(end[0] for end in ends) == pytest.approx(
+        [0.3, 0.3, 0.4, 0.4, 0.5, 0.5, 0.5, 0.5], abs=1e-3
+    )
+    assert [end[2] for end in ends] == pytest.approx([0.25] * 8, abs=1e-3)
+    assert max(r["metrics"]["farthest"] for r in records(pytester.path / "run")) < 10  # [mm]
+
+
+@pytest.mark.engine
+def test_keyframes_that_are_not_there_end_the_run(pytester: pytest.Pytester, blocks: Path) -> None:
+    pytester.makepyfile(TESTS.replace("starts.npz", "keyframes"))
+    found = pytester.runpytest_subprocess("--sim", "mujoco")
+    assert found.ret == pytest.ExitCode.USAGE_ERROR
+    assert f"{blocks} has no keyframes; name a file of starts, or none" in found.stdout.str()
+
+
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
