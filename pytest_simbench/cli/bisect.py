@@ -12,17 +12,16 @@ With `ends` in place of a metric it is about a user's scene (bisect_ends.py).
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from pytest_simbench.cli.values import BadInput, Span, shown
+from pytest_simbench.cli.bisect_ends import bisect_ends
+from pytest_simbench.cli.search import Search
+from pytest_simbench.cli.values import BadInput, Span
 from pytest_simbench.client import package_index
-from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.measure.bisection import (
     between,
     difference,
@@ -30,11 +29,6 @@ from pytest_simbench.measure.bisection import (
     like_the_bad_one,
     steps,
 )
-from pytest_simbench.measure.limits import CRASHED, named
-from pytest_simbench.measure.results import ResultSet
-from pytest_simbench.records.folder import RunFolder
-from pytest_simbench.records.metrics import Metric, UnknownMetric
-from pytest_simbench.records.series import series
 from pytest_simbench.simulator.registry import adapter
 
 ENDS = "ends"
@@ -62,8 +56,6 @@ def bisect(wanted: Span, metric_name: str, folder: Path, arguments: Sequence[str
         "the ends"
     )
     if metric_name == ENDS:
-        from pytest_simbench.cli.bisect_ends import bisect_ends
-
         return bisect_ends(search)
     search.run(0, last)
     metric = search.metric()
@@ -119,96 +111,3 @@ def _releases(wanted: Span) -> list[str]:
         if refused := info.refused(version):
             raise BadInput(refused)
     return between(known, wanted.good, wanted.bad)
-
-
-@dataclass(frozen=True)
-class Search:
-    """The runs of a bisection.
-
-    Attributes:
-        simulator: whose releases are compared.
-        metric_name: what is looked at.
-        releases: from the good one to the bad one.
-        folder: of all runs.
-        arguments: tests and options of each run.
-    """
-
-    simulator: str
-    metric_name: str
-    releases: Sequence[str]
-    folder: Path
-    arguments: Sequence[str]
-
-    def run(self, *places: int) -> None:
-        """Run the tests on some of the releases, unless the folder holds that."""
-        names = ",".join(self.named(place) for place in places)
-        keep = "--sim-resume" if RunFolder(self.folder).holds_run else "--sim-output"
-        command = [
-            *(sys.executable, "-m", "pytest", *self.arguments, f"{keep}={self.folder}"),
-            *(f"--sim-name={names}", "--sim-install-missing", "-q"),
-        ]
-        done = subprocess.run(
-            command, text=True, errors="replace",
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
-        )  # fmt: skip
-        if done.returncode not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED):
-            lines = [line for line in done.stdout.splitlines() if line.strip()]
-            raise BadInput(
-                f"the run on {names} ended with exit code {done.returncode}: "
-                f"{for_terminal(' '.join(lines[-3:]))[:600]}"
-            )
-
-    def metric(self) -> Metric:
-        """What is looked at.
-
-        Raises:
-            BadInput: no test has it, or several have, or neither direction is worse.
-        """
-        name, result = self.metric_name, self.result(0)
-        if named(name, result.known) == CRASHED.name:
-            return CRASHED
-        try:
-            metric = result.metric(name)
-        except UnknownMetric as error:
-            raise BadInput(str(error)) from None
-        if metric.better is None:
-            raise BadInput(f"{name} can be neither better nor worse")
-        return metric
-
-    def result(self, place: int) -> ResultSet:
-        """What a release scored.
-
-        Raises:
-            BadInput: the folder holds nothing of it, or several tests.
-        """
-        reading = RunFolder(self.folder).read()
-        rows = [
-            row
-            for task in reading.metrics
-            for row in series(r for r in reading.records if r.task == task)
-            if row.key.simulator == self.named(place)
-        ]
-        if len(rows) > 1:
-            names = {task: [m.name for m in known] for task, known in reading.metrics.items()}
-            rows = [r for r in rows if self.metric_name in names[r.records[0].task]]
-        if len(rows) != 1:
-            what = "no test" if not rows else "more than one test"
-            raise BadInput(
-                f"{what} with {shown(self.metric_name)} has run on "
-                f"{self.named(place)}; choose one test, with its file or with -k"
-            )
-        records = rows[0].records
-        return ResultSet(records, reading.metrics[records[0].task])
-
-    def describe(self, place: int) -> str:
-        """What a release scored, in words."""
-        name, result = self.metric_name, self.result(place)
-        crashed = f", {len(result.crashed)} crashed" if result.crashed else ""
-        if name in result.known and result.values(name):
-            mean = result.metric(name).format(result.interval(name).mean)
-            return f"{self.releases[place]} {name} {mean}{crashed}"
-        return f"{self.releases[place]} {len(result.crashed)} of {len(result)} crashed"
-
-    def named(self, place: int) -> str:
-        """A release as a simulator's name."""
-        return f"{self.simulator}=={self.releases[place]}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pytest_simbench.cli.bisect import Search
+from pytest_simbench.cli.search import Search
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.measure.bisection import first_worse
 from pytest_simbench.measure.settling import ALIKE, Settled, Who, settlings

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.cli.bisect import Search
 from pytest_simbench.cli.bisect_ends import bisect_ends
+from pytest_simbench.cli.search import Search
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.records.folder import RunFolder
 from tests.measure.test_settling import end
