@@ -116,11 +116,16 @@ def write_obj(path: Path, mesh: Polytope) -> Path:
 
 def write_stl(path: Path, mesh: Polytope) -> Path:
     """Write a hull as a binary STL file; the path."""
+    path.write_bytes(stl_bytes(mesh))
+    return path
+
+
+def stl_bytes(mesh: Polytope) -> bytes:
+    """A hull as a binary STL file."""
     triangles = np.zeros(len(mesh.triangles), TRIANGLE)
     triangles["corners"] = mesh.points[np.array(mesh.triangles)]
     count = np.uint32(len(triangles)).tobytes()
-    path.write_bytes(bytes(HEADER - len(count)) + count + triangles.tobytes())
-    return path
+    return bytes(HEADER - len(count)) + count + triangles.tobytes()
 
 
 def mesh_points(path: str) -> FloatArray:

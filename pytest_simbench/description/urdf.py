@@ -10,7 +10,7 @@ as visual shapes too.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -185,28 +185,11 @@ class PreparedRobot:
         """The reduced robot as URDF text."""
         root = ET.Element("robot", name=self.robot.name)
         for link in self.links.values():
-            element = ET.SubElement(root, "link", name=link.name)
-            if link.mass > 0:
-                _write_inertial(element, link)
-            for shape in link.shapes:
-                for tag in ("visual", "collision"):
-                    _write_shape(ET.SubElement(element, tag), shape)
+            write_link(root, link)
         for joint in self.joints:
-            element = ET.SubElement(root, "joint", name=joint.name, type=joint.kind)
-            write_origin(element, joint.origin)
-            ET.SubElement(element, "parent", link=joint.parent)
-            ET.SubElement(element, "child", link=joint.child)
-            ET.SubElement(element, "axis", xyz=_spaced(joint.axis))
-            lower, upper = self.limits[joint.name]
             drive = self.robot.joints[self.robot.joint_names.index(joint.name)]
-            ET.SubElement(
-                element,
-                "limit",
-                lower=repr(float(lower)),
-                upper=repr(float(upper)),
-                effort=repr(drive.effort_limit),
-                velocity=repr(self.velocity_limits[joint.name]),
-            )
+            fastest = self.velocity_limits[joint.name]
+            write_joint(root, joint, self.limits[joint.name], drive.effort_limit, fastest)
         # One engine reads files in pieces of 1024 bytes a line and may cut an attribute in two.
         ET.indent(root)
         return ET.tostring(root, encoding="unicode")
@@ -270,6 +253,31 @@ def write_origin(element: ET.Element, pose: Pose) -> None:
     if np.hypot(r[0, 0], r[1, 0]) < 1e-7:  # pitched by 90 degrees both turn about one axis
         roll, yaw = 0.0, np.arctan2(-r[0, 1], r[1, 1])
     ET.SubElement(element, "origin", xyz=_spaced(pose.position), rpy=_spaced((roll, pitch, yaw)))
+
+
+def write_link(root: ET.Element, link: Link) -> None:
+    """Add a link, its collision shapes as visual ones too."""
+    element = ET.SubElement(root, "link", name=link.name)
+    if link.mass > 0:
+        _write_inertial(element, link)
+    for shape in link.shapes:
+        for tag in ("visual", "collision"):
+            _write_shape(ET.SubElement(element, tag), shape)
+
+
+def write_joint(
+    root: ET.Element, joint: MovingJoint, limits: Iterable[float], effort: float, fastest: float
+) -> None:
+    """Add a joint, its limits [rad or m], largest effort [N m or N] and speed [rad/s or m/s]."""
+    element = ET.SubElement(root, "joint", name=joint.name, type=joint.kind)
+    write_origin(element, joint.origin)
+    ET.SubElement(element, "parent", link=joint.parent)
+    ET.SubElement(element, "child", link=joint.child)
+    ET.SubElement(element, "axis", xyz=_spaced(joint.axis))
+    lower, upper = (repr(float(limit)) for limit in limits)
+    ET.SubElement(
+        element, "limit", lower=lower, upper=upper, effort=repr(effort), velocity=repr(fastest)
+    )
 
 
 def _write_inertial(element: ET.Element, link: Link) -> None:

@@ -10,17 +10,7 @@ from dataclasses import dataclass
 
 from pytest_simbench.description.robot_files import keep
 from pytest_simbench.scene import Closure, Gripper, Joint, Pose, Robot, Vector3
-
-WIDEST = 6.0
-"""Limits of a hinge [rad]: less than a turn to each side, which every engine can hold."""
-
-FARTHEST = 10.0
-"""Limits of a slider [m]."""
-
-FREE = 1e-6
-"""Stiffness [N m/rad, N/m] and largest effort [N m, N] of a drive that leaves its joint free: less
-than a millionth of all that acts here. Of 0, engines that divide by a stiffness make no number, and
-others no drive; one whose drives are no springs needs the small effort."""
+from pytest_simbench.scene.robot import FARTHEST, FREE, WIDEST
 
 MOUNT = "mount"
 """The part that is fixed in the world."""

@@ -18,6 +18,17 @@ from pytest_simbench.scene.checks import (
 from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
 from pytest_simbench.scene.wire import Wire
 
+WIDEST = 6.0
+"""Limits of a hinge without any [rad]: less than a turn to each side, which every engine holds."""
+
+FARTHEST = 10.0
+"""Limits of a slider without any [m]."""
+
+FREE = 1e-6
+"""Stiffness [N m/rad, N/m] and largest effort [N m, N] of a drive that leaves its joint free: less
+than a millionth of all that acts here. Of 0, engines that divide by a stiffness make no number, and
+others no drive; one whose drives are no springs needs the small effort."""
+
 
 @dataclass(frozen=True)
 class Joint(Wire):

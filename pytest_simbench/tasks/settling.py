@@ -11,6 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import Motion, World
+from pytest_simbench.description.links import link_poses
+from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Body, Compound, FloatArray, Pose, Scene, SceneError
 from pytest_simbench.scene.penetration import penetration
@@ -76,10 +78,9 @@ class Settling(Task):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "premises", tuple(self.premises))
-        if self.world.robot is not None or not self.world.free_bodies:
+        if self.world.robot is None and not self.world.free_bodies:
             raise SceneError(
-                f"scene {self.world.name!r} has {_what(self.world)}; Settling takes scenes of free "
-                "bodies without a robot"
+                f"scene {self.world.name!r} has nothing that moves, so nothing settles"
             )
         names = {body.name for body in self.world.free_bodies}
         for premise in self.premises:
@@ -141,31 +142,43 @@ class Settling(Task):
             rest = world.wait(RESTLESS, log_period=LOG_PERIOD)
         assert rest is not None  # a log was asked for
         ends = {body.name: body.moved_to(world.pose(body.name)) for body in free}
-        starts = {body.name: body for body in free}
+        before = {body.name: _place(body) for body in free} | _links(world.scene, None)
+        after = {name: _place(body) for name, body in ends.items()}
+        after |= _links(world.scene, world.joints[0])
         ways = {
-            name: float(np.linalg.norm(np.subtract(_origin(end), _origin(starts[name]))))
-            for name, end in ends.items()
+            name: float(np.linalg.norm(np.subtract(place.position, before[name].position)))
+            for name, place in after.items()
         }
-        tilts = {name: tilted(starts[name].pose, end.pose) for name, end in ends.items()}
+        tilts = {name: tilted(before[name], place) for name, place in after.items()}
         failed = [str(p) for p in self.premises if not _holds(p, ends, tilts)]
         metrics: dict[str, float | None] = {
             "farthest": 1000 * max(ways.values()),
             "tilt": max(tilts.values()),
             "sunk": 1000 * deepest(world.scene, ends),
-            "restless": 1000 * _speed(rest),
+            "restless": 1000 * _speed(rest) if free else None,
         }
         if self.premises:
             metrics["premises"] = 1 - len(failed) / len(self.premises)
         details = {
-            "places": {name: _place(end).as_array().tolist() for name, end in ends.items()},
+            "places": {name: place.as_array().tolist() for name, place in after.items()},
             "ways": {name: round(1000 * way, 4) for name, way in ways.items()},
             "tilts": {name: round(tilt, 4) for name, tilt in tilts.items()},
         }
         return Outcome(metrics, details, reasons=tuple(f"not: {text}" for text in failed))
 
 
-def _what(scene: Scene) -> str:
-    return "no free body" if scene.robot is None else "a robot"
+def _links(scene: Scene, positions: FloatArray | None) -> dict[str, Pose]:
+    """The moving links of the scene's robot, each at its centre of mass, at joint positions
+    (n_joints,) [rad or m]; None: at the initial ones."""
+    if scene.robot is None:
+        return {}
+    prepared, robot = PreparedRobot(scene.robot), scene.robot
+    joints = robot.column("initial_position") if positions is None else positions
+    poses = link_poses(prepared, dict(zip(robot.joint_names, joints.tolist(), strict=True)))
+    return {
+        link.name: poses[link.name] * Pose.at(*link.centre.tolist())
+        for link in prepared.moving_links
+    }
 
 
 def _file_frame(body: Body) -> Pose:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED, Carried, named
+from pytest_simbench.description.urdf import ROOT
 from pytest_simbench.scene import (
     Body,
     Box,
@@ -35,6 +36,7 @@ from pytest_simbench.scene.pose import quaternion_of
 from pytest_simbench.scene.scene import ROOM, Start
 from pytest_simbench.simulator import DescriptionError, lazy_import
 
+from .articulated import MOUNT, Tree, directions, on_joints, triple
 from .told import DERIVED, OBJECTS, OPTIONS, SOLVER, TOLD
 
 mujoco = lazy_import("mujoco")
@@ -93,11 +95,11 @@ class Reading:
             raise DescriptionError(f"{path}: {' '.join(str(error).split())}") from None
         self.data = data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
-        self._names: dict[str, int] = {}
-        self._refuse_joints()
+        self._names: dict[str, int] = {ROOT: 0, MOUNT: 0}
         masks = model.geom_contype | model.geom_conaffinity
         self.solid = np.flatnonzero(masks).tolist()
         self.ground = self._find_ground()
+        self.links = on_joints(self)
         try:
             placed = [self._placed(*group) for group in self._groups()]
             self._place(placed)
@@ -119,18 +121,8 @@ class Reading:
 
     # What there is
 
-    def _refuse_joints(self) -> None:
-        kinds = self.model.jnt_type
-        held = np.flatnonzero(kinds != mujoco.mjtJoint.mjJNT_FREE).tolist()
-        if held:
-            names = named(self.name("joint", number) for number in held)
-            raise self.refuse(
-                f"bodies move on joints that are not free ({names}), which no scene holds yet; "
-                "read a scene of fixed and free bodies"
-            )
-
-    def _root(self, body: int) -> int:
-        """The free body that a body is a part of; 0: none, it is fixed."""
+    def root(self, body: int) -> int:
+        """The moving body that a body is a part of; 0: none, it is fixed."""
         root = int(self.model.body_weldid[body])
         return root if self.model.body_dofnum[root] else 0
 
@@ -153,37 +145,51 @@ class Reading:
         """Name, root and shapes of each body; of the world's own shapes each is a body."""
         model = self.model
         found: dict[tuple[int, int], list[int]] = {}
+        on_joints = {link.body for link in self.links}
         for geom in self.solid:
             body = int(model.geom_bodyid[geom])
-            root = self._root(body)
+            root = self.root(body)
+            if root in on_joints:
+                continue
             key = (root, root or body) if body else (0, -1 - geom)
             found.setdefault(key, []).append(geom)
-        empty = [b for b in range(1, model.nbody) if self._root(b) == b and (b, b) not in found]
+        roots = {b for b in range(1, model.nbody) if self.root(b) == b} - on_joints
+        empty = sorted(b for b in roots if (b, b) not in found)
         if empty:
             names = named(self.name("body", body) for body in empty)
             raise self.refuse(f"free bodies have no shape that collides: {names}")
         return [
-            (self._own_name("body", key) if key > 0 else self._own_name("geom", -1 - key), root, g)
+            (self.own_name("body", key) if key > 0 else self.own_name("geom", -1 - key), root, g)
             for (root, key), g in found.items()
         ]
 
-    def _own_name(self, kind: str, number: int) -> str:
-        """Its name in the file, without what a scene's names must not have."""
+    def own_name(self, kind: str, number: int, taken: dict[str, int] | None = None) -> str:
+        """Its name in the file, without what a scene's names must not have, and none of those that
+        are taken; None: by bodies and links."""
+        taken = self._names if taken is None else taken
         told = self.name(kind, number)
         name = "".join("_" if c in FORBIDDEN or not c.isprintable() else c for c in told)
         name = name.strip(" .")[:90] or kind
-        if name.lower() in RESERVED or name in self._names:
+        if name.lower() in RESERVED or name in taken:
             name = f"{name} {kind} {number}"
-        self._names[name] = number
+        taken[name] = number
         if name != told:
             self.tell(f"{kind} name", APPROXIMATED, f"it is {name!r} in the scene", [told])
         return name
 
     # Bodies
 
+    def pose(self, body: int) -> Pose:
+        """Of a body in the file's world."""
+        return _pose(self.data.xpos[body], self.data.xquat[body])
+
+    def geom_pose(self, geom: int) -> Pose:
+        """Of a shape in the file's world."""
+        return _pose(self.data.geom_xpos[geom], _quaternion(self.data.geom_xmat[geom]))
+
     def _placed(self, name: str, root: int, geoms: list[int]) -> Placed:
-        model, data = self.model, self.data
-        base = _pose(data.xpos[root], data.xquat[root])
+        model = self.model
+        base = self.pose(root)
         friction = float(model.geom_friction[geoms, 0].max())
         if model.geom_friction[geoms, 0].min() < friction:
             self.tell(
@@ -194,8 +200,8 @@ class Reading:
             )
         shapes = []
         for k, geom in enumerate(geoms):
-            place = base.inverse() * _pose(data.geom_xpos[geom], _quaternion(data.geom_xmat[geom]))
-            shape, own = self._shape(geom, str(k), friction)
+            place = base.inverse() * self.geom_pose(geom)
+            shape, own = self.shape(geom, str(k), friction)
             shapes.append(shape.moved_to(place * own))
         if not root:
             if len(shapes) == 1:
@@ -212,7 +218,7 @@ class Reading:
             if even and np.allclose(shapes[0].pose.as_array(), Pose().as_array(), atol=CLOSE):
                 body = shapes[0].changed(name=name, mass=mass)
                 if not np.allclose(np.diag(turned), body.even_inertia(), rtol=CLOSE, atol=0):
-                    body = body.changed(moments=_triple(np.diag(turned)))
+                    body = body.changed(moments=triple(np.diag(turned)))
                 return Placed(self._damped(body, root, centre), root, geoms, shapes[0].pose)
         moments, axes = np.linalg.eigh(tensor)
         axes[:, 0] *= np.sign(np.linalg.det(axes))
@@ -224,12 +230,12 @@ class Reading:
             Pose(),
             mass=mass,
             friction=friction,
-            moments=_triple(moments),
+            moments=triple(moments),
             file_frame=inverse,
         )
         return Placed(self._damped(body, root, centre), root, geoms, frame)
 
-    def _shape(self, geom: int, name: str, friction: float) -> tuple[Body, Pose]:
+    def shape(self, geom: int, name: str, friction: float) -> tuple[Body, Pose]:
         """A shape, and its frame in that of its geom."""
         model, kinds = self.model, mujoco.mjtGeom
         a, b, c = (float(value) for value in model.geom_size[geom])
@@ -247,15 +253,18 @@ class Reading:
             case kinds.mjGEOM_CAPSULE:
                 return Capsule(name, a, 2 * b, Pose(), **look), Pose()
             case kinds.mjGEOM_MESH:
-                vertices, frame = self._hull(geom)
+                vertices, frame = self.hull(geom)
                 return ConvexMesh(name, vertices, Pose(), **look), frame
-        kind = kinds(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
-        raise self.refuse(
+        raise self.refuse_shape(geom)
+
+    def refuse_shape(self, geom: int) -> DescriptionError:
+        kind = mujoco.mjtGeom(self.model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
+        return self.refuse(
             f"{self.name('geom', geom)} is of type {kind}, which no scene holds; make it a box, "
             "sphere, cylinder, capsule or mesh"
         )
 
-    def _hull(self, geom: int) -> tuple[Any, Pose]:
+    def hull(self, geom: int) -> tuple[Any, Pose]:
         """The corners of a mesh's convex hull in their frame, and that in the geom's."""
         model, mesh, where = self.model, int(self.model.geom_dataid[geom]), self.name("geom", geom)
         first = model.mesh_vertadr[mesh]
@@ -265,8 +274,8 @@ class Reading:
             count = int(model.mesh_graph[graph])
             points = vertices[model.mesh_graph[graph + 2 + count : graph + 2 + 2 * count]]
         if len(points) > MOST:
-            ways = _directions(400)
-            corners = {int(k) for k in np.argmax(_directions(MOST - 6) @ points.T, axis=1)}
+            ways = directions(400)
+            corners = {int(k) for k in np.argmax(directions(MOST - 6) @ points.T, axis=1)}
             corners |= {int(k) for sign in (1, -1) for k in np.argmax(sign * points, axis=0)}
             kept = points[sorted(corners)[:MOST]]
             gap = float(((ways @ points.T).max(axis=1) - (ways @ kept.T).max(axis=1)).max())
@@ -290,7 +299,7 @@ class Reading:
         """Mass [kg], centre of mass [m] and tensor of inertia about it [kg m^2] of a body and all
         that is fixed on it, in its frame."""
         model, data = self.model, self.data
-        own = [b for b in range(1, model.nbody) if self._root(b) == root]
+        own = [b for b in range(1, model.nbody) if self.root(b) == root]
         masses, turn = model.body_mass[own], data.xmat[root].reshape(3, 3)
         centres = (data.xipos[own] - data.xpos[root]) @ turn
         mass = float(masses.sum())
@@ -323,10 +332,7 @@ class Reading:
     def _place(self, placed: list[Placed]) -> None:
         """Put the bodies where they are, above the ground, into a scene."""
         model, data = self.model, self.data
-        moved = [
-            replace(p, body=p.body.moved_to(_pose(data.xpos[p.root], data.xquat[p.root]) * p.frame))
-            for p in placed
-        ]
+        moved = [replace(p, body=p.body.moved_to(self.pose(p.root) * p.frame)) for p in placed]
         down = np.array([[0.0, 0.0, -1.0]])
         if self.ground is not None:
             self.lift = -float(data.geom_xpos[self.ground, 2])
@@ -343,15 +349,18 @@ class Reading:
         self.placed = [
             replace(p, body=p.body.moved_to(p.body.pose.translated(z=self.lift))) for p in moved
         ]
+        tree = Tree(self, self.links)
+        self.servos = tree.servos
         free = [p.body.pose.position for p in self.placed if p.root]
         room = np.maximum(ROOM, 2 * np.abs(free).max(axis=0, initial=0.0) if free else 0.0)
         off = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
         self.scene = Scene(
             Path(self.path).stem.strip(" .") or "scene",
             tuple(p.body for p in self.placed),
-            gravity=(0.0, 0.0, 0.0) if off else _triple(model.opt.gravity),
+            tree.robot(self.lift) if self.links else None,
+            gravity=(0.0, 0.0, 0.0) if off else triple(model.opt.gravity),
             ground_friction=friction,
-            room=_triple(room),
+            room=triple(room),
             file=self.path,
             starts=tuple(self._start(key) for key in model.key_qpos),
             file_timestep=float(model.opt.timestep),
@@ -371,14 +380,14 @@ class Reading:
     # The account
 
     def _tell_shapes(self) -> None:
-        model, bodies = self.model, [p.body for p in self.placed]
+        model = self.model
         self.tell("body mass, inertia, pos, quat", CARRIED, "as compiled, in full digits")
         self.tell("geom type, size, pos, quat", CARRIED, f"{len(self.solid)} shapes that collide")
         self.tell("option gravity", CARRIED, f"{_values(np.array([self.scene.gravity]))} m/s^2")
         self.tell(
             "geom friction (sliding)",
             CARRIED,
-            f"{_values(np.array([b.friction for b in bodies]))}; of two surfaces the larger counts",
+            f"{_values(np.array(sorted(self.scene.frictions)))}; of two surfaces the larger counts",
         )
         seen = [
             g for g in range(model.ngeom) if not (model.geom_contype | model.geom_conaffinity)[g]
@@ -449,13 +458,11 @@ class Reading:
 
     def _tell_objects(self) -> None:
         for count, (kind, reason) in OBJECTS.items():
-            number = int(getattr(self.model, count, 0))
-            if number:
-                names = [
-                    getattr(self.model, kind)(k).name if hasattr(self.model, kind) else ""
-                    for k in range(number)
-                ]
-                where = [name or f"{kind} {k}" for k, name in enumerate(names)]
+            carried = self.servos if kind == "actuator" else set()
+            left = [k for k in range(int(getattr(self.model, count, 0))) if k not in carried]
+            if left:
+                known = hasattr(self.model, kind)
+                where = [self.name(kind, k) if known else f"{kind} {k}" for k in left]
                 self.tell(kind, NOT_CARRIED, reason, where)
 
 
@@ -467,18 +474,6 @@ def _quaternion(matrix: FloatArray) -> FloatArray:
     found = np.empty(4)
     mujoco.mju_mat2Quat(found, np.ravel(matrix))
     return found
-
-
-def _triple(values: Any) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in values)
-    return (x, y, z)
-
-
-def _directions(count: int) -> FloatArray:
-    """Unit vectors, spread evenly over all directions (a spiral), (count, 3)."""
-    z = 1 - (2 * np.arange(count) + 1) / count
-    angle, flat = np.pi * (3 - np.sqrt(5)) * np.arange(count), np.sqrt(1 - z**2)
-    return np.stack([flat * np.cos(angle), flat * np.sin(angle), z], axis=1)
 
 
 def _values(values: FloatArray) -> str:

@@ -184,6 +184,8 @@ class ODE(Simulator):
                 axis.tell_stops()
         self.contacts.make()
         self._advance(self.settings.timestep)
+        if self._drives is not None:
+            self._drives.rest()
         self._steps += 1
 
     def body_state(self) -> FloatArray:

@@ -7,6 +7,9 @@ bounded by FMax. What it does follows from Vel and CFM:
   is k (q* - q - h v) + d (v* - v) + tau_ff at the velocity v after the step h: the scene's drive
   law, implicit, and clipped to the limit within the solver.
 - `velocity`: Vel = P (q* - q), what Webots does with its motors; CFM is the world's.
+- at a stop ODE does not put the motor into the solver: it pushes with all of FMax, whatever Vel is.
+  A drawer of 1.4 kg that begins at its stop left with 15 m/s, of a motor that brakes with at most
+  10 kN. So at a stop FMax is, for that step, what the law asks for, of joints that are no fingers.
 - a rotor of inertia J: with Vel the present velocity and CFM = h / J the effort is that which
   accelerates it, -J dv / h, and FMax has no limit. It is a motor of its own beside the drive's.
 """
@@ -23,7 +26,7 @@ from pytest_simbench.simulator import lazy_import
 
 from .axes import Axis
 from .coupling import Pinion
-from .library import MOST_FORCE, SOFTNESS, VELOCITY
+from .library import HI_STOP, LO_STOP, MOST_FORCE, SOFTNESS, VELOCITY
 
 ode = lazy_import("ode")
 
@@ -64,6 +67,29 @@ class Rotor:
         return float(x * (u - a) + y * (v - b) + z * (w - c))
 
 
+class Stop:
+    """The ends of a joint whose drive is a spring.
+
+    Args:
+        axis: the joint.
+        softness: CFM of its motor.
+        limit: largest effort of its drive [N m or N].
+    """
+
+    def __init__(self, axis: Axis, softness: float, limit: float) -> None:
+        self.axis, self.softness, self.limit = axis, softness, limit
+        self.low, self.high = (axis.joint.getParam(end) for end in (LO_STOP, HI_STOP))
+
+    def reached(self) -> bool:
+        """Whether the joint stands at one of them."""
+        return not self.low < self.axis.angle() < self.high
+
+    def ease(self) -> None:
+        """Bound the motor by what the drive's law asks for now."""
+        asked = self.axis.joint.getParam(VELOCITY) - self.axis.rate()
+        self.axis.joint.setParam(MOST_FORCE, min(self.limit, abs(asked) / self.softness))
+
+
 class Drives:
     """The drives of a robot.
 
@@ -96,6 +122,7 @@ class Drives:
         self.axes = [axes[name] for name in robot.joint_names]
         self._shares, softness = _law(robot, timestep, drive, position_gain)
         self._zeros = self._shares[0] * [axis.zero for axis in self.axes]
+        fingers = [axes[name] for name in robot.gripper.joints]
         for axis, soft, limit in zip(
             self.axes, softness, robot.column("effort_limit"), strict=True
         ):
@@ -106,7 +133,6 @@ class Drives:
         self.pinion: Pinion | None = None
         if len(robot.gripper.joints) > 1:
             rotors = sum(inertias.pop(name) for name in robot.gripper.joints)
-            fingers = [axes[name] for name in robot.gripper.joints]
             self.pinion = Pinion(world, fingers, rotors, timestep)
         self.rotors = {
             name: Rotor(world, axes[name], inertia, timestep)
@@ -117,6 +143,14 @@ class Drives:
             (axis.joint.setParam, axis.angle, float(gain))
             for axis, gain in zip(self.axes, self._shares[0], strict=True)
         ]
+        self._stops = [
+            Stop(axis, soft, float(limit))
+            for axis, soft, limit in zip(
+                self.axes, softness, robot.column("effort_limit"), strict=True
+            )
+            if soft is not None and not axis.wide and axis not in fingers
+        ]
+        self._eased: list[Stop] = []
         start = robot.column("initial_position")
         self.command(start, 0 * start, 0 * start)
         if self.pinion is not None:
@@ -136,10 +170,18 @@ class Drives:
         """Before a step: tell the motors what they are asked for."""
         for (tell, angle, gain), asked in zip(self._motors, self._asked, strict=True):
             tell(VELOCITY, asked - gain * angle())
+        self._eased = [stop for stop in self._stops if stop.reached()]
+        for stop in self._eased:
+            stop.ease()
         for rotor in self.rotors.values():
             rotor.turn()
         if self.pinion is not None:
             self.pinion.mesh()
+
+    def rest(self) -> None:
+        """After a step: all have their largest effort again."""
+        for stop in self._eased:
+            stop.axis.joint.setParam(MOST_FORCE, stop.limit)
 
     def state(self) -> FloatArray:
         """Positions and velocities, (2, n_joints)."""

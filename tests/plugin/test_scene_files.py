@@ -133,11 +133,32 @@ def test_a_bad_file_is_one_sentence_before_anything_runs(
 
 
 @pytest.mark.engine
-def test_a_scene_of_joints_is_refused_by_name(pytester: pytest.Pytester, blocks: Path) -> None:
-    blocks.write_text(SCENE.replace("<freejoint/>", '<joint name="hinge" type="hinge"/>', 1))
+def test_what_hangs_on_a_joint_settles_too(pytester: pytest.Pytester, blocks: Path) -> None:
+    """A flap that falls by a quarter of a turn, to the end of its range."""
+    flap = '<joint axis="0 1 0" range="0 90"/><geom type="box" size=".2 .1 .01" pos=".2 0 0"/>'
+    blocks.write_text(
+        f'<mujoco><worldbody><geom type="plane" size="1 1 1"/><body name="flap" pos="0 0 1">{flap}'
+        "</body></worldbody></mujoco>"
+    )
+    found = pytester.runpytest_subprocess(
+        "--sim-scene", str(blocks), "--sim", "mujoco,drake", "--sim-output=run",
+        "-k", "not step and not mm",
+    )  # fmt: skip
+    found.assert_outcomes(passed=2)
+    for record in records(pytester.path / "run"):
+        assert record["details"]["places"]["flap"][:3] == pytest.approx([0, 0, 0.8], abs=0.02)
+        assert record["metrics"]["tilt"] == pytest.approx(90, abs=3)
+        assert record["metrics"]["restless"] is None
+
+
+@pytest.mark.engine
+def test_a_joint_that_no_scene_holds_is_refused_by_name(
+    pytester: pytest.Pytester, blocks: Path
+) -> None:
+    blocks.write_text(SCENE.replace("<freejoint/>", '<joint name="shoulder" type="ball"/>', 1))
     found = pytester.runpytest("--sim-scene", str(blocks), "--sim", "mujoco")
     assert found.ret == pytest.ExitCode.USAGE_ERROR
-    found.stderr.fnmatch_lines(["ERROR: --sim-scene:*hinge*"])
+    found.stderr.fnmatch_lines(["ERROR: --sim-scene:*shoulder*"])
 
 
 def test_without_a_file_the_test_is_skipped_and_says_so(pytester: pytest.Pytester) -> None:

@@ -161,7 +161,6 @@ def test_the_profile_file_needs_a_file(scene: Scene) -> None:
 
 
 REFUSED = {
-    "joints that are not free .hinge 1.": ('<freejoint name="f"/>', '<joint name="hinge 1"/>'),
     "no shape that collides: box": ('name="g"', 'contype="0" conaffinity="0"'),
     "is not level": ('type="plane"', 'type="plane" euler="10 0 0"'),
     "type ellipsoid": ('type="box" size=".05 .04', 'type="ellipsoid" size=".05 .04'),

@@ -1,0 +1,309 @@
+"""What moves on joints in a file, as one tree of links: a robot without a hand, fixed in the world.
+
+Cabinets, doors and arms of a file are branches of that tree, so every engine holds them as it holds
+any robot. A drive of each joint has the joint's damping, the spring's stiffness, and the gains of a
+position actuator; it holds the joint where it starts.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED
+from pytest_simbench.description.robot_files import digest, keep
+from pytest_simbench.description.shapes import stl_bytes
+from pytest_simbench.description.urdf import Link, MovingJoint, Shape, write_joint, write_link
+from pytest_simbench.scene import FloatArray, Gripper, Joint, Polytope, Pose, Robot, Vector3
+from pytest_simbench.scene.polytope import MOST
+from pytest_simbench.scene.robot import FARTHEST, FREE, WIDEST
+from pytest_simbench.simulator import lazy_import
+
+if TYPE_CHECKING:
+    from .reading import Reading
+
+mujoco = lazy_import("mujoco")
+
+MOUNT = "mount"
+"""The link that is fixed in the world."""
+
+STRONG = 1e4
+"""Largest effort of a drive without a limit [N m or N]."""
+
+FASTEST = 1000.0
+"""Largest speed of a joint, which a file does not limit [rad/s or m/s]."""
+
+ON_LINKS = {
+    "jnt_margin": "joint margin",
+    "jnt_solref": "joint solreflimit, solimplimit",
+    "jnt_solimp": "joint solreflimit, solimplimit",
+    "jnt_actfrcrange": "joint actuatorfrcrange",
+    "jnt_actgravcomp": "joint actuatorgravcomp",
+    "jnt_stiffnesspoly": "joint stiffness (of higher order)",
+    "dof_frictionloss": "joint frictionloss",
+    "dof_solref": "joint solreffriction, solimpfriction",
+    "dof_solimp": "joint solreffriction, solimpfriction",
+    "dof_dampingpoly": "joint damping (of higher order)",
+}
+"""Fields of a hinge that no scene holds, in the words of the file."""
+
+REASONS = {
+    "dof_frictionloss": "drives have no friction: what stays where it is pushed in the file may "
+    "creep, swing or fall here",
+}
+
+PLAIN = '<mujoco><worldbody><body><joint/><geom size="1"/></body></worldbody></mujoco>'
+
+
+@dataclass(frozen=True)
+class OnJoint:
+    """A link of the tree.
+
+    Attributes:
+        body: number of the model's body that the joint moves.
+        joint: number of the joint.
+        above: number of the moving body that it hangs on; 0: the world.
+        name: of the link.
+        told: name of the joint.
+    """
+
+    body: int
+    joint: int
+    above: int
+    name: str
+    told: str
+
+
+def on_joints(reading: Reading) -> list[OnJoint]:
+    """All links, parents first.
+
+    Raises:
+        DescriptionError: a body moves on a ball or on several joints, or hangs on one that flies.
+    """
+    model, kinds = reading.model, mujoco.mjtJoint
+    free = {int(model.jnt_bodyid[j]) for j in np.flatnonzero(model.jnt_type == kinds.mjJNT_FREE)}
+    found: list[OnJoint] = []
+    joint_names: dict[str, int] = {}
+    for body in range(1, model.nbody):
+        count, first = int(model.body_jntnum[body]), int(model.body_jntadr[body])
+        if not count or body in free:
+            continue
+        name, told = reading.name("body", body), reading.name("joint", first)
+        if count > 1 or model.jnt_type[first] == kinds.mjJNT_BALL:
+            what = f"{count} joints" if count > 1 else f"the ball joint {told}"
+            raise reading.refuse(
+                f"{name} moves on {what}, and a link of a scene moves on one hinge or slider"
+            )
+        above = reading.root(int(model.body_parentid[body]))
+        if above in free:
+            raise reading.refuse(
+                f"{name} hangs on {reading.name('body', above)}, which moves freely; in a scene "
+                "what has joints is fixed in the world"
+            )
+        link = reading.own_name("body", body)
+        found.append(
+            OnJoint(body, first, above, link, reading.own_name("joint", first, joint_names))
+        )
+    return found
+
+
+class Tree:
+    """The links as a robot.
+
+    Args:
+        reading: of the file.
+        links: of it, at least one.
+
+    Attributes:
+        servos: numbers of the actuators that a drive stands for.
+    """
+
+    def __init__(self, reading: Reading, links: list[OnJoint]) -> None:
+        self.reading, self.links = reading, links
+        self.model = reading.model
+        self._meshes: dict[str, bytes] = {}
+        self._coarse: dict[str, float] = {}
+        self.servos: set[int] = set()
+
+    def robot(self, lift: float) -> Robot:
+        """The robot, its mount at the file's origin, that height above the world's [m]."""
+        root = ET.Element("robot", name="tree")
+        ET.SubElement(root, "link", name=MOUNT)
+        frames, names = {0: Pose()}, {0: MOUNT}
+        joints = []
+        for link in self.links:
+            frames[link.body], names[link.body] = self._frame(link), link.name
+            origin = frames[link.above].inverse() * frames[link.body]
+            hinge = self.model.jnt_type[link.joint] == mujoco.mjtJoint.mjJNT_HINGE
+            axis = triple(self.model.jnt_axis[link.joint])
+            kind = "revolute" if hinge else "prismatic"
+            moving = MovingJoint(link.told, kind, names[link.above], link.name, origin, axis)
+            drive, limits = self._drive(link), self._limits(link, WIDEST if hinge else FARTHEST)
+            write_link(root, self._link(link))
+            write_joint(root, moving, limits, drive.effort_limit, FASTEST)
+            joints.append(drive)
+        geoms = [g for link in self.links for g in self._geoms(link)]
+        frictions = self.model.geom_friction[geoms, 0] if geoms else np.ones(1)
+        self._tell(frictions)
+        ET.indent(root)
+        return Robot(
+            name="tree",
+            urdf=str(keep(ET.tostring(root, encoding="unicode"), self._meshes)),
+            packages={},
+            srdf="",
+            joints=tuple(joints),
+            gripper=Gripper((), 0.0, 0.0, 0.0),
+            tool_frame=self.links[-1].name,
+            base=Pose.at(0.0, 0.0, lift),
+            friction=float(frictions.max()),
+        )
+
+    def _geoms(self, link: OnJoint) -> list[int]:
+        of = self.model.geom_bodyid
+        return [g for g in self.reading.solid if self.reading.root(int(of[g])) == link.body]
+
+    def _frame(self, link: OnJoint) -> Pose:
+        """Of the link, at its joint, in the file's world."""
+        body = self.reading.pose(link.body)
+        return body * Pose(triple(self.model.jnt_pos[link.joint]))
+
+    def _link(self, link: OnJoint) -> Link:
+        mass, centre, tensor = self.reading.inertial(link.body)
+        anchor = self.model.jnt_pos[link.joint]
+        frame = self._frame(link).inverse()
+        geoms = [(g, frame * self.reading.geom_pose(g)) for g in self._geoms(link)]
+        shapes = [self._shape(geom, pose, link) for geom, pose in geoms]
+        return Link(link.name, mass, centre - anchor, tensor, shapes)
+
+    def _shape(self, geom: int, pose: Pose, link: OnJoint) -> Shape:
+        """A box as a box, all else as a hull of corners; `pose` of the geom in the link."""
+        kinds, (a, b, c) = mujoco.mjtGeom, (float(size) for size in self.model.geom_size[geom])
+        kind = kinds(self.model.geom_type[geom])
+        if kind == kinds.mjGEOM_BOX:
+            return Shape(pose, size=(2 * a, 2 * b, 2 * c))
+        ways = directions(MOST)
+        if kind == kinds.mjGEOM_CYLINDER:
+            angles = np.linspace(0, 2 * np.pi, MOST // 2, endpoint=False)
+            ring = a * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+            ends = [np.hstack([ring, np.full((len(ring), 1), z)]) for z in (-b, b)]
+            points, gap = np.concatenate(ends), a * (1 - np.cos(np.pi / len(ring)))
+        elif kind in (kinds.mjGEOM_SPHERE, kinds.mjGEOM_CAPSULE):
+            half = b if kind == kinds.mjGEOM_CAPSULE else 0.0
+            points = a * ways + np.array([0.0, 0.0, half]) * np.sign(ways[:, 2:])
+            gap = a * (1 - float((directions(400) @ ways.T).max(axis=1).min()))
+        elif kind == kinds.mjGEOM_MESH:
+            corners, own = self.reading.hull(geom)
+            points, gap, pose = np.array(corners), 0.0, pose * own
+        else:
+            raise self.reading.refuse_shape(geom)
+        if gap:
+            self._coarse[link.name] = max(gap, self._coarse.get(link.name, 0.0))
+        data = stl_bytes(Polytope(points))
+        name = f"{digest(data)}.stl"
+        self._meshes[name] = data
+        return Shape(pose, mesh=name)
+
+    def _limits(self, link: OnJoint, widest: float) -> list[float]:
+        """From the posture in which the file is written [rad or m]."""
+        model, tell = self.model, self.reading.tell
+        if model.jnt_limited[link.joint]:
+            start = float(model.qpos0[model.jnt_qposadr[link.joint]])
+            low, high = (float(end) - start for end in model.jnt_range[link.joint])
+            if not low <= 0.0 <= high:
+                raise self.reading.refuse(f"joint {link.told} starts outside of its range")
+            return [low, high]
+        reason = f"joints without limits stop at {widest:g} rad or m to each side"
+        tell("joint range (none)", APPROXIMATED, reason, [link.told])
+        return [-widest, widest]
+
+    def _drive(self, link: OnJoint) -> Joint:
+        model, tell, dof = self.model, self.reading.tell, int(self.model.jnt_dofadr[link.joint])
+        stiffness, damping = 0.0, float(model.dof_damping[dof])
+        effort = STRONG
+        spring = float(np.ravel(model.jnt_stiffness[link.joint])[0])
+        at = int(model.jnt_qposadr[link.joint])
+        if spring and np.isclose(model.qpos_spring[at], model.qpos0[at]):
+            stiffness += spring
+        elif spring:
+            reason = "a drive holds its joint where it starts, and this spring rests elsewhere"
+            tell("joint stiffness, springref", NOT_CARRIED, reason, [link.told])
+        servo = self._servo(link)
+        if servo is not None:
+            gain, rate, limit = servo
+            stiffness, damping, effort = stiffness + gain, damping + rate, min(limit, STRONG)
+            reason = f"it holds its joint where it starts, by at most {effort:g} N m or N"
+            tell("actuator (position)", APPROXIMATED, reason, [link.told])
+        if not stiffness and not damping:
+            effort = FREE
+        armature = float(model.dof_armature[dof])
+        return Joint(link.told, max(stiffness, FREE), damping, effort, armature, 0.0)
+
+    def _servo(self, link: OnJoint) -> tuple[float, float, float] | None:
+        """Stiffness, damping and largest effort of a joint's one position actuator; None: it has
+        none of that kind."""
+        model, transmission = self.model, mujoco.mjtTrn.mjTRN_JOINT
+        own = [
+            k
+            for k in range(model.nu)
+            if model.actuator_trntype[k] == transmission
+            and model.actuator_trnid[k, 0] == link.joint
+        ]
+        if len(own) != 1:
+            return None
+        (k,) = own
+        gain, bias = float(model.actuator_gainprm[k, 0]), model.actuator_biasprm[k]
+        position = gain > 0 and bias[1] == -gain and not bias[0]
+        plain = model.actuator_gear[k, 0] == 1 and not model.actuator_dyntype[k]
+        if not position or not plain:
+            return None
+        limit = STRONG
+        if model.actuator_forcelimited[k]:
+            limit = float(np.abs(model.actuator_forcerange[k]).min())
+        self.servos.add(k)
+        return gain, float(-bias[2]), limit
+
+    def _tell(self, frictions: FloatArray) -> None:
+        tell, model = self.reading.tell, self.model
+        names = [link.told for link in self.links]
+        tell("joint pos, axis, range, armature", CARRIED, f"{len(names)} hinges and sliders", names)
+        dofs = model.jnt_dofadr[[link.joint for link in self.links]]
+        if model.dof_damping[dofs].any():
+            reason = "as the damping of the joint's drive"
+            tell("joint damping", CARRIED, reason, names)
+        if frictions.min() < frictions.max():
+            reason = f"links have one friction: the largest of {sorted(set(frictions.tolist()))}"
+            tell("geom friction (sliding)", APPROXIMATED, reason)
+        if len(self.links) > 1:
+            reason = "links of a scene pass through each other"
+            tell("contacts of links with each other", NOT_CARRIED, reason)
+        if self._coarse:
+            gap = 1000 * max(self._coarse.values())
+            reason = f"round shapes of links are hulls of corners, up to {gap:.2g} mm smaller"
+            tell("geom size (round, of links)", APPROXIMATED, reason, self._coarse)
+        plain: Any = mujoco.MjModel.from_xml_string(PLAIN)
+        numbers = {"jnt": [link.joint for link in self.links], "dof": dofs.tolist()}
+        for field, quantity in ON_LINKS.items():
+            usual = getattr(plain, field, None)
+            if usual is None:
+                continue
+            found = np.asarray(getattr(model, field))[numbers[field[:3]]]
+            odd = np.any(np.reshape(found != usual, (len(found), -1)), axis=1)
+            if odd.any():
+                reason = REASONS.get(field, "no drive of a scene has it")
+                where = [name for name, differs in zip(names, odd, strict=True) if differs]
+                tell(quantity, NOT_CARRIED, reason, where)
+
+
+def triple(values: Any) -> Vector3:
+    x, y, z = (float(value) for value in values)
+    return (x, y, z)
+
+
+def directions(count: int) -> FloatArray:
+    """Unit vectors, spread evenly over all directions (a spiral), (count, 3)."""
+    z = 1 - (2 * np.arange(count) + 1) / count
+    angle, flat = np.pi * (3 - np.sqrt(5)) * np.arange(count), np.sqrt(1 - z**2)
+    return np.stack([flat * np.cos(angle), flat * np.sin(angle), z], axis=1)

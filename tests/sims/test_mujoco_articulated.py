@@ -1,0 +1,172 @@
+"""What moves on joints in a file: the same tree of links, or a line of the account, or refused."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+mujoco = pytest.importorskip("mujoco")
+
+from pytest_simbench.sims.mujoco.adapter import MuJoCo  # noqa: E402
+from pytest_simbench.sims.mujoco.reading import Reading  # noqa: E402
+
+from pytest_simbench.description.urdf import PreparedRobot  # noqa: E402
+from pytest_simbench.experiment.case import Case  # noqa: E402
+from pytest_simbench.experiment.handle import SimulatorHandle  # noqa: E402
+from pytest_simbench.experiment.scene_file import read_scene_file  # noqa: E402
+from pytest_simbench.simulator import DescriptionError  # noqa: E402
+from tests.conftest import ADAPTERS, case_of  # noqa: E402
+
+KITCHEN = """
+<mujoco model="kitchen">
+  <worldbody>
+    <geom name="floor" type="plane" size="2 2 .1"/>
+    <body name="cabinet" pos="0 0 .3">
+      <geom name="back" type="box" size=".01 .2 .2" pos="-.2 0 0"/>
+      <body name="drawer">
+        <joint name="slide" type="slide" axis="1 0 0" range="0 .25" damping="2"/>
+        <geom name="bottom" type="box" size=".15 .15 .01" pos="0 0 -.05" mass="1"/>
+        <geom name="front" type="box" size=".01 .15 .05" pos=".15 0 0" mass=".3"/>
+        <geom name="knob" type="sphere" size=".02" pos=".18 0 0" mass=".05"/>
+      </body>
+    </body>
+    <body name="arm" pos="0 1 1" euler="0 30 20">
+      <joint name="shoulder" axis="0 .6 .8" pos="0 -.2 0" damping=".05" armature=".01"
+             range="-90 120"/>
+      <geom type="box" size=".01 .2 .02" mass="2"/>
+      <body name="handle" pos=".05 .15 .1" euler="10 0 0">
+        <geom type="capsule" size=".01 .05" mass=".1"/>
+      </body>
+      <body name="hand" pos="0 .3 0" euler="0 0 40">
+        <joint name="elbow" axis="1 0 .2" pos="0 0 .01" stiffness="3"/>
+        <geom name="palm" type="cylinder" size=".03 .1" pos=".05 .1 0" mass=".5"/>
+      </body>
+    </body>
+    <body name="ball" pos="0 0 .3"><freejoint/><geom size=".03" mass=".2"/></body>
+  </worldbody>
+  <actuator><position name="servo" joint="elbow" kp="20" kv="2" forcerange="-8 8"/></actuator>
+</mujoco>
+"""
+"""A drawer, an arm of two links with something fixed on it, and a ball in the drawer."""
+
+
+@pytest.fixture
+def kitchen(tmp_path: Path) -> Path:
+    path = tmp_path / "kitchen.xml"
+    path.write_text(KITCHEN)
+    return path
+
+
+def changed(path: Path, old: str, new: str) -> Reading:
+    text = KITCHEN.replace(old, new)
+    assert text != KITCHEN
+    path.write_text(text)
+    return Reading(str(path))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_joints_accelerate_as_those_of_the_file(kitchen: Path, seed: int) -> None:
+    """At any position and speed: masses, inertias, anchors, axes, armature, damping and drives."""
+    reading = Reading(str(kitchen))
+    assert reading.scene.robot is not None
+    names = reading.scene.robot.joint_names
+    simulator = MuJoCo(MuJoCo.profiles["default"])
+    simulator.load(reading.scene)
+    rng = np.random.default_rng(seed)
+    positions, speeds = rng.uniform(0, 0.2, 3), rng.uniform(-1, 1, 3)
+    found = {}
+    for who, model in (("file", reading.model), ("scene", simulator.model)):
+        data = mujoco.MjData(model)
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+        for name, position, speed in zip(names, positions, speeds, strict=True):
+            data.qpos[model.joint(name).qposadr] = position
+            data.qvel[model.joint(name).dofadr] = speed
+        mujoco.mj_forward(model, data)
+        found[who] = [float(data.qacc[model.joint(name).dofadr][0]) for name in names]
+    simulator.close()
+    assert np.abs(found["file"]).min() > 0.01
+    assert found["scene"] == pytest.approx(found["file"], rel=1e-5, abs=1e-6)
+
+
+def test_limits_drives_and_the_rest_of_the_scene(kitchen: Path) -> None:
+    scene = Reading(str(kitchen)).scene
+    assert scene.robot is not None
+    limits = PreparedRobot(scene.robot).limits
+    assert limits["slide"] == pytest.approx([0, 0.25])
+    assert limits["shoulder"] == pytest.approx(np.radians([-90, 120]))
+    elbow = scene.robot.joints[scene.robot.joint_names.index("elbow")]
+    assert (elbow.stiffness, elbow.damping, elbow.effort_limit) == (23.0, 2.0, 8.0)
+    assert [body.name for body in scene.bodies] == ["cabinet", "ball"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('pos="0 -.2 0"', 'pos="0 -.1 0"'),
+        ('axis="0 .6 .8"', 'axis="0 .8 .6"'),
+        ('name="elbow"', 'name="elbow" type="slide"'),
+        ('range="0 .25"', 'range="0 .3"'),
+        ('range="0 .25"', 'range="0 .25" ref=".1"'),
+        ('armature=".01"', 'armature=".02"'),
+        ('damping=".05"', 'damping=".06"'),
+        ('stiffness="3"', 'stiffness="4"'),
+        ('stiffness="3"', 'stiffness="3" springref="20"'),
+        ('name="elbow"', 'name="elbow" frictionloss=".1"'),
+        ('name="elbow"', 'name="elbow" limited="true" range="-1 1" margin=".1"'),
+        ('name="slide"', 'name="slide" solreflimit=".05 1"'),
+        ('name="slide"', 'name="slide" solimplimit=".8 .9 .01"'),
+        ('name="slide"', 'name="slide" actuatorfrcrange="-1 1"'),
+        ('kp="20"', 'kp="21"'),
+        ('kv="2"', 'kv="3"'),
+        ('kp="20" kv="2"', 'kp="20" kv="2" gear="2"'),
+        ("-8 8", "-9 9"),
+        ('name="palm"', 'name="palm" friction=".3"'),
+        ('size=".03 .1"', 'size=".03 .11"'),
+        ('euler="10 0 0"', 'euler="20 0 0"'),
+        ('name="hand"', 'name="hand" gravcomp="1"'),
+        ("<position name", '<motor joint="slide"/><position name'),
+    ],
+)
+def test_nothing_of_a_joint_is_dropped_in_silence(kitchen: Path, old: str, new: str) -> None:
+    before = Reading(str(kitchen))
+    after = changed(kitchen, old, new)
+    assert before.scene != after.scene or before.account != after.account
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ('name="elbow"', 'name="elbow" type="ball"', "hand moves on the ball joint elbow"),
+        ('stiffness="3"/>', '/><joint axis="0 1 0"/>', "hand moves on 2 joints"),
+        (
+            '<freejoint/><geom size=".03" mass=".2"/>',
+            '<freejoint/><geom size=".03"/><body name="ear"><joint/><geom size=".01"/></body>',
+            "ear hangs on ball, which moves freely",
+        ),
+        ('range="0 .25"', 'range=".1 .25"', "joint slide starts outside of its range"),
+        ('type="cylinder" size=".03 .1"', 'type="ellipsoid" size=".1 .1 .2"', "of type ellipsoid"),
+    ],
+)
+def test_what_no_tree_holds_is_refused(kitchen: Path, old: str, new: str, why: str) -> None:
+    with pytest.raises(DescriptionError, match=why):
+        changed(kitchen, old, new)
+
+
+@pytest.mark.engine
+@pytest.mark.parametrize("name", ADAPTERS)
+def test_every_engine_holds_drawer_and_arm(kitchen: Path, case: Case, name: str) -> None:
+    """Parity holds, the servo holds its link, and a ball that falls into the drawer does not move
+    it from its stop."""
+    scene = read_scene_file(kitchen).scene
+    with (
+        closing(SimulatorHandle(case_of(case, name))) as handle,
+        handle.episode(scene) as world,
+    ):
+        world.wait(0.5)
+        slide, _, elbow = world.joints[0]
+        assert abs(slide) < 1e-3
+        assert abs(elbow) < 0.15
+        assert world.pose("ball").position == pytest.approx((0, 0, 0.29), abs=0.01)
