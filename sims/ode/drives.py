@@ -67,29 +67,6 @@ class Rotor:
         return float(x * (u - a) + y * (v - b) + z * (w - c))
 
 
-class Stop:
-    """The ends of a joint whose drive is a spring.
-
-    Args:
-        axis: the joint.
-        softness: CFM of its motor.
-        limit: largest effort of its drive [N m or N].
-    """
-
-    def __init__(self, axis: Axis, softness: float, limit: float) -> None:
-        self.axis, self.softness, self.limit = axis, softness, limit
-        self.low, self.high = (axis.joint.getParam(end) for end in (LO_STOP, HI_STOP))
-
-    def reached(self) -> bool:
-        """Whether the joint stands at one of them."""
-        return not self.low < self.axis.angle() < self.high
-
-    def ease(self) -> None:
-        """Bound the motor by what the drive's law asks for now."""
-        asked = self.axis.joint.getParam(VELOCITY) - self.axis.rate()
-        self.axis.joint.setParam(MOST_FORCE, min(self.limit, abs(asked) / self.softness))
-
-
 class Drives:
     """The drives of a robot.
 
@@ -140,17 +117,12 @@ class Drives:
             if inertia > 0
         }
         self._motors = [
-            (axis.joint.setParam, axis.angle, float(gain))
-            for axis, gain in zip(self.axes, self._shares[0], strict=True)
+            (axis, axis.angle, float(gain), *_stops(axis, eased=axis not in fingers and bool(soft)))
+            for axis, gain, soft in zip(self.axes, self._shares[0], softness, strict=True)
         ]
-        self._stops = [
-            Stop(axis, soft, float(limit))
-            for axis, soft, limit in zip(
-                self.axes, softness, robot.column("effort_limit"), strict=True
-            )
-            if soft is not None and not axis.wide and axis not in fingers
-        ]
-        self._eased: list[Stop] = []
+        self._softness = dict(zip(self.axes, softness, strict=True))
+        self._limits = dict(zip(self.axes, robot.column("effort_limit").tolist(), strict=True))
+        self._eased: list[Axis] = []
         start = robot.column("initial_position")
         self.command(start, 0 * start, 0 * start)
         if self.pinion is not None:
@@ -168,11 +140,14 @@ class Drives:
 
     def act(self) -> None:
         """Before a step: tell the motors what they are asked for."""
-        for (tell, angle, gain), asked in zip(self._motors, self._asked, strict=True):
-            tell(VELOCITY, asked - gain * angle())
-        self._eased = [stop for stop in self._stops if stop.reached()]
-        for stop in self._eased:
-            stop.ease()
+        for (axis, angle, gain, low, high), asked in zip(self._motors, self._asked, strict=True):
+            at = angle()
+            velocity = asked - gain * at
+            axis.joint.setParam(VELOCITY, velocity)
+            if not low < at < high:
+                effort = abs(velocity - axis.rate()) / (self._softness[axis] or 1.0)
+                axis.joint.setParam(MOST_FORCE, min(self._limits[axis], effort))
+                self._eased.append(axis)
         for rotor in self.rotors.values():
             rotor.turn()
         if self.pinion is not None:
@@ -180,14 +155,23 @@ class Drives:
 
     def rest(self) -> None:
         """After a step: all have their largest effort again."""
-        for stop in self._eased:
-            stop.axis.joint.setParam(MOST_FORCE, stop.limit)
+        while self._eased:
+            axis = self._eased.pop()
+            axis.joint.setParam(MOST_FORCE, self._limits[axis])
 
     def state(self) -> FloatArray:
         """Positions and velocities, (2, n_joints)."""
         return np.array(
             [[axis.position() for axis in self.axes], [axis.rate() for axis in self.axes]]
         )
+
+
+def _stops(axis: Axis, eased: bool) -> tuple[float, float]:
+    """ODE's positions of a joint's stops [rad or m]; endless where its motor is not to be eased
+    there: a wide joint's stops are no business of its motor."""
+    if not eased or axis.wide:
+        return -np.inf, np.inf
+    return axis.joint.getParam(LO_STOP), axis.joint.getParam(HI_STOP)
 
 
 def _law(
