@@ -1,5 +1,5 @@
-"""Whether somebody's MJCF file may be given to a parser: no entities, no files out of its
-folder, no more than a worker can hold."""
+"""Whether somebody's MJCF file may be given to a parser: no entities, no files from elsewhere, no
+more than a worker can hold."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from pytest_simbench.ground.errors import DescriptionError
 
 MOST = {"body": 2000, "geom": 20_000}
 """Elements of a scene."""
+
+ABOVE = 2
+"""So many folders above its own may hold what a scene names: packages keep shared parts beside."""
 
 FOLDERS = {"mesh": "meshdir", "hfield": "meshdir", "skin": "meshdir", "texture": "texturedir"}
 """Elements that name a file, and what names its folder."""
@@ -25,7 +28,8 @@ def check_mjcf(path: str) -> None:
     main = Path(path)
     root = main.parent.resolve()
     lines: dict[ET.Element, tuple[Path, int]] = {}
-    elements = _included(main, root, (), lines)
+    room = _room(root)
+    elements = _included(main, root, room, (), lines)
     folders: dict[str, str] = {}
     count = dict.fromkeys(MOST, 0)
     for element in elements:
@@ -46,12 +50,22 @@ def check_mjcf(path: str) -> None:
         folder = folders.get(FOLDERS.get(element.tag, ""), "")
         for key in ("file", "content"):
             if element.tag in FOLDERS and element.get(key):
-                _inside(str(Path(folder) / element.get(key, "")), root, lines[element])
+                _inside(str(Path(folder) / element.get(key, "")), root, room, lines[element])
+
+
+def _room(root: Path) -> Path:
+    """The folder in which all files of a scene in the folder `root` must be: never a whole disk or
+    a user's whole home."""
+    home = Path.home()
+    whole = {home, *home.parents, Path(root.anchor)}
+    allowed = [path for path in root.parents[:ABOVE] if path not in whole]
+    return allowed[-1] if allowed else root
 
 
 def _included(
     path: Path,
     root: Path,
+    room: Path,
     above: tuple[Path, ...],
     lines: dict[ET.Element, tuple[Path, int]],
 ) -> list[ET.Element]:
@@ -66,27 +80,27 @@ def _included(
         if element.tag != "include":
             found.append(element)
             continue
-        other = _inside(element.get("file", ""), root, lines[element])
+        other = _inside(element.get("file", ""), root, room, lines[element])
         if other in (*above, path.resolve()):
             raise DescriptionError(
                 f"{path}, line {own[element]}: <include> of {other.name} runs in a circle"
             )
         if len(lines) > 5 * MOST["geom"]:
             raise DescriptionError(f"{path}, line {own[element]}: too much is included")
-        found += _included(other, root, (*above, path.resolve()), lines)
+        found += _included(other, root, room, (*above, path.resolve()), lines)
     return found
 
 
-def _inside(name: str, root: Path, at: tuple[Path, int]) -> Path:
-    """A file that one in the folder `root` names, which lies below that folder."""
+def _inside(name: str, root: Path, room: Path, at: tuple[Path, int]) -> Path:
+    """A file that one in the folder `root` names, which lies in the folder `room`."""
     where = f"{at[0]}, line {at[1]}: the file {name!r:.200}"
     try:
         path = (root / name).resolve()
         there = path.is_file()
     except (OSError, ValueError, RuntimeError):
         raise DescriptionError(f"{where} is no path") from None
-    if not path.is_relative_to(root):
-        raise DescriptionError(f"{where} lies out of the scene's folder {root}; put it there")
+    if not path.is_relative_to(room):
+        raise DescriptionError(f"{where} lies out of the folder {room} of the scene; put it there")
     if not there:
         raise DescriptionError(f"{where} is not there")
     return path

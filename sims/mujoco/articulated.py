@@ -58,6 +58,10 @@ REASONS = {
 PLAIN = '<mujoco><worldbody><body><joint/><geom size="1"/></body></worldbody></mujoco>'
 
 
+BETWEEN = 1e-3
+"""Share of a body's mass and inertia that a link between two of its joints has."""
+
+
 @dataclass(frozen=True)
 class OnJoint:
     """A link of the tree.
@@ -65,37 +69,41 @@ class OnJoint:
     Attributes:
         body: number of the model's body that the joint moves.
         joint: number of the joint.
-        above: number of the moving body that it hangs on; 0: the world.
+        above: the link that it hangs on; None: the mount.
         name: of the link.
         told: name of the joint.
+        whole: whether it is the body; else it is between two of the body's joints.
     """
 
     body: int
     joint: int
-    above: int
+    above: OnJoint | None
     name: str
     told: str
+    whole: bool = True
 
 
 def on_joints(reading: Reading) -> list[OnJoint]:
     """All links, parents first.
 
     Raises:
-        DescriptionError: a body moves on a ball or on several joints, or hangs on one that flies.
+        DescriptionError: a body moves on a ball joint, or hangs on one that flies.
     """
     model, kinds = reading.model, mujoco.mjtJoint
     free = {int(model.jnt_bodyid[j]) for j in np.flatnonzero(model.jnt_type == kinds.mjJNT_FREE)}
     found: list[OnJoint] = []
+    of_body: dict[int, OnJoint | None] = {0: None}
     joint_names: dict[str, int] = {}
     for body in range(1, model.nbody):
         count, first = int(model.body_jntnum[body]), int(model.body_jntadr[body])
         if not count or body in free:
             continue
-        name, told = reading.name("body", body), reading.name("joint", first)
-        if count > 1 or model.jnt_type[first] == kinds.mjJNT_BALL:
-            what = f"{count} joints" if count > 1 else f"the ball joint {told}"
+        name, joints = reading.name("body", body), range(first, first + count)
+        balls = [j for j in joints if model.jnt_type[j] == kinds.mjJNT_BALL]
+        if balls:
             raise reading.refuse(
-                f"{name} moves on {what}, and a link of a scene moves on one hinge or slider"
+                f"{name} moves on the ball joint {reading.name('joint', balls[0])}, and a link of "
+                "a scene moves on a hinge or a slider"
             )
         above = reading.root(int(model.body_parentid[body]))
         if above in free:
@@ -103,10 +111,15 @@ def on_joints(reading: Reading) -> list[OnJoint]:
                 f"{name} hangs on {reading.name('body', above)}, which moves freely; in a scene "
                 "what has joints is fixed in the world"
             )
-        link = reading.own_name("body", body)
-        found.append(
-            OnJoint(body, first, above, link, reading.own_name("joint", first, joint_names))
-        )
+        own, link = reading.own_name("body", body), of_body[above]
+        for joint in joints:
+            told, last = reading.own_name("joint", joint, joint_names), joint == joints[-1]
+            link = OnJoint(body, joint, link, own if last else f"{own} on {told}", told, last)
+            found.append(link)
+        of_body[body] = link
+        if count > 1:
+            reason = f"a link of {BETWEEN:g} of its mass and inertia stands between two joints"
+            reading.tell("body with several joints", APPROXIMATED, reason, [own])
     return found
 
 
@@ -132,20 +145,21 @@ class Tree:
         """The robot, its mount at the file's origin, that height above the world's [m]."""
         root = ET.Element("robot", name="tree")
         ET.SubElement(root, "link", name=MOUNT)
-        frames, names = {0: Pose()}, {0: MOUNT}
         joints = []
         for link in self.links:
-            frames[link.body], names[link.body] = self._frame(link), link.name
-            origin = frames[link.above].inverse() * frames[link.body]
+            above = Pose() if link.above is None else self._frame(link.above)
+            origin = above.inverse() * self._frame(link)
             hinge = self.model.jnt_type[link.joint] == mujoco.mjtJoint.mjJNT_HINGE
             axis = triple(self.model.jnt_axis[link.joint])
             kind = "revolute" if hinge else "prismatic"
-            moving = MovingJoint(link.told, kind, names[link.above], link.name, origin, axis)
-            drive, limits = self._drive(link), self._limits(link, WIDEST if hinge else FARTHEST)
+            on = MOUNT if link.above is None else link.above.name
+            moving = MovingJoint(link.told, kind, on, link.name, origin, axis)
+            limits = self._limits(link, WIDEST if hinge else FARTHEST)
+            drive = self._drive(link, min(max(0.0, limits[0]), limits[1]))
             write_link(root, self._link(link))
             write_joint(root, moving, limits, drive.effort_limit, FASTEST)
             joints.append(drive)
-        geoms = [g for link in self.links for g in self._geoms(link)]
+        geoms = [g for link in self.links if link.whole for g in self._geoms(link)]
         frictions = self.model.geom_friction[geoms, 0] if geoms else np.ones(1)
         self._tell(frictions)
         ET.indent(root)
@@ -173,6 +187,8 @@ class Tree:
     def _link(self, link: OnJoint) -> Link:
         mass, centre, tensor = self.reading.inertial(link.body)
         anchor = self.model.jnt_pos[link.joint]
+        if not link.whole:
+            return Link(link.name, BETWEEN * mass, centre - anchor, BETWEEN * tensor)
         frame = self._frame(link).inverse()
         geoms = [(g, frame * self.reading.geom_pose(g)) for g in self._geoms(link)]
         shapes = [self._shape(geom, pose, link) for geom, pose in geoms]
@@ -213,13 +229,14 @@ class Tree:
             start = float(model.qpos0[model.jnt_qposadr[link.joint]])
             low, high = (float(end) - start for end in model.jnt_range[link.joint])
             if not low <= 0.0 <= high:
-                raise self.reading.refuse(f"joint {link.told} starts outside of its range")
+                reason = "it starts outside of its range, here at the nearest end"
+                tell("joint range (start)", APPROXIMATED, reason, [link.told])
             return [low, high]
         reason = f"joints without limits stop at {widest:g} rad or m to each side"
         tell("joint range (none)", APPROXIMATED, reason, [link.told])
         return [-widest, widest]
 
-    def _drive(self, link: OnJoint) -> Joint:
+    def _drive(self, link: OnJoint, start: float) -> Joint:
         model, tell, dof = self.model, self.reading.tell, int(self.model.jnt_dofadr[link.joint])
         stiffness, damping = 0.0, float(model.dof_damping[dof])
         effort = STRONG
@@ -239,7 +256,7 @@ class Tree:
         if not stiffness and not damping:
             effort = FREE
         armature = float(model.dof_armature[dof])
-        return Joint(link.told, max(stiffness, FREE), damping, effort, armature, 0.0)
+        return Joint(link.told, max(stiffness, FREE), damping, effort, armature, start)
 
     def _servo(self, link: OnJoint) -> tuple[float, float, float] | None:
         """Stiffness, damping and largest effort of a joint's one position actuator; None: it has
