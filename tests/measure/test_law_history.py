@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from pytest_simbench.measure.history import histories
-from pytest_simbench.measure.law_history import LawHistory, law_histories
+from pytest_simbench.measure.history import LawHistory, histories, law_histories
 from pytest_simbench.records.phenomena import PHENOMENON
 from pytest_simbench.records.record import Record
 from tests.records.build import failed, record

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from pytest_simbench.measure.history import History, histories
-from pytest_simbench.measure.law_history import LawHistory, law_histories
+from pytest_simbench.measure.history import History, histories, law_histories
 from pytest_simbench.measure.settling import Settled, settlings
 from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.records.folder import Reading
@@ -16,8 +15,6 @@ from pytest_simbench.report.model.claims import Claims, claims_of
 from pytest_simbench.report.model.document import Section
 from pytest_simbench.report.model.outcome import Compared
 from pytest_simbench.report.model.summary import TaskSummary, at_own_steps, summarise
-
-AnyHistory = History | LawHistory
 
 
 @dataclass(frozen=True)
@@ -36,7 +33,7 @@ class Report:
 
     summaries: Sequence[TaskSummary] = ()
     records: Sequence[Record] = ()
-    histories: Sequence[AnyHistory] = ()
+    histories: Sequence[History] = ()
     sweeps: Sequence[Swept] = ()
     settled: Sequence[Settled] = ()
     claims: Claims | None = None
@@ -73,7 +70,7 @@ class Report:
         return [settling.section(one) for one in self.settled]
 
 
-def histories_of(reading: Reading) -> list[AnyHistory]:
+def histories_of(reading: Reading) -> list[History]:
     """The releases of simulators: of each test, and of all laws."""
     return [*histories(reading.records, reading.metrics), *law_histories(reading.records)]
 

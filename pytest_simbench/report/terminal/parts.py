@@ -7,11 +7,11 @@ from collections.abc import Iterable, Sequence
 
 from pytest_simbench.ground.text import for_terminal, in_one_line
 from pytest_simbench.measure.gate import GateReport
+from pytest_simbench.measure.history import History
 from pytest_simbench.measure.sweep import Swept
 from pytest_simbench.report.model import capabilities, changes, sweep
 from pytest_simbench.report.model.claims import Claims
 from pytest_simbench.report.model.document import Table
-from pytest_simbench.report.model.report import AnyHistory
 from pytest_simbench.report.terminal.grid import fill, render
 from pytest_simbench.simulator.info import SimulatorInfo
 
@@ -52,7 +52,7 @@ def sweep_lines(found: Sequence[Swept], width: int, whole: bool = False) -> list
     return lines
 
 
-def history_lines(found: Sequence[AnyHistory], width: int) -> list[str]:
+def history_lines(found: Sequence[History], width: int) -> list[str]:
     """Releases over time."""
     result = []
     for history in found:
