@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 from pytest_simbench.ground.text import for_csv, for_terminal
 from pytest_simbench.records.folder import Reading, RunFolder
@@ -28,7 +28,7 @@ from pytest_simbench.report.replay import REPLAY_NAME
 from pytest_simbench.worker.text import named
 
 if TYPE_CHECKING:
-    from pytest_simbench.report.replay.groups import Group
+    from pytest_simbench.report.replay.recorded import Group
 
 MARKDOWN_NAME = "report.md"
 CSV_NAME = "report.csv"
@@ -145,7 +145,7 @@ def _draw(
 
 def _replay(run: Path, records: Sequence[Record], told: list[str]) -> tuple[list[Group], str]:
     """What the replay shows, and the page itself; `told` takes what could not be shown."""
-    from pytest_simbench.report.replay.groups import groups
+    from pytest_simbench.report.replay.recorded import groups
     from pytest_simbench.report.replay.render import ReplayUnavailable, replay_of
 
     found = groups(run, records)
@@ -215,15 +215,15 @@ def _unwritable(path: Path, error: OSError) -> str:
 
 
 def csv_of(records: Sequence[Record]) -> str:
-    """One line for each repetition; an empty cell where a record has no value.
+    """One line for each repetition; an empty cell where a record has no value; no text is a
+    formula.
 
     Columns: what identifies it, its error, `metrics.<name>`, `cost.<name>` (see
     `records.metrics.COSTS`) and `seconds.<phase>`.
     """
     metrics = list(dict.fromkeys(name for record in records for name in record.metrics))
     file = io.StringIO(newline="")
-    writer = CellWriter(file)
-    writer.row(
+    rows: list[list[Any]] = [
         [
             *IDENTITY,
             *(f"error.{name}" for name in ("type", "phase", "message")),
@@ -231,7 +231,7 @@ def csv_of(records: Sequence[Record]) -> str:
             *(f"cost.{cost.name}" for cost in COSTS),
             *(f"seconds.{name}" for name in PHASES),
         ]
-    )
+    ]
     for record in records:
         error = record.error
         cells: list[Any] = [getattr(record, name) for name in IDENTITY]
@@ -239,16 +239,6 @@ def csv_of(records: Sequence[Record]) -> str:
         cells += [record.metrics.get(name) for name in metrics]
         cells += [record.cost(cost.name) for cost in COSTS]
         cells += [record.seconds.get(name) for name in PHASES]
-        writer.row(cells)
+        rows.append(cells)
+    csv.writer(file).writerows([for_csv(cell) for cell in row] for row in rows)
     return file.getvalue()
-
-
-class CellWriter:
-    """Writes lines of a CSV file in which no text is a formula."""
-
-    def __init__(self, file: TextIO) -> None:
-        self._writer = csv.writer(file)
-
-    def row(self, cells: Iterable[Any]) -> None:
-        """One line; numbers stay numbers."""
-        self._writer.writerow([for_csv(cell) for cell in cells])

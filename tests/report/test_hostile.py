@@ -19,9 +19,11 @@ from pytest_simbench.report.markdown.run import render_changes as changes_in_mar
 from pytest_simbench.report.markdown.run import render_run as markdown
 from pytest_simbench.report.markdown.run import render_tables as tables_in_markdown
 from pytest_simbench.report.model import repeatability
+from pytest_simbench.report.model.capabilities import columns
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import TaskSummary, summarise
-from pytest_simbench.report.terminal.parts import capability_table, render_changes, render_tables
+from pytest_simbench.report.terminal.grid import render
+from pytest_simbench.report.terminal.parts import render_changes, render_tables
 from pytest_simbench.report.terminal.progress import Progress
 from pytest_simbench.report.terminal.run import render_brief, render_run
 from pytest_simbench.simulator.registry import adapter
@@ -141,7 +143,7 @@ def test_the_tables_of_repeatability(text: str) -> None:
 @texts
 def test_the_table_of_simulators(text: str) -> None:
     info = replace(adapter("mujoco").info, name=text, title=text, licence=text, engine=text)
-    assert_harmless_terminal(capability_table([info], 100))
+    assert_harmless_terminal(render(columns([info]), 100))
     assert_harmless_markdown(capability_markdown([info]))
 
 

@@ -209,7 +209,7 @@ def _summary(
         sides = {place: row.records for place, row in enumerate(found)}
         apart = differences(sides, metrics, lambda a, b: comparable(found[a], found[b]), references)
         ordered = [record for row in found for record in row.records]
-        modes = [compared.sentence for compared in compare_modes(ordered, metrics)]
+        modes = compare_modes(ordered, metrics)
     return TaskSummary(
         task,
         metrics,

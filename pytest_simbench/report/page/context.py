@@ -19,8 +19,7 @@ from pytest_simbench.report.model.summary import Cause, Row, TaskSummary
 from pytest_simbench.report.page.pictures import of_sweeps, pictures
 from pytest_simbench.report.page.setup import setup
 from pytest_simbench.report.page.strips import strips
-from pytest_simbench.report.replay.groups import Group, links
-from pytest_simbench.report.replay.recorded import videos
+from pytest_simbench.report.replay.recorded import Group, links, videos
 
 TAIL = 30
 """Lines of a log that are shown."""

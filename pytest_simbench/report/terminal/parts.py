@@ -9,11 +9,10 @@ from pytest_simbench.ground.text import for_terminal, in_one_line
 from pytest_simbench.measure.gate import GateReport
 from pytest_simbench.measure.history import History
 from pytest_simbench.measure.sweep import Swept
-from pytest_simbench.report.model import capabilities, changes, sweep
+from pytest_simbench.report.model import changes, sweep
 from pytest_simbench.report.model.claims import Claims
 from pytest_simbench.report.model.document import Table
 from pytest_simbench.report.terminal.grid import fill, render
-from pytest_simbench.simulator.info import SimulatorInfo
 
 SHOWN = 3
 """Failures at time steps that the terminal tells without `-v`."""
@@ -97,8 +96,3 @@ def render_tables(found: Sequence[Table], width: int) -> str:
         head = [title, "-" * len(title), *([fill(table.note, width)] if table.note else [])]
         parts.append("\n".join([*head, "", render(table.columns, width)]))
     return for_terminal("\n\n".join(parts))
-
-
-def capability_table(infos: Sequence[SimulatorInfo], width: int) -> str:
-    """What each simulator is and can do."""
-    return render(capabilities.columns(infos), width)
