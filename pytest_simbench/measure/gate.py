@@ -130,15 +130,9 @@ def run_gate(
     *,
     typed: bool = True,
 ) -> GateReport:
-    """Compare two runs.
+    """Compare this run with the one of a baseline, by the metrics of each task.
 
-    Args:
-        baseline: records of the run to compare with.
-        current: records of this run.
-        limits: from `parse_limits`.
-        metrics: the metrics of each task, by its name.
-        typed: whether the limits are for this very run, so that one that compares nothing fails it;
-            else it is a note.
+    `typed` limits are for this very run: one that compares nothing fails it, else it is a note.
     """
     baseline, current = list(baseline), list(current)
     before, after = (
@@ -205,12 +199,9 @@ def side_by_side(
 ) -> tuple[tuple[Record, ...], tuple[Record, ...]]:
     """One run as two: what a simulator scored, as the baseline of others, and what these scored.
 
-    Args:
-        records: of the run.
-        name: of the simulator, whose records are given again as those of each other one: with its
-            name, and the id of its test of the same function, variant, mode and profile. Where the
-            other has no such test they keep the id that they have.
-        others: the names of these.
+    The records of the simulator of that name are given again as those of each other one: with its
+    name, and the id of its test of the same function, variant, mode and profile. Where the other
+    has no such test they keep the id that they have.
     """
     records, others = list(records), list(others)
     tests = {RowKey.of(record): record.test for record in records}

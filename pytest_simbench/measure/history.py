@@ -137,12 +137,8 @@ def by_release(records: Iterable[Record]) -> dict[tuple[str, RowKey], dict[str, 
 def histories(
     records: Iterable[Record], metrics: Mapping[str, Sequence[Metric]]
 ) -> list[TaskHistory]:
-    """The histories in a run: of each simulator with three or more releases, each test but laws.
-
-    Args:
-        records: of the run.
-        metrics: of each task, by its name.
-    """
+    """The histories in a run: of each simulator with three or more releases, each test but laws,
+    by the metrics of each task."""
     of_releases = (r for r in records if VersionedName.of(r.simulator).kind == RELEASE)
     rows = by_release(r for r in of_releases if not r.settings.get(PHENOMENON))
     found = []

@@ -114,12 +114,8 @@ class Choice:
 
 
 def sweeps(records: Iterable[Record], metrics: Mapping[str, Sequence[Metric]]) -> list[Swept]:
-    """Every law of which a simulator has two time steps or more, in order of appearance.
-
-    Args:
-        records: of one run.
-        metrics: what each task declares, for the unit.
-    """
+    """Every law of a run of which a simulator has two time steps or more, in order of appearance;
+    the metrics of each task tell the unit."""
     ended = (r for r in records if PHENOMENON in r.settings and r.status != "interrupted")
     found = []
     for law, of_law in grouped(ended, lambda r: r.task).items():

@@ -250,15 +250,12 @@ Runs = Mapping[str, tuple[Sequence[Record], Sequence[Record]]]
 
 
 def differences(runs: Runs, use: Use = "compare", fields: Sequence[str] | None = None) -> list[str]:
-    """One sentence for each value that differs, with the tests it differs in.
+    """One sentence for each value that differs between the records of a test before and now, with
+    the tests it differs in. The use says which fields must be equal; of `fields`, if they are
+    given, these alone.
 
     What a side cannot know (a repetition that failed at its start has no versions) is no
     difference.
-
-    Args:
-        runs: for each test the records before and now.
-        use: what for; says which fields must be equal.
-        fields: look at these alone.
     """
     found: dict[str, list[str]] = {}
     for test, (before, now) in runs.items():
@@ -283,12 +280,7 @@ def differences(runs: Runs, use: Use = "compare", fields: Sequence[str] | None =
 def other_meanings(
     before: Mapping[str, TaskDescription], now: Mapping[str, TaskDescription], use: Use = "compare"
 ) -> list[str]:
-    """One sentence for each metric that both runs have and that means something else in one.
-
-    Args:
-        before, now: what the runs say of their tasks, by name.
-        use: what for.
-    """
+    """One sentence for each metric that both runs have and that means something else in one."""
     found = []
     for task in (name for name in now if name in before):
         old = {metric.name: metric for metric in before[task].metrics}

@@ -180,12 +180,8 @@ class Found(Generic[T]):
 
 
 def read(folder: Path, name: str, make: Callable[[dict[str, Any], str], T]) -> Found[T]:
-    """The lines of a file.
-
-    Args:
-        folder: of an ordinary file.
-        name: of that file.
-        make: turns an object and its place, for messages, into an item, or raises ValueError.
+    """The lines of an ordinary file in a folder. `make` turns an object and its place, for
+    messages, into an item, or raises ValueError.
 
     Raises:
         UnreadableError: there is no such file.

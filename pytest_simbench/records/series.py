@@ -208,11 +208,8 @@ def by_test(
 
     A name is the test's id, without its file where that leaves all apart: it depends on where
     pytest ran. A test that repeats several tasks, or one with other parameters, has several: the
-    second is called `test_x[...] (stacking 2)`.
-
-    Args:
-        runs: records of each run, in the order in which they were made.
-        apart: splits the records of one test and task.
+    second is called `test_x[...] (stacking 2)`. `apart` splits the records of one test and task,
+    which come in the order in which they were made.
     """
     whole = any(len({r.test for r in run}) > len({r.name for r in run}) for run in runs)
     sides: list[dict[tuple[str, str, int], list[Record]]] = []

@@ -59,13 +59,8 @@ def write_report(
     comparison: Compared | None = None,
     looks: int = 1,
 ) -> Written:
-    """Write all files from what a run folder holds, into it.
-
-    Args:
-        folder: of the run.
-        reading: of it, where it has been read already.
-        comparison: with a baseline, where there is one.
-        looks: how often the run was judged, see `outcome.Outcome`.
+    """Write all files from what a run folder holds, which may have been read already, into it.
+    How often the run was judged, and with what it was compared, see `outcome.Outcome`.
 
     Raises:
         RecordError: its records cannot be read.
@@ -78,12 +73,8 @@ def write_files(
 ) -> Written:
     """Write all files; what cannot be written is told, and the rest is written all the same.
 
-    Args:
-        folder: where.
-        report: what is told.
-        run: the run folder, where it is another: traces, pictures and results on repeatability are
-            read from it.
-        figures: whether pictures are drawn too.
+    Traces, pictures and results on repeatability are read from the folder of the run, where that is
+    another one. Pictures are drawn where `figures` says so.
     """
     from pytest_simbench.report.page.context import page
     from pytest_simbench.report.page.render import render  # Jinja2
@@ -111,13 +102,8 @@ def write_files(
 def _draw(
     folder: Path, run: Path, report: Report, told: list[str], failed: list[str]
 ) -> tuple[list[str], dict[str, bytes]]:
-    """Draw and write all pictures.
-
-    Args:
-        folder: where.
-        run: folder with the pictures that simulators made.
-        report: what is told.
-        told, failed: take what could not be shown, and what went wrong, as sentences.
+    """Draw and write all pictures; those that simulators made are in the folder of the run. `told`
+    and `failed` take what could not be shown, and what went wrong, as sentences.
 
     Returns:
         Names of the files but contact sheets; and these (PNG), by the name of their task.
@@ -183,15 +169,8 @@ def write_badge(path: Path, records: Sequence[Record], passed: bool | None) -> s
 
 
 def write_tables(folder: Path, to: Path | None = None) -> tuple[list[Table], list[str]]:
-    """The tables of what a run folder holds on repeatability, also as a file of Markdown.
-
-    Args:
-        folder: of the run.
-        to: the folder for the file; None: there is none.
-
-    Returns:
-        The tables, and one sentence for each thing that is wrong.
-    """
+    """The tables of what a run folder holds on repeatability, and one sentence for each thing that
+    is wrong; with a folder for it also as a file of Markdown."""
     from pytest_simbench.report.model.repeatability import found_in
 
     found, problems = found_in(folder)

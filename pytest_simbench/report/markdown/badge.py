@@ -19,10 +19,7 @@ def badge(records: Sequence[Record], passed: bool | None) -> str:
 
     Green: every test passed and no repetition crashed. Yellow: the tests passed although some did.
     Red: a test or a limit failed. Grey: nothing was measured, or it is not known what passed.
-
-    Args:
-        records: of the run; interrupted repetitions say nothing.
-        passed: whether the tests, and the limits against the baseline, passed; None: not known.
+    Interrupted repetitions say nothing.
     """
     ended = [record for record in records if record.status != "interrupted"]
     failed = sum(not record.ok for record in ended)

@@ -180,13 +180,10 @@ def summarise(
     metrics: Mapping[str, Sequence[Metric]],
     references: Mapping[str, Mapping[str, float]] | None = None,
 ) -> list[TaskSummary]:
-    """The records as one summary per task, tasks in order of appearance.
+    """The records of one run as one summary per task, tasks in order of appearance.
 
-    Args:
-        records: of one run, in any order.
-        metrics: what each task declares, by its name; of a task that is missing here, the record's
-            metrics are shown as plain values.
-        references: by task, then by metric.
+    Metrics and references are what each task declares. Of a task that is missing there, the
+    record's metrics are shown as plain values.
     """
     return [
         _summary(task, found, metrics.get(task), dict((references or {}).get(task, {})))

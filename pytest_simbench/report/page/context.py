@@ -34,14 +34,8 @@ def page(
     replays: Sequence[Group] = (),
     sheets: Mapping[str, bytes] | None = None,
 ) -> Shown:
-    """What the page of a run tells; `render.render` makes HTML of it.
-
-    Args:
-        folder: of the run; its results on repeatability are read from it.
-        report: of the run.
-        replays: what the replay beside the page shows.
-        sheets: contact sheets (PNG), by the name of their task.
-    """
+    """What the page of a run tells, also of its results on repeatability, of the replay beside it,
+    and contact sheets (PNG) by task; `render.render` makes HTML of it."""
     summaries, tasks, comparison = report.summaries, report.tasks, report.comparison
     repetitions = _Repetitions(folder, replays)
     drawn = [pictures(summary) for summary in tasks]

@@ -103,12 +103,7 @@ class Strip:
 
 
 def strips(summary: TaskSummary, number: Callable[[Record], int]) -> list[Strip]:
-    """A plot for each metric and cost that any repetition has.
-
-    Args:
-        summary: of the task.
-        number: of a record on the page.
-    """
+    """A plot for each metric and cost that any repetition has; records have numbers on the page."""
     own = {metric.name for metric in summary.metrics}
     costs = [COST[name] for name in SHOWN_COSTS if name not in own]
     plots = [_strip(metric, summary, number) for metric in (*summary.metrics, *costs)]

@@ -97,13 +97,8 @@ def videos(run: Path) -> Callable[[Record], str]:
 def write_bags(
     run: Path, target: Path, records: Sequence[Record], progress: Progress
 ) -> tuple[int, list[str]]:
-    """Write a bag for each repetition that has a trace; those that are up to date stay.
-
-    Args:
-        run: folder of the run.
-        target: folder in which `recordings/` is.
-        records: of the run.
-        progress: told of each; a bag takes some seconds.
+    """Write a bag into `recordings/` of the target for each repetition of a run that has a trace,
+    which takes some seconds each; those that are up to date stay.
 
     Returns:
         How many there are now; and what could not be written, one sentence each.

@@ -41,10 +41,7 @@ class ReplayUnavailable(ImportError):
 
 
 def replay_of(shown: Sequence[Group]) -> tuple[str, int, list[str]]:
-    """The page.
-
-    Args:
-        shown: from `groups`.
+    """The page of `groups`.
 
     Returns:
         The page as HTML, how many of the groups it holds (the first ones), and what could not be

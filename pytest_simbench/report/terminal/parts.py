@@ -65,13 +65,8 @@ def history_lines(found: Sequence[History], width: int) -> list[str]:
 
 
 def render_changes(report: GateReport, width: int, limited: bool) -> str:
-    """The comparison with a baseline: differences first, then the table, then the verdicts.
-
-    Args:
-        report: from `run_gate`.
-        width: of the terminal.
-        limited: whether limits were given, so that passing is worth a sentence.
-    """
+    """The comparison with a baseline: differences first, then the table, then the verdicts. Where
+    limits were given, passing is worth a sentence."""
     columns = changes.columns(report)
     parts = [
         _listed(changes.DIFFERENT, report.differences, width),

@@ -29,11 +29,8 @@ LONGEST_WARNING = 2
 def render_run(summaries: Sequence[TaskSummary], width: int = 80) -> str:
     """Everything the terminal shows of a run, as plain lines of at most `width` columns.
 
-    No colours and nothing but ASCII of our own, so that any log holds it.
-
-    Args:
-        summaries: from `summary.summarise`; without one, the text is empty.
-        width: of the terminal; 80 to 140 read well.
+    No colours and nothing but ASCII of our own, so that any log holds it. 80 to 140 columns read
+    well. Without a summary the text is empty.
     """
     if not summaries:
         return ""
