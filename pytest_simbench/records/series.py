@@ -12,7 +12,6 @@ from pytest_simbench.records.configuration import (
     agree,
     equal_to,
     text,
-    values,
 )
 from pytest_simbench.records.record import Record
 
@@ -193,7 +192,7 @@ def comparable(a: Series, b: Series) -> bool:
 def told(records: Sequence[Record], use: Use = "pool") -> dict[str, object]:
     """What the records of one configuration say of it together."""
     found: dict[str, object] = {}
-    ordered = (values(record, use) for record in sorted(records, key=lambda r: not r.ok))
+    ordered = (Told.of(record, use).plain for record in sorted(records, key=lambda r: not r.ok))
     for each in {id(each): each for each in ordered}.values():
         for key, value in each.items():
             found.setdefault(key, value)
