@@ -94,36 +94,31 @@ def test_false_alarms_stay_below_one_in_twenty_even_without_a_margin(
     assert 1 <= false <= 5 + 2 * 2.2  # two standard errors of 5 in 100
 
 
-def test_the_sentence_says_what_by_how_much_and_how_sure() -> None:
-    report = run(made([1.0] * 20), made([0.8] * 20), "placed:5%")
-    assert report.failures == (
-        "test_stacking[engine-headless]: placed fell from 100 % to 80 % "
-        "(worse by 20 points, limit 5 points; p = 0.0001, 20 pairs)",
-    )
+MORE = {"rss_mb": {"mean": 180.0, "peak": 200.0}}
 
 
-def test_a_significant_change_within_the_limit_passes() -> None:
-    assert run(made([1.0] * 20), made([0.96] * 20), "placed:5%").failures == ()
-
-
-def test_a_large_change_that_may_be_chance_passes() -> None:
-    lucky = [1.0] * 19 + [0.0]
-    report = run(made([1.0] * 20), made(lucky), "placed:2%")
-    assert report.changes[0].loss == pytest.approx(0.05)
-    assert report.failures == ()
-
-
-def test_getting_better_passes() -> None:
-    report = run(made([0.8] * 20), made([1.0] * 20), "placed:5%")
-    assert report.failures == ()
-    assert "placed rose from 80 % to 100 % (worse by -20 points" in report.changes[0].sentence()
-
-
-def test_more_memory_fails() -> None:
-    more = {"rss_mb": {"mean": 180.0, "peak": 200.0}}
-    report = run(made([1.0] * 10), made([1.0] * 10, resources=more), "ram:10%,ram_peak:50%")
-    assert len(report.failures) == 1
-    assert "ram rose from 150 MB to 180 MB (worse by 20 %, limit 10 %" in report.failures[0]
+@pytest.mark.parametrize(
+    ("before", "now", "limits", "given", "fails", "said"),
+    [
+        ([1.0] * 20, [0.8] * 20, "placed:5%", {}, True,
+         "test_stacking[engine-headless]: placed fell from 100 % to 80 % (worse by 20 points, "
+         "limit 5 points; p = 0.0001, 20 pairs)"),
+        ([1.0] * 20, [0.96] * 20, "placed:5%", {}, False, "worse by 4 points"),
+        ([1.0] * 20, [1.0] * 19 + [0.0], "placed:2%", {}, False, "worse by 5 points"),  # chance
+        ([0.8] * 20, [1.0] * 20, "placed:5%", {}, False,
+         "placed rose from 80 % to 100 % (worse by -20 points"),
+        ([1.0] * 10, [1.0] * 10, "ram:10%,ram_peak:50%", {"resources": MORE}, True,
+         "ram rose from 150 MB to 180 MB (worse by 20 %, limit 10 %"),
+    ],
+)  # fmt: skip
+def test_what_is_worse_by_more_than_its_limit_and_not_by_chance_fails(
+    before: list[float], now: list[float], limits: str, given: dict[str, Any], fails: bool,
+    said: str,
+) -> None:  # fmt: skip
+    report = run(made(before), made(now, **given), limits)
+    sentence = report.changes[0].sentence()
+    assert said in sentence
+    assert report.failures == (sentence,) * fails
 
 
 def with_crashes(number: int, of: int = 20, **changes: Any) -> list[Record]:

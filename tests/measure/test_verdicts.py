@@ -86,12 +86,6 @@ def test_each_end_of_the_interval_of_a_claim_may_err_in_one_of_twenty_runs() -> 
     assert confidence(LENGTH, 0.01) == pytest.approx(0.99)
 
 
-def test_no_failure_of_twenty_supports_at_most_15_percent() -> None:
-    assert judge(at_most(0.15), proportion(0, 20, 0.9)).verdict is Verdict.SUPPORTED
-    assert judge(at_most(0.13), proportion(0, 20, 0.9)).verdict is Verdict.INCONCLUSIVE
-    assert judge(at_most(0.15), proportion(7, 20, 0.9)).verdict is Verdict.REFUTED
-
-
 def test_a_claim_reads_as_it_is_said() -> None:
     assert str(at_least(0.8)) == "at least 0.8"
     assert str(at_most(12.0)) == "at most 12"
