@@ -11,23 +11,15 @@ from pytest_simbench.measure.comparison import equivalence
 from pytest_simbench.measure.modes import MARGIN, compare_modes
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
+from tests.records import build
 
 PLACED = Metric("placed", "placed", kind="share", of=15, better="higher", study=True)
 
 
 def record(mode: str, seed: int, placed: float) -> Record:
-    return Record(
-        test=f"suites/test_stacking.py::test_stacking[mujoco-{mode}]",
-        function="suites/test_stacking.py::test_stacking",
-        task="stacking",
-        simulator="mujoco",
-        mode=mode,
-        profile="tuned",
-        repetition=seed,
-        seed=seed,
-        status="ok",
-        metrics={"placed": placed},
-    )
+    test = f"suites/test_stacking.py::test_stacking[mujoco-{mode}]"
+    given = {"test": test, "simulator": "mujoco", "mode": mode, "seed": seed}
+    return build.record(seed, metrics={"placed": placed}, **given)
 
 
 def compared(headless: list[float], gui: list[float]) -> str:
