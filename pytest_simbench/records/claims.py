@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from pytest_simbench.records.checked import Count, Name
-from pytest_simbench.records.description import Line
+from pytest_simbench.records.description import FolderLine
 
 Verdict = Literal["PASS", "FAIL", "UNDECIDED"]
 
@@ -14,7 +14,7 @@ Relation = Literal["at least", "at most"]
 
 
 @dataclass(frozen=True)
-class Claim(Line):
+class Claim(FolderLine):
     """One claim of one test, and its verdict. Of several of one `identity` the last one holds.
 
     Attributes:

@@ -15,7 +15,7 @@ from pytest_simbench.records.record import plain
 SCHEMA = 1
 
 
-class Line:
+class FolderLine:
     """A dataclass that is a line of a file of the run folder."""
 
     def to_dict(self) -> dict[str, Any]:
@@ -54,7 +54,7 @@ class Describing(Protocol):
 
 
 @dataclass(frozen=True)
-class TaskDescription(Line):
+class TaskDescription(FolderLine):
     """What a task's metrics and references mean.
 
     Attributes:
@@ -82,7 +82,7 @@ class TaskDescription(Line):
 
 
 @dataclass(frozen=True)
-class Threshold(Line):
+class Threshold(FolderLine):
     """A threshold that a test asked for.
 
     Attributes:

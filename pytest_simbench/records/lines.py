@@ -93,11 +93,6 @@ class LinesFile:
         self._pending: list[str] = []
         self._reason: OSError | None = None
 
-    @property
-    def pending(self) -> int:
-        """How many lines wait in memory because they could not be written."""
-        return len(self._pending)
-
     def append(self, line: str) -> bool:
         """Write a line of ASCII; False when it has to wait in memory. Never raises OSError."""
         self._pending.append(line)

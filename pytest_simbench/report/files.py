@@ -16,7 +16,7 @@ from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.metrics import COSTS
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.markdown.badge import badge
+from pytest_simbench.report.markdown.github import badge
 from pytest_simbench.report.markdown.run import render_run, render_tables
 from pytest_simbench.report.model.document import Table
 from pytest_simbench.report.model.outcome import NAME as OUTCOME

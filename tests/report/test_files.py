@@ -31,8 +31,7 @@ from pytest_simbench.report.files import (
     write_report,
     write_tables,
 )
-from pytest_simbench.report.markdown.badge import badge
-from pytest_simbench.report.markdown.github import LARGEST, VARIABLE, append_summary
+from pytest_simbench.report.markdown.github import LARGEST, VARIABLE, append_summary, badge
 from pytest_simbench.report.markdown.run import render_run, render_task
 from pytest_simbench.report.model import tables
 from pytest_simbench.report.model.report import Report

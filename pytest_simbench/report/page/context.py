@@ -11,8 +11,8 @@ from typing import Any
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.model import cells, changes, repeatability, sweep, tables, truth
-from pytest_simbench.report.model.again import command
 from pytest_simbench.report.model.answer import headline
+from pytest_simbench.report.model.claims import command
 from pytest_simbench.report.model.document import Of, Table
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import Cause, Row, TaskSummary
@@ -122,9 +122,8 @@ def _task(summary: TaskSummary, repetitions: _Repetitions, replays: Sequence[Gro
 
 def _cause(row: Row, cause: Cause, repetitions: _Repetitions) -> Shown:
     """Failures of a row that share type and phase, with the end of the first one's log."""
-    where = f" in {cause.phase}" if cause.phase else ""
     return {
-        "title": f"{row.label}: {len(cause.repetitions)} x {cause.type}{where}",
+        "title": f"{row.label}: {cause.told}",
         "of": row.of,
         "message": cause.message,
         "repetitions": tables.numbers(cause.repetitions, 10),

@@ -114,9 +114,7 @@ def _short(text: str, width: int) -> list[str]:
 def warnings(summaries: Sequence[TaskSummary]) -> list[str]:
     """Crashes by cause, then what a reader must know of the rows, those of one text together."""
     crashed = [
-        f"CRASHED {summary.task}, {row.label}: {len(cause.repetitions)} x {cause.type}"
-        + (f" in {cause.phase}" if cause.phase else "")
-        + f": {cause.message}"
+        f"CRASHED {summary.task}, {row.label}: {cause.told}: {cause.message}"
         for summary in summaries
         for row in summary.rows
         for cause in row.causes
