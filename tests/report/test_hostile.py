@@ -14,7 +14,6 @@ from pytest_simbench.records.record import Failure, Record
 from pytest_simbench.records.repeatability import Line
 from pytest_simbench.report.files import csv_of, write_files
 from pytest_simbench.report.markdown.capabilities import capability_markdown
-from pytest_simbench.report.markdown.github import VARIABLE, append_summary
 from pytest_simbench.report.markdown.run import render_changes as changes_in_markdown
 from pytest_simbench.report.markdown.run import render_run as markdown
 from pytest_simbench.report.markdown.run import render_tables as tables_in_markdown
@@ -161,9 +160,3 @@ def test_the_progress_line(text: str, is_tty: bool) -> None:
     progress.end_test()
     for part in written:
         assert_harmless_terminal(part.replace("\r", ""))
-
-
-def test_the_page_of_a_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(VARIABLE, str(tmp_path / "summary"))
-    assert append_summary(markdown(Report(told(ALL)))) == ""
-    assert_harmless_markdown((tmp_path / "summary").read_text(encoding="utf-8"))

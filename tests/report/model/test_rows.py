@@ -75,7 +75,11 @@ def test_failed_repetitions_count_and_interrupted_ones_are_left_out() -> None:
     assert (placed.count, placed.min, placed.max) == (5, 0.0, 0.8)  # a crash is the worst
     assert placed.mean == pytest.approx(1.4 / 5)
     hung, died = row.causes
-    assert (hung.error.type, hung.error.phase, hung.message) == ("WorkerHung", "settle", "no answer")
+    assert (hung.error.type, hung.error.phase, hung.message) == (
+        "WorkerHung",
+        "settle",
+        "no answer",
+    )
     assert (hung.repetitions, hung.tail) == ([3, 5], ["step 3", "died"])
     assert died.repetitions == [6]
 
