@@ -165,14 +165,6 @@ def test_crashes_count_in_shares_and_cost_nothing_where_there_is_none() -> None:
     assert "crashed rose" in paper.failures[0]
 
 
-def test_a_test_that_gives_nothing_any_more_fails_whatever_the_limits() -> None:
-    report = run(made([1.0] * 3), [failed(0), failed(1)], "placed:10%")
-    assert report.failures == (
-        "test_stacking[engine-headless]: none of 2 repetitions finished (most often WorkerHung in "
-        "settle); 3 of 3 did in the baseline",
-    )
-
-
 def test_a_limit_that_compares_nothing_fails_and_says_why() -> None:
     here = made([1.0] * 6) + made([1.0] * 6, test="test_other[engine-headless]")
     text = "placed:5%,landing_error:1,ram:10%"
@@ -226,42 +218,17 @@ def test_a_slow_machine_passes_and_a_real_slowdown_does_not() -> None:
     assert "machine speed taken out" in slow_engine.failures[0]
 
 
-def test_without_a_control_nothing_is_taken_out() -> None:
-    rng = np.random.default_rng(24)
-    report = run(timed(8.0, 0.1, rng), timed(16.0, None, rng), "rtf:20%")
-    assert not report.changes[0].normalised
-    assert len(report.failures) == 1
-
-
 def test_another_machine_without_a_control_is_no_change_of_the_simulator() -> None:
     rng = np.random.default_rng(1)
     before, slow = timed(8.0, None, rng), timed(16.0, None, rng)
     elsewhere = [replace(record, host={"cpu": "another", "cores": 8}) for record in slow]
-    assert len(run(before, slow, "rtf:20%").failures) == 1
+    slower = run(before, slow, "rtf:20%")
+    assert (len(slower.failures), slower.changes[0].normalised) == (1, False)
     report = run(before, elsewhere, "rtf:20%")
     (failure,) = report.failures
     assert failure.startswith("rtf:20% compared nothing: it depends on the machine, which was ano")
     with_control = [replace(r, host={"cpu": "another"}) for r in timed(16.0, 2e-4, rng)]
     assert len(run(timed(8.0, 2e-4, rng), with_control, "rtf:20%").failures) == 1
-
-
-def test_differences_are_named_first() -> None:
-    report = run(made([1.0] * 5), made([1.0] * 5, versions={"engine": "2.0"}), "placed:5%")
-    assert report.differences == (
-        'versions.engine was "1.0", is "2.0" (test_stacking[engine-headless])',
-    )
-
-
-def test_the_path_of_the_test_file_does_not_matter() -> None:
-    here = made([1.0] * 20, test="suites/test_stacking.py::test_stacking[engine-headless]")
-    there = made([0.5] * 20, test="test_stacking.py::test_stacking[engine-headless]")
-    assert len(run(here, there, "placed:5%").failures) == 1
-
-
-def test_two_tests_of_one_name_are_kept_apart_by_their_path() -> None:
-    both = made([1.0] * 6, test="a.py::t[e]") + made([0.5] * 6, test="b.py::t[e]")
-    report = run(both, both, "placed:5%")
-    assert {change.test for change in report.changes} == {"a.py::t[e]", "b.py::t[e]"}
 
 
 def test_what_cannot_be_compared_is_said() -> None:
@@ -347,7 +314,10 @@ def test_a_test_that_is_broken_is_told_beside_its_limits() -> None:
     assert run(made([1.0]), made([1.0]), "placed:5%").broken == ()
     report = run(made([1.0] * 2), [failed(0), failed(1, "WorkerDied"), failed(2)], "placed:5%")
     assert report.broken == report.failures[:1]
-    assert "none of 3 repetitions finished (most often WorkerHung in settle)" in report.broken[0]
+    assert report.broken == (
+        "test_stacking[engine-headless]: none of 3 repetitions finished (most often WorkerHung in "
+        "settle); 2 of 2 did in the baseline",
+    )
 
 
 def test_runs_of_different_robots_are_not_comparable() -> None:

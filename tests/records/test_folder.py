@@ -84,27 +84,6 @@ def test_a_wrong_value_is_named_with_file_and_line(
     assert len(RunFolder.of(path).scan().records) == 1
 
 
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        ("[1, 2]", "a line is a JSON object, not list"),
-        ("hello", "not JSON"),
-        ("{} x", "not JSON"),
-    ],
-)
-def test_a_line_that_is_no_record_is_named(line: str, message: str, tmp_path: Path) -> None:
-    path = tmp_path / RECORDS
-    path.write_text(line + "\n")
-    with pytest.raises(RecordError, match=message) as caught:
-        RunFolder(tmp_path).read()
-    assert f"{path}:1" in str(caught.value)
-
-
-def test_a_missing_file_is_one_sentence(tmp_path: Path) -> None:
-    with pytest.raises(RecordError, match="No such file or directory"):
-        RunFolder(tmp_path).read()
-
-
 def test_appended_records_are_read_back(tmp_path: Path) -> None:
     path = tmp_path / "run" / RECORDS
     folder = RunFolder(path.parent)
@@ -114,13 +93,6 @@ def test_appended_records_are_read_back(tmp_path: Path) -> None:
     assert path.read_bytes().count(b"\n") == 3  # on the disk before closing
     assert not folder.close()
     assert RunFolder(path.parent).read().records == tuple(written)
-
-
-def test_a_line_written_twice_counts_once(tmp_path: Path) -> None:
-    path = tmp_path / RECORDS
-    for _ in range(2):
-        RunFolder(path.parent).append(record(5))
-    assert len(RunFolder.of(path).read().records) == 1
 
 
 def test_a_record_too_long_to_be_read_keeps_all_but_its_details(tmp_path: Path) -> None:

@@ -96,12 +96,6 @@ def test_intervals_are_those_the_assertions_use() -> None:
         assert (found.low, found.high) == ends
 
 
-def test_costs_come_from_the_stepping_clocks() -> None:
-    costs = only(record()).costs
-    assert costs["rtf"] == spread([20.0])  # 160 simulated seconds in 8
-    assert costs["cpu_cost"] == spread([7.6 / 160])
-
-
 @given(
     st.lists(
         st.lists(st.floats(0, 500, allow_subnormal=False), min_size=1, max_size=20),
