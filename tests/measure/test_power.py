@@ -112,13 +112,6 @@ def test_what_supports_80_percent_is_the_first_count_whose_interval_lies_above(
         assert interval([0.0, *values[1:]], metric, 0.9).low < 0.8
 
 
-def test_no_failure_of_20_supports_at_most_15_percent_and_not_10() -> None:
-    """0.05^(1 / 20) = 0.861, 0.05^(1 / 29) = 0.902."""
-    assert least_supported(0.85, HIT, 20, 0.9) == 20
-    assert least_supported(0.9, HIT, 28, 0.9) is None
-    assert least_supported(0.9, HIT, 29, 0.9) == 29
-
-
 @pytest.mark.parametrize("metric", [HIT, PLACED], ids=["yes_no", "share"])
 @pytest.mark.parametrize("chance", [0.5, 0.05])
 def test_the_passing_rate_passes_that_often_in_simulation(metric: Metric, chance: float) -> None:

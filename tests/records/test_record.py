@@ -75,13 +75,6 @@ def test_numpy_values_nan_and_infinity_become_json() -> None:
     assert data["details"] == {"path": "a/b", "poses": [[1, 0], [0, 1]], "seed": 3, "far": None}
 
 
-def test_a_missing_key_is_named() -> None:
-    data = record().to_dict()
-    del data["simulator"]
-    with pytest.raises(RecordError, match="there is no 'simulator'"):
-        Record.from_dict(data)
-
-
 def test_costs_are_read_from_the_record() -> None:
     found = record()
     assert found.cost("rtf") == 17.5
