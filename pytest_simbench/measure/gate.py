@@ -293,9 +293,8 @@ def _change(
             "it depends on the machine, which was another one, and not every repetition has the "
             "control workload that takes the machine's speed out"
         )
-    first, second = old.by_seed(metric.name), new.by_seed(metric.name)
     evened = without_speed(metric.name, old, new)
-    first, second = evened or (first, second)
+    first, second = evened or (old.by_seed(metric.name), new.by_seed(metric.name))
     if not first or not second:
         return f"no repetition of {'this run' if first else 'the baseline'} has a value"
     worse: Alternative = "less" if metric.better == "higher" else "greater"
