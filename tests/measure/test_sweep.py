@@ -108,11 +108,8 @@ def test_the_cheapest_step_that_keeps_the_law_and_the_cheapest_within_an_error()
     assert within is not None
     assert (kept.step, within.step) == (0.002, 0.001)
     assert line.cheapest_within(1e-6) is None
-
-
-def test_the_cheapest_is_the_cheapest_and_not_the_longest_step() -> None:
     dear = law(0.004, 0.001, stepping={"cpu": 9.0, "simulated": 1.0, "steps": 250})
-    (line,) = one([dear, law(0.002, 0.001)]).lines
+    (line,) = one([dear, law(0.002, 0.001)]).lines  # the cheapest is not the longest step
     kept = line.cheapest_kept
     assert kept is not None
     assert kept.step == 0.002

@@ -106,20 +106,6 @@ def test_a_record_too_long_to_be_read_keeps_all_but_its_details(tmp_path: Path) 
     assert "more than a record may have" in found.notes.left_out
 
 
-@pytest.mark.parametrize("kind", ["fifo", "device", "link out"])
-def test_only_an_ordinary_file_in_the_folder_is_read(tmp_path: Path, kind: str) -> None:
-    run = tmp_path / "run"
-    run.mkdir()
-    path = run / RECORDS
-    (tmp_path / "other").write_text(record(1).to_json() + "\n")
-    if kind == "fifo":
-        os.mkfifo(path)
-    else:
-        path.symlink_to({"device": "/dev/zero", "link out": tmp_path / "other"}[kind])
-    with pytest.raises(RecordError, match=r"no ordinary file|leads out of its folder"):
-        RunFolder(run).read()
-
-
 def test_infinite_numbers_and_deep_nests_are_refused(tmp_path: Path) -> None:
     path = tmp_path / RECORDS
     good = record(details={"a": 1}).to_json()
@@ -202,21 +188,23 @@ def test_a_bad_description_is_told_and_takes_nothing_with_it(
     assert found.records
 
 
-@pytest.mark.parametrize("kind", ["fifo", "folder", "link out"])
-def test_descriptions_are_an_ordinary_file_in_the_folder(tmp_path: Path, kind: str) -> None:
+@pytest.mark.parametrize("name", [RECORDS, TASKS])
+@pytest.mark.parametrize("kind", ["fifo", "device", "folder", "link out"])
+def test_only_an_ordinary_file_in_the_folder_is_read(tmp_path: Path, name: str, kind: str) -> None:
     run = tmp_path / "run"
-    folder_with(run)
-    (tmp_path / "other").write_text(json.dumps(POURING.to_dict()) + "\n")
-    path = run / TASKS
+    folder_with(run, POURING)
+    path = run / name
+    path.rename(tmp_path / "other")
     if kind == "fifo":
         os.mkfifo(path)
     elif kind == "folder":
         path.mkdir()
     else:
-        path.symlink_to(tmp_path / "other")
-    found = RunFolder(run).read()
-    assert found.tasks == {}
-    (problem,) = found.problems
+        path.symlink_to({"device": "/dev/zero", "link out": tmp_path / "other"}[kind])
+    found = RunFolder(run).scan()
+    assert (found.records == ()) is (name == RECORDS)
+    assert (found.tasks == {}) is (name == TASKS)
+    (problem,) = (*found.problems, *found.refused)
     assert re.search("no ordinary file|Is a directory|leads out of its folder", problem)
     assert RunFolder(run).repair() == ()
 
