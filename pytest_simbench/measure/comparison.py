@@ -206,8 +206,7 @@ class Equivalence:
     """Whether two means differ by less than a margin, by two one-sided tests.
 
     Attributes:
-        difference: of the means, second - first.
-        margin: the largest difference that does not matter; same unit.
+        difference, margin: of the means, second - first, and the largest that does not matter.
         p_value: the larger of the two tests'.
     """
 

@@ -43,8 +43,6 @@ class Change:
     """One metric of one test, before and after.
 
     Attributes:
-        test: the test's id.
-        metric: what was compared.
         limit: how much worse it may get.
         comparison: the means and the p value: of getting worse where there is a limit, else of
             any change.

@@ -72,7 +72,6 @@ class Course:
     """One metric over the releases.
 
     Attributes:
-        metric: which.
         values: of each release by seed; empty where no repetition has one.
         changes: supported change points; their places count releases that have values.
     """
@@ -84,12 +83,7 @@ class Course:
 
 @dataclass(frozen=True)
 class TaskHistory(History):
-    """A task over the releases.
-
-    Attributes:
-        results: of each release.
-        courses: of each metric and cost.
-    """
+    """A task over the releases: the results of each, and the courses of each metric and cost."""
 
     results: tuple[ResultSet, ...]
     courses: tuple[Course, ...] = field(default=())
@@ -215,13 +209,7 @@ class Reached:
 
 @dataclass(frozen=True)
 class Row:
-    """One law over the releases.
-
-    Attributes:
-        name: of the law.
-        phenomenon: that it is of.
-        reached: by each release; None where it was not asked.
-    """
+    """One law, of a phenomenon, and what each release reached; None where it was not asked."""
 
     name: str
     phenomenon: str

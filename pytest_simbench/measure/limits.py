@@ -36,7 +36,6 @@ class Limit:
     """How much a metric may get worse.
 
     Attributes:
-        metric: the metric's name.
         amount: above or equal 0; a share (0.05) where `percent`, else in the metric's unit.
         percent: of the baseline's mean for values; percentage points for shares and yes-or-no
             metrics, which are shown in percent anyway.

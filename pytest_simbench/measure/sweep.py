@@ -99,13 +99,8 @@ class Swept:
 
 @dataclass(frozen=True)
 class Choice:
-    """The step to take for a phenomenon.
-
-    Attributes:
-        step: [s].
-        kept: laws with an error that `REFERENCE` may cost, of `laws`.
-        cost: CPU seconds for a simulated second, the mean over the laws.
-    """
+    """The step [s] to take for a phenomenon: how many of its laws are kept with an error that
+    `REFERENCE` may cost, at CPU seconds for a simulated second, the mean over the laws."""
 
     step: float
     kept: int

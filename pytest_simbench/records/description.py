@@ -58,7 +58,6 @@ class TaskDescription(FolderLine):
     """What a task's metrics and references mean.
 
     Attributes:
-        task: its name.
         metrics: what it measures, in the order of its tables.
         references: the value of a perfect simulator, by metric.
 
@@ -86,7 +85,6 @@ class Threshold(FolderLine):
     """A threshold that a test asked for.
 
     Attributes:
-        test: its id.
         metric: as the test named it.
         value: what it got: its own, or that of `--sim-threshold`.
     """

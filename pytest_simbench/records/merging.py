@@ -18,13 +18,7 @@ class MergeError(ValueError):
 
 @dataclass(frozen=True)
 class Merged:
-    """A record of the merged run.
-
-    Attributes:
-        record: under its new number.
-        run: name of the run that it comes from.
-        was: the record as it stands there.
-    """
+    """A record of the merged run, under its new number, and as it was in the run of that name."""
 
     record: Record
     run: str

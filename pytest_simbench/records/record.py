@@ -31,7 +31,6 @@ class Failure:
 
     Attributes:
         type: name of the typed error, for instance `WorkerHung`.
-        message: one sentence.
         phase: what the repetition was doing, for instance `settle`.
         log_tail: the last lines of the worker's log.
     """

@@ -30,13 +30,8 @@ NO_CLAIM = "no claim was made"
 
 @dataclass(frozen=True)
 class Trouble:
-    """A claim that failed or is not decided.
-
-    Attributes:
-        what: simulator, test, and what came of the claim.
-        worst: which repetition to look at, in words; empty where none stands out.
-        again: the command that runs it again; may be empty.
-    """
+    """What came of a claim that failed or is not decided; which repetition is the worst, in words,
+    and the command that runs it again, which may be empty."""
 
     what: str
     worst: str = ""

@@ -86,7 +86,6 @@ class Row:
         notes: what a reader must know of these numbers (parallel repetitions, reused worker).
         reasons: why scores are no better, in the task's words, and how often; the most frequent
             first. Those that differ in numbers alone are counted together.
-        records: all of its repetitions.
     """
 
     task: str

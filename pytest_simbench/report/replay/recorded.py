@@ -38,11 +38,7 @@ def trace_of(run: Path, record: Record) -> Path | None:
 
 @dataclass
 class Group:
-    """Repetitions of one task with one seed.
-
-    Attributes:
-        shown: the repetitions, each with its trace.
-    """
+    """Repetitions of one task with one seed, each with its trace."""
 
     task: str
     parameters: str
