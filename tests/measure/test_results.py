@@ -314,3 +314,12 @@ def test_a_failure_without_a_cause_is_counted_and_told() -> None:
     with pytest.raises(AssertionError) as caught:
         result.assert_no_crashes()
     assert str(caught.value).endswith("crashed: 1 x unknown cause (repetition 20, seed 1020)")
+
+
+@pytest.mark.parametrize("cause", ["RepetitionTimeout", "WorkerHung", "Diverged"])
+def test_every_cause_is_a_failure(cause: str) -> None:
+    result = ResultSet([*records("placed", [1.0] * 3), failed(3, cause)], METRICS)
+    assert [record.seed for record in result.crashed] == [1003]
+    assert result.crash_interval().mean == 0.25
+    with pytest.raises(AssertionError, match=f"1 of 4 repetitions crashed: 1 x {cause} in settle"):
+        result.assert_no_crashes()
