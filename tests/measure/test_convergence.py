@@ -67,6 +67,7 @@ def test_a_floor_of_double_precision_is_left_out_where_single_precision_is_allow
         ([1e-3, *[0.0] * 5], 0.0, "rounding"),
         ([1e-3, 1e-5, *[0.0] * 4], 0.0, "rounding"),
         ([3e-8, 1e-8, 2e-8, 4e-8, 1e-8, 5e-8], 1e-7, "rounding"),
+        ([4e-8, 2e-8, 1e-8, 4e-8, 1e-8, 5e-8], 1e-7, "rounding"),
         ([1.0], 0.0, "unknown"),
         ([], 0.0, "unknown"),
     ],

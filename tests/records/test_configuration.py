@@ -128,6 +128,7 @@ START = {"task.towers": 3}
         # One that knows more than the task's settings knows all of them.
         ({"status": "failed"}, True),
         ({"status": "failed", "settings": {**WHOLE, "timestep": 0.1}}, False),
+        ({"status": "failed", "settings": {"timestep": 0.002}}, False),
     ],
 )
 def test_who_is_of_one_configuration(changes: dict[str, Any], agrees: bool) -> None:

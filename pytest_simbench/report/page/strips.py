@@ -181,7 +181,7 @@ def _scale(low: float, high: float, log: bool) -> Callable[[float], float]:
         return lambda value: (LEFT + RIGHT) / 2
     of = math.log10 if log else float
     ends = of(low), of(high)
-    return lambda value: round(float(np.interp(of(max(value, low)), ends, (LEFT, RIGHT))), 2)
+    return lambda value: round(float(np.interp(of(value), ends, (LEFT, RIGHT))), 2)
 
 
 def _ticks(low: float, high: float, log: bool) -> list[float]:
