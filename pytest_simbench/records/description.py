@@ -36,8 +36,6 @@ class FolderLine:
             return checked.convert({k: v for k, v in whole.items() if v is not None}, cls)
         except checked.CheckError as error:
             raise checked.CheckError(f"{where}: {error}") from None
-        except RecursionError:
-            raise checked.CheckError(f"{where}: it is nested too deeply") from None
 
 
 class Describing(Protocol):

@@ -183,8 +183,6 @@ class Record:
             checked.convert(found.resources, Use, "resources")
         except checked.CheckError as error:
             raise RecordError(f"{where}: {error}") from None
-        except RecursionError:
-            raise RecordError(f"{where}: the record is nested too deeply") from None
         extra.pop("schema", None)
         shared = {name: _shared(getattr(found, name)) for name in _SHARED}
         return replace(found, extra=extra, **shared)
