@@ -10,7 +10,8 @@ from pathlib import Path
 from pytest_simbench.cli.names import read_names
 from pytest_simbench.client import environments
 from pytest_simbench.ground.text import for_terminal
-from pytest_simbench.report.terminal.parts import capability_table
+from pytest_simbench.report.model.capabilities import columns
+from pytest_simbench.report.terminal.grid import render
 from pytest_simbench.simulator.registry import adapter, known, problem, registered, registry
 
 Missing = Callable[[str], str | None]
@@ -90,7 +91,7 @@ def _paragraphs(
     too, and the reasons of those whose adapter is broken."""
     if not names:
         width = shutil.get_terminal_size((160, 24)).columns
-        yield capability_table([adapter(name).info for name in registered()], width)
+        yield render(columns([adapter(name).info for name in registered()]), width)
         yield ""
     for name in names or known():
         if broken := problem(name):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 from pytest_simbench.measure.comparison import MeanDifference, compare_by_seed
 from pytest_simbench.measure.limits import CRASHED
@@ -37,8 +37,12 @@ def difference(metric: Metric, before: ResultSet, after: ResultSet) -> MeanDiffe
     Raises:
         ValueError: a side has no value.
     """
-    first, second = _values(metric, before, after)
-    return compare_by_seed(first, second, "less" if metric.better == "higher" else "greater")
+    if metric is CRASHED:
+        sides = before.crashed_by_seed(), after.crashed_by_seed()
+    else:
+        usual = before.by_seed(metric.name), after.by_seed(metric.name)
+        sides = without_speed(metric.name, before, after) or usual
+    return compare_by_seed(*sides, "less" if metric.better == "higher" else "greater")
 
 
 def like_the_bad_one(metric: Metric, good: ResultSet, bad: ResultSet, other: ResultSet) -> bool:
@@ -53,15 +57,6 @@ def like_the_bad_one(metric: Metric, good: ResultSet, bad: ResultSet, other: Res
     here = difference(metric, good, other).difference
     there = difference(metric, good, bad).difference
     return here / there > 0.5
-
-
-def _values(
-    metric: Metric, before: ResultSet, after: ResultSet
-) -> tuple[Mapping[int, float], Mapping[int, float]]:
-    if metric is CRASHED:
-        return before.crashed_by_seed(), after.crashed_by_seed()
-    evened = without_speed(metric.name, before, after)
-    return evened or (before.by_seed(metric.name), after.by_seed(metric.name))
 
 
 def steps(number: int) -> int:

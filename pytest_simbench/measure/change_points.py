@@ -43,22 +43,19 @@ class ChangePoint:
     p_value: float
 
 
-def change_points(
-    values: Sequence[Mapping[int, float]], *, rows: int = 1, alpha: float = ALPHA
-) -> list[ChangePoint]:
+def change_points(values: Sequence[Mapping[int, float]], *, rows: int = 1) -> list[ChangePoint]:
     """The supported change points of a row, in order.
 
     Args:
         values: of each item (release) by seed; seeds may be missing.
         rows: that are searched together (metrics, tests); each p value is multiplied by it.
-        alpha: probability of a false change point among all of them.
     """
     seeds = sorted({seed for found in values for seed in found})
     if len(values) < 2 or not seeds:
         return []
     table = np.array([[found.get(seed, np.nan) for seed in seeds] for found in values])
     p_values: dict[int, float] = {}
-    _search(table, 0, len(table), rows, alpha, p_values)
+    _search(table, 0, len(table), rows, p_values)
     ends = [0, *sorted(p_values), len(table)]
     means = [float(np.nanmean(table[start:stop])) for start, stop in pairwise(ends)]
     return [
@@ -67,9 +64,7 @@ def change_points(
     ]
 
 
-def _search(
-    table: FloatArray, start: int, stop: int, rows: int, alpha: float, found: dict[int, float]
-) -> None:
+def _search(table: FloatArray, start: int, stop: int, rows: int, found: dict[int, float]) -> None:
     """Put the change points between two rows of the table into `found`, with their p values."""
     part = table[start:stop]
     part = part[:, np.isfinite(part).any(axis=0)]
@@ -82,12 +77,12 @@ def _search(
     if scale == 0.0:
         return
     p_value = min(1.0, rows * _chance(part, largest - 1e-9 * scale))
-    if p_value > alpha:
+    if p_value > ALPHA:
         return
     place = start + 1 + int(shifts.argmax())
     found[place] = p_value
-    _search(table, start, place, rows, alpha, found)
-    _search(table, place, stop, rows, alpha, found)
+    _search(table, start, place, rows, found)
+    _search(table, place, stop, rows, found)
 
 
 def _shifts(tables: FloatArray) -> FloatArray:

@@ -206,8 +206,7 @@ class Equivalence:
     """Whether two means differ by less than a margin, by two one-sided tests.
 
     Attributes:
-        difference: of the means, second - first.
-        margin: the largest difference that does not matter; same unit.
+        difference, margin: of the means, second - first, and the largest that does not matter.
         p_value: the larger of the two tests'.
     """
 
@@ -219,21 +218,18 @@ class Equivalence:
         return self.p_value <= alpha
 
 
-def equivalence(
-    first: ArrayLike, second: ArrayLike, margin: float, span: float = 1.0
-) -> Equivalence:
+def equivalence(first: ArrayLike, second: ArrayLike, margin: float) -> Equivalence:
     """Two one-sided paired t tests (TOST): "headless and GUI do not differ by more than `margin`".
 
     Not significantly different is not the same as equivalent: few repetitions show neither. Values
-    that were alike so far say nothing of what is rare: a difference of the whole `span` in a share
-    margin / span of the pairs stays unseen in n of them with the probability (1 - margin / span)^n,
+    that were alike so far say nothing of what is rare: a difference of a whole share in so many of
+    the pairs as the margin says stays unseen in n of them with the probability (1 - margin)^n,
     below which no p value lies. So pairs that are all equal show a margin of 5 points with 59 of
     them, of 10 points with 29.
 
     Args:
         first, second: values of the same seeds, (n,) each, at least two.
         margin: above 0.
-        span: the largest difference that there can be; 1 of shares.
 
     Raises:
         ValueError: fewer than two values on a side, unequal pairs, or a margin that is not above 0.
@@ -248,8 +244,8 @@ def equivalence(
     difference = float(b.mean() - a.mean())
     if np.ptp(b - a) <= 1e-12 * max(1.0, float(np.abs(a).max())):
         room = max(0.0, margin - abs(difference))
-        return Equivalence(difference, margin, max(0.0, 1 - room / span) ** a.size)
-    unseen = max(0.0, 1 - margin / span) ** a.size
+        return Equivalence(difference, margin, max(0.0, 1 - room) ** a.size)
+    unseen = max(0.0, 1 - margin) ** a.size
     sides: tuple[tuple[FloatArray, Alternative], ...] = (
         (b + margin, "greater"),
         (b - margin, "less"),
@@ -258,6 +254,6 @@ def equivalence(
     return Equivalence(difference, margin, float(max(*found, unseen)))
 
 
-def pairs_for_equivalence(margin: float, alpha: float = ALPHA, span: float = 1.0) -> int:
+def pairs_for_equivalence(margin: float) -> int:
     """Fewest pairs, all of them equal, that show an equivalence: 59 for 5 points of a share."""
-    return max(2, math.ceil(math.log(alpha) / math.log1p(-min(margin / span, 1 - 1e-9))))
+    return max(2, math.ceil(math.log(ALPHA) / math.log1p(-min(margin, 1 - 1e-9))))

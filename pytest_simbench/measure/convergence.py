@@ -89,17 +89,14 @@ def _told(h: np.ndarray, e: np.ndarray, level: np.ndarray) -> list[int]:
     """The places, longest step first, whose errors tell of the step: those above rounding, and
     those below it that go on falling."""
     found: list[int] = []
-    if (e <= level).all():
-        for k in range(len(h)):
-            if found and not _falls(h, e, k):
-                break
-            found.append(k)
-        return found if len(found) >= A_FALL else []
+    above = e > level
+    if rounding := not above.any():
+        above[0] = True
     for k in range(len(h)):
         goes_on = found and found[-1] == k - 1 and _falls(h, e, k)
-        if e[k] > level[k] or goes_on:
+        if above[k] or goes_on:
             found.append(k)
-    return found
+    return [] if rounding and len(found) < A_FALL else found
 
 
 def _falls(h: np.ndarray, e: np.ndarray, k: int) -> bool:

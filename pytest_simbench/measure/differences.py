@@ -103,7 +103,6 @@ def differences(
     metrics: Iterable[Metric],
     comparable: Callable[[Any, Any], bool] = lambda a, b: True,
     references: Mapping[str, float] | None = None,
-    alpha: float = ALPHA,
 ) -> list[Difference]:
     """Every pair of sides at every metric that both have, paired by seed.
 
@@ -118,7 +117,6 @@ def differences(
         metrics: of the task; crashes, CPU cost and memory are compared besides.
         comparable: which pairs are of interest.
         references: the right value of metrics without a good direction; nearer is better.
-        alpha: of the family-wise error of each family.
     """
     judged, given = list(metrics), references or {}
     own = {metric.name for metric in judged}
@@ -134,7 +132,7 @@ def differences(
             values = {key: _off(found, right) for key, found in _values(ended, metric).items()}
             known = metric if right is None else replace(metric, better="lower")
             tests += [_Test(a, b, known, values[a], values[b]) for a, b in pairs]
-        result += _judged(family, [test for test in tests if test.common], alpha)
+        result += _judged(family, [test for test in tests if test.common])
     return result
 
 
@@ -218,13 +216,13 @@ class _Test:
             return "different"
         return "worse" if (found > 0) == (self.metric.better == "higher") else "better"
 
-    def equivalent(self, alpha: float) -> bool:
+    def equivalent(self) -> bool:
         whole = len(self.common) == len(self.seeds) > 1 and self.metric.bounded
         first, second = self.sides.T
-        return whole and equivalence(first, second, MARGIN).equivalent(alpha)
+        return whole and equivalence(first, second, MARGIN).equivalent()
 
 
-def _judged(family: Family, tests: Sequence[_Test], alpha: float) -> list[Difference]:
+def _judged(family: Family, tests: Sequence[_Test]) -> list[Difference]:
     """All tests of a family together."""
     if not tests:
         return []
@@ -237,12 +235,12 @@ def _judged(family: Family, tests: Sequence[_Test], alpha: float) -> list[Differ
         centred[:, place] = [own.get(s, 0.0) for s in seeds]
     usable = np.array([not test.one_value for test in tests])
     scaled = _scaled(columns) * usable
-    p_values, bound = step_down(scaled, alpha)
-    reach = step_down(_scaled(centred) * usable, alpha)[1]
+    p_values, bound = step_down(scaled)
+    reach = step_down(_scaled(centred) * usable)[1]
     found = []
     for test, p, column in zip(tests, p_values, scaled.T, strict=True):
-        verdict = test.verdict(float(column.sum())) if p <= alpha else "undecided"
-        if verdict == "undecided" and test.equivalent(alpha):
+        verdict = test.verdict(float(column.sum())) if p <= ALPHA else "undecided"
+        if verdict == "undecided" and test.equivalent():
             verdict = "equivalent"
         differ = int(np.count_nonzero(test.gaps))
         needs = 0
@@ -269,9 +267,9 @@ def _scaled(columns: FloatArray) -> FloatArray:
     return columns / np.where(length > 0, length, 1.0)
 
 
-def step_down(columns: FloatArray, alpha: float = ALPHA) -> tuple[FloatArray, float]:
+def step_down(columns: FloatArray) -> tuple[FloatArray, float]:
     """Adjusted p values of columns (seeds, tests) of length 1, and what none of all statistics
-    exceeds but with probability `alpha` if no sides differ."""
+    exceeds but with probability `ALPHA` if no sides differ."""
     observed = np.round(np.abs(columns.sum(0)), 9)
     order = np.argsort(-observed, kind="stable")
     beyond, largest, count = np.zeros(len(order)), [], 0
@@ -285,7 +283,7 @@ def step_down(columns: FloatArray, alpha: float = ALPHA) -> tuple[FloatArray, fl
     p_values = np.empty(len(order))
     p_values[order] = np.minimum(1, np.maximum.accumulate(beyond / count) / GUARD)
     tail = np.sort(np.concatenate(largest))[::-1]
-    return p_values, float(tail[min(math.floor(GUARD * alpha * count), count - 1)])
+    return p_values, float(tail[min(math.floor(GUARD * ALPHA * count), count - 1)])
 
 
 def _signs(seeds: int, tests: int) -> Iterator[FloatArray]:

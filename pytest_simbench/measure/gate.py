@@ -43,8 +43,6 @@ class Change:
     """One metric of one test, before and after.
 
     Attributes:
-        test: the test's id.
-        metric: what was compared.
         limit: how much worse it may get.
         comparison: the means and the p value: of getting worse where there is a limit, else of
             any change.
@@ -130,15 +128,9 @@ def run_gate(
     *,
     typed: bool = True,
 ) -> GateReport:
-    """Compare two runs.
+    """Compare this run with the one of a baseline, by the metrics of each task.
 
-    Args:
-        baseline: records of the run to compare with.
-        current: records of this run.
-        limits: from `parse_limits`.
-        metrics: the metrics of each task, by its name.
-        typed: whether the limits are for this very run, so that one that compares nothing fails it;
-            else it is a note.
+    `typed` limits are for this very run: one that compares nothing fails it, else it is a note.
     """
     baseline, current = list(baseline), list(current)
     before, after = (
@@ -205,12 +197,9 @@ def side_by_side(
 ) -> tuple[tuple[Record, ...], tuple[Record, ...]]:
     """One run as two: what a simulator scored, as the baseline of others, and what these scored.
 
-    Args:
-        records: of the run.
-        name: of the simulator, whose records are given again as those of each other one: with its
-            name, and the id of its test of the same function, variant, mode and profile. Where the
-            other has no such test they keep the id that they have.
-        others: the names of these.
+    The records of the simulator of that name are given again as those of each other one: with its
+    name, and the id of its test of the same function, variant, mode and profile. Where the other
+    has no such test they keep the id that they have.
     """
     records, others = list(records), list(others)
     tests = {RowKey.of(record): record.test for record in records}
@@ -302,9 +291,8 @@ def _change(
             "it depends on the machine, which was another one, and not every repetition has the "
             "control workload that takes the machine's speed out"
         )
-    first, second = old.by_seed(metric.name), new.by_seed(metric.name)
     evened = without_speed(metric.name, old, new)
-    first, second = evened or (first, second)
+    first, second = evened or (old.by_seed(metric.name), new.by_seed(metric.name))
     if not first or not second:
         return f"no repetition of {'this run' if first else 'the baseline'} has a value"
     worse: Alternative = "less" if metric.better == "higher" else "greater"

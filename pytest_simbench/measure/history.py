@@ -1,22 +1,30 @@
-"""The releases of one simulator at one test, in order: what each scored, and where it changed."""
+"""The releases of one simulator, in order: what each scored, and where it changed.
+
+Laws are no sample (`measure.phenomena`), and one repetition of each is the rule, so there is
+nothing to permute. A change of a law is one of size: beyond a tolerance that decides, and by a
+factor of two at least. Where there are several repetitions, every one after it must lie beyond
+every one before it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from pytest_simbench.ground.versions import RELEASE, VersionedName, release_numbers
+from pytest_simbench.ground.versions import BUILD, RELEASE, VersionedName, release_numbers
 from pytest_simbench.measure.change_points import ChangePoint, change_points
 from pytest_simbench.measure.limits import CRASHED
+from pytest_simbench.measure.phenomena import BROKEN, KEPT
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.speed import without_speed
-from pytest_simbench.records.metrics import Metric
-from pytest_simbench.records.phenomena import PHENOMENON
+from pytest_simbench.records.metrics import Metric, significant
+from pytest_simbench.records.phenomena import PHENOMENON, ordered
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import grouped, series
+from pytest_simbench.records.series import RowKey, grouped, series
 
 FEWEST = 3
-"""Releases that make a history; two are compared by verdicts."""
+"""Releases that make a history of a task; two are compared by verdicts."""
 
 COSTS = ("cpu_cost", "ram_peak")
 """Costs of which there is a history: the machine's speed can be taken out of the one, and the other
@@ -26,13 +34,44 @@ SMALLEST = 0.1
 """Relative change of a cost that is told. One hour of a machine differs from the next by 4 to 6 %
 after its speed is taken out (docs/gate.md), and a release's repetitions share their hour."""
 
+FEWEST_OF_LAWS = 2
+"""Releases that make a history of laws: what changed between two is a fact."""
+
+FACTOR = 2.0
+"""By which an error over its tolerance must grow or shrink: a tolerance is a bound (`BROKEN`)."""
+
+
+@dataclass(frozen=True)
+class History:
+    """A test of a simulator over its releases.
+
+    Attributes:
+        simulator: without a version.
+        task, test: what was done; the test without its parameters.
+        variant: mode and profile, and further parameters of the test.
+        releases: versions, oldest first; then builds, with an `@` before their names.
+    """
+
+    simulator: str
+    task: str
+    test: str
+    variant: str
+    releases: tuple[str, ...]
+
+    @property
+    def title(self) -> str:
+        return f"{self.simulator}, {self.task} ({self.variant})"
+
+    def sentences(self) -> list[str]:
+        """What each release changed, in words."""
+        raise NotImplementedError
+
 
 @dataclass(frozen=True)
 class Course:
     """One metric over the releases.
 
     Attributes:
-        metric: which.
         values: of each release by seed; empty where no repetition has one.
         changes: supported change points; their places count releases that have values.
     """
@@ -43,34 +82,11 @@ class Course:
 
 
 @dataclass(frozen=True)
-class History:
-    """One test of one simulator over its releases.
+class TaskHistory(History):
+    """A task over the releases: the results of each, and the courses of each metric and cost."""
 
-    Attributes:
-        simulator: without a version.
-        task, test: what was done; the test without its parameters.
-        variant: mode and profile, and further parameters of the test.
-        releases: versions, oldest first.
-        results: of each release.
-        courses: of each metric and cost.
-    """
-
-    simulator: str
-    task: str
-    test: str
-    variant: str
-    releases: tuple[str, ...]
     results: tuple[ResultSet, ...]
     courses: tuple[Course, ...] = field(default=())
-
-    @property
-    def identity(self) -> tuple[str, ...]:
-        """What tells it from others of its simulator and task."""
-        return self.test, self.variant
-
-    @property
-    def title(self) -> str:
-        return f"{self.simulator}, {self.task} ({self.variant})"
 
     def sentences(self) -> list[str]:
         """What changed with which release, how much, and how sure; and which releases crashed."""
@@ -99,33 +115,38 @@ class History:
         return found
 
 
-def histories(records: Iterable[Record], metrics: Mapping[str, Sequence[Metric]]) -> list[History]:
-    """The histories in a run: of each simulator with three or more releases, each test but laws.
-
-    Args:
-        records: of the run.
-        metrics: of each task, by its name.
-    """
-    of_releases = (r for r in records if VersionedName.of(r.simulator).kind == RELEASE)
-    no_laws = (r for r in of_releases if not r.settings.get(PHENOMENON))  # see `law_history`
-    found = []
-    for task, of_task in grouped(no_laws, lambda r: r.task).items():
-        rows: dict[tuple[str, ...], dict[str, list[Record]]] = {}
+def by_release(records: Iterable[Record]) -> dict[tuple[str, RowKey], dict[str, list[Record]]]:
+    """The rows of each task by the release or build that they are of. What all releases of a
+    simulator have in common is their task, and their key with the simulator's name alone."""
+    found: dict[tuple[str, RowKey], dict[str, list[Record]]] = {}
+    for task, of_task in grouped(records, lambda r: r.task).items():
         for row in series(of_task):
-            name, key = VersionedName.of(row.key.simulator), row.key
-            place = (name.base, key.mode, key.profile, key.function, key.parameters)
-            rows.setdefault(place, {})[name.which] = row.records
-        for (base, mode, profile, function, parameters), releases in rows.items():
-            if len(releases) >= FEWEST:
-                order = tuple(sorted(releases, key=release_numbers))
-                sets = tuple(ResultSet(releases[v], metrics.get(task, ())) for v in order)
-                variant = " ".join(filter(None, (mode, profile, parameters)))
-                found.append(History(base, task, function, variant, order, sets))
+            name = VersionedName.of(row.key.simulator)
+            label = name.which if name.kind == RELEASE else f"{BUILD}{name.which}"
+            of_all = found.setdefault((task, row.key._replace(simulator=name.base)), {})
+            of_all[label] = row.records
+    return found
+
+
+def histories(
+    records: Iterable[Record], metrics: Mapping[str, Sequence[Metric]]
+) -> list[TaskHistory]:
+    """The histories in a run: of each simulator with three or more releases, each test but laws,
+    by the metrics of each task."""
+    of_releases = (r for r in records if VersionedName.of(r.simulator).kind == RELEASE)
+    rows = by_release(r for r in of_releases if not r.settings.get(PHENOMENON))
+    found = []
+    for (task, key), releases in rows.items():
+        if len(releases) >= FEWEST:
+            order = tuple(sorted(releases, key=release_numbers))
+            sets = tuple(ResultSet(releases[v], metrics.get(task, ())) for v in order)
+            variant = " ".join(filter(None, (key.mode, key.profile, key.parameters)))
+            found.append(TaskHistory(key.simulator, task, key.function, variant, order, sets))
     number = sum(len(_courses(history)) for history in found)
     return [replace(h, courses=tuple(_changed(c, number) for c in _courses(h))) for h in found]
 
 
-def _courses(history: History) -> list[Course]:
+def _courses(history: TaskHistory) -> list[Course]:
     """Each metric, cost and the crashes over the releases; without those that nobody has."""
     results = history.results
     metrics = list(results[-1].metrics.values())
@@ -159,3 +180,138 @@ def _matters(metric: Metric, change: ChangePoint) -> bool:
     deterministic engine's rounding is significant too."""
     shown = metric.format(change.before) != metric.format(change.after)
     return shown and abs(change.after - change.before) >= metric.smallest_difference
+
+
+@dataclass(frozen=True)
+class Reached:
+    """What a release made of a law.
+
+    Attributes:
+        least, most: error over tolerance, of all repetitions; infinite where one failed.
+        errors: of each repetition, in the law's unit.
+        message: of a repetition that failed; empty where none did.
+    """
+
+    least: float
+    most: float
+    errors: tuple[float, ...] = ()
+    message: str = ""
+
+    @classmethod
+    def of(cls, records: Sequence[Record]) -> Reached:
+        ratios = [r.metrics.get("ratio") if r.ok else None for r in records]
+        known = [math.inf if ratio is None else ratio for ratio in ratios]
+        errors = [error for r in records if r.ok and (error := r.metrics.get("error")) is not None]
+        failures = [r.error for r in records if r.error]
+        message = f"{failures[0].type}: {failures[0].message}" if failures else ""
+        return cls(min(known), max(known), tuple(errors), message)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One law, of a phenomenon, and what each release reached; None where it was not asked."""
+
+    name: str
+    phenomenon: str
+    reached: tuple[Reached | None, ...]
+
+    def changes(self) -> Iterator[tuple[int, Reached, Reached]]:
+        """The places of releases that changed it, what was before, and what they reached."""
+        before: Reached | None = None
+        for place, now in enumerate(self.reached):
+            if now is None:
+                continue
+            if before is None or _worse(before, now) or _worse(now, before):
+                if before is not None:
+                    yield place, before, now
+                before = now
+
+
+@dataclass(frozen=True)
+class LawHistory(History):
+    """All laws of a test over the releases, in the order of their phenomena."""
+
+    laws: tuple[Row, ...]
+
+    @property
+    def title(self) -> str:
+        return f"{self.simulator}, {len(self.laws)} laws ({self.variant})"
+
+    def sentences(self) -> list[str]:
+        """The same; then what all keep and miss, and which changed nothing."""
+        found = []
+        for place, release in enumerate(self.releases):
+            changed = [
+                _told(law.name, before, now)
+                for law in self.laws
+                for at, before, now in law.changes()
+                if at == place
+            ]
+            if changed:
+                found.append(f"{release}: {'; '.join(changed)}")
+        if not found:
+            found.append("no release changed a law")
+        if alike := [v for k, v in enumerate(self.releases) if k and self._alike(k)]:
+            found.append(f"not one reading changed, to the last bit, with {', '.join(alike)}")
+        kept = [law for law in self.laws if all(r is None or r.most <= KEPT for r in law.reached)]
+        missed = [law.name for law in self.laws
+                  if all(r is None or r.least > BROKEN for r in law.reached)]  # fmt: skip
+        found.append(f"kept by all: {len(kept)} of {len(self.laws)} laws")
+        if missed:
+            found.append(f"broken by all: {', '.join(missed)}")
+        return found
+
+    def _alike(self, place: int) -> bool:
+        """Whether a release reads as the one before it on all laws."""
+        pairs = [(law.reached[place - 1], law.reached[place]) for law in self.laws]
+        return all(a and b and a.errors and a.errors == b.errors for a, b in pairs)
+
+
+def law_histories(records: Iterable[Record]) -> list[LawHistory]:
+    """The histories of laws in a run: of each simulator with two or more releases and builds."""
+    versions = (r for r in records if VersionedName.of(r.simulator).kind)
+    every = by_release(r for r in versions if r.settings.get(PHENOMENON))
+    found = []
+    for of, laws in grouped(every, lambda at: at[1]._replace(parameters="")).items():
+        known = {label for law in laws for label in every[law]}
+        releases = sorted(known, key=lambda label: (label[0] == BUILD, release_numbers(label)))
+        if len(releases) >= FEWEST_OF_LAWS:
+            tasks = [task for task, _ in laws]
+            rows = [
+                Row(
+                    task if tasks.count(task) == 1 else f"{task} [{key.parameters}]",
+                    str(next(iter(of_release.values()))[0].settings[PHENOMENON]),
+                    tuple(Reached.of(of_release[v]) if v in of_release else None for v in releases),
+                )
+                for task, key in laws
+                for of_release in [every[task, key]]
+            ]
+            places = ordered(row.phenomenon for row in rows)
+            rows.sort(key=lambda row: places.index(row.phenomenon))
+            variant = f"{of.mode} {of.profile}"
+            told = of.simulator, "laws", of.function, variant, tuple(releases), tuple(rows)
+            found.append(LawHistory(*told))
+    return found
+
+
+def _worse(better: Reached, worse: Reached) -> bool:
+    """Whether the one decides against a release, and the other is better by `FACTOR`."""
+    if math.isinf(better.most):
+        return False
+    return worse.least > BROKEN and worse.least >= FACTOR * better.most
+
+
+def _told(law: str, before: Reached, now: Reached) -> str:
+    sizes = f"({times(before)} -> {times(now)})"
+    if math.isinf(now.most):
+        return f"{law} fails ({times(before)} before): {now.message[:200]}"
+    if now.most <= KEPT:
+        return f"{law} is kept {sizes}"
+    if before.most <= KEPT:
+        return f"{law} is broken {sizes}"
+    return f"{law} is missed by {'more' if _worse(before, now) else 'less'} {sizes}"
+
+
+def times(reached: Reached) -> str:
+    """Error over tolerance, the worst of the repetitions, for people."""
+    return "fails" if math.isinf(reached.most) else f"{significant(reached.most, 2)}x"

@@ -36,7 +36,6 @@ class Limit:
     """How much a metric may get worse.
 
     Attributes:
-        metric: the metric's name.
         amount: above or equal 0; a share (0.05) where `percent`, else in the metric's unit.
         percent: of the baseline's mean for values; percentage points for shares and yes-or-no
             metrics, which are shown in percent anyway.
@@ -82,11 +81,8 @@ class Limit:
 def parse_limits(text: str, metrics: Iterable[Metric]) -> tuple[Limit, ...]:
     """The limits in `name:amount[,name:amount...]`.
 
-    An amount with % is relative (points for shares); one without is in the metric's own unit.
-
-    Args:
-        text: as the user gave it.
-        metrics: of all tasks; the costs and `crashed` are known besides.
+    An amount with % is relative (points for shares); one without is in the metric's own unit. The
+    costs and `crashed` are known besides the metrics of all tasks.
 
     Raises:
         LimitError: an item that is not of that form, is there twice, names a metric of which

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from pytest_simbench.measure.comparison import (
     ALPHA,
@@ -18,46 +17,9 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import RowKey, series, told
 
 
-@dataclass(frozen=True)
-class ModeComparison:
-    """One metric of one simulator in both modes.
-
-    Attributes:
-        simulator, profile, test: what ran in both.
-        pairs: seeds at which both modes have a value; a crashed one has the worst.
-        result: of the tests; None for fewer than two pairs.
-    """
-
-    simulator: str
-    profile: str
-    test: str
-    metric: Metric
-    pairs: int
-    result: Equivalence | None
-
-    @property
-    def sentence(self) -> str:
-        """The verdict in words."""
-        name = f"{self.simulator}, headless and gui, {self.metric.title}"
-        if self.result is None:
-            return f"{name}: too few common seeds to compare."
-        points = 100 * self.result.difference
-        found = f"gui {points:+.3g} points, {self.pairs} common seeds"
-        if self.result.equivalent(ALPHA):
-            return f"{name}: the same within {100 * MARGIN:g} points ({found})."
-        fewest = pairs_for_equivalence(MARGIN)
-        if self.pairs < fewest and abs(self.result.difference) < MARGIN:
-            return (
-                f"{name}: {found}; the same within {100 * MARGIN:g} points takes {fewest} or more."
-            )
-        return (
-            f"{name}: not shown to be the same within {100 * MARGIN:g} points ({found}, "
-            f"p = {self.result.p_value:.2g})."
-        )
-
-
-def compare_modes(records: Sequence[Record], metrics: Iterable[Metric]) -> list[ModeComparison]:
-    """Every simulator that ran in both modes, at each of the study's shares, paired by seed."""
+def compare_modes(records: Sequence[Record], metrics: Iterable[Metric]) -> list[str]:
+    """A sentence for each simulator that ran in both modes and each of the study's shares, paired
+    by seed; a crashed repetition has the worst value."""
     shares = [metric for metric in metrics if metric.study and metric.bounded]
     sides: dict[tuple[RowKey, str], dict[str, dict[int, Record]]] = {}
     for row in series(record for record in records if record.status != "interrupted"):
@@ -78,6 +40,20 @@ def compare_modes(records: Sequence[Record], metrics: Iterable[Metric]) -> list[
             ]
             headless, gui = [one for one, _ in pairs], [other for _, other in pairs]
             result = equivalence(headless, gui, MARGIN) if len(pairs) >= 2 else None
-            side = (of.simulator, of.profile, of.function)
-            found.append(ModeComparison(*side, metric, len(pairs), result))
+            name = f"{of.simulator}, headless and gui, {metric.title}"
+            found.append(f"{name}: {_told(result, len(pairs))}.")
     return found
+
+
+def _told(result: Equivalence | None, pairs: int) -> str:
+    """The verdict in words; there is no result of fewer than two pairs."""
+    if result is None:
+        return "too few common seeds to compare"
+    found = f"gui {100 * result.difference:+.3g} points, {pairs} common seeds"
+    same = f"the same within {100 * MARGIN:g} points"
+    if result.equivalent(ALPHA):
+        return f"{same} ({found})"
+    fewest = pairs_for_equivalence(MARGIN)
+    if pairs < fewest and abs(result.difference) < MARGIN:
+        return f"{found}; {same} takes {fewest} or more"
+    return f"not shown to be {same} ({found}, p = {result.p_value:.2g})"

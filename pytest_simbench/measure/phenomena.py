@@ -47,11 +47,7 @@ def better(one: Ratios, other: Ratios) -> bool:
 
 
 def verdict(found: Mapping[str, Ratios]) -> Verdict:
-    """The verdict on the laws of one phenomenon.
-
-    Args:
-        found: by contender, in any order.
-    """
+    """The verdict on the laws of one phenomenon, which are given by contender."""
     laws = {law for ratios in found.values() for law in ratios}
     compared = {who: ratios for who, ratios in found.items() if ratios.keys() == laws}
     unbeaten = tuple(

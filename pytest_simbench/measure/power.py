@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 
 from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval, proportion
 from pytest_simbench.records.metrics import Metric
@@ -53,11 +54,7 @@ def repetitions_for_proportion(
 
     if not leaves(MOST):
         return None
-    low, high = 0, MOST  # the width shrinks with n, so bisection finds the fewest
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if leaves(middle) else (middle, high)
-    return high
+    return 1 + bisect_left(range(1, MOST), True, key=leaves)  # the width shrinks with n
 
 
 def repetitions_to_detect(

@@ -50,11 +50,9 @@ class Ends:
 
 @dataclass(frozen=True)
 class Settled:
-    """One scene in several simulators.
+    """One scene, and its free bodies by name, in several simulators.
 
     Attributes:
-        scene: its name.
-        bodies: names of its free bodies.
         written: of each simulator what became of the scene as it is written.
         moved: the same with starts moved by at most so much [m], smallest first.
         finer: the same with time steps so many times as fine.

@@ -99,13 +99,8 @@ class Swept:
 
 @dataclass(frozen=True)
 class Choice:
-    """The step to take for a phenomenon.
-
-    Attributes:
-        step: [s].
-        kept: laws with an error that `REFERENCE` may cost, of `laws`.
-        cost: CPU seconds for a simulated second, the mean over the laws.
-    """
+    """The step [s] to take for a phenomenon: how many of its laws are kept with an error that
+    `REFERENCE` may cost, at CPU seconds for a simulated second, the mean over the laws."""
 
     step: float
     kept: int
@@ -114,12 +109,8 @@ class Choice:
 
 
 def sweeps(records: Iterable[Record], metrics: Mapping[str, Sequence[Metric]]) -> list[Swept]:
-    """Every law of which a simulator has two time steps or more, in order of appearance.
-
-    Args:
-        records: of one run.
-        metrics: what each task declares, for the unit.
-    """
+    """Every law of a run of which a simulator has two time steps or more, in order of appearance;
+    the metrics of each task tell the unit."""
     ended = (r for r in records if PHENOMENON in r.settings and r.status != "interrupted")
     found = []
     for law, of_law in grouped(ended, lambda r: r.task).items():

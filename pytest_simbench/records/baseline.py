@@ -13,7 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pytest_simbench.records.description import TaskDescription, TaskDescriptionError
+from pytest_simbench.records.checked import CheckError
+from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RECORDS, Reading, RunFolder
 from pytest_simbench.records.record import SCHEMA, Record, RecordError
 from pytest_simbench.records.series import settled
@@ -97,7 +98,7 @@ def _tasks(data: Mapping[str, Any], where: str, problems: list[str]) -> dict[str
     for item in listed if isinstance(listed, list) else [listed]:
         try:
             task = TaskDescription.from_dict(item, f"{where}: {KEY!r}")
-        except TaskDescriptionError as error:
+        except CheckError as error:
             problems.append(str(error))
         else:
             found[task.task] = task

@@ -87,9 +87,7 @@ def writable(text: str) -> str:
 
 def convert(value: Any, kind: type[T], where: str = "") -> T:
     """Plain data as the dataclass (or typed dict) that they are of; more keys count for nothing.
-
-    Args:
-        where: the place of the data, for messages.
+    `where` is the place of the data, for messages.
 
     Raises:
         CheckError: a key is missing, or a value is of another type or outside its bounds.

@@ -59,11 +59,8 @@ class Seen:
 def published_again(
     repetitions: Iterable[tuple[str, int, Sample | None, Iterable[Seen]]],
 ) -> str:
-    """A sentence when repetitions are of what their settings were chosen on; else nothing.
-
-    Args:
-        repetitions: task, seed, what it was held against, and what the settings were chosen on.
-    """
+    """A sentence when repetitions are of what their settings were chosen on; else nothing. Each is
+    given by task, seed, what it was held against, and what the settings were chosen on."""
     seen: dict[Seen, None] = {}
     hit = total = 0
     for task, seed, sample, declared in repetitions:

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
-from pytest_simbench.records import checked
 from pytest_simbench.records.checked import Count, Name
-from pytest_simbench.records.record import plain
-
-SCHEMA = 1
+from pytest_simbench.records.description import FolderLine
 
 Verdict = Literal["PASS", "FAIL", "UNDECIDED"]
 
 Relation = Literal["at least", "at most"]
 
 
-class ClaimError(ValueError):
-    """What is no claim; the message says where, and what is wrong with it."""
-
-
 @dataclass(frozen=True)
-class Claim:
+class Claim(FolderLine):
     """One claim of one test, and its verdict. Of several of one `identity` the last one holds.
 
     Attributes:
@@ -57,21 +50,3 @@ class Claim:
     def identity(self) -> tuple[object, ...]:
         """What tells it from other claims of a run."""
         return self.test, self.task, self.metric, self.relation
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data; bounds that are not finite are None."""
-        found: dict[str, Any] = plain({"schema": SCHEMA, **asdict(self)})
-        return found
-
-    @classmethod
-    def from_dict(cls, data: Any, where: str = "claim") -> Claim:
-        """The claim in `data`; `where` names it in messages.
-
-        Raises:
-            ClaimError: it is none, or of a newer schema.
-        """
-        try:
-            checked.schema(data, SCHEMA)
-            return checked.convert(checked.plain(data), cls)
-        except (checked.CheckError, RecursionError) as error:
-            raise ClaimError(f"{where}: {error}") from None

@@ -127,52 +127,6 @@ TASK = "task."
 """Before a task's parameters among the settings: known before anything ran."""
 
 
-class Known(NamedTuple):
-    """What was found of records that share everything of a use.
-
-    Attributes:
-        parts: the fields themselves, kept so that no other object gets their identity.
-        values: see `values`.
-        told: see `Told.of`.
-    """
-
-    parts: tuple[Any, ...]
-    values: dict[str, Any]
-    told: Told
-
-
-_found: dict[tuple[Any, ...], Known] = {}
-_MOST_FOUND = 1000
-
-
-def _known(record: Record, use: Use) -> Known:
-    """Of records that were read together, most share these fields, so it is found out once; and
-    each record keeps it."""
-    kept: dict[str, Known] = vars(record).setdefault("_known", {})
-    if use not in kept:
-        kept[use] = _shared(record, use)
-    return kept[use]
-
-
-def _shared(record: Record, use: Use) -> Known:
-    parts = tuple(getattr(record, name) for name in equal_to(use))
-    same = (repr(p) if isinstance(p, str | int | float | None) else id(p) for p in parts)
-    unknown = partial(record)
-    key = (use, unknown, *same)
-    if key not in _found:
-        if len(_found) >= _MOST_FOUND:
-            _found.clear()
-        found = _values(record, use)
-        _found[key] = Known(parts, found, Told({k: text(v) for k, v in found.items()}, unknown))
-    return _found[key]
-
-
-def values(record: Record, use: Use) -> Mapping[str, Any]:
-    """What a record says of everything that must be equal: `settings.timestep` to 0.002. Records
-    that share all of it get the same object."""
-    return _known(record, use).values
-
-
 def _values(record: Record, use: Use) -> dict[str, Any]:
     return {
         key: value
@@ -205,16 +159,35 @@ class Told(NamedTuple):
     """What a record tells of its configuration.
 
     Attributes:
-        values: of everything that must be equal, as JSON.
+        plain: of everything that must be equal: `settings.timestep` to 0.002.
+        values: the same as JSON.
         unknown: fields of which it may not tell everything.
+        parts: the fields themselves, kept so that no other object gets their identity.
     """
 
+    plain: dict[str, Any]
     values: dict[str, str]
     unknown: frozenset[str]
+    parts: tuple[Any, ...]
 
     @classmethod
     def of(cls, record: Record, use: Use = "pool") -> Told:
-        return _known(record, use).told
+        """Of records that were read together most share these fields, so it is found out once for
+        all of them; and each record keeps it."""
+        kept: dict[str, Told] = vars(record).setdefault("_told", {})
+        if use not in kept:
+            parts = tuple(getattr(record, name) for name in equal_to(use))
+            same = (repr(p) if isinstance(p, str | int | float | None) else id(p) for p in parts)
+            unknown = partial(record)
+            key = (use, unknown, *same)
+            if key not in _found:
+                if len(_found) >= _MOST_FOUND:
+                    _found.clear()
+                found = _values(record, use)
+                shown = {name: text(value) for name, value in found.items()}
+                _found[key] = cls(found, shown, unknown, parts)
+            kept[use] = _found[key]
+        return kept[use]
 
     def agrees(self, other: Told) -> bool:
         """Whether nothing known contradicts that both are of one configuration."""
@@ -225,6 +198,10 @@ class Told(NamedTuple):
             else field_of(key) in (other.unknown if key in a else self.unknown)
             for key in a.keys() | b.keys()
         )
+
+
+_found: dict[tuple[Any, ...], Told] = {}
+_MOST_FOUND = 1000
 
 
 def agree(first: Record, second: Record, use: Use = "pool") -> bool:
@@ -250,15 +227,12 @@ Runs = Mapping[str, tuple[Sequence[Record], Sequence[Record]]]
 
 
 def differences(runs: Runs, use: Use = "compare", fields: Sequence[str] | None = None) -> list[str]:
-    """One sentence for each value that differs, with the tests it differs in.
+    """One sentence for each value that differs between the records of a test before and now, with
+    the tests it differs in. The use says which fields must be equal; of `fields`, if they are
+    given, these alone.
 
     What a side cannot know (a repetition that failed at its start has no versions) is no
     difference.
-
-    Args:
-        runs: for each test the records before and now.
-        use: what for; says which fields must be equal.
-        fields: look at these alone.
     """
     found: dict[str, list[str]] = {}
     for test, (before, now) in runs.items():
@@ -283,12 +257,7 @@ def differences(runs: Runs, use: Use = "compare", fields: Sequence[str] | None =
 def other_meanings(
     before: Mapping[str, TaskDescription], now: Mapping[str, TaskDescription], use: Use = "compare"
 ) -> list[str]:
-    """One sentence for each metric that both runs have and that means something else in one.
-
-    Args:
-        before, now: what the runs say of their tasks, by name.
-        use: what for.
-    """
+    """One sentence for each metric that both runs have and that means something else in one."""
     found = []
     for task in (name for name in now if name in before):
         old = {metric.name: metric for metric in before[task].metrics}

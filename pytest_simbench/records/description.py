@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from math import isfinite
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, Self
 
 from pytest_simbench.records import checked
 from pytest_simbench.records.checked import Name
@@ -14,11 +14,28 @@ from pytest_simbench.records.record import plain
 
 SCHEMA = 1
 
-T = TypeVar("T")
 
+class FolderLine:
+    """A dataclass that is a line of a file of the run folder."""
 
-class TaskDescriptionError(ValueError):
-    """What is no description; the message says where, and what is wrong with it."""
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data; numbers that JSON does not have are None."""
+        found: dict[str, Any] = plain({"schema": SCHEMA, **asdict(self)})  # type: ignore[call-overload]
+        return found
+
+    @classmethod
+    def from_dict(cls, data: Any, where: str = "line") -> Self:
+        """What `data` hold; `where` names them in messages.
+
+        Raises:
+            CheckError: a part is missing or of the wrong type, or the schema is a newer one.
+        """
+        try:
+            checked.schema(data, SCHEMA)
+            whole = checked.plain(data)
+            return checked.convert({k: v for k, v in whole.items() if v is not None}, cls)
+        except checked.CheckError as error:
+            raise checked.CheckError(f"{where}: {error}") from None
 
 
 class Describing(Protocol):
@@ -35,11 +52,10 @@ class Describing(Protocol):
 
 
 @dataclass(frozen=True)
-class TaskDescription:
+class TaskDescription(FolderLine):
     """What a task's metrics and references mean.
 
     Attributes:
-        task: its name.
         metrics: what it measures, in the order of its tables.
         references: the value of a perfect simulator, by metric.
 
@@ -61,28 +77,12 @@ class TaskDescription:
         known = {name: value for name, value in task.references.items() if isfinite(value)}
         return cls(task.name, tuple(task.metrics), known)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data."""
-        found: dict[str, Any] = plain({"schema": SCHEMA, **asdict(self)})
-        return found
-
-    @classmethod
-    def from_dict(cls, data: Any, where: str = "description") -> TaskDescription:
-        """The description in `data`; `where` names it in messages.
-
-        Raises:
-            TaskDescriptionError: a part of it is missing or of the wrong type, or the schema is a
-                newer one.
-        """
-        return _read(cls, data, where)
-
 
 @dataclass(frozen=True)
-class Threshold:
+class Threshold(FolderLine):
     """A threshold that a test asked for.
 
     Attributes:
-        test: its id.
         metric: as the test named it.
         value: what it got: its own, or that of `--sim-threshold`.
     """
@@ -90,27 +90,3 @@ class Threshold:
     test: Name
     metric: Name
     value: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data."""
-        return {"schema": SCHEMA, **asdict(self)}
-
-    @classmethod
-    def from_dict(cls, data: Any, where: str = "threshold") -> Threshold:
-        """The threshold in `data`.
-
-        Raises:
-            TaskDescriptionError: it is none.
-        """
-        return _read(cls, data, where)
-
-
-def _read(kind: type[T], data: Any, where: str) -> T:
-    try:
-        checked.schema(data, SCHEMA)
-        whole = checked.plain(data)
-        return checked.convert({k: v for k, v in whole.items() if v is not None}, kind)
-    except checked.CheckError as error:
-        raise TaskDescriptionError(f"{where}: {error}") from None
-    except RecursionError:
-        raise TaskDescriptionError(f"{where}: it is nested too deeply") from None

@@ -85,12 +85,7 @@ class RunFolder:
     To write, `lock` it first. What a full disk or a lost folder does not take stays in this
     object and is read back from it.
 
-    Args:
-        path: of the folder.
-        records: name of its record file.
-
     Attributes:
-        path: the same.
         own: records that this process made or took over, as they came.
     """
 
@@ -104,7 +99,6 @@ class RunFolder:
         self._described: dict[str, TaskDescription] = {}
         self._asked: dict[Threshold, None] = {}
         self._claims: list[Claim] = []
-        self._written: set[str] = set()
         self._lock = threading.RLock()
 
     @classmethod
@@ -139,10 +133,7 @@ class RunFolder:
         return bool(self.own or self._asked or self._described)
 
     def lock(self, *, shared: bool = False) -> None:
-        """Make it this run's own until `close`.
-
-        Args:
-            shared: one of several processes of one run (xdist's workers).
+        """Make it this run's own until `close`; `shared` by its processes (xdist's workers).
 
         Raises:
             FolderError: it cannot be written to, or another run is under way in it.
@@ -191,22 +182,17 @@ class RunFolder:
         """Write what a task's numbers mean, unless the folder says so already."""
         found = task if isinstance(task, TaskDescription) else TaskDescription.of(task)
         with self._lock:
-            line = json.dumps(found.to_dict())
-            if line in self._written:
-                return
-            self._written.add(line)
-            self._described[found.task] = found
-            if self._tasks().get(found.task) != found:
-                self._write(TASKS, line)
+            if self._described.get(found.task) != found:
+                self._described[found.task] = found
+                if self._tasks().get(found.task) != found:
+                    self._write(TASKS, json.dumps(found.to_dict()))
 
     def ask(self, threshold: Threshold) -> None:
         """Write a threshold that a test asked for."""
         with self._lock:
-            self._asked.setdefault(threshold)
-            line = json.dumps(threshold.to_dict())
-            if line not in self._written:
-                self._written.add(line)
-                self._write(THRESHOLDS, line)
+            if threshold not in self._asked:
+                self._asked[threshold] = None
+                self._write(THRESHOLDS, json.dumps(threshold.to_dict()))
 
     def claim(self, claim: Claim) -> None:
         """Keep what came of a claim."""

@@ -93,11 +93,6 @@ class LinesFile:
         self._pending: list[str] = []
         self._reason: OSError | None = None
 
-    @property
-    def pending(self) -> int:
-        """How many lines wait in memory because they could not be written."""
-        return len(self._pending)
-
     def append(self, line: str) -> bool:
         """Write a line of ASCII; False when it has to wait in memory. Never raises OSError."""
         self._pending.append(line)
@@ -180,12 +175,8 @@ class Found(Generic[T]):
 
 
 def read(folder: Path, name: str, make: Callable[[dict[str, Any], str], T]) -> Found[T]:
-    """The lines of a file.
-
-    Args:
-        folder: of an ordinary file.
-        name: of that file.
-        make: turns an object and its place, for messages, into an item, or raises ValueError.
+    """The lines of an ordinary file in a folder. `make` turns an object and its place, for
+    messages, into an item, or raises ValueError.
 
     Raises:
         UnreadableError: there is no such file.

@@ -19,11 +19,8 @@ class FolderLock:
     """A folder that this process writes a run to; until `close` no other run may use it.
 
     It is a lock on the folder itself and ends with the process, however that ends. A file
-    system without locks (some network drives) gives none, and two runs could meet there.
-
-    Args:
-        folder: made if it is not there.
-        shared: one of several processes of one run (xdist's workers).
+    system without locks (some network drives) gives none, and two runs could meet there. A folder
+    that is not there is made. Several processes of one run (xdist's workers) are `shared`.
 
     Raises:
         FolderError: it cannot be written to, or another run is under way in it.

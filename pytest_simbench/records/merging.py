@@ -18,13 +18,7 @@ class MergeError(ValueError):
 
 @dataclass(frozen=True)
 class Merged:
-    """A record of the merged run.
-
-    Attributes:
-        record: under its new number.
-        run: name of the run that it comes from.
-        was: the record as it stands there.
-    """
+    """A record of the merged run, under its new number, and as it was in the run of that name."""
 
     record: Record
     run: str
@@ -32,14 +26,11 @@ class Merged:
 
 
 def merge(runs: Mapping[str, Sequence[Record]]) -> list[Merged]:
-    """The records of all runs as of one, by test and seed.
+    """The records of all runs, which have names, as of one, by test and seed.
 
     Repetition k of the whole has the k-th seed from the smallest of its test, as in a straight run.
     Interrupted repetitions are left out. Tests are matched without the path of their file where
     that leaves them apart: it depends on where pytest ran.
-
-    Args:
-        runs: records by the name of their run.
 
     Raises:
         MergeError: a seed is there twice, or settings or versions differ.
@@ -67,10 +58,7 @@ def merge(runs: Mapping[str, Sequence[Record]]) -> list[Merged]:
 
 
 def merge_tasks(runs: Mapping[str, Mapping[str, TaskDescription]]) -> dict[str, TaskDescription]:
-    """What the numbers of all runs mean.
-
-    Args:
-        runs: the descriptions of each run, by task, by the name of the run.
+    """What the numbers of all runs, which have names, mean, by task.
 
     Raises:
         MergeError: a metric means one thing in one run and another in another.

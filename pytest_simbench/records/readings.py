@@ -17,8 +17,7 @@ class Reading:
     """What an engine did, and what is right, in the law's unit.
 
     Attributes:
-        value: measured.
-        exact: by the law.
+        value, exact: measured, and by the law.
         tolerance: by the step; above 0.
 
     Raises:

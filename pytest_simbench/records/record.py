@@ -31,7 +31,6 @@ class Failure:
 
     Attributes:
         type: name of the typed error, for instance `WorkerHung`.
-        message: one sentence.
         phase: what the repetition was doing, for instance `settle`.
         log_tail: the last lines of the worker's log.
     """
@@ -184,8 +183,6 @@ class Record:
             checked.convert(found.resources, Use, "resources")
         except checked.CheckError as error:
             raise RecordError(f"{where}: {error}") from None
-        except RecursionError:
-            raise RecordError(f"{where}: the record is nested too deeply") from None
         extra.pop("schema", None)
         shared = {name: _shared(getattr(found, name)) for name in _SHARED}
         return replace(found, extra=extra, **shared)

@@ -12,7 +12,6 @@ from pytest_simbench.records.configuration import (
     agree,
     equal_to,
     text,
-    values,
 )
 from pytest_simbench.records.record import Record
 
@@ -193,7 +192,7 @@ def comparable(a: Series, b: Series) -> bool:
 def told(records: Sequence[Record], use: Use = "pool") -> dict[str, object]:
     """What the records of one configuration say of it together."""
     found: dict[str, object] = {}
-    ordered = (values(record, use) for record in sorted(records, key=lambda r: not r.ok))
+    ordered = (Told.of(record, use).plain for record in sorted(records, key=lambda r: not r.ok))
     for each in {id(each): each for each in ordered}.values():
         for key, value in each.items():
             found.setdefault(key, value)
@@ -208,11 +207,8 @@ def by_test(
 
     A name is the test's id, without its file where that leaves all apart: it depends on where
     pytest ran. A test that repeats several tasks, or one with other parameters, has several: the
-    second is called `test_x[...] (stacking 2)`.
-
-    Args:
-        runs: records of each run, in the order in which they were made.
-        apart: splits the records of one test and task.
+    second is called `test_x[...] (stacking 2)`. `apart` splits the records of one test and task,
+    which come in the order in which they were made.
     """
     whole = any(len({r.test for r in run}) > len({r.name for r in run}) for run in runs)
     sides: list[dict[tuple[str, str, int], list[Record]]] = []

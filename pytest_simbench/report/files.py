@@ -5,18 +5,18 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 from pytest_simbench.ground.text import for_csv, for_terminal
 from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.metrics import COSTS
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.markdown.badge import badge
+from pytest_simbench.report.markdown.github import badge
 from pytest_simbench.report.markdown.run import render_run, render_tables
 from pytest_simbench.report.model.document import Table
 from pytest_simbench.report.model.outcome import NAME as OUTCOME
@@ -28,7 +28,7 @@ from pytest_simbench.report.replay import REPLAY_NAME
 from pytest_simbench.worker.text import named
 
 if TYPE_CHECKING:
-    from pytest_simbench.report.replay.groups import Group
+    from pytest_simbench.report.replay.recorded import Group
 
 MARKDOWN_NAME = "report.md"
 CSV_NAME = "report.csv"
@@ -59,13 +59,8 @@ def write_report(
     comparison: Compared | None = None,
     looks: int = 1,
 ) -> Written:
-    """Write all files from what a run folder holds, into it.
-
-    Args:
-        folder: of the run.
-        reading: of it, where it has been read already.
-        comparison: with a baseline, where there is one.
-        looks: how often the run was judged, see `outcome.Outcome`.
+    """Write all files from what a run folder holds, which may have been read already, into it.
+    How often the run was judged, and with what it was compared, see `outcome.Outcome`.
 
     Raises:
         RecordError: its records cannot be read.
@@ -78,12 +73,8 @@ def write_files(
 ) -> Written:
     """Write all files; what cannot be written is told, and the rest is written all the same.
 
-    Args:
-        folder: where.
-        report: what is told.
-        run: the run folder, where it is another: traces, pictures and results on repeatability are
-            read from it.
-        figures: whether pictures are drawn too.
+    Traces, pictures and results on repeatability are read from the folder of the run, where that is
+    another one. Pictures are drawn where `figures` says so.
     """
     from pytest_simbench.report.page.context import page
     from pytest_simbench.report.page.render import render  # Jinja2
@@ -111,13 +102,8 @@ def write_files(
 def _draw(
     folder: Path, run: Path, report: Report, told: list[str], failed: list[str]
 ) -> tuple[list[str], dict[str, bytes]]:
-    """Draw and write all pictures.
-
-    Args:
-        folder: where.
-        run: folder with the pictures that simulators made.
-        report: what is told.
-        told, failed: take what could not be shown, and what went wrong, as sentences.
+    """Draw and write all pictures; those that simulators made are in the folder of the run. `told`
+    and `failed` take what could not be shown, and what went wrong, as sentences.
 
     Returns:
         Names of the files but contact sheets; and these (PNG), by the name of their task.
@@ -145,7 +131,7 @@ def _draw(
 
 def _replay(run: Path, records: Sequence[Record], told: list[str]) -> tuple[list[Group], str]:
     """What the replay shows, and the page itself; `told` takes what could not be shown."""
-    from pytest_simbench.report.replay.groups import groups
+    from pytest_simbench.report.replay.recorded import groups
     from pytest_simbench.report.replay.render import ReplayUnavailable, replay_of
 
     found = groups(run, records)
@@ -183,15 +169,8 @@ def write_badge(path: Path, records: Sequence[Record], passed: bool | None) -> s
 
 
 def write_tables(folder: Path, to: Path | None = None) -> tuple[list[Table], list[str]]:
-    """The tables of what a run folder holds on repeatability, also as a file of Markdown.
-
-    Args:
-        folder: of the run.
-        to: the folder for the file; None: there is none.
-
-    Returns:
-        The tables, and one sentence for each thing that is wrong.
-    """
+    """The tables of what a run folder holds on repeatability, and one sentence for each thing that
+    is wrong; with a folder for it also as a file of Markdown."""
     from pytest_simbench.report.model.repeatability import found_in
 
     found, problems = found_in(folder)
@@ -215,15 +194,15 @@ def _unwritable(path: Path, error: OSError) -> str:
 
 
 def csv_of(records: Sequence[Record]) -> str:
-    """One line for each repetition; an empty cell where a record has no value.
+    """One line for each repetition; an empty cell where a record has no value; no text is a
+    formula.
 
     Columns: what identifies it, its error, `metrics.<name>`, `cost.<name>` (see
     `records.metrics.COSTS`) and `seconds.<phase>`.
     """
     metrics = list(dict.fromkeys(name for record in records for name in record.metrics))
     file = io.StringIO(newline="")
-    writer = CellWriter(file)
-    writer.row(
+    rows: list[list[Any]] = [
         [
             *IDENTITY,
             *(f"error.{name}" for name in ("type", "phase", "message")),
@@ -231,7 +210,7 @@ def csv_of(records: Sequence[Record]) -> str:
             *(f"cost.{cost.name}" for cost in COSTS),
             *(f"seconds.{name}" for name in PHASES),
         ]
-    )
+    ]
     for record in records:
         error = record.error
         cells: list[Any] = [getattr(record, name) for name in IDENTITY]
@@ -239,16 +218,6 @@ def csv_of(records: Sequence[Record]) -> str:
         cells += [record.metrics.get(name) for name in metrics]
         cells += [record.cost(cost.name) for cost in COSTS]
         cells += [record.seconds.get(name) for name in PHASES]
-        writer.row(cells)
+        rows.append(cells)
+    csv.writer(file).writerows([for_csv(cell) for cell in row] for row in rows)
     return file.getvalue()
-
-
-class CellWriter:
-    """Writes lines of a CSV file in which no text is a formula."""
-
-    def __init__(self, file: TextIO) -> None:
-        self._writer = csv.writer(file)
-
-    def row(self, cells: Iterable[Any]) -> None:
-        """One line; numbers stay numbers."""
-        self._writer.writerow([for_csv(cell) for cell in cells])

@@ -45,12 +45,6 @@ def test_a_floor_of_rounding_is_left_out() -> None:
     assert convergence(STEPS, errors).order < 1.2
 
 
-def test_errors_that_are_rounding_alone_have_no_order() -> None:
-    found = convergence(STEPS, [3e-8, 1e-8, 2e-8, 4e-8, 1e-8, 5e-8], rounding=1e-7)
-    assert found.kind == "rounding"
-    assert math.isnan(found.order)
-
-
 def test_a_clean_fall_below_rounding_is_an_order() -> None:
     """An engine that computes in double precision, where single precision is allowed for."""
     found = convergence(STEPS, [h**3 for h in STEPS], rounding=1e-6)
@@ -66,22 +60,32 @@ def test_a_floor_of_double_precision_is_left_out_where_single_precision_is_allow
     assert found.order == pytest.approx(4, abs=0.05)
 
 
-def test_zeros_are_exact_and_a_zero_among_others_is_left_out() -> None:
-    assert convergence(STEPS, [0.0] * 6).kind == "exact"
+@pytest.mark.parametrize(
+    ("errors", "rounding", "kind"),
+    [
+        ([0.0] * 6, 0.0, "exact"),
+        ([1e-3, *[0.0] * 5], 0.0, "rounding"),
+        ([1e-3, 1e-5, *[0.0] * 4], 0.0, "rounding"),
+        ([3e-8, 1e-8, 2e-8, 4e-8, 1e-8, 5e-8], 1e-7, "rounding"),
+        ([4e-8, 2e-8, 1e-8, 4e-8, 1e-8, 5e-8], 1e-7, "rounding"),
+        ([1.0], 0.0, "unknown"),
+        ([], 0.0, "unknown"),
+    ],
+)
+def test_errors_that_have_no_order(errors: list[float], rounding: float, kind: str) -> None:
+    found = convergence(STEPS[: len(errors)], errors, rounding)
+    assert found.kind == kind
+    assert math.isnan(found.order)
+
+
+def test_a_zero_among_others_is_left_out() -> None:
     assert convergence(STEPS, [*STEPS[:5], 0.0]).order == pytest.approx(1)
-    assert convergence(STEPS, [1e-3, *[0.0] * 5]).kind == "rounding"
-    assert convergence(STEPS, [1e-3, 1e-5, *[0.0] * 4]).kind == "rounding"
 
 
 def test_two_steps_give_an_order_without_an_interval() -> None:
     found = convergence(STEPS[:2], [4e-3, 1e-3])
     assert found.order == pytest.approx(2)
     assert (found.low, found.high) == (-math.inf, math.inf)
-
-
-def test_one_step_or_none_tells_nothing() -> None:
-    assert convergence([1e-3], [1.0]).kind == "unknown"
-    assert convergence([], []).kind == "unknown"
 
 
 def test_an_error_that_the_step_does_not_change_has_order_zero() -> None:

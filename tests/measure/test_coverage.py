@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import binom
 
-from pytest_simbench.measure.intervals import FEWEST, interval, proportion
+from pytest_simbench.measure.intervals import interval, proportion
 from pytest_simbench.measure.verdicts import Verdict, at_least, at_most, confidence, judge
 from pytest_simbench.records.metrics import Metric
 
@@ -98,12 +98,6 @@ def test_counts(name: str, n: int) -> None:
     assert all(one.low <= one.mean <= one.high for one in given)
     for wrong in (sum(one.low > truth for one in given), sum(one.high < truth for one in given)):
         assert enough(1 - wrong / len(given), len(given), least=0.975)
-
-
-@pytest.mark.parametrize("n", range(1, FEWEST))
-@pytest.mark.parametrize("name", VALUES)
-def test_few_values_have_no_interval(name: str, n: int) -> None:
-    assert held(*VALUES[name], n, VALUE, 20)[1] == 0
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 10, 20, 60])

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from pytest_simbench.measure.history import histories
-from pytest_simbench.measure.law_history import LawHistory, law_histories
+from pytest_simbench.measure.history import LawHistory, histories, law_histories
 from pytest_simbench.records.phenomena import PHENOMENON
 from pytest_simbench.records.record import Record
 from tests.records.build import failed, record
@@ -66,58 +65,47 @@ def test_what_each_release_changed() -> None:
     ]
 
 
+def twice(*last: float) -> list[Record]:
+    """Two repetitions of each release, of the last one these."""
+    sets = ((0.2, 0.3), (0.3, 0.2), (0.2, 0.2), last)
+    return [r for v, told in zip(RELEASES, sets, strict=True) for r in asked("glide", v, *told)]
+
+
 @pytest.mark.parametrize(
-    "ratios",
+    ("found", "told"),
     [
-        (0.9, 1.9, 0.9, 1.9),  # within the bound of a tolerance
-        (1.1, 2.1, 1.1, 2.1),  # less than twice as far
-        (30.0, 40.0, 50.0, 59.0),
-        (0.001, 0.9, 0.001, 0.9),  # kept is kept
-        (None, None, None, None),
+        *(
+            (row("glide", *ratios), "no release changed a law")
+            for ratios in (
+                (0.9, 1.9, 0.9, 1.9),  # within the bound of a tolerance
+                (1.1, 2.1, 1.1, 2.1),  # less than twice as far
+                (30.0, 40.0, 50.0, 59.0),
+                (0.001, 0.9, 0.001, 0.9),  # kept is kept
+                (None, None, None, None),
+            )
+        ),
+        # What grows a little with each release.
+        (row("glide", 3.0, 4.0, 5.0, 6.5), "2.0: glide is missed by more (3x -> 6.5x)"),
+        # Two releases are enough, and a build comes after them.
+        ([*asked("glide", "1.9", 3.0), *asked("glide", "1.10", 0.5)],
+         "1.10: glide is kept (3x -> 0.5x)"),
+        ([*asked("glide", "@mine", 8.0), *asked("glide", "1.9", 0.5)],
+         "@mine: glide is broken (0.5x -> 8x)"),
+        # Several repetitions must all have changed.
+        (twice(5.0, 0.2), "no release changed a law"),
+        (twice(5.0, 6.0), "2.0: glide is broken (0.3x -> 6x)"),
+        # A law that a release was not asked counts for nothing.
+        ([*row("fall", 0.1, 0.1, 0.1, 0.1), *asked("glide", "1.2", 0.5), *asked("glide", "2.0", 5)],
+         "2.0: glide is broken (0.5x -> 5x)"),
     ],
-)
-def test_what_decides_nothing_is_no_change(ratios: tuple[float | None, ...]) -> None:
-    assert only(row("glide", *ratios)).sentences()[0] == "no release changed a law"
-
-
-def test_two_releases_are_enough() -> None:
-    told = only([*asked("glide", "1.9", 3.0), *asked("glide", "1.10", 0.5)]).sentences()
-    assert told[0] == "1.10: glide is kept (3x -> 0.5x)"
-
-
-def test_a_build_comes_after_the_releases() -> None:
-    history = only([*asked("glide", "@mine", 8.0), *asked("glide", "1.9", 0.5)])
-    assert history.releases == ("1.9", "@mine")
-    assert history.sentences()[0] == "@mine: glide is broken (0.5x -> 8x)"
-
-
-def test_what_grows_a_little_with_each_release_is_told() -> None:
-    told = only(row("glide", 3.0, 4.0, 5.0, 6.5)).sentences()
-    assert told[0] == "2.0: glide is missed by more (3x -> 6.5x)"
-
-
-def test_several_repetitions_must_all_have_changed() -> None:
-    def of(*last: float) -> str:
-        sets = ((0.2, 0.3), (0.3, 0.2), (0.2, 0.2), last)
-        found = [r for v, values in zip(RELEASES, sets, strict=True)
-                 for r in asked("glide", v, *values)]  # fmt: skip
-        return only(found).sentences()[0]
-
-    assert of(5.0, 0.2) == "no release changed a law"
-    assert of(5.0, 6.0) == "2.0: glide is broken (0.3x -> 6x)"
+)  # fmt: skip
+def test_what_is_a_change(found: list[Record], told: str) -> None:
+    assert only(found).sentences()[0] == told
 
 
 def test_a_release_that_changed_no_bit() -> None:
     told = only([*row("glide", 0.5, 0.5, 0.6, 0.6), *row("drop", 0.1, 0.1, 0.1, 0.1)]).sentences()
     assert "not one reading changed, to the last bit, with 1.9, 2.0" in told
-
-
-def test_a_law_that_a_release_was_not_asked_counts_for_nothing() -> None:
-    found = [*row("fall", 0.1, 0.1, 0.1, 0.1), *asked("glide", "1.2", 0.5),
-             *asked("glide", "2.0", 5.0)]  # fmt: skip
-    history = only(found)
-    assert history.laws[1].reached[1:3] == (None, None)
-    assert history.sentences()[0] == "2.0: glide is broken (0.5x -> 5x)"
 
 
 def test_laws_are_in_no_other_history() -> None:

@@ -7,29 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pytest_simbench.measure.modes import MARGIN, ModeComparison, compare_modes
+from pytest_simbench.measure.comparison import equivalence
+from pytest_simbench.measure.modes import MARGIN, compare_modes
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
+from tests.records import build
 
 PLACED = Metric("placed", "placed", kind="share", of=15, better="higher", study=True)
 
 
 def record(mode: str, seed: int, placed: float) -> Record:
-    return Record(
-        test=f"suites/test_stacking.py::test_stacking[mujoco-{mode}]",
-        function="suites/test_stacking.py::test_stacking",
-        task="stacking",
-        simulator="mujoco",
-        mode=mode,
-        profile="tuned",
-        repetition=seed,
-        seed=seed,
-        status="ok",
-        metrics={"placed": placed},
-    )
+    test = f"suites/test_stacking.py::test_stacking[mujoco-{mode}]"
+    given = {"test": test, "simulator": "mujoco", "mode": mode, "seed": seed}
+    return build.record(seed, metrics={"placed": placed}, **given)
 
 
-def compared(headless: list[float], gui: list[float]) -> ModeComparison:
+def compared(headless: list[float], gui: list[float]) -> str:
     records = [record("headless", k, value) for k, value in enumerate(headless)]
     records += [record("gui", k, value) for k, value in enumerate(gui)]
     (found,) = compare_modes(records, [PLACED])
@@ -39,16 +32,7 @@ def compared(headless: list[float], gui: list[float]) -> ModeComparison:
 def test_bit_identical_modes_are_the_same() -> None:
     """As many as bound a loss that was never seen below the margin."""
     found = compared([1.0, 0.8, 1.0] * 20, [1.0, 0.8, 1.0] * 20)
-    assert "the same within 5 points (gui +0 points, 60 common seeds)" in found.sentence
-
-
-def test_a_clear_difference_is_not_called_the_same() -> None:
-    found = compared([1.0, 0.9, 1.0, 0.95] * 5, [0.8, 0.7, 0.8, 0.75] * 5)
-    assert "not shown to be the same within 5 points (gui -20 points" in found.sentence
-
-
-def test_one_common_seed_is_too_few() -> None:
-    assert "too few common seeds" in compared([1.0], [1.0, 0.9]).sentence
+    assert "the same within 5 points (gui +0 points, 60 common seeds)" in found
 
 
 def test_a_single_mode_is_not_compared() -> None:
@@ -62,27 +46,22 @@ def test_error_rates(true: float, low: float, high: float) -> None:
     claims = 0
     for _ in range(300):
         headless = rng.normal(0.8, 0.05, 60)
-        result = compared(list(headless), list(headless - true + rng.normal(0, 0.05, 60))).result
-        assert result is not None
-        claims += result.equivalent()
+        told = compared(list(headless), list(headless - true + rng.normal(0, 0.05, 60)))
+        claims += ": the same within 5 points (" in told
     assert low <= claims / 300 <= high
 
 
 def test_each_sentence_word_by_word() -> None:
-    same = compared([1.0, 0.8, 1.0], [1.0, 0.8, 1.0])
     name = "mujoco, headless and gui, placed"
-    assert (same.simulator, same.profile, same.pairs) == ("mujoco", "tuned", 3)
-    assert same.test == "suites/test_stacking.py::test_stacking"
-    assert same.sentence == (
+    assert compared([1.0, 0.8, 1.0], [1.0, 0.8, 1.0]) == (
         f"{name}: gui +0 points, 3 common seeds; the same within 5 points takes 59 or more."
     )
-    other = compared([1.0, 0.5, 0.75, 0.5], [0.75, 0.5, 0.5, 0.25])
-    assert other.result is not None
-    assert other.sentence == (
+    headless, gui = [1.0, 0.5, 0.75, 0.5], [0.75, 0.5, 0.5, 0.25]
+    assert compared(headless, gui) == (
         f"{name}: not shown to be the same within 5 points (gui -18.8 points, 4 common seeds, "
-        f"p = {other.result.p_value:.2g})."
+        f"p = {equivalence(headless, gui, MARGIN).p_value:.2g})."
     )
-    assert compared([1.0], [1.0]).sentence == f"{name}: too few common seeds to compare."
+    assert compared([1.0], [1.0]) == f"{name}: too few common seeds to compare."
 
 
 def test_two_common_seeds_are_paired_by_seed() -> None:
@@ -90,16 +69,14 @@ def test_two_common_seeds_are_paired_by_seed() -> None:
     records = [record("headless", k, value) for k, value in enumerate([1.0, 0.5])]
     records += [record("gui", k, value) for k, value in ((7, 0.2), (1, 0.5), (0, 1.0))]
     (found,) = compare_modes(records, [PLACED])
-    assert found.pairs == 2
-    assert found.result is not None
-    assert found.result.difference == 0.0
+    assert "placed: gui +0 points, 2 common seeds;" in found
 
 
 def test_only_the_studys_shares_are_compared_and_a_crash_counts() -> None:
     metrics = [
-        replace(PLACED, name="a", study=False),
+        replace(PLACED, title="a", name="a", study=False),
         Metric("b", "b", study=True),
-        replace(PLACED, name="c"),
+        replace(PLACED, title="c", name="c"),
     ]
     values = {"a": 1.0, "b": 1.0, "c": None, "placed": 1.0}
     records = [
@@ -109,7 +86,6 @@ def test_only_the_studys_shares_are_compared_and_a_crash_counts() -> None:
     ]
     failed = replace(record("gui", 5, 0.0), status="failed")
     found = compare_modes([*records, failed, record("headless", 5, 0.0)], [*metrics, PLACED])
-    assert [(row.metric.name, row.pairs, row.result is None) for row in found] == [
-        ("c", 0, True),
-        ("placed", 3, False),
-    ]
+    first, second = (sentence.partition("gui, ")[2] for sentence in found)
+    assert first == "c: too few common seeds to compare."
+    assert second.startswith("placed: gui +0 points, 3 common seeds;")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -14,51 +15,36 @@ RIGHT = {"x": 0.1, "y": 0.9, "z": 0.5}
 WRONG = {"x": 0.1, "y": 40.0, "z": 0.5}
 WRONG_ELSEWHERE = {"x": 9.0, "y": 0.2, "z": 0.5}
 FAILS = {"x": 0.1, "y": math.inf, "z": 0.5}
+NEARER = {law: ratio / 2 for law, ratio in RIGHT.items()}
 AT_THE_EDGE = {"x": 0.1, "y": 1.9, "z": 0.5}
 
 
-def test_the_only_one_that_is_right_is_the_best() -> None:
-    found = verdict({"wrong": WRONG, "right": RIGHT, "fails": FAILS})
-    assert (found.best, found.unbeaten) == ("right", ("right",))
-    assert found.kept == {"wrong": 2, "right": 3, "fails": 2}
-    assert (found.laws, found.incomplete) == (3, ())
-
-
-def test_of_two_that_are_right_none_is_the_best() -> None:
-    found = verdict({"one": RIGHT, "two": {k: v / 2 for k, v in RIGHT.items()}, "wrong": WRONG})
-    assert (found.best, found.unbeaten) == (None, ("one", "two"))
-
-
-def test_who_is_wrong_about_different_laws_is_not_compared_by_their_number() -> None:
-    twice = {**WRONG_ELSEWHERE, "z": 7.0}
-    found = verdict({"once": WRONG, "twice": twice})
-    assert (found.best, found.unbeaten) == (None, ("once", "twice"))
-    assert found.kept == {"once": 2, "twice": 1}
-
-
-def test_what_is_missed_by_less_than_two_tolerances_speaks_against_nobody() -> None:
+@pytest.mark.parametrize(
+    ("found", "best", "unbeaten", "kept"),
+    [
+        ({"wrong": WRONG, "right": RIGHT, "fails": FAILS}, "right", "right", (2, 3, 2)),
+        ({"one": RIGHT, "two": NEARER, "wrong": WRONG}, None, "one two", (3, 3, 2)),
+        # Who is wrong about different laws is not compared by their number.
+        ({"once": WRONG, "twice": {**WRONG_ELSEWHERE, "z": 7.0}}, None, "once twice", (2, 1)),
+        # What is missed by less than two tolerances speaks against nobody.
+        ({"right": RIGHT, "edge": AT_THE_EDGE}, None, "right edge", (3, 2)),
+        ({"right": RIGHT, "broken": {**AT_THE_EDGE, "y": 2.1}}, "right", "right", (3, 2)),
+        ({"one": WRONG, "two": WRONG}, None, "one two", (2, 2)),
+        # The least wrong is the best though it breaks a law.
+        ({"bad": {**WRONG, "z": 8.0}, "less": WRONG}, "less", "less", (1, 2)),
+        ({"alone": RIGHT}, None, "alone", (3,)),
+    ],
+)
+def test_who_is_the_best_and_whom_nobody_beats(
+    found: dict[str, dict[str, float]], best: str | None, unbeaten: str, kept: tuple[int, ...]
+) -> None:
     assert KEPT < AT_THE_EDGE["y"] < BROKEN
-    found = verdict({"right": RIGHT, "edge": AT_THE_EDGE})
-    assert (found.best, found.unbeaten) == (None, ("right", "edge"))
-    assert verdict({"right": RIGHT, "broken": {**AT_THE_EDGE, "y": 2.1}}).best == "right"
-
-
-def test_all_wrong_alike_and_nobody_is_the_best() -> None:
-    assert verdict({"one": WRONG, "two": WRONG}).best is None
-
-
-def test_the_least_wrong_is_the_best_though_it_breaks_a_law() -> None:
-    assert verdict({"bad": {**WRONG, "z": 8.0}, "less": WRONG}).best == "less"
-
-
-def test_one_alone_is_not_the_best() -> None:
-    assert verdict({"alone": RIGHT}).best is None
-
-
-def test_who_did_not_do_all_laws_is_not_compared() -> None:
-    found = verdict({"right": RIGHT, "half": {"x": 0.0}, "wrong": WRONG})
-    assert (found.best, found.incomplete) == ("right", ("half",))
-    assert "half" not in found.kept
+    told = verdict(found)
+    assert (told.best, told.unbeaten) == (best, tuple(unbeaten.split()))
+    assert told.kept == dict(zip(found, kept, strict=True))
+    assert (told.laws, told.incomplete) == (3, ())
+    half = verdict({"half": {"x": 0.0}, **found})  # who did not do all laws is not compared
+    assert half == replace(told, incomplete=("half",))
 
 
 def test_the_worst_law_is_what_counts() -> None:

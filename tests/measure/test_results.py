@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -118,25 +120,97 @@ def test_a_metric_that_is_not_available_is_left_out() -> None:
     assert ResultSet(made, METRICS).values("placed") == [0.5]
 
 
-def test_costs_are_metrics_too() -> None:
-    result = placed(1.0, 0.5, *[1.0] * 3)
-    assert result.values("rtf") == [17.5] * 5
-    result.assert_at_least("rtf", 10)
-    with pytest.raises(AssertionError, match=r"ram_peak is 161 MB on average .* above 100 MB"):
-        result.assert_at_most("ram_peak", 100)
+PERFECT = [1.0] * 20
+HALF = [1.0, 0.5, 1.0, 1.0, 1.0]
 
 
-def test_an_unknown_metric_lists_the_valid_ones() -> None:
-    with pytest.raises(UnknownMetric, match=r"no metric is named 'place'.*valid names: .*placed"):
-        placed(1.0).assert_at_least("place", 0.5)
-
-
-def test_at_least_passes_without_a_word_when_the_interval_is_above() -> None:
+@pytest.mark.parametrize(
+    ("values", "crashed", "check", "given"),
+    [
+        (GOOD, 0, "at_least", ("placed", 0.8)),
+        (GOOD, 0, "at_most", ("placed", 1.0)),
+        (GOOD, 0, "between", ("placed", 0.8, 1.0)),
+        (HALF, 0, "at_least", ("rtf", 10)),
+        (HALF, 0, "at_least", ("rtf", 17.5)),  # the same in all repetitions
+        (GOOD, 0, "crashed_at_most", (0.15,)),
+        (GOOD, 1, "crashed_at_most", (0.3,)),
+        (GOOD, 0, "crashed_at_most", (1.0,)),
+        (GOOD, 0, "no_crashes", ()),
+    ],
+)
+def test_what_is_supported_passes_without_a_word(
+    values: list[float], crashed: int, check: str, given: tuple[Any, ...]
+) -> None:
+    made = placed(*values, also=crashed)
+    made.records += (record(30, status="interrupted"),)  # it counts as neither
+    assert len(made.interrupted) == 1
+    assert made.crash_interval().n == len(values) + crashed
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        placed(*GOOD).assert_at_least("placed", 0.8)
-        placed(*GOOD).assert_at_most("placed", 1.0)
-        placed(*GOOD).assert_between("placed", 0.8, 1.0)
+        getattr(made, f"assert_{check}")(*given)
+
+
+@pytest.mark.parametrize(
+    ("values", "crashed", "check", "given", "said"),
+    [
+        (HALF, 0, "at_most", ("ram_peak", 100), r"ram_peak is 161 MB on average .* above 100 MB"),
+        (MIXED, 0, "at_most", ("placed", 0.7), "which is above 70 %"),
+        (MIXED, 0, "between", ("placed", 0.97, 1.0), "which is below 97 %"),
+        (MIXED, 0, "between", ("placed", 0.1, 0.7), "which is above 70 %"),
+        (GOOD, 0, "between", ("placed", 0.0, 0.0), "above 0 %"),
+        (HALF, 0, "at_least", ("rtf", 17.6), r"17\.5 on average \(the same in all repetitions, 5"),
+        ([1.0], 0, "at_least", ("landing_x", 1.0),
+         "landing_x is not available in any of the 1 repetitions that finished"),
+        (GOOD[:13], 7, "crashed_at_most", (0.15,), r"95 % bounds 17\.73 % and .*above 15 %"),
+        (GOOD, 20, "crashed_at_most", (0.1,), "which is above 10 %"),
+        (GOOD, 1, "no_crashes", (), "1 of 21 repetitions crashed: 1 x WorkerHung in settle"),
+    ],
+)  # fmt: skip
+def test_what_is_refuted_fails_with_what_was_measured(
+    values: list[float], crashed: int, check: str, given: tuple[Any, ...], said: str
+) -> None:
+    with pytest.raises(AssertionError, match=said):
+        getattr(placed(*values, also=crashed), f"assert_{check}")(*given)
+
+
+@pytest.mark.parametrize(
+    ("values", "crashed", "check", "given", "said"),
+    [
+        (PERFECT, 0, "at_least", ("placed", 0.9), "83.1 % and 100 %, 20 repetitions): inconclusive "
+         "whether at least 90 %, about 14 more repetitions needed"),
+        ([1.0], 0, "at_least", ("rtf", 10),
+         "is 17.5 on average (no 95 % bounds yet, 1 repetition)"),
+        (GOOD, 0, "crashed_at_most", (0.0,), "inconclusive whether at most 0 %"),
+        (GOOD, 0, "crashed_at_most", (0.1,), "0 of 20 repetitions crashed (95 % bounds 0 % and"),
+        (GOOD, 1, "crashed_at_most", (0.1,), "inconclusive whether at most 10 %"),
+    ],
+)  # fmt: skip
+def test_what_is_not_decided_warns_with_what_was_measured(
+    values: list[float], crashed: int, check: str, given: tuple[Any, ...], said: str
+) -> None:
+    with pytest.warns(InconclusiveWarning, match=re.escape(said)):
+        getattr(placed(*values, also=crashed), f"assert_{check}")(*given)
+
+
+@pytest.mark.parametrize(
+    ("check", "given", "said"),
+    [
+        ("between", ("placed", 0.9, 0.8), "low is above high"),
+        ("crashed_at_most", (5,), "between 0 and 1, not at 5; did you mean 0.05?"),
+        ("crashed_at_most", (1.5,), "not at 1.5"),
+    ],
+)
+def test_what_is_no_claim_is_refused(check: str, given: tuple[Any, ...], said: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(said)):
+        getattr(placed(*GOOD), f"assert_{check}")(*given)
+
+
+def test_an_unknown_metric_lists_the_valid_ones_and_where_it_is_missing() -> None:
+    said = r"no metric is named 'place' in stacking on engine headless.*valid names: .*placed"
+    with pytest.raises(UnknownMetric, match=said):
+        placed(1.0).assert_at_least("place", 0.5)
+    with pytest.raises(UnknownMetric, match="'place'; did you mean"):
+        ResultSet([], METRICS).metric("place")
 
 
 def test_at_least_fails_with_one_sentence_that_says_all() -> None:
@@ -147,33 +221,6 @@ def test_at_least_fails_with_one_sentence_that_says_all() -> None:
         "stacking on engine headless (tuned): placed is 85.71 % on average (95 % bounds 62.9 % and "
     )
     assert message.endswith("21 repetitions, 1 crashed and counted as 0 %), which is below 97 %")
-
-
-def test_at_most_fails_when_the_interval_is_above() -> None:
-    with pytest.raises(AssertionError, match="which is above 70 %"):
-        placed(*MIXED).assert_at_most("placed", 0.7)
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "wrong"), [(0.97, 1.0, "below 97"), (0.1, 0.7, "above 70")]
-)
-def test_between_fails_on_either_side(low: float, high: float, wrong: str) -> None:
-    with pytest.raises(AssertionError, match=f"which is {wrong} %"):
-        placed(*MIXED).assert_between("placed", low, high)
-
-
-def test_between_needs_its_ends_in_order() -> None:
-    with pytest.raises(ValueError, match="low is above high"):
-        placed(*MIXED).assert_between("placed", 0.9, 0.8)
-
-
-def test_a_claim_that_is_not_decided_warns_with_the_repetitions_needed() -> None:
-    with pytest.warns(InconclusiveWarning) as caught:
-        placed(*[1.0] * 20).assert_at_least("placed", 0.9)
-    assert str(caught[0].message).endswith(
-        "83.1 % and 100 %, 20 repetitions): inconclusive whether at least 90 %, "
-        "about 14 more repetitions needed"
-    )
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
@@ -190,19 +237,6 @@ def test_fewer_than_five_repetitions_are_not_judged(n: int, value: float) -> Non
     ):
         with pytest.warns(InconclusiveWarning, match="not judged whether at .*a claim needs 5"):
             check()
-
-
-def test_too_few_values_have_no_bounds() -> None:
-    with pytest.warns(InconclusiveWarning) as caught:
-        placed(1.0).assert_at_least("rtf", 10)
-    assert "is 17.5 on average (no 95 % bounds yet, 1 repetition)" in str(caught[0].message)
-
-
-def test_values_that_never_change_are_judged_as_they_are() -> None:
-    result = placed(*[1.0] * 5)
-    result.assert_at_least("rtf", 17.5)
-    with pytest.raises(AssertionError, match=r"17\.5 on average \(the same in all repetitions, 5"):
-        result.assert_at_least("rtf", 17.6)
 
 
 def test_strict_fails_what_is_not_decided() -> None:
@@ -229,14 +263,6 @@ def test_a_warning_points_at_the_line_of_the_test() -> None:
         assert caught[0].filename == __file__
 
 
-def test_no_failure_in_twenty_repetitions_supports_at_most_15_percent() -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        placed(*GOOD).assert_crashed_at_most(0.15)
-    with pytest.raises(AssertionError, match=r"95 % bounds 17\.73 % and .*above 15 %"):
-        placed(*GOOD[:13], also=7).assert_crashed_at_most(0.15)
-
-
 def test_without_a_good_repetition_a_metric_fails_with_the_causes() -> None:
     made = [failed(0), failed(1), failed(2, "WorkerDied", "step")]
     with pytest.raises(AssertionError) as caught:
@@ -258,39 +284,6 @@ def test_without_any_repetition_everything_fails() -> None:
         ):
             with pytest.raises(AssertionError, match="no repetition has ended"):
                 check()
-
-
-def test_a_metric_that_no_repetition_has_fails() -> None:
-    with pytest.raises(
-        AssertionError, match="landing_x is not available in any of the 1 repetitions that finished"
-    ):
-        placed(1.0).assert_at_least("landing_x", 1.0)
-
-
-def test_no_failures_is_strict() -> None:
-    placed(*GOOD).assert_no_crashes()
-    with pytest.raises(
-        AssertionError, match=r"1 of 21 repetitions crashed: 1 x WorkerHung in settle"
-    ):
-        placed(*GOOD, also=1).assert_no_crashes()
-
-
-def test_failures_at_most_is_judged_by_its_interval() -> None:
-    placed(*GOOD, also=1).assert_crashed_at_most(0.3)
-    with pytest.raises(AssertionError, match="which is above 10 %"):
-        placed(*GOOD, also=20).assert_crashed_at_most(0.1)
-    with pytest.warns(InconclusiveWarning, match="inconclusive whether at most 10 %"):
-        placed(*GOOD, also=1).assert_crashed_at_most(0.1)
-    with pytest.raises(ValueError, match="between 0 and 1, not at 5; did you mean 0.05?"):
-        placed(*GOOD).assert_crashed_at_most(5)
-
-
-def test_interrupted_repetitions_count_as_neither() -> None:
-    made = [*records("placed", GOOD), record(20, status="interrupted")]
-    result = ResultSet(made, METRICS)
-    result.assert_no_crashes()
-    assert result.crash_interval().n == 20
-    assert len(result.interrupted) == 1
 
 
 def test_the_summary_is_readable() -> None:
@@ -315,36 +308,12 @@ def test_a_claim_is_judged_with_the_error_of_the_set() -> None:
         result.assert_at_least("placed", 0.999)
 
 
-def test_an_unknown_metric_is_told_with_where_it_is_missing() -> None:
-    with pytest.raises(UnknownMetric, match="'place' in stacking on engine headless"):
-        placed(1.0).metric("place")
-    with pytest.raises(UnknownMetric, match="'place'; did you mean"):
-        ResultSet([], METRICS).metric("place")
-
-
 def test_a_failure_without_a_cause_is_counted_and_told() -> None:
     result = ResultSet([*records("placed", GOOD), record(20, status="failed")], METRICS)
     assert list(result.causes()) == ["unknown cause"]
     with pytest.raises(AssertionError) as caught:
         result.assert_no_crashes()
     assert str(caught.value).endswith("crashed: 1 x unknown cause (repetition 20, seed 1020)")
-
-
-def test_no_failure_is_told_without_reasons() -> None:
-    with pytest.warns(
-        InconclusiveWarning, match=r"0 of 20 repetitions crashed \(95 % bounds 0 % and"
-    ):
-        placed(*GOOD).assert_crashed_at_most(0.1)
-
-
-def test_a_range_may_be_a_point_and_failures_any_share() -> None:
-    with pytest.raises(AssertionError, match="above 0 %"):
-        placed(*GOOD).assert_between("placed", 0.0, 0.0)
-    placed(*GOOD).assert_crashed_at_most(1.0)
-    with pytest.warns(InconclusiveWarning):
-        placed(*GOOD).assert_crashed_at_most(0.0)
-    with pytest.raises(ValueError, match="not at 1.5"):
-        placed(*GOOD).assert_crashed_at_most(1.5)
 
 
 @pytest.mark.parametrize("cause", ["RepetitionTimeout", "WorkerHung", "Diverged"])

@@ -10,7 +10,7 @@ import pytest
 from pytest_simbench.measure.settling import Settled, settlings
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.model.settling import section, sentences
-from tests.records.build import made
+from tests.records.build import record
 
 MODE = ("headless", "tuned")
 
@@ -20,25 +20,20 @@ def end(
 ) -> Record:
     """A repetition in which the bowl ends at x [mm]."""
     place = [x / 1000, 0.0, 0.9, 1.0, 0.0, 0.0, 0.0]
-    return made(
-        {
-            "test": f"test_scene[{simulator}-headless]",
-            "task": "settling",
-            "simulator": simulator,
-            "mode": "headless",
-            "profile": "tuned",
-            "repetition": seed,
-            "seed": seed,
-            "status": "ok",
-            "metrics": {"premises": float(x < 20)},
-            "details": {"places": {"bowl": place}},
-            "settings": {
-                "timestep": step, "task.scene": "bowl", "task.scene_digest": "d",
-                "task.seconds": 2.5, "task.moved": moved, "task.starts": 0,
-            },
-            **given,
-        }
-    )  # fmt: skip
+    told = {
+        "test": f"test_scene[{simulator}-headless]",
+        "task": "settling",
+        "simulator": simulator,
+        "seed": seed,
+        "metrics": {"premises": float(x < 20)},
+        "details": {"places": {"bowl": place}},
+        "settings": {
+            "timestep": step, "task.scene": "bowl", "task.scene_digest": "d",
+            "task.seconds": 2.5, "task.moved": moved, "task.starts": 0,
+        },
+        "stepping": {},
+    }  # fmt: skip
+    return record(seed, **{**told, **given})
 
 
 def one(*records: Record) -> Settled:

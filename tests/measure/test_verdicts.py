@@ -45,13 +45,10 @@ SHARE = Metric("placed", "placed", kind="share", of=15)
 LENGTH = Metric("landing_error", "landing error", "m", "lower")
 
 
-def test_the_advice_says_how_many_more() -> None:
+def test_the_advice_says_how_many_more_or_that_no_number_decides() -> None:
     found = judge(at_least(0.9), proportion(20, 20, 0.9))
     assert found.verdict is Verdict.INCONCLUSIVE
     assert found.advice == "about 9 more repetitions needed"
-
-
-def test_the_advice_admits_what_no_number_decides() -> None:
     assert "too close" in judge(at_least(0.85), between(0.8, 0.9)).advice
 
 
@@ -75,11 +72,6 @@ def test_fewer_than_five_repetitions_are_not_judged(n: int) -> None:
     assert judge(at_most(0.02), interval([0.01] * n, LENGTH)).verdict is Verdict.NOT_JUDGED
 
 
-def test_five_repetitions_are_judged() -> None:
-    assert judge(at_least(0.3), interval([1.0] * 5, SHARE)).verdict is Verdict.SUPPORTED
-    assert judge(at_most(0.3), interval([1.0] * 5, SHARE)).verdict is Verdict.REFUTED
-
-
 def test_a_value_that_never_changes_is_judged_as_it_is() -> None:
     found = interval([0.0101, 0.0101, 0.0101002, 0.0101, 0.0101], LENGTH)
     assert judge(at_most(0.02), found).verdict is Verdict.SUPPORTED
@@ -95,15 +87,10 @@ def test_each_end_of_the_interval_of_a_claim_may_err_in_one_of_twenty_runs() -> 
     assert confidence(LENGTH, 0.01) == pytest.approx(0.99)
 
 
-def test_no_failure_of_twenty_supports_at_most_15_percent() -> None:
-    assert judge(at_most(0.15), proportion(0, 20, 0.9)).verdict is Verdict.SUPPORTED
-    assert judge(at_most(0.13), proportion(0, 20, 0.9)).verdict is Verdict.INCONCLUSIVE
-    assert judge(at_most(0.15), proportion(7, 20, 0.9)).verdict is Verdict.REFUTED
-
-
 def test_a_claim_reads_as_it_is_said() -> None:
     assert str(at_least(0.8)) == "at least 0.8"
     assert str(at_most(12.0)) == "at most 12"
     for value, claim in ((1.0, at_least(0.3)), (0.0, at_most(0.7))):
         found = judge(claim, interval([value] * 5, SHARE))
         assert (found.verdict, found.claim, found.further) == (Verdict.SUPPORTED, claim, 0)
+    assert judge(at_most(0.3), interval([1.0] * 5, SHARE)).verdict is Verdict.REFUTED

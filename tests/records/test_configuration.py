@@ -20,7 +20,7 @@ from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 
-from .build import failed, record
+from .build import record
 
 ANOTHER: dict[str, Any] = {
     "test": "test_other[engine-headless]",
@@ -107,30 +107,34 @@ def test_other_meanings_are_named(change: dict[str, Any], named: str | None) -> 
         assert other_meanings(before, now, use) == ([named] if named else [])  # type: ignore[arg-type]
 
 
-def test_results_and_circumstances_are_no_configuration() -> None:
-    other = whole(
-        repetition=9, metrics={"placed": 0.1}, host={"cpu": "x"}, contended=True, attempt=2
-    )
-    assert agree(whole(), other)
+WHOLE = {"timestep": 0.002, "task.towers": 3}
+START = {"task.towers": 3}
 
 
-def test_what_a_failed_start_did_not_learn_contradicts_nothing() -> None:
-    dead = replace(failed(1), settings={"task.towers": 3}, versions={}, deviations=())
-    ours = whole(settings={"timestep": 0.002, "task.towers": 3})
-    assert agree(ours, dead)
-    assert agree(dead, ours)
-    assert not agree(ours, replace(dead, settings={"task.towers": 4}))
-    assert not agree(ours, replace(dead, settings={"task.towers": 3, "timestep": 0.1}))
-    assert not agree(ours, replace(dead, versions={"engine": "9"}))
-
-
-def test_a_setting_that_one_lacks_is_a_difference_between_records_that_ended() -> None:
-    assert not agree(whole(), whole(settings={"timestep": 0.002, "cone": "elliptic"}))
-    assert not agree(whole(), whole(versions={}))
-
-
-def test_an_older_record_without_scene_and_limits_agrees() -> None:
-    assert agree(whole(), record())
+@pytest.mark.parametrize(
+    ("changes", "agrees"),
+    [
+        # Results and circumstances are no configuration.
+        ({"repetition": 9, "metrics": {"placed": 0.1}, "contended": True, "attempt": 2}, True),
+        ({"scene": "", "limits": {}}, True),  # an older record has neither
+        # Of a record that ended what it lacks is not there.
+        ({"settings": {**WHOLE, "cone": "elliptic"}}, False),
+        ({"versions": {}}, False),
+        # What a failed start did not learn contradicts nothing.
+        ({"status": "failed", "settings": START, "versions": {}, "deviations": ()}, True),
+        ({"status": "failed", "settings": {}}, True),
+        ({"status": "failed", "settings": {"task.towers": 4}}, False),
+        ({"status": "failed", "settings": START, "versions": {"engine": "9"}}, False),
+        # One that knows more than the task's settings knows all of them.
+        ({"status": "failed"}, True),
+        ({"status": "failed", "settings": {**WHOLE, "timestep": 0.1}}, False),
+        ({"status": "failed", "settings": {"timestep": 0.002}}, False),
+    ],
+)
+def test_who_is_of_one_configuration(changes: dict[str, Any], agrees: bool) -> None:
+    ours = whole(settings=WHOLE)
+    other = replace(ours, **changes)
+    assert agree(ours, other) is agree(other, ours) is agrees
 
 
 def test_another_robot_is_named() -> None:
@@ -145,20 +149,6 @@ def test_another_robot_is_named() -> None:
     ]
     runs = {"t": ([whole(robot={**ur5, "digest": "34cd"})], [whole(robot=ur5)])}
     assert differences(runs) == ['robot.digest was "34cd", is "12ab" (t)']
-
-
-def test_a_failure_that_knows_its_settings_agrees_with_no_others() -> None:
-    """One that knows the task's alone died before the engine told its own."""
-    ok = whole(settings={"timestep": 0.002, "task.cubes": 15})
-    dead = replace(failed(1), limits=ok.limits, scene=ok.scene)
-    for settings, fits in (
-        ({"timestep": 0.002, "task.cubes": 15}, True),
-        ({"timestep": 0.004, "task.cubes": 15}, False),
-        ({"task.cubes": 15}, True),
-        ({"task.cubes": 20}, False),
-        ({}, True),
-    ):
-        assert agree(ok, replace(dead, settings=settings)) is fits
 
 
 def test_equal_runs_differ_in_nothing() -> None:

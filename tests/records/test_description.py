@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.records.description import TaskDescription, TaskDescriptionError, Threshold
+from pytest_simbench.records.checked import CheckError
+from pytest_simbench.records.description import TaskDescription, Threshold
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.tasks import LeaningTowers, Stacking, Throwing
 
@@ -95,7 +96,7 @@ def test_a_newer_plugin_may_say_more_of_a_metric() -> None:
     ids=lambda value: value[:60] if isinstance(value, str) else "",
 )
 def test_something_else_is_one_sentence(data: Any, message: str) -> None:
-    with pytest.raises(TaskDescriptionError) as caught:
+    with pytest.raises(CheckError) as caught:
         TaskDescription.from_dict(data, "here")
     assert str(caught.value).startswith(f"here: {message}")
     assert len(str(caught.value)) < 300
@@ -123,7 +124,7 @@ def test_whatever_it_is_it_is_a_description_or_refused(data: dict[str, Any]) -> 
     for kind in (TaskDescription, Threshold):
         try:
             found = kind.from_dict(data)
-        except TaskDescriptionError:
+        except CheckError:
             continue
         again = json.loads(json.dumps(found.to_dict(), allow_nan=False))
         assert kind.from_dict(again) == found
@@ -134,5 +135,5 @@ def test_a_threshold_survives_its_line() -> None:
     assert Threshold.from_dict(json.loads(json.dumps(asked.to_dict()))) == asked
     for wrong in ({}, {"test": "t", "metric": "m"}, {"test": "t", "metric": 3, "value": 1},
                   {"test": "t", "metric": "m", "value": "1"}):  # fmt: skip
-        with pytest.raises(TaskDescriptionError, match="here: "):
+        with pytest.raises(CheckError, match="here: "):
             Threshold.from_dict(wrong, "here")

@@ -84,27 +84,6 @@ def test_a_wrong_value_is_named_with_file_and_line(
     assert len(RunFolder.of(path).scan().records) == 1
 
 
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        ("[1, 2]", "a line is a JSON object, not list"),
-        ("hello", "not JSON"),
-        ("{} x", "not JSON"),
-    ],
-)
-def test_a_line_that_is_no_record_is_named(line: str, message: str, tmp_path: Path) -> None:
-    path = tmp_path / RECORDS
-    path.write_text(line + "\n")
-    with pytest.raises(RecordError, match=message) as caught:
-        RunFolder(tmp_path).read()
-    assert f"{path}:1" in str(caught.value)
-
-
-def test_a_missing_file_is_one_sentence(tmp_path: Path) -> None:
-    with pytest.raises(RecordError, match="No such file or directory"):
-        RunFolder(tmp_path).read()
-
-
 def test_appended_records_are_read_back(tmp_path: Path) -> None:
     path = tmp_path / "run" / RECORDS
     folder = RunFolder(path.parent)
@@ -116,13 +95,6 @@ def test_appended_records_are_read_back(tmp_path: Path) -> None:
     assert RunFolder(path.parent).read().records == tuple(written)
 
 
-def test_a_line_written_twice_counts_once(tmp_path: Path) -> None:
-    path = tmp_path / RECORDS
-    for _ in range(2):
-        RunFolder(path.parent).append(record(5))
-    assert len(RunFolder.of(path).read().records) == 1
-
-
 def test_a_record_too_long_to_be_read_keeps_all_but_its_details(tmp_path: Path) -> None:
     path = tmp_path / RECORDS
     details = {"poses": "x" * LARGEST_LINE}
@@ -132,20 +104,6 @@ def test_a_record_too_long_to_be_read_keeps_all_but_its_details(tmp_path: Path) 
     assert found.metrics == {"placed": 0.5}
     assert found.notes.log == "logs/a.log"
     assert "more than a record may have" in found.notes.left_out
-
-
-@pytest.mark.parametrize("kind", ["fifo", "device", "link out"])
-def test_only_an_ordinary_file_in_the_folder_is_read(tmp_path: Path, kind: str) -> None:
-    run = tmp_path / "run"
-    run.mkdir()
-    path = run / RECORDS
-    (tmp_path / "other").write_text(record(1).to_json() + "\n")
-    if kind == "fifo":
-        os.mkfifo(path)
-    else:
-        path.symlink_to({"device": "/dev/zero", "link out": tmp_path / "other"}[kind])
-    with pytest.raises(RecordError, match=r"no ordinary file|leads out of its folder"):
-        RunFolder(run).read()
 
 
 def test_infinite_numbers_and_deep_nests_are_refused(tmp_path: Path) -> None:
@@ -230,21 +188,23 @@ def test_a_bad_description_is_told_and_takes_nothing_with_it(
     assert found.records
 
 
-@pytest.mark.parametrize("kind", ["fifo", "folder", "link out"])
-def test_descriptions_are_an_ordinary_file_in_the_folder(tmp_path: Path, kind: str) -> None:
+@pytest.mark.parametrize("name", [RECORDS, TASKS])
+@pytest.mark.parametrize("kind", ["fifo", "device", "folder", "link out"])
+def test_only_an_ordinary_file_in_the_folder_is_read(tmp_path: Path, name: str, kind: str) -> None:
     run = tmp_path / "run"
-    folder_with(run)
-    (tmp_path / "other").write_text(json.dumps(POURING.to_dict()) + "\n")
-    path = run / TASKS
+    folder_with(run, POURING)
+    path = run / name
+    path.rename(tmp_path / "other")
     if kind == "fifo":
         os.mkfifo(path)
     elif kind == "folder":
         path.mkdir()
     else:
-        path.symlink_to(tmp_path / "other")
-    found = RunFolder(run).read()
-    assert found.tasks == {}
-    (problem,) = found.problems
+        path.symlink_to({"device": "/dev/zero", "link out": tmp_path / "other"}[kind])
+    found = RunFolder(run).scan()
+    assert (found.records == ()) is (name == RECORDS)
+    assert (found.tasks == {}) is (name == TASKS)
+    (problem,) = (*found.problems, *found.refused)
     assert re.search("no ordinary file|Is a directory|leads out of its folder", problem)
     assert RunFolder(run).repair() == ()
 

@@ -9,11 +9,6 @@ from hypothesis import strategies as st
 from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric, significant
 
 
-def test_a_share_says_of_how_many() -> None:
-    with pytest.raises(ValueError, match="'placed' is a share: say of how many"):
-        Metric("placed", "placed", kind="share")
-
-
 @pytest.mark.parametrize(
     ("metric", "value", "text"),
     [

@@ -28,17 +28,23 @@ def test_runs_of_one_second_have_different_folders(tmp_path: Path) -> None:
     assert new_name(tmp_path).parent == tmp_path
 
 
+def with_links(parent: Path) -> Path:
+    """A folder with links that lead out of it."""
+    run = parent / "run"
+    run.mkdir()
+    (parent / "victim").touch()
+    (run / "out").symlink_to(parent / "victim")
+    (run / "through").symlink_to(parent)
+    return run
+
+
 @pytest.mark.parametrize(
     "name",
     ["../victim", "/etc/passwd", "a/../../victim", "out", "through/victim", "through/new", "", ".",
      "a\0b", "\ud800", "x" * 300],
 )  # fmt: skip
 def test_nothing_leads_out_of_a_folder(tmp_path: Path, name: str) -> None:
-    run = tmp_path / "run"
-    run.mkdir()
-    (tmp_path / "victim").touch()
-    (run / "out").symlink_to(tmp_path / "victim")
-    (run / "through").symlink_to(tmp_path)
+    run = with_links(tmp_path)
     with pytest.raises(FolderError):
         inside(run, name)
 
@@ -84,11 +90,7 @@ def test_a_link_in_the_place_of_a_temporary_file_is_not_followed(
 @pytest.mark.parametrize("flags", [os.O_RDONLY, os.O_RDWR | os.O_CREAT | os.O_APPEND])
 @pytest.mark.parametrize("name", ["out", "through/victim", "through/new", "../victim", "", "a\0b"])
 def test_what_is_opened_lies_inside(tmp_path: Path, name: str, flags: int) -> None:
-    run = tmp_path / "run"
-    run.mkdir()
-    (tmp_path / "victim").touch()
-    (run / "out").symlink_to(tmp_path / "victim")
-    (run / "through").symlink_to(tmp_path)
+    run = with_links(tmp_path)
     with pytest.raises(OSError, match="leads out of its folder or is a link|is no file's name"):
         opened(run, name, flags)
     if name != "out":  # which would be replaced

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.records.metrics import COSTS, Metric
 from pytest_simbench.records.record import Failure, Record, RecordError
 
 from .build import record
@@ -77,13 +75,6 @@ def test_numpy_values_nan_and_infinity_become_json() -> None:
     assert data["details"] == {"path": "a/b", "poses": [[1, 0], [0, 1]], "seed": 3, "far": None}
 
 
-def test_a_missing_key_is_named() -> None:
-    data = record().to_dict()
-    del data["simulator"]
-    with pytest.raises(RecordError, match="there is no 'simulator'"):
-        Record.from_dict(data)
-
-
 def test_costs_are_read_from_the_record() -> None:
     found = record()
     assert found.cost("rtf") == 17.5
@@ -103,22 +94,3 @@ def test_what_is_no_record_is_told_word_by_word() -> None:
         with pytest.raises(RecordError) as caught:
             Record.from_json(line, "here")
         assert str(caught.value).startswith(said)
-
-
-HIT = Metric("hit", "hit", kind="yes_no")
-LOST = Metric("lost", "lost", better="lower", kind="yes_no")
-MOVED = Metric("moved", "moved", better=None, kind="share", of=6)
-FAR = Metric("far", "far", "m", "lower")
-
-
-@pytest.mark.parametrize(
-    ("metric", "counts"), [(HIT, 0.0), (LOST, 1.0), (MOVED, None), (FAR, None), (COSTS[0], None)]
-)
-def test_a_crashed_repetition_counts_with_the_worst_value(
-    metric: Metric, counts: float | None
-) -> None:
-    crashed = record(status="failed", metrics={metric.name: 0.5}, error=Failure("WorkerDied"))
-    assert crashed.value(metric) == counts
-    assert replace(crashed, protocol="paper").value(metric) is None
-    assert replace(crashed, status="interrupted").value(metric) is None
-    assert replace(crashed, status="ok", error=None).value(metric) == 0.5

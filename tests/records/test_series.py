@@ -102,18 +102,6 @@ def test_one_row_needs_no_label_and_functions_have_theirs() -> None:
     assert [row.label for row in series(two)] == ["t.py::test_a", "t.py::test_b"]
 
 
-def test_rows_are_ranked_only_where_the_same_was_asked() -> None:
-    ours, other = record(1), record(1, simulator="b", test="test_stacking[b-headless]")
-
-    def ranked(**changes: object) -> bool:
-        return comparable(*series([ours, replace(other, **changes)]))
-
-    assert ranked()
-    assert ranked(settings={"timestep": 9.0})
-    assert not ranked(jitter=50.0)
-    assert not ranked(protocol="paper")
-
-
 def test_tests_are_matched_without_their_file_and_tasks_told_apart() -> None:
     old = [record(1, test="a/t.py::test_x[e]"), record(1, test="a/t.py::test_x[e]", task="throw")]
     new = [record(1, test="t.py::test_x[e]")]
@@ -150,7 +138,7 @@ def test_robots_are_told_by_name_alone_and_what_else_differs_beside() -> None:
     ]
 
 
-def test_rows_of_other_modes_profiles_or_functions_are_not_ranked() -> None:
+def test_rows_are_ranked_only_where_the_same_was_asked() -> None:
     ours, other = record(1), record(1, simulator="b", test="test_stacking[b-headless]")
 
     def ranked(**changes: object) -> bool:
@@ -158,8 +146,9 @@ def test_rows_of_other_modes_profiles_or_functions_are_not_ranked() -> None:
         return comparable(mine, another)
 
     assert ranked()
-    assert not ranked(mode="gui")
-    assert not ranked(profile="default")
+    assert ranked(settings={"timestep": 9.0})
+    for name, value in {"jitter": 50.0, "protocol": "paper", "mode": "gui", "profile": "x"}.items():
+        assert not ranked(**{name: value})
     runs = [record(1, test=f"test_{n}[{s}]", simulator=s) for s in "ab" for n in "xy"]
     rows = {(row.key.simulator, row.label): row for row in series(runs)}
     assert comparable(rows["a", "test_x"], rows["b", "test_x"])

@@ -9,7 +9,7 @@ from typing import Any
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Failure, Record
 from pytest_simbench.report.model.document import Column
-from tests.records.build import made
+from tests.records import build
 
 STACKING = (
     Metric("placed", "placed", "", "higher", "share", 15, study=True),
@@ -55,39 +55,20 @@ def record(
     **changes: Any,
 ) -> Record:
     """A repetition that took 10 s, stepped 8 s of them for 160 simulated seconds."""
+    seconds = {"launch": 0.5, "load": 0.3, "plan": 1.0, "step": 8.0, "other": 0.2, "total": 10.0}
     given: dict[str, Any] = {
         "test": f"test_{task}[{simulator}-{mode}]",
-        "seed": 1000 + repetition,
-        "status": "ok",
-        "seconds": {
-            "launch": 0.5,
-            "load": 0.3,
-            "plan": 1.0,
-            "step": 8.0,
-            "other": 0.2,
-            "total": 10.0,
-        },
+        "task": task,
+        "simulator": simulator,
+        "mode": mode,
+        "profile": profile,
+        "seconds": seconds,
         "stepping": {"wall": 8.0, "cpu": 7.6, "steps": 40000, "simulated": 160.0},
         "timeline": {"start": 0.8, "end": 9.8},
-        "resources": {
-            "cpu_percent": {"mean": 99.0, "std": 3.0},
-            "rss_mb": {"mean": 150.0, "std": 2.0, "peak": 161.0},
-            "samples": 100,
-        },
         "deviations": ("rolling friction is not modelled",) if simulator == "pybullet" else (),
+        **{name: {} for name in ("settings", "versions", "host")},
     }
-    given.update(changes)
-    return made(
-        {
-            "task": task,
-            "simulator": simulator,
-            "mode": mode,
-            "profile": profile,
-            "repetition": repetition,
-            "metrics": metrics or {},
-            **given,
-        }
-    )
+    return build.record(repetition, metrics=dict(metrics or {}), **{**given, **changes})
 
 
 def failed(kind: str, phase: str, message: str, **given: Any) -> Record:

@@ -20,7 +20,7 @@ from pytest_simbench.report.figures.history import FAILS, NOT_ASKED, draw_laws
 from pytest_simbench.report.figures.sheet import sheet_name, sheets
 from pytest_simbench.report.figures.task import draw, pictures
 from pytest_simbench.report.files import write_files
-from pytest_simbench.report.model.report import Report, histories_of
+from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import summarise
 from tests.hostile import HOSTILE
 from tests.measure.test_law_history import asked, row
@@ -109,7 +109,7 @@ def test_one_picture_for_all_laws_over_releases_and_its_colours(tmp_path: Path) 
         *row("tower", 0.1, 0.1, None, 0.1),
         *asked("glide", "2.0", 50.0),
     ]
-    (laws,) = found = histories_of(Reading(records=tuple(records)))
+    (laws,) = found = Report.of(Reading(records=tuple(records))).histories
     with drawing():
         (axis,) = draw_laws(laws).axes  # type: ignore[arg-type]
         cells = [[to_hex(cell) for cell in line] for line in axis.images[0].get_array()]

@@ -31,11 +31,10 @@ from pytest_simbench.report.files import (
     write_report,
     write_tables,
 )
-from pytest_simbench.report.markdown.badge import badge
-from pytest_simbench.report.markdown.github import LARGEST, VARIABLE, append_summary
+from pytest_simbench.report.markdown.github import LARGEST, VARIABLE, append_summary, badge
 from pytest_simbench.report.markdown.run import render_run, render_task
 from pytest_simbench.report.model import tables
-from pytest_simbench.report.model.report import Report, summaries_of
+from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.terminal import run as terminal
 from pytest_simbench.report.terminal.parts import render_changes
@@ -176,7 +175,7 @@ def test_whatever_is_said_of_whatever_numbers_is_shown(
 ) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        summaries = summaries_of(reading(said, of))
+        summaries = Report.of(reading(said, of)).summaries
     assert_harmless_terminal(terminal.render_run(summaries, 100))
     assert_harmless_markdown(render_run(Report(summaries)))
 

@@ -14,14 +14,15 @@ from pytest_simbench.records.record import Failure, Record
 from pytest_simbench.records.repeatability import Line
 from pytest_simbench.report.files import csv_of, write_files
 from pytest_simbench.report.markdown.capabilities import capability_markdown
-from pytest_simbench.report.markdown.github import VARIABLE, append_summary
 from pytest_simbench.report.markdown.run import render_changes as changes_in_markdown
 from pytest_simbench.report.markdown.run import render_run as markdown
 from pytest_simbench.report.markdown.run import render_tables as tables_in_markdown
 from pytest_simbench.report.model import repeatability
+from pytest_simbench.report.model.capabilities import columns
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import TaskSummary, summarise
-from pytest_simbench.report.terminal.parts import capability_table, render_changes, render_tables
+from pytest_simbench.report.terminal.grid import render
+from pytest_simbench.report.terminal.parts import render_changes, render_tables
 from pytest_simbench.report.terminal.progress import Progress
 from pytest_simbench.report.terminal.run import render_brief, render_run
 from pytest_simbench.simulator.registry import adapter
@@ -141,7 +142,7 @@ def test_the_tables_of_repeatability(text: str) -> None:
 @texts
 def test_the_table_of_simulators(text: str) -> None:
     info = replace(adapter("mujoco").info, name=text, title=text, licence=text, engine=text)
-    assert_harmless_terminal(capability_table([info], 100))
+    assert_harmless_terminal(render(columns([info]), 100))
     assert_harmless_markdown(capability_markdown([info]))
 
 
@@ -159,9 +160,3 @@ def test_the_progress_line(text: str, is_tty: bool) -> None:
     progress.end_test()
     for part in written:
         assert_harmless_terminal(part.replace("\r", ""))
-
-
-def test_the_page_of_a_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(VARIABLE, str(tmp_path / "summary"))
-    assert append_summary(markdown(Report(told(ALL)))) == ""
-    assert_harmless_markdown((tmp_path / "summary").read_text(encoding="utf-8"))

@@ -60,10 +60,8 @@ def write(folder: Path, pictures: Iterable[tuple[str, Any]]) -> list[Path]:
 
 @contextmanager
 def drawing(**settings: Any) -> Iterator[None]:
-    """While pictures are drawn and saved: no text means anything, no warning is shown.
-
-    Args:
-        settings: more of matplotlib's, `svg_fonttype` for `svg.fonttype`.
+    """While pictures are drawn and saved: no text means anything, no warning is shown. More
+    settings of matplotlib may be given, `svg_fonttype` for `svg.fonttype`.
 
     Raises:
         FiguresUnavailable: matplotlib is not installed.

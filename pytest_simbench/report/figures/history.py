@@ -8,12 +8,17 @@ from typing import Any
 
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.text import for_figure
-from pytest_simbench.measure.history import Course, History
+from pytest_simbench.measure.history import (
+    Course,
+    History,
+    LawHistory,
+    Reached,
+    TaskHistory,
+    times,
+)
 from pytest_simbench.measure.intervals import interval
-from pytest_simbench.measure.law_history import LawHistory, Reached, times
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
 from pytest_simbench.report.figures.drawing import COLOURS, Named, heading, panelled
-from pytest_simbench.report.model.report import AnyHistory
 
 SHOWN = 6
 """Panels of a picture at most: those that changed come first."""
@@ -33,14 +38,19 @@ ROW = 0.17
 """Height of a law [in]."""
 
 
-def pictures(found: Sequence[AnyHistory]) -> Named:
+def pictures(found: Sequence[History]) -> Named:
     """Each history, `SIMULATOR_TASK_history`."""
     for history in found:
-        name = file_name(f"{history.simulator}_{history.task}_history", *history.identity)
-        yield name, draw_laws(history) if isinstance(history, LawHistory) else draw(history)
+        name = file_name(
+            f"{history.simulator}_{history.task}_history", history.test, history.variant
+        )
+        if isinstance(history, LawHistory):
+            yield name, draw_laws(history)
+        elif isinstance(history, TaskHistory):
+            yield name, draw(history)
 
 
-def draw(history: History) -> Any:
+def draw(history: TaskHistory) -> Any:
     """Each metric over the releases as a `matplotlib.figure.Figure`, within `figures.drawing`.
 
     A dot is a mean, the line through it its 95 % interval, a dashed line a supported change point.

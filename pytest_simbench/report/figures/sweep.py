@@ -32,13 +32,7 @@ def pictures(found: Sequence[Swept]) -> Named:
 
 def draw(found: Sequence[Swept], phenomenon: str, over: str) -> Any:
     """The error of each law of a phenomenon as a `matplotlib.figure.Figure`, within
-    `figures.drawing`: a panel for each law, a line for each simulator.
-
-    Args:
-        found: the laws.
-        phenomenon: which of them.
-        over: `step` or `cost`, see `OVER`.
-    """
+    `figures.drawing`, over `step` or `cost`: a panel for each law, a line for each simulator."""
     from matplotlib.figure import Figure
 
     laws = [law for law in found if law.phenomenon == phenomenon]

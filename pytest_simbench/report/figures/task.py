@@ -22,16 +22,8 @@ def pictures(summaries: Sequence[TaskSummary]) -> Named:
 
 
 def draw(summary: TaskSummary, name: str, *, titled: bool = True) -> Any:
-    """One picture of a task as a `matplotlib.figure.Figure`, within `drawing`.
-
-    Args:
-        summary: of the task.
-        name: `metrics`, `times`, `resources` or `phases`.
-        titled: whether a title stands above it.
-
-    Returns:
-        None where there is nothing to draw.
-    """
+    """One picture of a task (`metrics`, `times`, `resources` or `phases`) as a
+    `matplotlib.figure.Figure`, within `drawing`; None where there is nothing to draw."""
     from matplotlib.figure import Figure
 
     rows = [row for row in summary.rows if row.finished]

@@ -1,9 +1,15 @@
-"""The summary page of a GitHub job: what its file takes is shown as Markdown."""
+"""What GitHub shows besides: the summary page of a job, whose file takes Markdown, and a badge of a
+README, the JSON that shields.io reads (shields.io/badges/endpoint-badge)."""
 
 from __future__ import annotations
 
+import json
 import os
+from collections.abc import Sequence
 from pathlib import Path
+
+from pytest_simbench.ground.text import in_one_line
+from pytest_simbench.records.record import Record
 
 VARIABLE = "GITHUB_STEP_SUMMARY"
 """Names the file (docs.github.com, workflow commands, adding a job summary)."""
@@ -32,3 +38,39 @@ def append_summary(text: str) -> str:
     except OSError as error:
         return f"the summary for GitHub cannot be written to {path} ({error.strerror})"
     return ""
+
+
+LABEL = "simulators"
+
+LONGEST = 60
+"""Characters of the message."""
+
+
+def badge(records: Sequence[Record], passed: bool | None) -> str:
+    """The badge of a run, as JSON.
+
+    Green: every test passed and no repetition crashed. Yellow: the tests passed although some did.
+    Red: a test or a limit failed. Grey: nothing was measured, or it is not known what passed.
+    Interrupted repetitions say nothing.
+    """
+    ended = [record for record in records if record.status != "interrupted"]
+    failed = sum(not record.ok for record in ended)
+    names = list(dict.fromkeys(record.simulator for record in ended))
+    who = names[0] if len(names) == 1 else f"{len(names)} simulators"
+    if not ended:
+        message, colour = "nothing measured", "lightgrey"
+    elif passed is None:
+        message, colour = f"{who}: {len(ended)} repetitions, not judged", "lightgrey"
+    elif not passed:
+        message, colour = f"{who}: failing", "red"
+    elif failed:
+        message, colour = f"{who}: {failed} of {len(ended)} repetitions crashed", "yellow"
+    else:
+        message, colour = f"{who}: {len(ended)} repetitions passed", "brightgreen"
+    data = {
+        "schemaVersion": 1,
+        "label": LABEL,
+        "message": in_one_line(message, LONGEST),
+        "color": colour,
+    }
+    return json.dumps(data) + "\n"

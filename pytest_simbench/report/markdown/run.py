@@ -14,12 +14,7 @@ from pytest_simbench.report.model.summary import TaskSummary
 
 
 def render_run(report: Report, pictures: Sequence[str] = ()) -> str:
-    """The whole report; ends with a newline.
-
-    Args:
-        report: of the run.
-        pictures: addresses of pictures to show at the end, relative to the report.
-    """
+    """The whole report, with pictures at addresses relative to it; ends with a newline."""
     if not (report.summaries or report.sweeps):
         return "No repetition was recorded.\n"
     parts = [render_claims(report.claims)] if report.claims else []

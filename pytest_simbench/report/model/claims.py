@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +15,6 @@ from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.metrics import COSTS, Metric, significant
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import grouped
-from pytest_simbench.report.model.again import command
 from pytest_simbench.report.model.document import Column, Table, names
 
 MOST = 12
@@ -30,13 +30,8 @@ NO_CLAIM = "no claim was made"
 
 @dataclass(frozen=True)
 class Trouble:
-    """A claim that failed or is not decided.
-
-    Attributes:
-        what: simulator, test, and what came of the claim.
-        worst: which repetition to look at, in words; empty where none stands out.
-        again: the command that runs it again; may be empty.
-    """
+    """What came of a claim that failed or is not decided; which repetition is the worst, in words,
+    and the command that runs it again, which may be empty."""
 
     what: str
     worst: str = ""
@@ -207,3 +202,33 @@ def _trouble(told: _Told, records: Sequence[Record]) -> Trouble:
         return Trouble(what)
     where = f"seed {worst.seed}, repetition {worst.repetition}"
     return Trouble(what, f"{where} {why}", command(worst))
+
+
+def command(record: Record) -> str:
+    """What runs the same seed of the same test again; empty where its id is no plain one.
+
+    Settings that `--sim-set` changed are not in it. A profile, a robot or a time step in the id is
+    one of several that the run had: a run of this one alone has none there.
+    """
+    file, _, name = record.function.partition("::")
+    step = record.settings.get("timestep")
+    alone = f"{record.function}[{record.simulator}-{record.mode}"
+    ours_first = record.test.startswith(alone)
+    test = f"{'-'.join(filter(None, [alone, record.variant]))}]" if ours_first else record.test
+    fine = name and record.test.isprintable() and not file.startswith(("-", "/", "."))
+    if not fine or ".." in file or not file.endswith(".py"):
+        return ""
+    options = [
+        f"--sim-name={record.simulator}",
+        f"--sim-seed={record.seed}",
+        "--sim-reps=1",
+        f"--sim-profile={record.profile}",
+        f"--sim-protocol={record.protocol}",
+        f"--sim-jitter={record.jitter:g}",
+        *[f"--sim-robot={record.robot.get('name')}"] * bool(record.robot),
+        *["--sim-gui"] * (record.mode == "gui"),
+        *[f"--sim-set={record.simulator}.timestep={step!r}"] * record.swept,
+    ]
+    if not all(map(str.isprintable, options)):
+        return ""
+    return shlex.join(["pytest", test, *options])

@@ -65,15 +65,11 @@ def _possible(values: Sequence[float], metric: Metric) -> bool:
 
 
 def pooled(resources: Iterable[Mapping[str, Any]], cost: str) -> Spread | None:
-    """Mean and deviation of what was sampled, each repetition counting the same.
+    """Mean and deviation of a cost that was sampled (`cpu`, `ram`); repetitions count the same.
 
     So the mean is that of the repetitions' means, whose interval is shown, however many samples a
     repetition has. The deviation is within and between repetitions: with means m_i and deviations
     s_i the variance is the mean of s_i^2 + (m_i - m)^2.
-
-    Args:
-        resources: of each repetition, as records hold them.
-        cost: `cpu` or `ram`.
     """
     parts, peaks = [], []
     for use in resources:

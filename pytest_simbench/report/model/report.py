@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from pytest_simbench.measure.history import History, histories
-from pytest_simbench.measure.law_history import LawHistory, law_histories
+from pytest_simbench.measure.history import History, histories, law_histories
 from pytest_simbench.measure.settling import TASK as SETTLING
 from pytest_simbench.measure.settling import Settled, settlings
-from pytest_simbench.measure.sweep import Swept
+from pytest_simbench.measure.sweep import Swept, sweeps
 from pytest_simbench.records.folder import Reading
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.model import settling, sweep, tables, truth
@@ -17,8 +16,6 @@ from pytest_simbench.report.model.claims import Claims, claims_of
 from pytest_simbench.report.model.document import Section
 from pytest_simbench.report.model.outcome import Compared
 from pytest_simbench.report.model.summary import TaskSummary, at_own_steps, summarise
-
-AnyHistory = History | LawHistory
 
 
 @dataclass(frozen=True)
@@ -37,7 +34,7 @@ class Report:
 
     summaries: Sequence[TaskSummary] = ()
     records: Sequence[Record] = ()
-    histories: Sequence[AnyHistory] = ()
+    histories: Sequence[History] = ()
     sweeps: Sequence[Swept] = ()
     settled: Sequence[Settled] = ()
     claims: Claims | None = None
@@ -46,11 +43,16 @@ class Report:
     @classmethod
     def of(cls, reading: Reading, comparison: Compared | None = None, looks: int = 1) -> Report:
         """What a run folder holds, that was judged so often (`outcome.Outcome`)."""
+        # However many processes wrote them.
+        records = sorted(reading.records, key=lambda r: (r.test, r.repetition))
+        # A scene that is left to itself has a section that holds its releases against its noise.
+        tests = [record for record in reading.records if record.task != SETTLING]
+        found = summarise(at_own_steps(records), reading.metrics, reading.references)
         return cls(
-            summaries_of(reading, looks),
-            in_order(reading.records),
-            histories_of(reading),
-            sweep.of_run(reading),
+            [replace(summary, looks=looks) for summary in found],
+            records,
+            [*histories(tests, reading.metrics), *law_histories(reading.records)],
+            sweeps(reading.records, reading.metrics),
             settlings(reading.records),
             claims_of(reading, comparison[1] if comparison else None),
             comparison,
@@ -72,22 +74,3 @@ class Report:
     def scenes(self) -> list[Section]:
         """Users' scenes, whose first sentences are the answer."""
         return [settling.section(one) for one in self.settled]
-
-
-def histories_of(reading: Reading) -> list[AnyHistory]:
-    """The releases of simulators: of each test, and of all laws. A scene that is left to itself has
-    a section of its own, which holds its releases against its noise."""
-    tests = [record for record in reading.records if record.task != SETTLING]
-    return [*histories(tests, reading.metrics), *law_histories(reading.records)]
-
-
-def summaries_of(reading: Reading, looks: int = 1) -> list[TaskSummary]:
-    """What a run that was judged so often tells of each task."""
-    records = at_own_steps(in_order(reading.records))
-    found = summarise(records, reading.metrics, reading.references)
-    return [replace(summary, looks=looks) for summary in found]
-
-
-def in_order(records: Sequence[Record]) -> list[Record]:
-    """By test and repetition, however many processes wrote them."""
-    return sorted(records, key=lambda r: (r.test, r.repetition))

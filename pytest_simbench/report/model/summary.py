@@ -17,7 +17,7 @@ from pytest_simbench.measure.modes import compare_modes
 from pytest_simbench.records.choices import published_again
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.phenomena import PHENOMENON
-from pytest_simbench.records.record import Record
+from pytest_simbench.records.record import Failure, Record
 from pytest_simbench.records.series import comparable, grouped, series
 from pytest_simbench.report.model.document import Of, names
 from pytest_simbench.report.model.pooling import (
@@ -38,11 +38,13 @@ SHOWN_COSTS = ("cpu", "ram", "rtf", "cpu_cost", "start", "end")
 
 @dataclass(frozen=True)
 class Cause:
-    """Failures of one row that share type and phase."""
+    """Failures of one row that share type and phase; message and log are those of the first."""
 
-    type: str
-    phase: str
     records: Sequence[Record]
+
+    @property
+    def error(self) -> Failure:
+        return self.records[0].error or Failure("unknown", "the record names no cause")
 
     @property
     def repetitions(self) -> list[int]:
@@ -51,19 +53,22 @@ class Cause:
 
     @property
     def message(self) -> str:
-        """That of the first of them, in one line."""
-        error = self.records[0].error
-        return " ".join(error.message.split()) if error else "the record names no cause"
+        """In one line."""
+        return " ".join(self.error.message.split())
 
     @property
     def tail(self) -> list[str]:
-        """The last lines of that one's log, which is at `log`."""
-        error = self.records[0].error
-        return error.log_tail.strip().splitlines() if error else []
+        """The last lines of the log, which is at `log`."""
+        return self.error.log_tail.strip().splitlines()
 
     @property
     def log(self) -> str:
         return self.records[0].notes.log
+
+    @property
+    def told(self) -> str:
+        """How many there are of what: `2 x WorkerHung in settle`."""
+        return f"{len(self.records)} x {self.error.cause}"
 
 
 @dataclass(frozen=True)
@@ -81,7 +86,6 @@ class Row:
         notes: what a reader must know of these numbers (parallel repetitions, reused worker).
         reasons: why scores are no better, in the task's words, and how often; the most frequent
             first. Those that differ in numbers alone are counted together.
-        records: all of its repetitions.
     """
 
     task: str
@@ -180,13 +184,10 @@ def summarise(
     metrics: Mapping[str, Sequence[Metric]],
     references: Mapping[str, Mapping[str, float]] | None = None,
 ) -> list[TaskSummary]:
-    """The records as one summary per task, tasks in order of appearance.
+    """The records of one run as one summary per task, tasks in order of appearance.
 
-    Args:
-        records: of one run, in any order.
-        metrics: what each task declares, by its name; of a task that is missing here, the record's
-            metrics are shown as plain values.
-        references: by task, then by metric.
+    Metrics and references are what each task declares. Of a task that is missing there, the
+    record's metrics are shown as plain values.
     """
     return [
         _summary(task, found, metrics.get(task), dict((references or {}).get(task, {})))
@@ -209,7 +210,7 @@ def _summary(
         sides = {place: row.records for place, row in enumerate(found)}
         apart = differences(sides, metrics, lambda a, b: comparable(found[a], found[b]), references)
         ordered = [record for row in found for record in row.records]
-        modes = [compared.sentence for compared in compare_modes(ordered, metrics)]
+        modes = compare_modes(ordered, metrics)
     return TaskSummary(
         task,
         metrics,
@@ -289,9 +290,6 @@ def _seconds(records: Sequence[Record]) -> dict[str, float]:
 
 def _causes(records: Sequence[Record]) -> tuple[Cause, ...]:
     """The most frequent first."""
-    groups = grouped(
-        (record for record in records if record.status == "failed"),
-        lambda r: (r.error.type, r.error.phase) if r.error else ("unknown", ""),
-    )
-    ordered = sorted(groups.items(), key=lambda item: -len(item[1]))
-    return tuple(Cause(kind, phase, group) for (kind, phase), group in ordered)
+    failed = (record for record in records if record.status == "failed")
+    groups = grouped(failed, lambda r: (r.error.type, r.error.phase) if r.error else None)
+    return tuple(map(Cause, sorted(groups.values(), key=len, reverse=True)))

@@ -6,8 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from pytest_simbench.measure.convergence import Convergence
-from pytest_simbench.measure.sweep import REFERENCE, Choice, Line, Point, Swept, choice, sweeps
-from pytest_simbench.records.folder import Reading
+from pytest_simbench.measure.sweep import REFERENCE, Choice, Line, Point, Swept, choice
 from pytest_simbench.records.phenomena import ordered
 from pytest_simbench.records.series import step_text
 from pytest_simbench.report.model import cells
@@ -32,11 +31,6 @@ FAILED = "what failed at a time step"
 """Titles of tables."""
 
 Who = tuple[str, str, str, int]
-
-
-def of_run(reading: Reading) -> list[Swept]:
-    """The laws over time steps that a run has."""
-    return sweeps(reading.records, reading.metrics)
 
 
 def section(found: Sequence[Swept]) -> Section | None:

@@ -166,7 +166,7 @@ def failures(summary: TaskSummary) -> list[Column]:
     causes = [cause for _, cause in found]
     shown = [
         "; ".join(
-            [cause.message or cause.type]
+            [cause.message or cause.error.type]
             + [f"last line of its log: {line.strip()}" for line in cause.tail[-1:]]
             + ([f"log: {cause.log}"] if cause.log else [])
         )
@@ -175,8 +175,8 @@ def failures(summary: TaskSummary) -> list[Column]:
     return [
         Column("simulator", [row.label for row, _ in found], left=True, wrap=True),
         Column("count", [str(len(cause.repetitions)) for cause in causes]),
-        Column("failure", [cause.type for cause in causes], left=True),
-        Column("phase", [cause.phase or cells.MISSING for cause in causes], left=True),
+        Column("failure", [cause.error.type for cause in causes], left=True),
+        Column("phase", [cause.error.phase or cells.MISSING for cause in causes], left=True),
         Column("repetitions", [numbers(cause.repetitions) for cause in causes], left=True),
         Column("message", shown, left=True, wrap=True),
     ]

@@ -11,16 +11,15 @@ from typing import Any
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.model import cells, changes, repeatability, sweep, tables, truth
-from pytest_simbench.report.model.again import command
 from pytest_simbench.report.model.answer import headline
+from pytest_simbench.report.model.claims import command
 from pytest_simbench.report.model.document import Of, Table
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import Cause, Row, TaskSummary
 from pytest_simbench.report.page.pictures import of_sweeps, pictures
 from pytest_simbench.report.page.setup import setup
 from pytest_simbench.report.page.strips import strips
-from pytest_simbench.report.replay.groups import Group, links
-from pytest_simbench.report.replay.recorded import videos
+from pytest_simbench.report.replay.recorded import Group, links, videos
 
 TAIL = 30
 """Lines of a log that are shown."""
@@ -35,14 +34,8 @@ def page(
     replays: Sequence[Group] = (),
     sheets: Mapping[str, bytes] | None = None,
 ) -> Shown:
-    """What the page of a run tells; `render.render` makes HTML of it.
-
-    Args:
-        folder: of the run; its results on repeatability are read from it.
-        report: of the run.
-        replays: what the replay beside the page shows.
-        sheets: contact sheets (PNG), by the name of their task.
-    """
+    """What the page of a run tells, also of its results on repeatability, of the replay beside it,
+    and contact sheets (PNG) by task; `render.render` makes HTML of it."""
     summaries, tasks, comparison = report.summaries, report.tasks, report.comparison
     repetitions = _Repetitions(folder, replays)
     drawn = [pictures(summary) for summary in tasks]
@@ -129,9 +122,8 @@ def _task(summary: TaskSummary, repetitions: _Repetitions, replays: Sequence[Gro
 
 def _cause(row: Row, cause: Cause, repetitions: _Repetitions) -> Shown:
     """Failures of a row that share type and phase, with the end of the first one's log."""
-    where = f" in {cause.phase}" if cause.phase else ""
     return {
-        "title": f"{row.label}: {len(cause.repetitions)} x {cause.type}{where}",
+        "title": f"{row.label}: {cause.told}",
         "of": row.of,
         "message": cause.message,
         "repetitions": tables.numbers(cause.repetitions, 10),

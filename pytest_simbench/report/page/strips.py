@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
+import numpy as np
+
 from pytest_simbench.ground.text import for_figure
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
@@ -103,12 +105,7 @@ class Strip:
 
 
 def strips(summary: TaskSummary, number: Callable[[Record], int]) -> list[Strip]:
-    """A plot for each metric and cost that any repetition has.
-
-    Args:
-        summary: of the task.
-        number: of a record on the page.
-    """
+    """A plot for each metric and cost that any repetition has; records have numbers on the page."""
     own = {metric.name for metric in summary.metrics}
     costs = [COST[name] for name in SHOWN_COSTS if name not in own]
     plots = [_strip(metric, summary, number) for metric in (*summary.metrics, *costs)]
@@ -180,15 +177,11 @@ def _some(found: Sequence[T], by: Callable[[T], float] = lambda item: 0.0) -> Se
 
 def _scale(low: float, high: float, log: bool) -> Callable[[float], float]:
     """From values to shares of the width [%]."""
+    if high <= low:
+        return lambda value: (LEFT + RIGHT) / 2
     of = math.log10 if log else float
-
-    def place(value: float) -> float:
-        share = 0.5
-        if high > low:
-            share = (of(max(value, low) if log else value) - of(low)) / (of(high) - of(low))
-        return round(LEFT + (RIGHT - LEFT) * min(1.0, max(0.0, share)), 2)
-
-    return place
+    ends = of(low), of(high)
+    return lambda value: round(float(np.interp(of(value), ends, (LEFT, RIGHT))), 2)
 
 
 def _ticks(low: float, high: float, log: bool) -> list[float]:

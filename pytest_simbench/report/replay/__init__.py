@@ -1,8 +1,5 @@
 """`replay.html`: what all simulators did on one seed, side by side in 3-D, from a run's traces.
-
-Modules: `groups` (which repetitions are shown together), `render` (one HTML file), `recorded` (what
-a run's folder holds of them, and bags for others). trimesh writes the viewer, with three.js inside;
-it is optional and imported only when a page is written.
-"""
+trimesh writes the viewer, with three.js inside; it is optional and imported only when a page is
+written."""
 
 REPLAY_NAME = "replay.html"

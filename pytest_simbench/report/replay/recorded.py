@@ -1,9 +1,11 @@
-"""What a run's folder holds of its repetitions: traces, videos, and a bag for each trace."""
+"""What a run's folder holds of its repetitions: traces, which a replay shows side by side, videos,
+and a bag for each trace."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from pytest_simbench.experiment.identity import file_stem_of
@@ -11,8 +13,10 @@ from pytest_simbench.recordings import film
 from pytest_simbench.recordings import trace as traces
 from pytest_simbench.recordings.bag import write_bag
 from pytest_simbench.recordings.trace import Trace, TraceError
+from pytest_simbench.records.configuration import task_parameters
 from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.records.record import Record
+from pytest_simbench.report.replay import REPLAY_NAME
 from pytest_simbench.report.terminal.progress import Progress
 
 FOLDER = "recordings"
@@ -30,6 +34,41 @@ def trace_of(run: Path, record: Record) -> Path | None:
     """
     path = inside(run, f"{traces.FOLDER}/{file_stem_of(record)}.npz")
     return path if path.is_file() else None
+
+
+@dataclass
+class Group:
+    """Repetitions of one task with one seed, each with its trace."""
+
+    task: str
+    parameters: str
+    seed: int
+    shown: list[tuple[Record, Path]] = field(default_factory=list)
+
+
+def groups(run: Path, records: Sequence[Record]) -> list[Group]:
+    """Those of a run folder: the first seed of each task, then the others, in their order."""
+    found: dict[tuple[str, str, int], Group] = {}
+    for record in records:
+        try:
+            path = trace_of(run, record)
+        except FolderError:
+            continue
+        if path is None:
+            continue
+        key = (record.task, task_parameters(record), record.seed)
+        found.setdefault(key, Group(*key)).shown.append((record, path))
+    tasks: dict[tuple[str, str], int] = {}
+    placed = []
+    for task, told, seed in sorted(found):
+        place = tasks[task, told] = tasks.get((task, told), -1) + 1
+        placed.append((place > 0, task, told, seed))
+    return [found[key[1], key[2], key[3]] for key in sorted(placed)]
+
+
+def links(shown: Sequence[Group]) -> dict[int, str]:
+    """The address of each repetition's replay, beside the report, by `id(record)`."""
+    return {id(r): f"{REPLAY_NAME}#{k}" for k, group in enumerate(shown) for r, _ in group.shown}
 
 
 def videos(run: Path) -> Callable[[Record], str]:
@@ -54,13 +93,8 @@ def videos(run: Path) -> Callable[[Record], str]:
 def write_bags(
     run: Path, target: Path, records: Sequence[Record], progress: Progress
 ) -> tuple[int, list[str]]:
-    """Write a bag for each repetition that has a trace; those that are up to date stay.
-
-    Args:
-        run: folder of the run.
-        target: folder in which `recordings/` is.
-        records: of the run.
-        progress: told of each; a bag takes some seconds.
+    """Write a bag into `recordings/` of the target for each repetition of a run that has a trace,
+    which takes some seconds each; those that are up to date stay.
 
     Returns:
         How many there are now; and what could not be written, one sentence each.

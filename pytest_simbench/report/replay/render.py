@@ -21,7 +21,7 @@ from pytest_simbench.ground.text import in_one_line
 from pytest_simbench.recordings.bag import METAL
 from pytest_simbench.recordings.figure import Figure, Mesh
 from pytest_simbench.recordings.trace import Trace, TraceError
-from pytest_simbench.report.replay.groups import Group
+from pytest_simbench.report.replay.recorded import Group
 from pytest_simbench.scene import Body, Box, Pose, Solid
 
 INSTALL = "no replay in 3-D: pip install 'pytest-simbench[replay]'"
@@ -41,10 +41,7 @@ class ReplayUnavailable(ImportError):
 
 
 def replay_of(shown: Sequence[Group]) -> tuple[str, int, list[str]]:
-    """The page.
-
-    Args:
-        shown: from `groups`.
+    """The page of `groups`.
 
     Returns:
         The page as HTML, how many of the groups it holds (the first ones), and what could not be

@@ -7,13 +7,12 @@ from collections.abc import Iterable, Sequence
 
 from pytest_simbench.ground.text import for_terminal, in_one_line
 from pytest_simbench.measure.gate import GateReport
+from pytest_simbench.measure.history import History
 from pytest_simbench.measure.sweep import Swept
-from pytest_simbench.report.model import capabilities, changes, sweep
+from pytest_simbench.report.model import changes, sweep
 from pytest_simbench.report.model.claims import Claims
 from pytest_simbench.report.model.document import Table
-from pytest_simbench.report.model.report import AnyHistory
 from pytest_simbench.report.terminal.grid import fill, render
-from pytest_simbench.simulator.info import SimulatorInfo
 
 SHOWN = 3
 """Failures at time steps that the terminal tells without `-v`."""
@@ -52,7 +51,7 @@ def sweep_lines(found: Sequence[Swept], width: int, whole: bool = False) -> list
     return lines
 
 
-def history_lines(found: Sequence[AnyHistory], width: int) -> list[str]:
+def history_lines(found: Sequence[History], width: int) -> list[str]:
     """Releases over time."""
     result = []
     for history in found:
@@ -66,13 +65,8 @@ def history_lines(found: Sequence[AnyHistory], width: int) -> list[str]:
 
 
 def render_changes(report: GateReport, width: int, limited: bool) -> str:
-    """The comparison with a baseline: differences first, then the table, then the verdicts.
-
-    Args:
-        report: from `run_gate`.
-        width: of the terminal.
-        limited: whether limits were given, so that passing is worth a sentence.
-    """
+    """The comparison with a baseline: differences first, then the table, then the verdicts. Where
+    limits were given, passing is worth a sentence."""
     columns = changes.columns(report)
     parts = [
         _listed(changes.DIFFERENT, report.differences, width),
@@ -97,8 +91,3 @@ def render_tables(found: Sequence[Table], width: int) -> str:
         head = [title, "-" * len(title), *([fill(table.note, width)] if table.note else [])]
         parts.append("\n".join([*head, "", render(table.columns, width)]))
     return for_terminal("\n\n".join(parts))
-
-
-def capability_table(infos: Sequence[SimulatorInfo], width: int) -> str:
-    """What each simulator is and can do."""
-    return render(capabilities.columns(infos), width)

@@ -114,11 +114,8 @@ class Progress:
         self._last = float("-inf")
 
     def start_test(self, test_id: str, repetitions: int, last: int | None = None) -> None:
-        """A test begins, or goes on, that will now run so many repetitions.
-
-        Args:
-            last: number of the last of them, where others ran before.
-        """
+        """A test begins, or goes on, that will now run so many repetitions; `last` is the number of
+        the last of them, where others ran before."""
         with self._lock:
             self._test = _Test(in_one_line(test_id), repetitions, last or repetitions)
             self._last = self._clock() if not self._is_tty else float("-inf")

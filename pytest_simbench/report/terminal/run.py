@@ -29,11 +29,8 @@ LONGEST_WARNING = 2
 def render_run(summaries: Sequence[TaskSummary], width: int = 80) -> str:
     """Everything the terminal shows of a run, as plain lines of at most `width` columns.
 
-    No colours and nothing but ASCII of our own, so that any log holds it.
-
-    Args:
-        summaries: from `summary.summarise`; without one, the text is empty.
-        width: of the terminal; 80 to 140 read well.
+    No colours and nothing but ASCII of our own, so that any log holds it. 80 to 140 columns read
+    well. Without a summary the text is empty.
     """
     if not summaries:
         return ""
@@ -117,9 +114,7 @@ def _short(text: str, width: int) -> list[str]:
 def warnings(summaries: Sequence[TaskSummary]) -> list[str]:
     """Crashes by cause, then what a reader must know of the rows, those of one text together."""
     crashed = [
-        f"CRASHED {summary.task}, {row.label}: {len(cause.repetitions)} x {cause.type}"
-        + (f" in {cause.phase}" if cause.phase else "")
-        + f": {cause.message}"
+        f"CRASHED {summary.task}, {row.label}: {cause.told}: {cause.message}"
         for summary in summaries
         for row in summary.rows
         for cause in row.causes

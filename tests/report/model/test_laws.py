@@ -17,7 +17,7 @@ from pytest_simbench.records.readings import Reading as Told
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.markdown.run import render_run as markdown
 from pytest_simbench.report.model import sweep, truth
-from pytest_simbench.report.model.report import Report, histories_of
+from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import TaskSummary, at_own_steps, summarise
 from pytest_simbench.report.page.context import page
 from pytest_simbench.report.page.render import render
@@ -204,7 +204,7 @@ def test_releases_are_told_in_lines_and_in_markdown() -> None:
         *row("tower", 0.1, 0.1, None, 0.1),
         *asked("glide", "2.0", 50.0),
     ]
-    found = histories_of(Reading(records=tuple(records)))
+    found = Report.of(Reading(records=tuple(records))).histories
     assert history_lines(found, 60)[:2] == [
         "engine, 3 laws (headless tuned): 4 releases, 1.2 to 2.0",
         "  1.10: tower fails (0.1x before): WorkerHung: no answer for",

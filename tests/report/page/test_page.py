@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.model import cells, tables
-from pytest_simbench.report.model.again import command
+from pytest_simbench.report.model.claims import command
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.page import context

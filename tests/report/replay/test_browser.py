@@ -17,7 +17,7 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.report.files import write_files
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import summarise
-from pytest_simbench.report.replay.groups import groups
+from pytest_simbench.report.replay.recorded import groups
 from pytest_simbench.report.replay.render import replay_of
 from pytest_simbench.scene import Pose
 from tests.hostile import HOSTILE

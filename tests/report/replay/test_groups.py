@@ -16,7 +16,7 @@ from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.page import context
 from pytest_simbench.report.page.render import render as html
 from pytest_simbench.report.replay import render
-from pytest_simbench.report.replay.groups import groups, links
+from pytest_simbench.report.replay.recorded import groups, links
 from pytest_simbench.report.replay.render import ReplayUnavailable, replay_of
 from tests.recordings.samples import trace
 from tests.report.samples import METRICS, record
