@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 from typing import Protocol as Interface
 
+from pytest_simbench.client.answers import Constructed
 from pytest_simbench.client.errors import (
     DisplayError,
     DisplayLost,
@@ -17,11 +18,9 @@ from pytest_simbench.client.errors import (
     Where,
     WorkerError,
 )
-from pytest_simbench.client.launch import Constructed
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.resources import ResourceSampler
-from pytest_simbench.client.stopwatch import Stopwatch
-from pytest_simbench.client.world import TRACE_PERIOD, Motion, World
+from pytest_simbench.client.world import TRACE_PERIOD, Motion, Stopwatch, World
 from pytest_simbench.experiment.camera import Camera
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import file_stem, record_of, settings

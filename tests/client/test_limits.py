@@ -17,9 +17,9 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from pytest_simbench.client import logs
-from pytest_simbench.client.crowding import crowding, scheduled
+from pytest_simbench.client.launch import KEPT, LARGEST
 from pytest_simbench.client.process import WorkerProcess
+from pytest_simbench.client.resources import crowding, scheduled
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.executor import LocalExecutor
@@ -113,14 +113,14 @@ def test_a_worker_that_does_not_close(case: Case, monkeypatch: pytest.MonkeyPatc
 def test_a_log_does_not_fill_the_disk(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     assert failure(faulty(case, "FloodsTheLog", stall_timeout=3.0))[0] == "WorkerHung"
     (log,) = (case.folder / "logs").iterdir()
-    assert log.stat().st_size < logs.LARGEST
+    assert log.stat().st_size < LARGEST
 
 
 def test_a_log_is_cut_though_it_grew_at_once(case: Case) -> None:
     record, _ = Repetition(Experiment(faulty(case, "FloodsAtOnce"), Falling()), 1).run()
     assert record.status == "ok"
     (log,) = (case.folder / "logs").iterdir()
-    assert log.stat().st_size < 2 * logs.KEPT
+    assert log.stat().st_size < 2 * KEPT
 
 
 @pytest.mark.parametrize("limit", [20.0, 60.0])
@@ -345,5 +345,5 @@ def test_a_little_waiting_is_not_told(
     monkeypatch: pytest.MonkeyPatch, waited: float, told: bool
 ) -> None:
     """A fifth of the time is the limit: 2.5 of 12.5 s."""
-    monkeypatch.setattr("pytest_simbench.client.crowding.scheduled", lambda pid: (10.0, waited))
+    monkeypatch.setattr("pytest_simbench.client.resources.scheduled", lambda pid: (10.0, waited))
     assert bool(crowding(7)) is told

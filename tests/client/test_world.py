@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pytest_simbench.client.answers import Frame
 from pytest_simbench.client.errors import Diverged, Where
-from pytest_simbench.client.frame import Frame
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.experiment.case import Case

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.case import PROTOCOLS, Case
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.protocol import PROTOCOLS
 from pytest_simbench.experiment.repetition import Hooks, Repetition, group
 from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.tasks.base import Jitter, Task

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.client.answers import Constructed
 from pytest_simbench.client.errors import Where, WorkerError
-from pytest_simbench.client.launch import Constructed
 from pytest_simbench.client.world import World
 from pytest_simbench.description.robot_files import received
 from pytest_simbench.motion.model import RobotModel
