@@ -189,6 +189,9 @@ LIES: dict[str, dict[str, Any]] = {
     "versions that cannot be sent": {
         "versions": lambda self: {"mujoco": "3.3", "numpy": Unprintable}
     },
+    "bodies": {"body_state": lambda self: MuJoCo.body_state(self)[:-1]},
+    "time": {"time": property(lambda self: min(0.3, MuJoCo.time.fget(self)))},  # type: ignore[attr-defined]
+    "joints": {"joint_state": lambda self: MuJoCo.joint_state(self)[:, [2, 1, 0, *range(3, 9)]]},
 }
 """What an adapter says, of another type than it must be."""
 

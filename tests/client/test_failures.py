@@ -94,6 +94,9 @@ CAUSES = [
     ("Lies deviations", "ProtocolError", "load", "Expected `str`, got `int` - at `$.excused["),
     ("Lies no dict of versions", "EngineFailed", "launch",
      "'int' object has no attribute 'get'"),
+    ("Lies bodies", "BadState", "load",
+     "mujoco: body_state() must be an array of float64 (2, 13), not float64 (1, 13)"),
+    ("Lies time", "BadState", "fall", "steps of 0.001 s from 0 s on, not 0.3 s"),
     ("Lies versions that cannot be sent", "EngineFailed", "launch", "DumpError"),
     ("Forks", "ProtocolError", "task", "engine forks and its child answers"),
 ]  # fmt: skip
