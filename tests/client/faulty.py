@@ -283,47 +283,16 @@ class ParentThatDies(Parent):
 
 
 HAUNTED = 0.5
-"""Simulated time from which on cubes do what no cube can [s]."""
+"""Simulated time from which on a cube does what no cube can [s]."""
 
 
-def without_contacts(simulator: MuJoCo) -> None:
-    import mujoco
+class Flying(MuJoCo):
+    """One cube is blown away, through whatever is in the way, at 10 m/s."""
 
-    simulator.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-
-
-class Ghost(MuJoCo):
     def step(self) -> None:
         super().step()
         if self.time >= HAUNTED:
-            self.haunt()
-
-    def haunt(self) -> None:
-        raise NotImplementedError
-
-
-class Sinking(Ghost):
-    """Nothing touches anything any more."""
-
-    def haunt(self) -> None:
-        without_contacts(self)
-
-
-class Flying(Ghost):
-    """One cube is blown away, through whatever is in the way, at 10 m/s."""
-
-    def haunt(self) -> None:
-        self.data.qvel[0] = 10.0
-
-
-class Merging(Ghost):
-    """One cube stands where another one stands, and nothing drives them apart."""
-
-    def haunt(self) -> None:
-        without_contacts(self)
-        self.model.opt.gravity[:] = 0.0
-        self.data.qpos[:3] = self.data.qpos[7:10]
-        self.data.qvel[:] = 0.0
+            self.data.qvel[0] = 10.0
 
 
 class Faulty(Simulator):

@@ -24,9 +24,9 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.tasks import LeaningTowers
 from pytest_simbench.tasks.base import Count, Outcome
 from pytest_simbench.worker.server import Server
-from pytest_simbench.worker.text import LONGEST, LONGEST_LOGGED, named, readable
+from pytest_simbench.worker.text import LONGEST_LOGGED
 from tests.client.failing import Silent, failure, faulty, run
-from tests.client.faulty import RAISED, Unprintable
+from tests.client.faulty import RAISED
 from tests.conftest import ADAPTERS
 from tests.tiny import Falling
 
@@ -111,19 +111,11 @@ def test_the_cause_arrives(case: Case, fault: str, kind: str, phase: str, messag
     assert message in found[2]
 
 
-@pytest.mark.parametrize(
-    ("ghost", "message"),
-    [
-        ("Sinking", "deep in the ground"),
-        ("Flying", "'cube_01' left the room"),
-        ("Merging", "'cube_01' and 'cube_02' overlap by"),
-    ],
-)
-def test_a_world_that_cannot_be_is_not_scored(case: Case, ghost: str, message: str) -> None:
-    case = faulty(case, ghost, stall_timeout=20.0)
+def test_a_world_that_cannot_be_is_not_scored(case: Case) -> None:
+    case = faulty(case, "Flying", stall_timeout=20.0)
     kind, phase, said = failure(case, LeaningTowers(margins=(0.015,)))
     assert (kind, phase) == ("Diverged", "settle")
-    assert message in said
+    assert "'cube_01' left the room" in said
 
 
 @pytest.mark.parametrize(
@@ -273,9 +265,3 @@ def test_words() -> None:
     assert exit_text(139) == "exited with status 139, a shell's word for SIGSEGV"
     assert exit_text(3) == "exited with status 3"
     assert exit_text(-9) == "was killed by SIGKILL"
-    assert readable("short") == "short"
-    assert readable("x" * LONGEST) == "x" * LONGEST
-    assert readable("x" * (LONGEST + 1)) == "x" * LONGEST + " ... (1 more characters)"
-    assert readable("\ud800") == "\\ud800"
-    assert named(Unprintable()) == "Unprintable: (its message cannot be read: RuntimeError)"
-    assert named(ValueError()) == "ValueError"

@@ -27,7 +27,7 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.repeater import Repeater
-from pytest_simbench.experiment.repetition import Hooks, Repetition
+from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.records.record import Record
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
 from tests.client.failing import STALL, Silent, failure, faulty
@@ -121,23 +121,6 @@ def test_a_log_is_cut_though_it_grew_at_once(case: Case) -> None:
     assert record.status == "ok"
     (log,) = (case.folder / "logs").iterdir()
     assert log.stat().st_size < 2 * KEPT
-
-
-@pytest.mark.parametrize("limit", [20.0, 60.0])
-def test_the_limits_are_those_given(case: Case, limit: float) -> None:
-    """Unscaled, on the worker's own clock: the numbers that the process is told."""
-    launch = replace(case, stall_timeout=limit).launch("limits")
-    assert (launch.start_timeout, launch.stall_timeout) == (limit, limit)
-    made: list[WorkerProcess] = []
-    repetition = Repetition(Experiment(replace(case, timeout=limit), Falling()), 1)
-    keep = repetition._made
-    repetition._made = lambda process: (keep(process), made.append(process))  # type: ignore
-    before = time.monotonic()
-    deadlines = []
-    repetition.hooks = Hooks(phase=lambda name: deadlines.extend(p.deadline for p in made))
-    repetition.run()
-    assert deadlines
-    assert all(before + limit <= at <= before + limit + 1.0 for at in deadlines if at)
 
 
 def interrupt_after(seconds: float, times: int = 1, apart: float = 0.0) -> threading.Thread:

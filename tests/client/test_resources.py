@@ -22,7 +22,6 @@ import pytest
 from pytest_simbench.client import resources
 from pytest_simbench.client.resources import (
     LISTING_INTERVAL,
-    MeanAndStd,
     ResourceSample,
     ResourceSampler,
     ResourceUse,
@@ -143,24 +142,6 @@ def test_samples_carry_the_phase_of_their_moment(start: Start) -> None:
     assert sum(len(phase.samples) for phase in phases.values()) == len(use.samples)
 
 
-def test_the_memory_limit_is_reported_once_and_can_end_the_process(start: Start) -> None:
-    process = start(ALLOCATE)
-    seen: list[float] = []
-
-    def end(rss_mb: float) -> None:
-        seen.append(rss_mb)
-        process.kill()
-
-    sampler = ResourceSampler(process.pid, 0.02, limit_mb=100, on_limit=end)
-    time.sleep(0.1)
-    assert not seen
-    go(process)
-    assert process.wait(timeout=15) == -signal.SIGKILL
-    sampler.stop()
-    until(lambda: len(seen) == 1)
-    assert seen[0] > 100
-
-
 def test_an_error_in_the_callback_does_not_end_the_sampling(start: Start) -> None:
     process = start(IDLE)
 
@@ -214,10 +195,15 @@ def test_the_wire_form_is_that_of_the_record() -> None:
         ResourceSample(0.2, "step", 90, 110),
         ResourceSample(0.3, "step", 110, 120),
     )
-    wire = ResourceUse(samples, 130.0).to_wire()
+    use = ResourceUse(samples, 130.123456)
+    assert {phase: part.peak_mb for phase, part in use.phases().items()} == {
+        "load": 100,
+        "step": 120,
+    }
+    wire = use.to_wire()
     assert json.loads(json.dumps(wire)) == {
         "cpu_percent": {"mean": 83.333, "std": 30.551},
-        "rss_mb": {"mean": 110, "std": 10, "peak": 130},
+        "rss_mb": {"mean": 110, "std": 10, "peak": 130.123},
         "samples": 3,
         "phases": {
             "load": {
@@ -232,10 +218,6 @@ def test_the_wire_form_is_that_of_the_record() -> None:
             },
         },
     }
-
-
-def test_spread_of_a_single_sample_is_none() -> None:
-    assert MeanAndStd.of([3.0]) == MeanAndStd(3.0, 0.0)
 
 
 class Process:
@@ -398,14 +380,3 @@ def test_one_thread_serves_all_and_ends_with_the_last() -> None:
     with ResourceSampler(pid, 0.01) as again:
         while again.latest is None:
             assert again.active
-
-
-def test_phases_have_their_own_peak_and_the_wire_three_decimals() -> None:
-    samples = (
-        ResourceSample(0.1, "a", 1, 10.0),
-        ResourceSample(0.2, "b", 2, 30.0),
-        ResourceSample(0.3, "a", 3, 20.0),
-    )
-    use = ResourceUse(samples, 30.123456)
-    assert {phase: part.peak_mb for phase, part in use.phases().items()} == {"a": 20.0, "b": 30.0}
-    assert use.to_wire()["rss_mb"]["peak"] == 30.123

@@ -82,6 +82,14 @@ def ask(monkeypatch: pytest.MonkeyPatch) -> Iterator[Asked]:
         os.environ.pop(variable, None)
 
 
+@pytest.fixture
+def loaded(ask: Asked) -> Asked:
+    """One whose world is loaded."""
+    ask.construct()
+    ask.load()
+    return ask
+
+
 def test_hello(ask: Asked) -> None:
     version = "{}.{}.{}".format(*sys.version_info)
     assert ask("hello") == {"pid": os.getpid(), "version": __version__, "python": version}
@@ -208,83 +216,69 @@ def test_a_body_with_the_name_of_a_link(ask: Asked) -> None:
     assert Hosted.calls == []
 
 
-def test_what_the_engine_says_while_it_remembers_another_scene(ask: Asked) -> None:
-    ask.construct()
-    ask.load()
-    assert ask("read_back")["body/cube/mass"] == 0.1
+def test_what_the_engine_says_while_it_remembers_another_scene(loaded: Asked) -> None:
+    assert loaded("read_back")["body/cube/mass"] == 0.1
     other = SCENE.with_body(Box("cube", (0.05,) * 3, Pose.at(0.5, 0, 0.5), mass=0.3))
-    assert ask("read_back", remember=other.to_wire())["body/cube/mass"] == 0.3
-    assert ask("read_back")["body/cube/mass"] == 0.1
+    assert loaded("read_back", remember=other.to_wire())["body/cube/mass"] == 0.3
+    assert loaded("read_back")["body/cube/mass"] == 0.1
 
 
-def test_waiting_and_following(ask: Asked) -> None:
-    ask.construct()
-    ask.load()
-    answer = ask("wait", duration=0.04, log_period=0.02)
+def test_waiting_and_following(loaded: Asked) -> None:
+    answer = loaded("wait", duration=0.04, log_period=0.02)
     assert set(answer) == {"log", "time", "joints", "bodies"}
     assert answer["time"] == pytest.approx(0.04)
     assert np.allclose(answer["log"]["time"], [0.02, 0.04])
     assert answer["log"]["bodies"].shape == (2, 1, 13)
     rows = np.zeros((3, 0))
     moved = {"tick": 0.004, "position": rows, "velocity": rows, "effort": rows}
-    answer = ask("follow", **moved, log_period=None)
+    answer = loaded("follow", **moved, log_period=None)
     assert set(answer) == {"log", "time", "joints", "bodies"}
     assert answer["time"] == pytest.approx(0.048)
     assert answer["log"] == {}
     assert [call for call in Hosted.calls if call[0] == "command"] == [("command", [], [], [])] * 2
 
 
-def test_a_log_that_is_none_is_found(ask: Asked, monkeypatch: Any) -> None:
-    ask.construct()
-    ask.load()
+def test_a_log_that_is_none_is_found(loaded: Asked, monkeypatch: Any) -> None:
     monkeypatch.setattr(Hosted, "joint_state", lambda self: np.zeros((2, 1)))
-    kind, message = ask.error("wait", duration=0.04, log_period=0.02)
+    kind, message = loaded.error("wait", duration=0.04, log_period=0.02)
     assert kind == "StateError"
     assert message == (
         "hosted: joint_state() must be an array of float64 (2, 0), not float64 (2, 1)"
     )
 
 
-def test_saved_states_have_names(ask: Asked) -> None:
-    ask.construct()
-    ask.load()
-    ask("save", name="start")
-    ask("wait", duration=0.04, log_period=None)
-    ask("save", name="later")
-    ask("wait", duration=0.04, log_period=None)
-    assert ask("restore", name="start")["time"] == 0.0
-    assert ask("restore", name="later")["time"] == pytest.approx(0.04)
+def test_saved_states_have_names(loaded: Asked) -> None:
+    loaded("save", name="start")
+    loaded("wait", duration=0.04, log_period=None)
+    loaded("save", name="later")
+    loaded("wait", duration=0.04, log_period=None)
+    assert loaded("restore", name="start")["time"] == 0.0
+    assert loaded("restore", name="later")["time"] == pytest.approx(0.04)
 
 
-def test_contacts_and_pictures(ask: Asked) -> None:
-    ask.construct()
-    ask.load()
-    assert ask("contact_count") == 7
-    assert ask("render", width=4, height=3).shape == (3, 4, 3)
+def test_contacts_and_pictures(loaded: Asked) -> None:
+    assert loaded("contact_count") == 7
+    assert loaded("render", width=4, height=3).shape == (3, 4, 3)
 
 
-def test_a_film_is_of_whole_steps_and_of_the_size_asked_for(ask: Asked) -> None:
-    ask.construct()
-    ask.load()
-    assert ask("film", period=0.0085, width=4, height=3) == pytest.approx(0.008)
-    ask("wait", duration=0.016, log_period=None)
-    frames = [sent["frame"] for sent in ask.sent if "frame" in sent]
+def test_a_film_is_of_whole_steps_and_of_the_size_asked_for(loaded: Asked) -> None:
+    assert loaded("film", period=0.0085, width=4, height=3) == pytest.approx(0.008)
+    loaded("wait", duration=0.016, log_period=None)
+    frames = [sent["frame"] for sent in loaded.sent if "frame" in sent]
     assert [frame["time"] for frame in frames] == pytest.approx([0.008, 0.016])
     assert [unpack(frame["picture"]).shape for frame in frames] == [(3, 4, 3)] * 2
-    ask.sent.clear()
-    assert ask("film", period=None, width=4, height=3) is None
-    ask("wait", duration=0.016, log_period=None)
-    assert ask.sent == []
+    loaded.sent.clear()
+    assert loaded("film", period=None, width=4, height=3) is None
+    loaded("wait", duration=0.016, log_period=None)
+    assert loaded.sent == []
 
 
-def test_forces_of_a_pair_are_one_sum_on_the_first_by_name(ask: Asked) -> None:
-    ask.construct()
-    ask.load()
+def test_forces_of_a_pair_are_one_sum_on_the_first_by_name(loaded: Asked) -> None:
     one, two, three = np.arange(1.0, 7.0), np.full(6, 10.0), np.full(6, 0.5)
     Hosted.touching.extend([
         ("cube", "table", one), ("table", "cube", two), ("cube", "table", three), ("a", "b", one),
     ])  # fmt: skip
-    (first, second, wrench), other = ask("contact_forces")
+    (first, second, wrench), other = loaded("contact_forces")
     assert (first, second) == ("cube", "table")
     assert wrench == pytest.approx(one - two + three)
     assert other[:2] == ["a", "b"] or other[:2] == ("a", "b")
@@ -316,14 +310,12 @@ def test_it_waits_for_the_wall_clock_where_asked(ask: Asked) -> None:
     assert ask.server.stepper.real_time is False
 
 
-def test_signs_of_life(ask: Asked, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_signs_of_life(loaded: Asked, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stepping, "HEARTBEAT_PERIOD", -1.0)
-    ask.construct()
-    ask.load()
-    ask("wait", duration=0.2, log_period=None)
-    assert ask.sent
-    assert all(set(sign) == {"alive"} and type(sign["alive"]) is float for sign in ask.sent)
-    assert [sign["alive"] for sign in ask.sent] == pytest.approx([0.1, 0.2])
+    loaded("wait", duration=0.2, log_period=None)
+    assert loaded.sent
+    assert all(set(sign) == {"alive"} and type(sign["alive"]) is float for sign in loaded.sent)
+    assert [sign["alive"] for sign in loaded.sent] == pytest.approx([0.1, 0.2])
 
 
 def test_closing(ask: Asked) -> None:
@@ -365,21 +357,19 @@ class Mute(Exception):
     ],
 )
 def test_every_error_is_an_answer(
-    ask: Asked, error: BaseException, kind: str, message: str, capsys: pytest.CaptureFixture[str]
+    loaded: Asked, error: BaseException, kind: str, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    ask.construct()
-    ask.load()
     Hosted.raises.append(error)
-    assert ask.error("wait", duration=0.1, log_period=None) == (kind, message)
+    assert loaded.error("wait", duration=0.1, log_period=None) == (kind, message)
     log = capsys.readouterr().err
     assert log.startswith("Traceback (most recent call last):")
     assert type(error).__name__ in log
     Hosted.raises.clear()
-    assert ask("wait", duration=0.1, log_period=None)["time"] == pytest.approx(0.1)
+    assert loaded("wait", duration=0.1, log_period=None)["time"] == pytest.approx(0.1)
 
 
 def test_an_error_is_an_answer_though_the_log_cannot_be_written(
-    ask: Asked, monkeypatch: pytest.MonkeyPatch
+    loaded: Asked, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Full:
         def write(self, text: str) -> int:
@@ -387,18 +377,16 @@ def test_an_error_is_an_answer_though_the_log_cannot_be_written(
 
         flush = None
 
-    ask.construct()
-    ask.load()
     Hosted.raises.append(ValueError("so"))
     monkeypatch.setattr(sys, "stderr", Full())
-    assert ask.error("wait", duration=0.1, log_period=None) == ("EngineError", "ValueError: so")
+    assert loaded.error("wait", duration=0.1, log_period=None) == ("EngineError", "ValueError: so")
 
 
-def test_the_log_holds_a_long_traceback_cut(ask: Asked, capsys: pytest.CaptureFixture[str]) -> None:
-    ask.construct()
-    ask.load()
+def test_the_log_holds_a_long_traceback_cut(
+    loaded: Asked, capsys: pytest.CaptureFixture[str]
+) -> None:
     Hosted.raises.append(ValueError("x" * 200_000))
-    ask.error("wait", duration=0.1, log_period=None)
+    loaded.error("wait", duration=0.1, log_period=None)
     assert 100_000 < len(capsys.readouterr().err) < 100_100
 
 
