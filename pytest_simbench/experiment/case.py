@@ -146,11 +146,6 @@ class Case:
         )
 
     @property
-    def reuses_worker(self) -> bool:
-        """Whether one worker serves several repetitions."""
-        return self.costly_start and not self.fresh
-
-    @property
     def short_name(self) -> str:
         """The test's name without its file, fit for a file name; no other test has it."""
         return file_name(short(self.test), self.test)

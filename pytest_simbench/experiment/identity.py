@@ -61,7 +61,7 @@ def record_of(
         status=status,
         protocol=case.protocol.name,
         jitter=case.jitter,
-        settings={**settings, **experiment.parameters},
+        settings={**settings, **experiment.task.parameters()},
         versions={"pytest-simbench": __version__, **versions},
         scene=scene_digest(experiment.task),
         robot=describe_robot(experiment.robot),
@@ -164,7 +164,7 @@ def _content(path: str) -> str:
 def file_stem(experiment: Experiment, number: int) -> str:
     """The name of a repetition's log and trace, without folder and ending; no other has it."""
     case, task = experiment.case, experiment.task
-    return _stem(case.test, task.name, experiment.parameters, number, case.attempt)
+    return _stem(case.test, task.name, task.parameters(), number, case.attempt)
 
 
 def file_stem_of(record: Record) -> str:
