@@ -203,24 +203,6 @@ class Unprintable(Exception):
     __repr__ = __str__
 
 
-class Unspeakable(Exception):
-    def __str__(self) -> str:
-        raise SystemExit(9)
-
-
-class Letters(str):
-    """A text that is no text to execnet."""
-
-
-class OwnText(Exception):
-    def __str__(self) -> str:
-        return Letters("mine")
-
-
-class Rude(BaseException):
-    """An exception that no `except Exception` sees."""
-
-
 class Derived(UnavailableError):
     """An adapter's own kind of one of ours."""
 
@@ -229,16 +211,7 @@ RAISED: dict[str, Any] = {
     "surrogate": lambda: ValueError("bad \ud800 text"),
     "huge": lambda: ValueError("y" * 5_000_000),
     "no_text": Unprintable,
-    "exits_in_text": Unspeakable,
-    "own_text": OwnText,
-    "parity_without_text": lambda: type("Odd", (Unprintable, ParityError), {})(),
-    "exit_without_text": lambda: SystemExit(Unprintable()),
-    "no_string": lambda: ValueError(b"bytes", {1: 2}, None),
-    "interrupt": lambda: KeyboardInterrupt("from inside"),
-    "generator": lambda: GeneratorExit("done"),
-    "rude": lambda: Rude("hm"),
     "exit": lambda: SystemExit(3),
-    "exit_text": lambda: SystemExit("tired"),
     "parity": lambda: ParityError("\udfff" * 3000),
     "derived": lambda: Derived("no driver"),
 }

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
+import execnet
 import numpy as np
 import pytest
 
@@ -54,6 +55,7 @@ class Asked:
     def error(self, op: str, **arguments: Any) -> tuple[str, str]:
         """Type and message of what went wrong."""
         answer = self.answer(op, **arguments)
+        assert execnet.loads(execnet.dumps(answer)) == answer
         assert set(answer) == {"error"}
         assert set(answer["error"]) == {"type", "message"}
         return answer["error"]["type"], answer["error"]["message"]
@@ -333,6 +335,30 @@ class Mute(Exception):
     def __str__(self) -> str:
         raise RuntimeError("no text")
 
+    __repr__ = __str__
+
+
+class MuteParity(Mute, ParityError):
+    """One of ours that has no text either."""
+
+
+class Exiting(Exception):
+    def __str__(self) -> str:
+        raise SystemExit(9)
+
+
+class Letters(str):
+    """A text that is no text to execnet."""
+
+
+class Spelt(Exception):
+    def __str__(self) -> str:
+        return Letters("mine")
+
+
+class Rude(BaseException):
+    """An exception that no `except Exception` sees."""
+
 
 @pytest.mark.parametrize(
     ("error", "kind", "message"),
@@ -348,7 +374,19 @@ class Mute(Exception):
         (ValueError("so"), "EngineError", "ValueError: so"),
         (ValueError(), "EngineError", "ValueError"),
         (KeyboardInterrupt(), "EngineError", "KeyboardInterrupt"),
+        (KeyboardInterrupt("so"), "EngineError", "KeyboardInterrupt: so"),
+        (GeneratorExit("so"), "EngineError", "GeneratorExit: so"),
+        (Rude("so"), "EngineError", "Rude: so"),
         (Mute(), "EngineError", "Mute: (its message cannot be read: RuntimeError)"),
+        (Exiting(), "EngineError", "Exiting: (its message cannot be read: SystemExit)"),
+        (Spelt(), "EngineError", "Spelt: mine"),
+        (MuteParity(), "ParityError", "(its message cannot be read: RuntimeError)"),
+        (
+            SystemExit(Mute()),
+            "SystemExit",
+            "the adapter called sys.exit('(its message cannot be read: RuntimeError)'), status 1",
+        ),
+        (ValueError(b"b", {1: 2}, None), "EngineError", "ValueError: (b'b', {1: 2}, None)"),
         (
             ValueError("x" * 5000),
             "EngineError",
