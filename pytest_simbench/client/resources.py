@@ -314,11 +314,7 @@ def scheduled(pid: int, proc: Path = Path("/proc")) -> tuple[float, float]:
 
 
 def crowding(pid: int) -> str:
-    """What a late worker's error says of a machine that was too full; nothing if it was not.
-
-    Args:
-        pid: of a process on this machine.
-    """
+    """What a late worker's error says of a machine that was too full; nothing if it was not."""
     computed, waited = scheduled(pid)
     if waited <= CROWDED * (computed + waited):
         return ""

@@ -74,11 +74,7 @@ class Shared:
 
 
 class ClusterExecutor(Executor):
-    """Repetitions on the nodes of a cluster.
-
-    Args:
-        pool: the nodes.
-    """
+    """Repetitions on the nodes of a cluster."""
 
     def __init__(self, pool: Pool) -> None:
         self.pool = pool

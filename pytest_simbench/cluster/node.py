@@ -198,11 +198,7 @@ _latest = LatestJobs()
 
 
 def run(packed: Packed, number: int) -> dict[str, Any]:
-    """What Dask calls on a node.
-
-    Args:
-        packed: the job, or its digest alone.
-        number: see `carry_out`.
+    """What Dask calls on a node, with a job or its digest alone.
 
     Returns:
         what `carry_out` does; or `lost`: why this node cannot carry it out, as text; or `unknown`:

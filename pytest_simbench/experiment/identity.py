@@ -36,16 +36,8 @@ def record_of(
     versions: Mapping[str, str],
     **found: Any,
 ) -> Record:
-    """The record of a repetition: what the experiment says of it, and what was found besides.
-
-    Args:
-        experiment: that is repeated.
-        number: of the repetition, from 1.
-        status: how it ended.
-        settings: of the simulator.
-        versions: of the packages that it runs on.
-        found: further fields of the record.
-    """
+    """The record of a repetition, counted from 1: what the experiment says of it, and the fields of
+    the record that were found besides."""
     case = experiment.case
     return Record(
         test=case.test,

@@ -82,9 +82,6 @@ class Clock:
 class Control:
     """Runs the workload often enough to take its share, and keeps its clocks.
 
-    Args:
-        clock: of the stepping.
-
     Attributes:
         runs: of the workload, after two that only warm it up.
         wall: seconds of all runs.

@@ -237,12 +237,8 @@ class Watch:
 
 
 class Obstacles:
-    """Boxes around all that a body can touch, but for the ground.
-
-    Args:
-        scene: with the bodies and the robot.
-        expected: its quantities, with their outlines.
-    """
+    """Boxes around all that a body can touch, but for the ground: from the outlines of a scene's
+    quantities."""
 
     def __init__(self, scene: Scene, expected: Mapping[str, Any]) -> None:
         self._robot = None if scene.robot is None else PreparedRobot(scene.robot)
