@@ -12,8 +12,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.worker.text import readable
-from pytest_simbench.worker.wire import unpack
+from pytest_simbench.worker.wire import readable, unpack
 
 
 class Hello(TypedDict):

@@ -37,8 +37,7 @@ from pytest_simbench.client.launch import Launch
 from pytest_simbench.client.resources import crowding
 from pytest_simbench.ground.versions import RELEASE, VersionedName
 from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.worker.text import named, readable
-from pytest_simbench.worker.wire import pack, unpack
+from pytest_simbench.worker.wire import named, pack, readable, unpack
 
 LOOK_PERIOD = 1.0
 """Wall time between two looks at the log and the limits while waiting for an answer [s]."""

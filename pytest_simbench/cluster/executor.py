@@ -35,7 +35,7 @@ from pytest_simbench.recordings.trace import FOLDER as TRACES
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Failure, Record, Status
-from pytest_simbench.worker.text import told
+from pytest_simbench.worker.wire import told
 
 ATTEMPTS = 2
 """Of a repetition: after a lost node once more elsewhere."""

@@ -14,7 +14,7 @@ from pytest_simbench.recordings import album, film
 from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.worker.text import named
+from pytest_simbench.worker.wire import named
 
 
 def draws(simulator: str) -> str:

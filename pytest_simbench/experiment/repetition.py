@@ -35,7 +35,7 @@ from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.registry import seeds_seen
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.worker.stepping import CHECK_PERIOD
-from pytest_simbench.worker.text import LONGEST, named, readable, told
+from pytest_simbench.worker.wire import LONGEST, named, readable, told
 
 
 @dataclass(frozen=True)

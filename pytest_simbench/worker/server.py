@@ -46,9 +46,8 @@ from pytest_simbench.worker.state import (
     checked_state,
 )
 from pytest_simbench.worker.stepping import Film, Stepper
-from pytest_simbench.worker.text import LONGEST_LOGGED, named, readable, told
 from pytest_simbench.worker.watching import Watch
-from pytest_simbench.worker.wire import pack, unpack
+from pytest_simbench.worker.wire import LONGEST_LOGGED, named, pack, readable, told, unpack
 
 
 def peak_rss_mb() -> float | None:

@@ -12,8 +12,7 @@ import numpy as np
 from pytest_simbench.scene import FloatArray, Scene, Trajectory
 from pytest_simbench.simulator import DivergedError, Simulator
 from pytest_simbench.worker.acting import Acting
-from pytest_simbench.worker.control import Clock, Control
-from pytest_simbench.worker.family import Family
+from pytest_simbench.worker.control import Clock, Control, Family
 from pytest_simbench.worker.state import States
 from pytest_simbench.worker.watching import Watch
 

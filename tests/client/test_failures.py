@@ -24,7 +24,7 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.tasks import LeaningTowers
 from pytest_simbench.tasks.base import Count, Outcome
 from pytest_simbench.worker.server import Server
-from pytest_simbench.worker.text import LONGEST_LOGGED
+from pytest_simbench.worker.wire import LONGEST_LOGGED
 from tests.client.failing import Silent, failure, faulty, run
 from tests.client.faulty import RAISED
 from tests.conftest import ADAPTERS

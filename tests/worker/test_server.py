@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from collections.abc import Iterator
 from typing import Any
@@ -15,9 +16,8 @@ from pytest_simbench import __version__
 from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.simulator import DivergedError, ParityError, StateError
 from pytest_simbench.worker import stepping
-from pytest_simbench.worker.server import Server, serve
-from pytest_simbench.worker.text import LONGEST
-from pytest_simbench.worker.wire import pack, unpack
+from pytest_simbench.worker.server import Server, peak_rss_mb, reset_peak_rss, serve
+from pytest_simbench.worker.wire import LONGEST, pack, unpack
 from tests.worker.hosted import Hosted
 
 CUBE = Box("cube", (0.05, 0.05, 0.05), Pose.at(0.5, 0.0, 0.5), mass=0.1)
@@ -442,3 +442,38 @@ def test_it_serves_until_it_is_told_to_close() -> None:
     assert [(answer["number"], "ok" in answer) for answer in sent] == [(0, True), (1, True)]
     assert sent[1]["ok"] is None
     assert len(requests) == 1
+
+
+CODE = """
+from pytest_simbench.worker.server import peak_rss_mb, reset_peak_rss
+
+def kilobytes(key):
+    with open("/proc/self/status") as status:
+        return next(int(line.split()[1]) for line in status if line.startswith(key))
+
+block = bytearray(b"x") * 100_000_000
+peak, before = peak_rss_mb(), kilobytes("VmHWM")
+del block
+reset_peak_rss()
+print(peak, before, peak_rss_mb(), kilobytes("VmRSS"))
+"""
+
+
+def test_the_peak_is_the_kernel_s_and_starts_anew() -> None:
+    found = subprocess.run(
+        [sys.executable, "-c", CODE], capture_output=True, text=True, check=True
+    ).stdout.split()
+    peak, kilobytes, after, now = map(float, found)
+    assert peak == pytest.approx(kilobytes * 1024 / 1e6, rel=3e-4)  # not MiB: 4.9 % less
+    assert peak > 100
+    assert after < peak - 90
+    assert after == pytest.approx(now * 1024 / 1e6, rel=0.05)
+
+
+def test_where_the_kernel_tells_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*args: object, **options: object) -> None:
+        raise PermissionError("no /proc here")
+
+    monkeypatch.setattr("builtins.open", refused)
+    assert peak_rss_mb() is None
+    reset_peak_rss()
