@@ -1,5 +1,5 @@
-"""What crosses the boundary: arrays as bytes with dtype and shape, inside the plain data of execnet;
-and texts of exceptions, made fit to travel and to be kept, whatever they hold."""
+"""What crosses the boundary: arrays, as bytes with dtype and shape inside what execnet carries, and
+texts of exceptions, made fit to travel and to be kept, whatever they hold."""
 
 from __future__ import annotations
 
