@@ -28,7 +28,6 @@ class Launch:
         spec: whole execnet specification, which overrides `python` (another host).
         environment: variables set in the worker's environment.
         log: file that takes all of the worker's output, None to leave it alone.
-        start_timeout: for interpreter start and handshake, each [s].
         stall_timeout: longest silence before the worker counts as hung [s].
         compile_timeout: for `Simulator.compile` [s], if that is longer; 0 where there is nothing
             to compile.
@@ -39,7 +38,6 @@ class Launch:
     spec: str | None = None
     environment: Mapping[str, str] = field(default_factory=dict)
     log: Path | None = None
-    start_timeout: float = 60.0
     stall_timeout: float = 60.0
     compile_timeout: float = 0.0
 

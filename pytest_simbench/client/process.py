@@ -42,6 +42,9 @@ from pytest_simbench.worker.wire import named, pack, readable, unpack
 LOOK_PERIOD = 1.0
 """Wall time between two looks at the log and the limits while waiting for an answer [s]."""
 
+LEAST_START = 1.0
+"""For an interpreter to start, and for its hello, however short silence may be else [s]."""
+
 EXIT_TIMEOUT = 2.0
 """The pipe breaks a moment before the process can be waited for [s]."""
 
@@ -106,8 +109,9 @@ class WorkerProcess:
     def _start(self) -> None:
         launch = self.launch
         self._connection.open(bootstrap, self._configuration())
-        self._next(launch.start_timeout, self._not_started)
-        hello = self.request("hello", timeout=launch.start_timeout)
+        limit = max(launch.stall_timeout, LEAST_START)
+        self._next(limit, self._not_started)
+        hello = self.request("hello", timeout=limit)
         self.pid = hello["pid"]
         self.python_version = hello["python"]
         if hello["version"] != __version__:

@@ -170,7 +170,6 @@ class Case:
                 **(self.display.environment() if self.display else {}),
             },
             log=log,
-            start_timeout=max(self.stall_timeout, 1.0),
             stall_timeout=self.stall_timeout,
             compile_timeout=self.compile_timeout if self.costly_start else 0.0,
         )

@@ -64,11 +64,6 @@ def go(process: subprocess.Popen[str]) -> None:
 
 
 IDLE = "print('ready', flush=True); input()"
-ALLOCATE = """
-    print('ready', flush=True); input()
-    block = bytearray(b'x') * (200_000_000)
-    input()
-"""
 
 
 def until(condition: Callable[[], bool], seconds: float = 15.0) -> None:
@@ -122,37 +117,6 @@ def test_a_child_that_comes_later_and_goes_is_followed(start: Start) -> None:
         until(lambda: sampler.latest is not None and sampler.latest.rss_mb > 100)
         go(process)
         until(lambda: sampler.latest is not None and sampler.latest.rss_mb < 50)
-
-
-def test_samples_carry_the_phase_of_their_moment(start: Start) -> None:
-    process = start(ALLOCATE)
-    with ResourceSampler(process.pid, 0.02) as sampler:
-        sampler.phase = "load"
-        until(lambda: sampler.latest is not None and sampler.latest.phase == "load")
-        go(process)
-        until(lambda: sampler.latest is not None and sampler.latest.rss_mb > 200)
-        sampler.phase = "step"
-        until(lambda: sampler.latest is not None and sampler.latest.phase == "step")
-        use = sampler.stop()
-    phases = use.phases()
-    assert list(phases)[-2:] == ["load", "step"]
-    step = phases["step"].rss_mb
-    assert step is not None
-    assert step.mean == pytest.approx(psutil.Process(process.pid).memory_info().rss / 1e6, rel=0.01)
-    assert sum(len(phase.samples) for phase in phases.values()) == len(use.samples)
-
-
-def test_an_error_in_the_callback_does_not_end_the_sampling(start: Start) -> None:
-    process = start(IDLE)
-
-    def fail(rss_mb: float) -> None:
-        raise ProcessLookupError
-
-    with ResourceSampler(process.pid, 0.02, limit_mb=0.1, on_limit=fail) as sampler:
-        until(lambda: sampler.callback_error is not None)
-        seen = len(sampler._samples)
-        until(lambda: len(sampler._samples) > seen + 1)
-        assert isinstance(sampler.callback_error, ProcessLookupError)
 
 
 def test_samples_of_a_process_that_dies_are_kept(start: Start) -> None:
@@ -352,6 +316,24 @@ def test_samples_come_in_a_rhythm_and_never_too_soon(
     monkeypatch: pytest.MonkeyPatch, looks: list[float], times: list[float]
 ) -> None:
     assert [s.time for s in sampled(monkeypatch, looks)] == pytest.approx(times)
+
+
+def test_samples_carry_the_phase_of_their_moment() -> None:
+    found = sampler()
+    for phase in ("load", "step"):
+        found.phase = phase
+        assert found.look().phase == phase
+
+
+def test_an_error_in_the_callback_does_not_end_the_sampling() -> None:
+    def fail(rss_mb: float) -> None:
+        raise ProcessLookupError
+
+    with ResourceSampler(psutil.Process().pid, 0.02, limit_mb=0.1, on_limit=fail) as found:
+        until(lambda: found.callback_error is not None)
+        seen = len(found._samples)
+        until(lambda: len(found._samples) > seen + 1)
+        assert isinstance(found.callback_error, ProcessLookupError)
 
 
 def test_a_limit_is_exceeded_only_above_it_and_told_once() -> None:

@@ -80,7 +80,7 @@ class ScriptedProcess:
 
     def __init__(self, script: Iterable[Mishap] = (), *, timestep: float = 0.004) -> None:
         self.where = Where("scripted", "headless")
-        self.launch = SimpleNamespace(compile_timeout=0.0, log=None, start_timeout=1.0)
+        self.launch = SimpleNamespace(compile_timeout=0.0, log=None)
         self.deadline: float | None = None
         self.pending = list(script)
         self.timestep = timestep
