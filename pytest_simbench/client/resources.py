@@ -174,7 +174,6 @@ class ResourceSampler:
         self.pid = pid
         self.interval = interval
         self.limit_mb = limit_mb
-        self.callback_error: Exception | None = None
         self._on_limit = on_limit
         self._samples: list[ResourceSample] = []
         self._began = time.perf_counter()
@@ -235,14 +234,8 @@ class ResourceSampler:
         limit, tell = self.limit_mb, self._on_limit
         if limit is not None and tell is not None and sample.rss_mb > limit:
             self._on_limit = None
-            arguments = tell, sample.rss_mb
-            threading.Thread(target=self._tell, args=arguments, name=TELLER, daemon=True).start()
-
-    def _tell(self, tell: Callable[[float], object], rss_mb: float) -> None:
-        try:
-            tell(rss_mb)
-        except Exception as error:  # sampling goes on; the owner can look at it
-            self.callback_error = error
+            arguments = (sample.rss_mb,)  # in a thread of its own: sampling goes on, come what may
+            threading.Thread(target=tell, args=arguments, name=TELLER, daemon=True).start()
 
 
 class _Looks:

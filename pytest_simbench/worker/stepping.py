@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,9 @@ period is made of these looks, and costs next to nothing."""
 LOOK_PERIOD = 0.01
 """Simulated time between two looks at the wall clock, for window and pacing [s]."""
 
+LOG = ("time", "joints", "bodies")
+"""What is sampled while stepping."""
+
 
 @dataclass
 class Clocks:
@@ -48,28 +51,6 @@ class Clocks:
     wall: float = 0.0
     waited: float = 0.0
     cpu: float = 0.0
-
-
-@dataclass
-class Log:
-    """States sampled while stepping; `arrays` stacks them."""
-
-    times: list[float] = field(default_factory=list)
-    joints: list[FloatArray] = field(default_factory=list)
-    bodies: list[FloatArray] = field(default_factory=list)
-
-    def sample(self, time: float, joints: FloatArray, bodies: FloatArray) -> None:
-        self.times.append(time)
-        self.joints.append(joints)
-        self.bodies.append(bodies)
-
-    def arrays(self) -> dict[str, FloatArray]:
-        """time (n,), joints (n, 2, n_joints), bodies (n, n_free, 13)."""
-        return {
-            "time": np.array(self.times),
-            "joints": np.array(self.joints),
-            "bodies": np.array(self.bodies),
-        }
 
 
 @dataclass(frozen=True)
@@ -132,7 +113,8 @@ class Stepper:
         """Advance by `steps`; a log sample every `log_period` [s] (0: every step; None: no log).
 
         Returns:
-            The log; {} where there is no sample.
+            The log: time (n,), joints (n, 2, n_joints), bodies (n, n_free, 13); {} where there is
+            no sample.
 
         Raises:
             DivergedError: joint or body state is not finite.
@@ -145,7 +127,8 @@ class Stepper:
         watched = simulator.gui or self.real_time
         look_every = max(1, round((LOOK_PERIOD if watched else CHECK_PERIOD) / timestep))
         film_every = self.film.every if self.film is not None else 0
-        log, states, from_time = Log(), self.states, self.states.time()
+        states, from_time = self.states, self.states.time()
+        samples: list[tuple[float, FloatArray, FloatArray]] = []
         watch, from_start = self.watch, self.clocks.steps
         due = watch.due - from_start if watch is not None else 0
         step, command, clock = simulator.step, simulator.command, self._clock
@@ -183,7 +166,7 @@ class Stepper:
             if logs or checks:
                 joints, bodies = states.joints(), states.bodies()
                 if logs:
-                    log.sample(now, joints, bodies)
+                    samples.append((now, joints, bodies))
                 if checks:
                     self._check_finite(now, joints, bodies)
                     if watch is not None:
@@ -208,7 +191,8 @@ class Stepper:
             resumed, waited = clock()
         totals.steps += steps
         totals.simulated += steps * timestep
-        return log.arrays() if log.times else {}
+        columns = map(np.array, zip(*samples, strict=True))
+        return dict(zip(LOG, columns, strict=True)) if samples else {}
 
     def _check_finite(self, time: float, joints: FloatArray, bodies: FloatArray) -> None:
         for what, state in (("joints", joints), ("bodies", bodies)):

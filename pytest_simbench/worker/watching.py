@@ -163,7 +163,7 @@ class Watch:
         return seconds
 
     def check_log(self, log: Mapping[str, FloatArray]) -> None:
-        """The samples of a motion, as `stepping.Log.arrays`: whether anything jumps.
+        """The samples of a motion, as `Stepper` gives them: whether anything jumps.
 
         Raises:
             ParityError: something does.
