@@ -305,11 +305,9 @@ class Repetition:
 
     def _log_name(self) -> str:
         log = self._process.launch.log if self._process else None
-        return (
-            str(log.relative_to(self.case.folder))
-            if log and self.case.folder in log.parents
-            else ""
-        )
+        if log is None or self.case.folder not in log.parents:
+            return ""
+        return str(log.relative_to(self.case.folder))
 
     def _filming(self) -> Camera | None:
         """For the film of a repetition that counts."""
