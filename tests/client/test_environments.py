@@ -212,14 +212,6 @@ def home(monkeypatch: pytest.MonkeyPatch, path: str | Path) -> None:
     monkeypatch.setattr(SystemPython, "python", Path(path))
 
 
-def script(folder: Path, text: str) -> Path:
-    """An executable that is no Python."""
-    path = folder / "python3"
-    path.write_text(f"#!/bin/sh\n{text}\n")
-    path.chmod(0o755)
-    return path
-
-
 def test_absent_engine(packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch) -> None:
     home(monkeypatch, sys.executable)
     assert missing(packaged) == (
@@ -276,28 +268,33 @@ def test_an_engine_that_is_importable_here_runs_here(packaged: SimulatorInfo) ->
     assert interpreter(packaged) is None
 
 
-def test_no_such_interpreter(
-    packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (None, "does not run"),
+        ("exit 1", "does not run"),
+        ("echo hello", "does not run"),
+        ("kill -9 $$", "does not run"),
+        (
+            """echo '{"python": [3, 10, 12], "version": "1", "absent": []}'""",
+            "is Python 3.10.12, older than 3.11",
+        ),
+    ],
+)
+def test_what_is_no_interpreter_for_us(
+    packaged: SimulatorInfo,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    text: str | None,
+    message: str,
 ) -> None:
-    home(monkeypatch, tmp_path / "python3")
-    assert f"{tmp_path / 'python3'} does not run" in str(missing(packaged))
-    assert SystemPython(packaged).version() is None
-
-
-@pytest.mark.parametrize("text", ["exit 1", "echo hello", "kill -9 $$"])
-def test_something_that_is_no_interpreter(
-    packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, text: str
-) -> None:
-    home(monkeypatch, script(tmp_path, text))
-    assert "does not run" in str(missing(packaged))
-
-
-def test_python_that_is_too_old(
-    packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    answer = '{"python": [3, 10, 12], "version": "1", "absent": []}'
-    home(monkeypatch, script(tmp_path, f"echo '{answer}'"))
-    assert "is Python 3.10.12, older than 3.11" in str(missing(packaged))
+    path = tmp_path / "python3"
+    home(monkeypatch, path)
+    if text is not None:
+        path.write_text(f"#!/bin/sh\n{text}\n")
+        path.chmod(0o755)
+    assert f"{path} {message}" in str(missing(packaged))
+    assert SystemPython(packaged).version() == ("1" if "older" in message else None)
 
 
 PAGE = """<!DOCTYPE html><html><body>
