@@ -28,7 +28,7 @@ class Launch:
         spec: whole execnet specification, which overrides `python` (another host).
         environment: variables set in the worker's environment.
         log: file that takes all of the worker's output, None to leave it alone.
-        stall_timeout: longest silence before the worker counts as hung [s].
+        stall_timeout: longest silence before the worker counts as hung, also while it starts [s].
         compile_timeout: for `Simulator.compile` [s], if that is longer; 0 where there is nothing
             to compile.
     """

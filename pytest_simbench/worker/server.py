@@ -45,7 +45,7 @@ from pytest_simbench.worker.state import (
     checked_quantities,
     checked_state,
 )
-from pytest_simbench.worker.stepping import Film, Stepper
+from pytest_simbench.worker.stepping import Stepper
 from pytest_simbench.worker.watching import Watch
 from pytest_simbench.worker.wire import LONGEST_LOGGED, named, pack, readable, told, unpack
 
@@ -259,7 +259,7 @@ class Server:
             stepper.film = None
             return None
         every = max(1, round(period / timestep))
-        stepper.film = Film(every, lambda: self._shoot(width, height))
+        stepper.film = every, lambda: self._shoot(width, height)
         return every * timestep
 
     def _shoot(self, width: int, height: int) -> None:

@@ -53,21 +53,14 @@ class Clocks:
     cpu: float = 0.0
 
 
-@dataclass(frozen=True)
-class Film:
-    """A picture every so many steps, counted since loading; `shoot` takes and sends one."""
-
-    every: int
-    shoot: Callable[[], None]
-
-
 class Stepper:
     """Steps one simulator through trajectories and waits, and keeps its clocks.
 
     Attributes:
         states: reads the simulator's clock and states.
         acting: what moves bodies from outside; None: nothing.
-        film: pictures along the way, outside of the measured stepping time; None: none.
+        film: every how many steps since loading a picture is due, and what takes one, outside of
+            the measured stepping time; None: no pictures.
         clocks: totals since loading.
         control: the workload that shows the machine's speed meanwhile.
         watch: what looks whether the world stays as it was loaded; None: nothing.
@@ -89,7 +82,7 @@ class Stepper:
         self._clock, self._family = Clock(), Family()
         self.control = Control(self._clock)
         self.real_time = False
-        self.film: Film | None = None
+        self.film: tuple[int, Callable[[], None]] | None = None
         self.watch: Watch | None = None
         self._next_picture = 0.0
 
@@ -126,7 +119,7 @@ class Stepper:
         check_every = max(1, round(CHECK_PERIOD / timestep))
         watched = simulator.gui or self.real_time
         look_every = max(1, round((LOOK_PERIOD if watched else CHECK_PERIOD) / timestep))
-        film_every = self.film.every if self.film is not None else 0
+        film_every = self.film[0] if self.film is not None else 0
         states, from_time = self.states, self.states.time()
         samples: list[tuple[float, FloatArray, FloatArray]] = []
         watch, from_start = self.watch, self.clocks.steps
@@ -176,7 +169,7 @@ class Stepper:
                 beat = stopped
                 self.heartbeat(now)
             if films and self.film is not None:
-                self.film.shoot()
+                self.film[1]()
             if simulator.gui and stopped > self._next_picture:
                 simulator.refresh_window()
                 drawn = time.perf_counter()

@@ -25,7 +25,7 @@ from pytest_simbench.scene import (
 from pytest_simbench.simulator import DivergedError, NotSupportedError
 from pytest_simbench.worker import control
 from pytest_simbench.worker.acting import Acting, prescribed
-from pytest_simbench.worker.stepping import CHECK_PERIOD, Clocks, Film, Stepper
+from pytest_simbench.worker.stepping import CHECK_PERIOD, Clocks, Stepper
 from tests.worker.hosted import Toy
 
 CUBE = Box("cube", (0.05, 0.05, 0.05), Pose.at(0.5, 0.0, 0.5, yaw=0.3), mass=0.1)
@@ -53,7 +53,7 @@ def test_a_state_that_is_sampled_is_not_read_again_to_be_checked() -> None:
 def test_pictures_go_on_from_one_operation_to_the_next() -> None:
     toy, times = Toy(), []
     stepper = stepping(toy)
-    stepper.film = Film(20, lambda: times.append(toy.time))
+    stepper.film = 20, lambda: times.append(toy.time)
     for duration in (0.05, 0.02, 0.06):
         stepper.wait(duration, None)
     assert times == pytest.approx([0.04, 0.08, 0.12])
