@@ -105,7 +105,7 @@ SLOW = {
 }
 """They take more than a second of CPU time each, and no engine. The quick tier leaves them out."""
 
-ENGINE_FIXTURES = {"case", "machines", "pytester", "stepper"}
+ENGINE_FIXTURES = {"case", "machines", "pytester"}
 """Of tests that run MuJoCo, pytest with simulators, or a cluster of them."""
 
 

@@ -1,19 +1,39 @@
-"""What a worker answers to each request, by type: nothing else is used, or written to a record."""
+"""What a worker sends, by type: an answer to each request, and frames of a film in between. Nothing
+else is used, or written to a record."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, NotRequired, TypedDict
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
-from pytest_simbench.client.launch import Constructed
+from pytest_simbench.worker.wire import readable, unpack
 
 
 class Hello(TypedDict):
     pid: int
     version: str
     python: str
+
+
+@dataclass(frozen=True)
+class Constructed:
+    """A simulator that a worker made.
+
+    Attributes:
+        settings: all of them, by name.
+        versions: of the packages that it runs on, by name.
+        untested: why this is no version that the adapter was tested with; empty if it is one.
+    """
+
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    versions: Mapping[str, str] = field(default_factory=dict)
+    untested: str = ""
 
 
 class State(TypedDict):
@@ -82,3 +102,37 @@ def checked(operation: str, answer: Any) -> Any:
         msgspec.ValidationError: it is of another one; the message says where in it.
     """
     return msgspec.convert(answer, ANSWERS[operation])
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One picture of a film, or why there are no more.
+
+    Attributes:
+        time: simulated [s].
+        picture: (height, width, 3), red, green, blue; None: the engine could not draw it.
+        problem: why, as a sentence.
+        seconds: that drawing took [s].
+    """
+
+    time: float
+    picture: NDArray[np.uint8] | None
+    problem: str
+    seconds: float
+
+    @classmethod
+    def from_wire(cls, data: Any, size: tuple[int, int]) -> Frame:
+        """What came for a picture of `size` (width, height); what is none is a problem."""
+        try:
+            time, seconds = float(data["time"]), float(data["seconds"])
+            if "problem" in data:
+                return cls(time, None, readable(str(data["problem"])), 0.0)
+            picture = unpack(data["picture"])
+            if picture.dtype == np.uint8 and picture.shape == (*size[::-1], 3):
+                return cls(time, picture, "", max(0.0, seconds) if math.isfinite(seconds) else 0.0)
+            came = f"{picture.dtype} {picture.shape}"
+        except (KeyError, TypeError, ValueError, AttributeError):
+            came = f"{data!r:.80}"
+        return cls(
+            0.0, None, f"the engine drew what is no picture of {size}: {readable(came)}", 0.0
+        )

@@ -72,8 +72,8 @@ class Environment:
     folder: Path
 
     @classmethod
-    def of(cls, info: SimulatorInfo, root: Path | None = None) -> Environment:
-        return cls(info, (root or default_folder()) / (info.home or info.name))
+    def of(cls, info: SimulatorInfo) -> Environment:
+        return cls(info, default_folder() / (info.home or info.name))
 
     @property
     def python(self) -> Path:
@@ -114,8 +114,12 @@ class Environment:
         return None
 
     def variables(self) -> dict[str, str]:
-        """Environment variables that keep compiled kernels between runs."""
-        return cache_variables(self.info.caches, self.folder / "cache")
+        """Variables that keep compiled kernels between runs, unless the user set them."""
+        return {
+            variable: str(self.folder / "cache" / name)
+            for variable, name in self.info.caches.items()
+            if variable not in os.environ
+        }
 
     def check(self) -> None:
         """Complain of what can be known before anything is made.
@@ -309,20 +313,11 @@ def remove(folder: Path) -> None:
         shutil.rmtree(folder)
 
 
-def existing(root: Path | None = None) -> Iterator[Path]:
+def existing() -> Iterator[Path]:
     """The folders of the environments that are there, also of half-made ones, by name."""
-    root = root or default_folder()
+    root = default_folder()
     if root.is_dir():
         yield from sorted(p for p in root.iterdir() if p.is_dir() and not p.name.startswith("."))
-
-
-def cache_variables(caches: Mapping[str, str], folder: Path) -> dict[str, str]:
-    """Variables of `SimulatorInfo.caches`, pointing into a folder, unless the user set them."""
-    return {
-        variable: str(folder / name)
-        for variable, name in caches.items()
-        if variable not in os.environ
-    }
 
 
 def missing(info: SimulatorInfo) -> str | None:

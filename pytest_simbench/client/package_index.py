@@ -12,6 +12,7 @@ import subprocess
 import sys
 import urllib.error
 import urllib.request
+from bisect import bisect
 from collections.abc import Iterable
 from contextlib import suppress
 from functools import cache
@@ -69,19 +70,15 @@ def releases(distribution: str) -> list[str]:
 
 def newest_of_minors(versions: Iterable[str]) -> list[str]:
     """The last of each minor version (3.2.0, 3.2.1, 3.3.0: 3.2.1 and 3.3.0), oldest first."""
-    newest: dict[tuple[int, int], Version] = {}
-    for version in sorted(map(Version, versions)):
-        newest[version.major, version.minor] = version
+    newest = {(v.major, v.minor): v for v in sorted(map(Version, versions))}
     return [str(version) for version in newest.values()]
 
 
-def nearest(version: str, versions: Iterable[str], number: int = 4) -> list[str]:
-    """The released versions next to one that is not, oldest first."""
+def nearest(version: str, versions: Iterable[str]) -> list[str]:
+    """The four released versions next to one that is not, oldest first."""
     ordered = sorted(map(Version, versions))
-    below = [v for v in ordered if v < Version(version)]
-    above = ordered[len(below) :]
-    chosen = below[-(number - min(len(above), number // 2)) :] + above
-    return [str(v) for v in chosen[:number]]
+    first = max(0, min(bisect(ordered, Version(version)) - 2, len(ordered) - 4))
+    return [str(v) for v in ordered[first : first + 4]]
 
 
 def unreleased(distribution: str, version: str, known: Iterable[str]) -> str:

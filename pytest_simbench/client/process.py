@@ -17,9 +17,8 @@ from packaging.utils import canonicalize_version
 
 from pytest_simbench import __version__
 from pytest_simbench.client import bootstrap, reaper
-from pytest_simbench.client.answers import checked
+from pytest_simbench.client.answers import Constructed, Frame, checked
 from pytest_simbench.client.connection import Connection, RemoteError
-from pytest_simbench.client.crowding import crowding
 from pytest_simbench.client.errors import (
     REMOTE_ERRORS,
     EngineFailed,
@@ -34,16 +33,17 @@ from pytest_simbench.client.errors import (
     WorkerStartError,
     exit_text,
 )
-from pytest_simbench.client.frame import Frame
-from pytest_simbench.client.launch import Constructed, Launch
-from pytest_simbench.client.logs import shorten_log, tail_of_log
+from pytest_simbench.client.launch import Launch
+from pytest_simbench.client.resources import crowding
 from pytest_simbench.ground.versions import RELEASE, VersionedName
 from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.worker.text import named, readable
-from pytest_simbench.worker.wire import pack, unpack
+from pytest_simbench.worker.wire import named, pack, readable, unpack
 
 LOOK_PERIOD = 1.0
 """Wall time between two looks at the log and the limits while waiting for an answer [s]."""
+
+LEAST_START = 1.0
+"""For an interpreter to start, and for its hello, however short silence may be else [s]."""
 
 EXIT_TIMEOUT = 2.0
 """The pipe breaks a moment before the process can be waited for [s]."""
@@ -109,8 +109,9 @@ class WorkerProcess:
     def _start(self) -> None:
         launch = self.launch
         self._connection.open(bootstrap, self._configuration())
-        self._next(launch.start_timeout, self._not_started)
-        hello = self.request("hello", timeout=launch.start_timeout)
+        limit = max(launch.stall_timeout, LEAST_START)
+        self._next(limit, self._not_started)
+        hello = self.request("hello", timeout=limit)
         self.pid = hello["pid"]
         self.python_version = hello["python"]
         if hello["version"] != __version__:
@@ -253,7 +254,7 @@ class WorkerProcess:
         began = time.monotonic()
         limit = self.launch.stall_timeout if timeout is None else timeout
         while True:
-            shorten_log(self.launch.log)
+            self.launch.shorten_log()
             # Signs of life put the end off, unless the request as a whole is limited.
             since = max(began, self._connection.heard) if timeout is None else began
             now, until, error = time.monotonic(), since + limit, late
@@ -272,7 +273,7 @@ class WorkerProcess:
 
     def _remote_error(self, error: dict[str, str]) -> WorkerError:
         kind = REMOTE_ERRORS.get(error["type"], EngineFailed)
-        return kind(error["message"], self.where, self.log_tail())
+        return kind(error["message"], self.where, self.launch.log_tail())
 
     def _hung(self, limit: float) -> WorkerError:
         what = (
@@ -325,7 +326,7 @@ class WorkerProcess:
     def _ended_by(self, kind: type[WorkerError], what: str) -> WorkerError:
         """End the worker; the error for it, which is the first reason that anybody gave."""
         self._give_reason(kind, what)
-        tail = self.log_tail()
+        tail = self.launch.log_tail()
         self.kill()
         assert self._reason is not None
         kind, what = self._reason
@@ -334,10 +335,6 @@ class WorkerProcess:
     def _give_reason(self, kind: type[WorkerError], what: str) -> None:
         with self._lock:
             self._reason = self._reason or (kind, what)
-
-    def log_tail(self) -> str:
-        """The last lines of the worker's log."""
-        return tail_of_log(self.launch.log)
 
     def kill_for_memory(self, used_mb: float, limit_mb: float) -> None:
         """End a worker that eats memory; the request under way raises `OutOfMemory`."""
@@ -387,7 +384,7 @@ class WorkerProcess:
                 process.kill()
         self._connection.cut()
         self._connection.close()
-        shorten_log(self.launch.log)
+        self.launch.shorten_log()
         if self._temporary is not None:
             shutil.rmtree(self._temporary, ignore_errors=True)
         self._ended = True

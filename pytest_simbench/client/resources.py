@@ -1,4 +1,4 @@
-"""CPU and memory of a worker and its children, sampled from outside.
+"""CPU and memory of a worker and its children, seen from outside; whether it had a processor.
 
 A look at one process costs about 30 us of CPU, a look for children about 600 us on a quiet machine
 (measured with psutil 7 on Linux): 0.1 % of a core at 10 Hz.
@@ -6,10 +6,12 @@ A look at one process costs about 30 us of CPU, a look for children about 600 us
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any, NamedTuple
 
@@ -23,6 +25,10 @@ THREAD, TELLER = "simbench-sampler", "simbench-memory"
 
 LISTING_INTERVAL = 1.0
 """Wall seconds between two looks for new children: listing reads every process of the machine."""
+
+CROWDED = 0.2
+"""A worker that waited for more than this share of its time was held up. With three busy processes
+on two cores each waited for 0.3 to 0.5."""
 
 
 class ResourceSample(NamedTuple):
@@ -168,7 +174,6 @@ class ResourceSampler:
         self.pid = pid
         self.interval = interval
         self.limit_mb = limit_mb
-        self.callback_error: Exception | None = None
         self._on_limit = on_limit
         self._samples: list[ResourceSample] = []
         self._began = time.perf_counter()
@@ -229,14 +234,8 @@ class ResourceSampler:
         limit, tell = self.limit_mb, self._on_limit
         if limit is not None and tell is not None and sample.rss_mb > limit:
             self._on_limit = None
-            arguments = tell, sample.rss_mb
-            threading.Thread(target=self._tell, args=arguments, name=TELLER, daemon=True).start()
-
-    def _tell(self, tell: Callable[[float], object], rss_mb: float) -> None:
-        try:
-            tell(rss_mb)
-        except Exception as error:  # sampling goes on; the owner can look at it
-            self.callback_error = error
+            arguments = (sample.rss_mb,)  # in a thread of its own: sampling goes on, come what may
+            threading.Thread(target=tell, args=arguments, name=TELLER, daemon=True).start()
 
 
 class _Looks:
@@ -290,3 +289,29 @@ class _Looks:
 
 
 _looks = _Looks()
+
+
+def scheduled(pid: int, proc: Path = Path("/proc")) -> tuple[float, float]:
+    """How long the living threads of a process computed, and waited for a processor [s].
+
+    From the kernel's `schedstat` (Linux). Both are 0 where it does not tell, or the process is
+    gone.
+    """
+    computed = waited = 0.0
+    with contextlib.suppress(OSError, ValueError):
+        for thread in (proc / str(pid) / "task").iterdir():
+            on, off = (thread / "schedstat").read_text().split()[:2]
+            computed += float(on) / 1e9
+            waited += float(off) / 1e9
+    return computed, waited
+
+
+def crowding(pid: int) -> str:
+    """What a late worker's error says of a machine that was too full; nothing if it was not."""
+    computed, waited = scheduled(pid)
+    if waited <= CROWDED * (computed + waited):
+        return ""
+    return (
+        f"; its threads waited {waited:.0f} s for a processor and computed {computed:.0f} s, so "
+        "the machine had too much to do: ask for fewer --sim-jobs, or end what else runs"
+    )

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_simbench.client.answers import Frame
 from pytest_simbench.client.errors import Diverged, EngineFailed
-from pytest_simbench.client.frame import Frame
 from pytest_simbench.client.process import WorkerProcess
-from pytest_simbench.client.stopwatch import Stopwatch
 from pytest_simbench.description.robot_files import with_content
 from pytest_simbench.ground.files import FileError
 from pytest_simbench.scene import FloatArray, Pose, Scene, Trajectory
@@ -28,7 +27,6 @@ TRACE_PERIOD = 0.02
 PART = 2.0
 """A sampled wait is asked for in parts of this simulated time [s]: the worker holds the samples of
 one. Those of a minute took 27 MB there, which looked like the simulator's memory."""
-
 
 LONGEST = 1e9
 """A wait [s]."""
@@ -58,6 +56,32 @@ class Motion:
             np.concatenate([part.joints for part in parts]),
             np.concatenate([part.bodies for part in parts]),
         )
+
+
+class Stopwatch:
+    """Adds up wall seconds by name; the total runs from construction."""
+
+    def __init__(self) -> None:
+        self.started = time.perf_counter()
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def measuring(self, name: str) -> Iterator[None]:
+        began = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.add(name, time.perf_counter() - began)
+
+    def add(self, name: str, seconds: float) -> None:
+        self.seconds[name] = self.seconds.get(name, 0.0) + seconds
+
+    def leave_out(self, seconds: float) -> None:
+        """What just took so long is none of what is timed."""
+        self.started += seconds
+
+    def elapsed(self) -> float:
+        return time.perf_counter() - self.started
 
 
 class World:
@@ -131,7 +155,9 @@ class World:
         try:
             return with_content(self.scene.to_wire(), self.scene.robot)
         except (DescriptionError, FileError) as error:
-            raise EngineFailed(str(error), self.process.where, self.process.log_tail()) from None
+            raise EngineFailed(
+                str(error), self.process.where, self.process.launch.log_tail()
+            ) from None
 
     def _compile(self) -> None:
         """Have the engine compile; the repetition's time-out stands still meanwhile."""

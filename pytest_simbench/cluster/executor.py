@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import CancelledError, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ from pytest_simbench.recordings.trace import FOLDER as TRACES
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Failure, Record, Status
-from pytest_simbench.worker.text import told
+from pytest_simbench.worker.wire import told
 
 ATTEMPTS = 2
 """Of a repetition: after a lost node once more elsewhere."""
@@ -74,11 +74,7 @@ class Shared:
 
 
 class ClusterExecutor(Executor):
-    """Repetitions on the nodes of a cluster.
-
-    Args:
-        pool: the nodes.
-    """
+    """Repetitions on the nodes of a cluster."""
 
     def __init__(self, pool: Pool) -> None:
         self.pool = pool
@@ -93,7 +89,7 @@ class ClusterExecutor(Executor):
     def repetition(
         self, experiment: Experiment, number: int, hooks: Hooks | None = None
     ) -> AnyRepetition:
-        return RemoteRepetition(self.pool, self.shared, experiment, number, hooks or Hooks())
+        return RemoteRepetition(self, experiment, number, hooks or Hooks())
 
     def shared(self, experiment: Experiment) -> Shared:
         """What an experiment's repetitions share, made once: meshes and data sets are large.
@@ -116,15 +112,14 @@ class RemoteRepetition:
 
     def __init__(
         self,
-        pool: Pool,
-        shared: Callable[[Experiment], Shared],
+        executor: ClusterExecutor,
         experiment: Experiment,
         number: int,
         hooks: Hooks,
     ) -> None:
-        self.pool = pool
+        self.pool = executor.pool
         self.experiment = experiment
-        self._shared = shared
+        self._shared = executor.shared
         self.case = case = experiment.case
         self.number = number
         self.hooks = hooks
@@ -160,7 +155,9 @@ class RemoteRepetition:
         while True:
             reserved = self.pool.reserve(self._able, avoid, self._stop)
             if self._stop.is_set():
-                raise self._interrupted(reserved)
+                if reserved is not None:
+                    self.pool.release(reserved[0])
+                raise self._interrupted()
             if reserved is None:
                 raise NodeLost(self._why("no other node offers it"), self.where)
             key, self._node = reserved
@@ -188,9 +185,7 @@ class RemoteRepetition:
         lost = f"it was lost on {', then on '.join(self._lost)}; " if self._lost else ""
         return f"{lost}{end}"
 
-    def _interrupted(self, reserved: tuple[str, Node] | None) -> BaseException:
-        if reserved is not None:
-            self.pool.release(reserved[0])
+    def _interrupted(self) -> BaseException:
         return Interrupted("the run was interrupted", self.where)
 
     def _on(self, node: Node, key: str, job: Packed) -> Mapping[str, Any]:
@@ -206,7 +201,7 @@ class RemoteRepetition:
             shown: Mapping[str, Any] = {}
             while not wait([coming], LOOK_PERIOD).done:
                 if self._stop.is_set():
-                    raise self._interrupted(None)
+                    raise self._interrupted()
                 if not self.pool.lives(node):
                     raise _Lost(GONE)
                 shown = self._show(key, shown)

@@ -123,11 +123,7 @@ class Job:
         )
 
     def experiment(self, folder: Path, **more: Any) -> Experiment:
-        """On this machine.
-
-        Args:
-            folder: for logs and traces.
-            more: further attributes of the case.
+        """On this machine, with a folder for logs and traces.
 
         Raises:
             OSError: the robot's files cannot be kept here.

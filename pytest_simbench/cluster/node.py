@@ -17,7 +17,6 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +69,7 @@ class Benches:
     def __init__(self) -> None:
         self._by_case: dict[str, Bench] = {}
         self._lock = threading.Lock()
-        atexit.register(self._clear, 0.0)
+        atexit.register(self._close)
 
     @contextmanager
     def bench(self, job: Job) -> Iterator[Bench]:
@@ -81,70 +80,46 @@ class Benches:
         """
         key = repr((job.client, sorted(job.case.items())))
         with self._lock:
-            bench = self._by_case.get(key)
-            if bench is None:
-                bench = Bench(Path(tempfile.mkdtemp(prefix="simbench-node-")))
-                self._by_case[key] = bench
+            if key not in self._by_case:
+                self._by_case[key] = Bench(Path(tempfile.mkdtemp(prefix="simbench-node-")))
+            bench = self._by_case[key]
             bench.users += 1
         try:
             yield bench
         finally:
             with self._lock:
                 bench.users -= 1
-                bench.left = time.monotonic()
-            costly = job.case["costly_start"] and not job.case["fresh"]
-            self._clear(IDLE if costly else 0.0, None if costly else bench)
-            if costly:
-                timer = threading.Timer(IDLE + 1.0, self._clear, (IDLE,))
+                bench.left = left = time.monotonic()
+            if job.case["costly_start"] and not job.case["fresh"]:
+                timer = threading.Timer(IDLE, self._clear, (key, left))
                 timer.daemon = True
                 timer.start()
+            else:
+                self._clear(key, left)
 
-    def _clear(self, after: float, only: Bench | None = None) -> None:
+    def _clear(self, key: str, left: float) -> None:
+        """Clear a bench away that nobody has used since it was left."""
         with self._lock:
-            now = time.monotonic()
-            old = {
-                key: bench
-                for key, bench in self._by_case.items()
-                if not bench.users and now - bench.left >= after and only in (None, bench)
-            }
-            for key in old:
-                del self._by_case[key]
-        for bench in old.values():
+            bench = self._by_case.get(key)
+            if bench is None or bench.users or bench.left != left:
+                return
+            del self._by_case[key]
+        bench.close()
+
+    def _close(self) -> None:
+        for bench in self._by_case.values():
             bench.close()
 
 
-@cache
-def benches() -> Benches:
-    """Those of this process."""
-    return Benches()
-
-
-@cache
-def displays() -> Displays:
-    """Those of this process."""
-    return Displays()
-
-
-@dataclass
-class JobProgress:
-    """How far a repetition is, as its hooks tell."""
-
-    phase: str = ""
-    done: int = 0
-    total: int = 0
-
-    def enter(self, phase: str) -> None:
-        self.phase = phase
-
-    def count(self, done: int, total: int) -> None:
-        self.done, self.total = done, total
+_benches = Benches()
+_displays = Displays()
 
 
 def carry_out(
     job: Job,
     number: int,
     slots: int,
-    progress: JobProgress,
+    progress: dict[str, Any],
     started: Callable[[Repetition], object],
 ) -> dict[str, Any]:
     """Carry a repetition out.
@@ -153,7 +128,7 @@ def carry_out(
         job: what to do.
         number: of the repetition; 0 starts and ends the simulator alone.
         slots: of the node; with several at once, records are contended.
-        progress: kept up to date.
+        progress: takes how far it is: `phase`, `done`, `total`.
         started: told of the repetition before it runs, so that another thread may kill it.
 
     Returns:
@@ -163,10 +138,13 @@ def carry_out(
     Raises:
         OSError: this machine cannot carry it out: its disk is full, for instance.
     """
-    with benches().bench(job) as bench:
-        display = displays() if job.case["mode"] == "gui" else None
+    with _benches.bench(job) as bench:
+        display = _displays if job.case["mode"] == "gui" else None
         experiment = job.experiment(bench.folder, contended=slots > 1, display=display)
-        hooks = Hooks(phase=progress.enter, count=progress.count)
+        hooks = Hooks(
+            phase=lambda name: progress.update(phase=name),
+            count=lambda done, total: progress.update(done=done, total=total),
+        )
         repetition = Repetition(experiment, number, idle=bench.idle, hooks=hooks)
         started(repetition)
         record, error = repetition.run()
@@ -220,11 +198,7 @@ _latest = LatestJobs()
 
 
 def run(packed: Packed, number: int) -> dict[str, Any]:
-    """What Dask calls on a node.
-
-    Args:
-        packed: the job, or its digest alone.
-        number: see `carry_out`.
+    """What Dask calls on a node, with a job or its digest alone.
 
     Returns:
         what `carry_out` does; or `lost`: why this node cannot carry it out, as text; or `unknown`:
@@ -237,19 +211,20 @@ def run(packed: Packed, number: int) -> dict[str, Any]:
         return {"unknown": packed.digest}
     worker = get_worker()
     key = worker.get_current_task()
-    progress, ended = JobProgress(), threading.Event()
+    nothing: dict[str, Any] = {"phase": "", "done": 0, "total": 0}
+    progress, ended = dict(nothing), threading.Event()
 
     def watch(repetition: Repetition) -> None:
         """Tell of the progress, and end what nobody wants any more."""
-        before = JobProgress()
+        before = nothing
         while not ended.wait(LOOK_PERIOD):
             task = worker.state.tasks.get(key)
             if task is None or task.state in ("cancelled", "released", "forgotten"):
                 repetition.kill()
                 return
-            now = JobProgress(progress.phase, progress.done, progress.total)
+            now = dict(progress)
             if now != before:
-                worker.log_event(TOPIC, {"key": key, **vars(now)})
+                worker.log_event(TOPIC, {"key": key, **now})
                 before = now
 
     def started(repetition: Repetition) -> None:

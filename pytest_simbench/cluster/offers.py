@@ -100,60 +100,51 @@ class Node:
         address: of this process of it; one that is started again has another.
         name: of the node.
         slots: repetitions at once.
-        offers: names of its resources.
+        versions: of the plugin, of Python and of its simulators, by name; a release by its own
+            name, `mysim==3.3.7`.
+        devices: those of `DEVICES` that it has.
     """
 
     address: str
     name: str
     slots: int
-    offers: frozenset[str]
+    versions: Mapping[str, str]
+    devices: tuple[str, ...]
 
     @classmethod
     def of(cls, address: str, name: object, resources: Mapping[str, float]) -> Node | None:
         """The node, or None for a worker of Dask's that is none of ours."""
         if SLOTS not in resources:
             return None
-        return cls(address, str(name), int(resources[SLOTS]), frozenset(resources))
-
-    def version(self, simulator: str) -> str | None:
-        """Of a simulator there, or None; a release is asked for by its name, `mysim==3.3.7`."""
-        versions = dict(_taken_apart(offer) for offer in self.offers if RELEASE in offer)
-        return versions.get(simulator)
+        parts = [offer.rpartition(RELEASE) for offer in sorted(resources) if RELEASE in offer]
+        versions = {name: found for name, _, found in parts}
+        devices = tuple(device for device in DEVICES if device in resources)
+        return cls(address, str(name), int(resources[SLOTS]), versions, devices)
 
     @property
     def stranger(self) -> str:
         """Why nothing can be carried out there, in words, or nothing."""
-        if PLUGIN not in self.offers:
-            return f"runs pytest-simbench {self.version(SLOTS)}, and this is {__version__}"
-        if PYTHON not in self.offers:
-            ours = PYTHON.partition("==")[2]
-            return f"runs Python {self.version('python')}, and this is {ours}"
+        for what, offer in (("pytest-simbench", PLUGIN), ("Python", PYTHON)):
+            name, _, ours = offer.partition(RELEASE)
+            if self.versions.get(name) != ours:
+                return f"runs {what} {self.versions.get(name)}, and this is {ours}"
         return ""
 
     def has(self, simulator: str, mode: str) -> bool:
         """Whether it can carry out repetitions of a simulator in a mode."""
         return (
             not self.stranger
-            and self.version(simulator) is not None
-            and (mode != "gui" or DISPLAY in self.offers)
+            and simulator in self.versions
+            and (mode != "gui" or DISPLAY in self.devices)
         )
 
     def __str__(self) -> str:
-        own = (SLOTS, "python")
-        sims = [_taken_apart(offer) for offer in sorted(self.offers) if RELEASE in offer]
         told = [
             name if RELEASE in name else f"{name} {found}"
-            for name, found in sims
-            if name not in own
+            for name, found in self.versions.items()
+            if name not in (SLOTS, "python")
         ]
-        told += [device for device in DEVICES if device in self.offers]
-        return f"{self.name} has {', '.join(told) or 'no simulator'}"
-
-
-def _taken_apart(offer: str) -> tuple[str, str]:
-    """Name and version."""
-    name, _, found = offer.rpartition(RELEASE)
-    return name, found
+        return f"{self.name} has {', '.join([*told, *self.devices]) or 'no simulator'}"
 
 
 def refusal(nodes: Sequence[Node]) -> str:
@@ -173,12 +164,12 @@ def unmet(nodes: Sequence[Node], simulator: str, modes: Iterable[str]) -> str | 
         if not able:
             what = f"{simulator} with a display" if mode == "gui" else simulator
             told = f"no node of the cluster offers {what}: {'; '.join(map(str, nodes))}"
-            if RELEASE in simulator and not any(node.version(simulator) for node in nodes):
+            if RELEASE in simulator and not any(simulator in node.versions for node in nodes):
                 told += f"; on one of them: simbench install {simulator}, and start it again"
             return told
         versions: dict[str, list[str]] = {}
         for node in able:
-            versions.setdefault(node.version(simulator) or "", []).append(node.name)
+            versions.setdefault(node.versions[simulator], []).append(node.name)
         if len(versions) > 1:
             told = ", ".join(f"{v} ({', '.join(names)})" for v, names in sorted(versions.items()))
             return (

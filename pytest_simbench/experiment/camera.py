@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from pytest_simbench.client.frame import Frame
+from pytest_simbench.client.answers import Frame
 from pytest_simbench.client.world import World
 from pytest_simbench.recordings.album import SIZE, Album
 from pytest_simbench.recordings.film import PERIOD, Film

@@ -11,13 +11,51 @@ from typing import Any
 from pytest_simbench.client.display import Displays
 from pytest_simbench.client.environments import Environment, interpreter
 from pytest_simbench.client.launch import Launch
-from pytest_simbench.experiment.protocol import PROTOCOLS, Protocol
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.records.choices import FIRST_SEED
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.series import short
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator.registry import adapter, address
+from pytest_simbench.tasks.base import Task
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """How repetitions are run.
+
+    Attributes:
+        name: as given to `--protocol`.
+        real_time: step in step with the wall clock.
+        before: how long the idle worker is recorded before its simulator starts [s].
+        repetitions: default of `--reps`.
+        smallest: run the smallest version of each task.
+        study: run each task by the reference study's own rules.
+    """
+
+    name: str
+    real_time: bool = False
+    before: float = 0.0
+    repetitions: int = 20
+    smallest: bool = False
+    study: bool = False
+
+    def version_of(self, task: Task) -> Task:
+        """What is run when a test asks for `task`; `Experiment.task` asks, and nobody else."""
+        if self.smallest:
+            return task.smoke()
+        return task.study() if self.study else task
+
+
+PROTOCOLS = {
+    protocol.name: protocol
+    for protocol in (
+        Protocol("fast"),
+        Protocol("paper", real_time=True, before=5.0, study=True),
+        Protocol("smoke", repetitions=1, smallest=True),
+    )
+}
+"""The study's time-outs (900 s, 600 s) are the tasks' own and hold in every protocol."""
 
 
 @dataclass(frozen=True)
@@ -108,11 +146,6 @@ class Case:
         )
 
     @property
-    def reuses_worker(self) -> bool:
-        """Whether one worker serves several repetitions."""
-        return self.costly_start and not self.fresh
-
-    @property
     def short_name(self) -> str:
         """The test's name without its file, fit for a file name; no other test has it."""
         return file_name(short(self.test), self.test)
@@ -137,7 +170,6 @@ class Case:
                 **(self.display.environment() if self.display else {}),
             },
             log=log,
-            start_timeout=max(self.stall_timeout, 1.0),
             stall_timeout=self.stall_timeout,
             compile_timeout=self.compile_timeout if self.costly_start else 0.0,
         )

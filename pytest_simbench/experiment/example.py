@@ -248,19 +248,13 @@ def replay_command(path: Path, case: Case, scene: Scene) -> str:
     """What to type to see the episode in `path` again, as it was run here."""
     with suppress(ValueError):
         path = path.absolute().relative_to(Path.cwd())
-    words = ["simbench", "replay", str(path)]
+    words, own = ["simbench", "replay", str(path)], None
+    with suppress(SimulatorError):
+        own = interpreter(adapter(case.simulator).info)  # what a replay takes by itself
     if case.spec:
         words.append(f"--spec={case.spec}")
-    elif case.python and case.python != _own_python(case.simulator):
+    elif case.python and case.python != own:
         words.append(f"--python={case.python}")
     if scene.robot is not None and scene.robot.name not in ROBOTS:
         words.append("--trust-robot")
     return shlex.join(words)
-
-
-def _own_python(simulator: str) -> str | None:
-    """The interpreter that a replay takes by itself."""
-    try:
-        return interpreter(adapter(simulator).info)
-    except SimulatorError:
-        return None

@@ -57,25 +57,15 @@ class Experiment:
         """Of a repetition, counted from 1."""
         return self.case.seed + number - 1
 
-    @property
-    def jitter(self) -> Jitter:
-        """Of the cubes' start, as large as `--jitter` has it."""
-        one = Jitter()
-        return Jitter(one.distance * self.case.jitter, one.angle * self.case.jitter)
-
     def scene(self, seed: int) -> Scene:
-        """The world that the task begins with."""
-        return self.task.scene(seed, self.jitter)
+        """The world that the task begins with, its cubes disturbed as `--jitter` has it."""
+        one, scale = Jitter(), self.case.jitter
+        return self.task.scene(seed, Jitter(one.distance * scale, one.angle * scale))
 
     @property
     def reuses_worker(self) -> bool:
         """Whether one worker serves several repetitions."""
-        return self.case.reuses_worker or (self.task.shares_worker and not self.case.fresh)
-
-    @property
-    def parameters(self) -> dict[str, Any]:
-        """Of the task, under their names in records."""
-        return self.task.parameters()
+        return (self.case.costly_start or self.task.shares_worker) and not self.case.fresh
 
     @property
     def timeout(self) -> float:

@@ -9,8 +9,8 @@ from contextlib import contextmanager, suppress
 from itertools import count
 from typing import Any
 
+from pytest_simbench.client.answers import Constructed
 from pytest_simbench.client.errors import DisplayError, DisplayLost, Where, WorkerError
-from pytest_simbench.client.launch import Constructed
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.tape import TapedWorld
 from pytest_simbench.experiment.case import Case

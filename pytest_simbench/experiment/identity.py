@@ -36,16 +36,8 @@ def record_of(
     versions: Mapping[str, str],
     **found: Any,
 ) -> Record:
-    """The record of a repetition: what the experiment says of it, and what was found besides.
-
-    Args:
-        experiment: that is repeated.
-        number: of the repetition, from 1.
-        status: how it ended.
-        settings: of the simulator.
-        versions: of the packages that it runs on.
-        found: further fields of the record.
-    """
+    """The record of a repetition, counted from 1: what the experiment says of it, and the fields of
+    the record that were found besides."""
     case = experiment.case
     return Record(
         test=case.test,
@@ -61,7 +53,7 @@ def record_of(
         status=status,
         protocol=case.protocol.name,
         jitter=case.jitter,
-        settings={**settings, **experiment.parameters},
+        settings={**settings, **experiment.task.parameters()},
         versions={"pytest-simbench": __version__, **versions},
         scene=scene_digest(experiment.task),
         robot=describe_robot(experiment.robot),
@@ -164,7 +156,7 @@ def _content(path: str) -> str:
 def file_stem(experiment: Experiment, number: int) -> str:
     """The name of a repetition's log and trace, without folder and ending; no other has it."""
     case, task = experiment.case, experiment.task
-    return _stem(case.test, task.name, experiment.parameters, number, case.attempt)
+    return _stem(case.test, task.name, task.parameters(), number, case.attempt)
 
 
 def file_stem_of(record: Record) -> str:

@@ -14,7 +14,7 @@ from pytest_simbench.recordings import album, film
 from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.worker.text import named
+from pytest_simbench.worker.wire import named
 
 
 def draws(simulator: str) -> str:
@@ -25,13 +25,8 @@ def draws(simulator: str) -> str:
 
 
 def photograph(experiment: Experiment, *, pictures: bool = True, video: bool = False) -> str:
-    """Repeat the first seed once more, into `pictures/` and `videos/` of the run folder; what is
-    there already stays.
-
-    Args:
-        experiment: to repeat.
-        pictures: whether an album is made.
-        video: whether a film is made.
+    """Repeat the first seed once more for an album, a film or both, in `pictures/` and `videos/` of
+    the run folder; what is there already stays.
 
     Returns:
         Why there is none, as a sentence, or nothing.

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 from typing import Protocol as Interface
 
+from pytest_simbench.client.answers import Constructed
 from pytest_simbench.client.errors import (
     DisplayError,
     DisplayLost,
@@ -17,11 +18,9 @@ from pytest_simbench.client.errors import (
     Where,
     WorkerError,
 )
-from pytest_simbench.client.launch import Constructed
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.resources import ResourceSampler
-from pytest_simbench.client.stopwatch import Stopwatch
-from pytest_simbench.client.world import TRACE_PERIOD, Motion, World
+from pytest_simbench.client.world import TRACE_PERIOD, Motion, Stopwatch, World
 from pytest_simbench.experiment.camera import Camera
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import file_stem, record_of, settings
@@ -36,7 +35,7 @@ from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.registry import seeds_seen
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.worker.stepping import CHECK_PERIOD
-from pytest_simbench.worker.text import LONGEST, named, readable, told
+from pytest_simbench.worker.wire import LONGEST, named, readable, told
 
 
 @dataclass(frozen=True)
@@ -306,11 +305,9 @@ class Repetition:
 
     def _log_name(self) -> str:
         log = self._process.launch.log if self._process else None
-        return (
-            str(log.relative_to(self.case.folder))
-            if log and self.case.folder in log.parents
-            else ""
-        )
+        if log is None or self.case.folder not in log.parents:
+            return ""
+        return str(log.relative_to(self.case.folder))
 
     def _filming(self) -> Camera | None:
         """For the film of a repetition that counts."""

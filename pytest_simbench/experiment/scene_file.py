@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-import threading
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 from pytest_simbench.client.environments import Environment, interpreter, missing
@@ -37,10 +37,6 @@ class SceneFile:
     account: tuple[Carried, ...]
 
 
-_read: dict[tuple[Path, int, int], SceneFile] = {}
-_lock = threading.Lock()
-
-
 def read_scene_file(path: str | Path) -> SceneFile:
     """Read a file by the first engine here that reads such files.
 
@@ -52,14 +48,10 @@ def read_scene_file(path: str | Path) -> SceneFile:
             it; one sentence with the file, and its line where that is known.
     """
     whole = Path(path).absolute()
-    info = _reader(whole)
+    name = _reader(whole).name
     check_mjcf(str(whole))
     status = whole.stat()
-    key = (whole, status.st_size, status.st_mtime_ns)
-    with _lock:
-        if key not in _read:
-            _read[key] = _ask(info, whole)
-        return _read[key]
+    return _ask(name, whole, status.st_size, status.st_mtime_ns)
 
 
 def _reader(path: Path) -> SimulatorInfo:
@@ -82,16 +74,19 @@ def _reader(path: Path) -> SimulatorInfo:
     raise DescriptionError(f"{path}: no engine here reads {ending or 'such'} files; give {known}")
 
 
-def _ask(info: SimulatorInfo, path: Path) -> SceneFile:
+@cache
+def _ask(name: str, path: Path, size: int, modified: int) -> SceneFile:
+    """What a simulator reads of a file, of which size and time of change tell whether it is new."""
+    info = adapter(name).info
     with tempfile.NamedTemporaryFile(prefix="simbench-reader-", suffix=".log") as log:
         launch = Launch(
-            address(info.name) or "",
+            address(name) or "",
             python=interpreter(info),
             environment=Environment.of(info).variables(),
             log=Path(log.name),
         )
         try:
-            process = WorkerProcess(launch, Where(info.name, "headless", phase="reading"))
+            process = WorkerProcess(launch, Where(name, "headless", phase="reading"))
             try:
                 process.construct("default")
                 answer = process.request("read_file", path=str(path))

@@ -32,10 +32,7 @@ NOW, LATER = b"n", b"l"
 
 
 class Slots:
-    """Gives slots out, in a thread of the run's first process, until `close`.
-
-    Args:
-        number: of repetitions at once.
+    """Gives so many slots out, in a thread of the run's first process, until `close`.
 
     Attributes:
         address: for `slot`.

@@ -113,8 +113,7 @@ def case_of(
         item: the test; None for the handle that all tests share.
         settings: that the test changes, unchecked.
     """
-    from pytest_simbench.experiment.case import Case
-    from pytest_simbench.experiment.protocol import PROTOCOLS
+    from pytest_simbench.experiment.case import PROTOCOLS, Case
     from pytest_simbench.plugin.marks import number_mark
     from pytest_simbench.plugin.variants import named
 

@@ -101,7 +101,7 @@ def _keep(kind: Kind, episodes: Episodes, result: Mapping[str, Any]) -> None:
         case.profile,
         episodes.task.name,
         case.seed,
-        {**constructed.settings, **episodes.experiment.parameters},
+        {**constructed.settings, **episodes.experiment.task.parameters()},
         constructed.versions,
         result,
     )

@@ -178,7 +178,7 @@ class Run:
 
         More than once when a plugin reruns a failed test, or a test repeats a task twice.
         """
-        case, parameters = experiment.case, json.dumps(experiment.parameters, default=str)
+        case, parameters = experiment.case, json.dumps(experiment.task.parameters(), default=str)
         key = (case.test, experiment.task.name, parameters)
         self._attempts[key] += 1
         return self._attempts[key]

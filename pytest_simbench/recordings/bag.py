@@ -150,19 +150,17 @@ class _Bag:
 
     def _markers(self, start: int) -> Iterator[Any]:
         """A marker for each shape, in the frame of its link or body; it moves with that frame."""
-        trace, messages = self._trace, self._messages
-        solids = [(box, solid) for box in trace.boxes for solid in box.solids()]
+        figure, marker = self._trace.figure, self._messages.marker
+        solids = [(box, solid) for box in self._trace.boxes for solid in box.solids()]
         for k, (box, solid) in enumerate(solids):
-            place = (start, frame_of(box), "bodies", k)
-            yield messages.solid(*place, solid, box.colour)
-        for k, part in enumerate(trace.figure.parts if trace.figure else ()):
-            assert trace.figure is not None
-            place = (start, part.link, "robot", k)
-            if part.mesh is not None:
-                corners = trace.figure.meshes[part.mesh].triangles.reshape(-1, 3)
-                yield messages.triangles(*place, part.pose, corners, METAL)
-            elif part.size is not None:
-                yield messages.solid(*place, Solid("box", part.size, part.pose), METAL)
+            yield marker(start, frame_of(box), "bodies", k, solid, box.colour)
+        for k, part in enumerate(figure.parts if figure else ()):
+            if figure is not None and part.mesh is not None:
+                mesh: Any = (figure.meshes[part.mesh].vertices, figure.meshes[part.mesh].faces)
+                solid = Solid("mesh", (1.0, 1.0, 1.0), part.pose, mesh)
+            else:
+                solid = Solid("box", part.size or (0.0, 0.0, 0.0), part.pose)
+            yield marker(start, part.link, "robot", k, solid, METAL)
 
     def _topic(self, name: str, kind: str, latched: bool = False) -> Callable[[int, Any], None]:
         """Adds a topic; what writes a message of it at a time [ns]."""

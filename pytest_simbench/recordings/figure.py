@@ -6,10 +6,10 @@ The shapes are the collision shapes, the same that every engine is given.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +55,7 @@ class Part(Wire):
 
 
 @dataclass(frozen=True)
-class Figure:
+class Figure(Wire):
     """A robot to be drawn.
 
     Attributes:
@@ -67,12 +67,14 @@ class Figure:
         urdf: the reduced robot as text, without its meshes: their paths do not travel.
     """
 
+    unwritten: ClassVar[tuple[str, ...]] = ("meshes",)
+
     name: str
     root: str
     hinges: Sequence[MovingJoint]
     parts: Sequence[Part]
-    meshes: Sequence[Mesh]
     urdf: str
+    meshes: Sequence[Mesh] = ()
 
     @classmethod
     def of(cls, robot: Robot) -> Figure:
@@ -93,8 +95,8 @@ class Figure:
                 Part(name, s.pose, s.size, None if s.mesh is None else paths.index(s.mesh))
                 for name, s in shapes
             ],
-            [Mesh.from_stl(path) for path in paths],
             _without_meshes(prepared.to_urdf()),
+            [Mesh.from_stl(path) for path in paths],
         )
 
     @property
@@ -118,27 +120,8 @@ class Figure:
             found[hinge.child] = composed(found[hinge.parent], moved)
         return np.stack([found[name] for name in self.links], axis=1)
 
-    def to_wire(self) -> dict[str, Any]:
-        """Everything but the meshes, as plain data."""
-        return {
-            "name": self.name,
-            "root": self.root,
-            "hinges": [hinge.to_wire() for hinge in self.hinges],
-            "parts": [part.to_wire() for part in self.parts],
-            "urdf": self.urdf,
-        }
-
-    @classmethod
-    def from_wire(cls, data: Mapping[str, Any], meshes: Sequence[Mesh]) -> Figure:
-        joints = map(MovingJoint.from_wire, data["hinges"])
-        hinges = [replace(joint, axis=_unit(joint.axis)) for joint in joints]
-        parts = [Part.from_wire(part) for part in data["parts"]]
-        found = cls(data["name"], data["root"], hinges, parts, meshes, data["urdf"])
-        found._check()
-        return found
-
-    def _check(self) -> None:
-        """For figures that somebody else wrote.
+    def checked(self) -> Figure:
+        """The same, with axes of unit length, for figures that somebody else wrote.
 
         Raises:
             ValueError: a link hangs on none before it, or a part names what there is not.
@@ -153,6 +136,7 @@ class Figure:
                 raise ValueError(f"a shape of {part.link!r} is none")
             if part.mesh is not None and not 0 <= part.mesh < len(self.meshes):
                 raise ValueError(f"a shape of {part.link!r} has no mesh")
+        return replace(self, hinges=[replace(h, axis=_unit(h.axis)) for h in self.hinges])
 
 
 def relative(hinge: MovingJoint, positions: FloatArray) -> FloatArray:

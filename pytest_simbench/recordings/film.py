@@ -48,11 +48,8 @@ def check_available() -> None:
 
 
 class Film:
-    """One film, picture by picture; a minute takes some megabytes of memory.
-
-    Args:
-        folder: of the run.
-        name: of the file in it; it is there when the film is whole.
+    """One film, picture by picture; a minute takes some megabytes of memory. Its file in the run
+    folder is there when it is whole.
 
     Attributes:
         frames: pictures so far.

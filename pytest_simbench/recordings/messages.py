@@ -12,15 +12,16 @@ import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
 from pytest_simbench.ground.text import in_one_line
-from pytest_simbench.scene import FloatArray, Pose, Solid
+from pytest_simbench.scene import FloatArray, Solid
 
 NANOSECONDS = 10**9
 
 INFO = 20
 """Level of a message about what is normal (rcl_interfaces/msg/Log)."""
 
-SOLIDS = {"box": "CUBE", "ball": "SPHERE", "tube": "CYLINDER"}
-"""What visualization_msgs/msg/Marker calls the solids of a body."""
+MARKER = "visualization_msgs/msg/Marker"
+SOLIDS = {"box": "CUBE", "ball": "SPHERE", "tube": "CYLINDER", "mesh": "TRIANGLE_LIST"}
+"""What a marker calls the solids of a body."""
 
 NO_CORNERS = np.zeros((0, 3))
 
@@ -71,44 +72,25 @@ class Messages:
             line=0,
         )
 
-    def solid(
+    def marker(
         self, nanoseconds: int, frame: str, namespace: str, number: int, solid: Solid,
         colour: Sequence[float],
     ) -> Any:  # fmt: skip
-        """A marker: a solid at its pose in a frame, with which it moves."""
+        """A solid at its pose in a frame, with which it moves; of a mesh its triangles."""
+        size, corners = solid.extents, NO_CORNERS
         if solid.kind == "mesh":
             vertices, triangles = solid.mesh
-            corners = np.array(vertices)[np.array(triangles).ravel()]
-            return self.triangles(
-                nanoseconds, frame, namespace, number, solid.pose, corners, colour
-            )
-        kind = getattr(self.store.types["visualization_msgs/msg/Marker"], SOLIDS[solid.kind])
-        place = (nanoseconds, frame, namespace, number, solid.pose)
-        return self._marker(*place, kind, solid.extents, colour, NO_CORNERS)
-
-    def triangles(
-        self, nanoseconds: int, frame: str, namespace: str, number: int, pose: Pose,
-        corners: FloatArray, colour: Sequence[float],
-    ) -> Any:  # fmt: skip
-        """The same of triangles, three corners each, (3 n, 3) [m]."""
-        kind = self.store.types["visualization_msgs/msg/Marker"].TRIANGLE_LIST  # type: ignore[attr-defined]
-        place = (nanoseconds, frame, namespace, number, pose)
-        return self._marker(*place, kind, (1.0, 1.0, 1.0), colour, corners)
-
-    def _marker(
-        self, nanoseconds: int, frame: str, namespace: str, number: int, pose: Pose, kind: int,
-        size: Sequence[float], colour: Sequence[float], corners: FloatArray,
-    ) -> Any:  # fmt: skip
+            size, corners = (1.0, 1.0, 1.0), np.asarray(vertices)[np.ravel(triangles)]
         none = np.zeros(0, dtype=np.uint8)
         point = self.store.types["geometry_msgs/msg/Point"]
-        rotation = self._transform(pose.as_array()).rotation
-        position = point(*map(float, pose.position))
+        rotation = self._transform(solid.pose.as_array()).rotation
+        position = point(*map(float, solid.pose.position))
         return self.make(
-            "visualization_msgs/msg/Marker",
+            MARKER,
             header=self.header(nanoseconds, frame),
             ns=namespace,
             id=number,
-            type=kind,
+            type=getattr(self.store.types[MARKER], SOLIDS[solid.kind]),
             action=0,
             pose=self.make("geometry_msgs/msg/Pose", position=position, orientation=rotation),
             scale=self.make("geometry_msgs/msg/Vector3", **dict(zip("xyz", size, strict=True))),

@@ -16,7 +16,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -170,7 +170,7 @@ class Trace:
             [str(name) for name in arrays["joint_names"]],
             [str(name) for name in arrays["body_names"]],
             [Body.from_wire(box) for box in about["boxes"]],
-            None if figure is None else Figure.from_wire(figure, meshes),
+            None if figure is None else replace(Figure.from_wire(figure), meshes=meshes).checked(),
             [(float(time), str(name)) for time, name in about["phases"]],
         )
         rows = len(found.time)

@@ -25,7 +25,7 @@ from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import PHASES
 from pytest_simbench.report.page import PAGE_NAME
 from pytest_simbench.report.replay import REPLAY_NAME
-from pytest_simbench.worker.text import named
+from pytest_simbench.worker.wire import named
 
 if TYPE_CHECKING:
     from pytest_simbench.report.replay.recorded import Group

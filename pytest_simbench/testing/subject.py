@@ -13,9 +13,10 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.client.answers import Constructed
 from pytest_simbench.client.environments import Environment, interpreter
 from pytest_simbench.client.errors import BadState, Diverged, Where, WorkerError
-from pytest_simbench.client.launch import Constructed, Launch
+from pytest_simbench.client.launch import Launch
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.description.urdf import ROOT

@@ -12,11 +12,7 @@ from pytest_simbench.simulator import Simulator
 
 
 class Acting:
-    """Tells a simulator before each step what acts on its bodies in that step.
-
-    Args:
-        simulator: a loaded one.
-        scene: what it loaded.
+    """Tells a simulator before each step what acts on the bodies of its loaded scene in that step.
 
     Raises:
         NotSupportedError: the scene has forces or prescribed bodies, and the simulator takes none.

@@ -45,10 +45,9 @@ from pytest_simbench.worker.state import (
     checked_quantities,
     checked_state,
 )
-from pytest_simbench.worker.stepping import Film, Stepper
-from pytest_simbench.worker.text import LONGEST_LOGGED, named, readable, told
+from pytest_simbench.worker.stepping import Stepper
 from pytest_simbench.worker.watching import Watch
-from pytest_simbench.worker.wire import pack, unpack
+from pytest_simbench.worker.wire import LONGEST_LOGGED, named, pack, readable, told, unpack
 
 
 def peak_rss_mb() -> float | None:
@@ -262,7 +261,7 @@ class Server:
             stepper.film = None
             return None
         every = max(1, round(period / timestep))
-        stepper.film = Film(every, lambda: self._shoot(width, height))
+        stepper.film = every, lambda: self._shoot(width, height)
         return every * timestep
 
     def _shoot(self, width: int, height: int) -> None:

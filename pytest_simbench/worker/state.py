@@ -16,7 +16,7 @@ import numpy as np
 
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import ParityError, Simulator, StateError
-from pytest_simbench.worker.text import shown
+from pytest_simbench.worker.wire import shown
 
 POSITION_TOLERANCE = 1e-3
 """Between scene and engine at the start [m], [rad]: single precision at 10 m is 1e-6."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,7 @@ import numpy as np
 from pytest_simbench.scene import FloatArray, Scene, Trajectory
 from pytest_simbench.simulator import DivergedError, Simulator
 from pytest_simbench.worker.acting import Acting
-from pytest_simbench.worker.control import Clock, Control
-from pytest_simbench.worker.family import Family
+from pytest_simbench.worker.control import Clock, Control, Family
 from pytest_simbench.worker.state import States
 from pytest_simbench.worker.watching import Watch
 
@@ -30,6 +29,9 @@ period is made of these looks, and costs next to nothing."""
 
 LOOK_PERIOD = 0.01
 """Simulated time between two looks at the wall clock, for window and pacing [s]."""
+
+LOG = ("time", "joints", "bodies")
+"""What is sampled while stepping."""
 
 
 @dataclass
@@ -51,43 +53,14 @@ class Clocks:
     cpu: float = 0.0
 
 
-@dataclass
-class Log:
-    """States sampled while stepping; `arrays` stacks them."""
-
-    times: list[float] = field(default_factory=list)
-    joints: list[FloatArray] = field(default_factory=list)
-    bodies: list[FloatArray] = field(default_factory=list)
-
-    def sample(self, time: float, joints: FloatArray, bodies: FloatArray) -> None:
-        self.times.append(time)
-        self.joints.append(joints)
-        self.bodies.append(bodies)
-
-    def arrays(self) -> dict[str, FloatArray]:
-        """time (n,), joints (n, 2, n_joints), bodies (n, n_free, 13)."""
-        return {
-            "time": np.array(self.times),
-            "joints": np.array(self.joints),
-            "bodies": np.array(self.bodies),
-        }
-
-
-@dataclass(frozen=True)
-class Film:
-    """A picture every so many steps, counted since loading; `shoot` takes and sends one."""
-
-    every: int
-    shoot: Callable[[], None]
-
-
 class Stepper:
     """Steps one simulator through trajectories and waits, and keeps its clocks.
 
     Attributes:
         states: reads the simulator's clock and states.
         acting: what moves bodies from outside; None: nothing.
-        film: pictures along the way, outside of the measured stepping time; None: none.
+        film: every how many steps since loading a picture is due, and what takes one, outside of
+            the measured stepping time; None: no pictures.
         clocks: totals since loading.
         control: the workload that shows the machine's speed meanwhile.
         watch: what looks whether the world stays as it was loaded; None: nothing.
@@ -109,7 +82,7 @@ class Stepper:
         self._clock, self._family = Clock(), Family()
         self.control = Control(self._clock)
         self.real_time = False
-        self.film: Film | None = None
+        self.film: tuple[int, Callable[[], None]] | None = None
         self.watch: Watch | None = None
         self._next_picture = 0.0
 
@@ -133,7 +106,8 @@ class Stepper:
         """Advance by `steps`; a log sample every `log_period` [s] (0: every step; None: no log).
 
         Returns:
-            The log; {} where there is no sample.
+            The log: time (n,), joints (n, 2, n_joints), bodies (n, n_free, 13); {} where there is
+            no sample.
 
         Raises:
             DivergedError: joint or body state is not finite.
@@ -145,8 +119,9 @@ class Stepper:
         check_every = max(1, round(CHECK_PERIOD / timestep))
         watched = simulator.gui or self.real_time
         look_every = max(1, round((LOOK_PERIOD if watched else CHECK_PERIOD) / timestep))
-        film_every = self.film.every if self.film is not None else 0
-        log, states, from_time = Log(), self.states, self.states.time()
+        film_every = self.film[0] if self.film is not None else 0
+        states, from_time = self.states, self.states.time()
+        samples: list[tuple[float, FloatArray, FloatArray]] = []
         watch, from_start = self.watch, self.clocks.steps
         due = watch.due - from_start if watch is not None else 0
         step, command, clock = simulator.step, simulator.command, self._clock
@@ -184,7 +159,7 @@ class Stepper:
             if logs or checks:
                 joints, bodies = states.joints(), states.bodies()
                 if logs:
-                    log.sample(now, joints, bodies)
+                    samples.append((now, joints, bodies))
                 if checks:
                     self._check_finite(now, joints, bodies)
                     if watch is not None:
@@ -194,7 +169,7 @@ class Stepper:
                 beat = stopped
                 self.heartbeat(now)
             if films and self.film is not None:
-                self.film.shoot()
+                self.film[1]()
             if simulator.gui and stopped > self._next_picture:
                 simulator.refresh_window()
                 drawn = time.perf_counter()
@@ -209,7 +184,8 @@ class Stepper:
             resumed, waited = clock()
         totals.steps += steps
         totals.simulated += steps * timestep
-        return log.arrays() if log.times else {}
+        columns = map(np.array, zip(*samples, strict=True))
+        return dict(zip(LOG, columns, strict=True)) if samples else {}
 
     def _check_finite(self, time: float, joints: FloatArray, bodies: FloatArray) -> None:
         for what, state in (("joints", joints), ("bodies", bodies)):

@@ -163,7 +163,7 @@ class Watch:
         return seconds
 
     def check_log(self, log: Mapping[str, FloatArray]) -> None:
-        """The samples of a motion, as `stepping.Log.arrays`: whether anything jumps.
+        """The samples of a motion, as `Stepper` gives them: whether anything jumps.
 
         Raises:
             ParityError: something does.
@@ -237,12 +237,8 @@ class Watch:
 
 
 class Obstacles:
-    """Boxes around all that a body can touch, but for the ground.
-
-    Args:
-        scene: with the bodies and the robot.
-        expected: its quantities, with their outlines.
-    """
+    """Boxes around all that a body can touch, but for the ground: from the outlines of a scene's
+    quantities."""
 
     def __init__(self, scene: Scene, expected: Mapping[str, Any]) -> None:
         self._robot = None if scene.robot is None else PreparedRobot(scene.robot)

@@ -11,7 +11,7 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.records.record import Record
 from pytest_simbench.tasks import Task
-from pytest_simbench.worker.text import LONGEST
+from pytest_simbench.worker.wire import LONGEST
 from tests.conftest import workers
 from tests.tiny import Falling
 

@@ -1,9 +1,8 @@
-"""Interpreters of engines that cannot share pytest's: made for real, or the system's."""
+"""Interpreters of engines that cannot share ours: made, or the system's; which releases exist."""
 
 from __future__ import annotations
 
 import json
-import os
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -13,17 +12,23 @@ from pathlib import Path
 import pytest
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
-from pytest_simbench.client import environments
+from pytest_simbench.client import environments, package_index
 from pytest_simbench.client.environments import (
     MARKER,
     Environment,
-    cache_variables,
     create_all,
     existing,
     interpreter,
     missing,
     outside,
     remove,
+)
+from pytest_simbench.client.package_index import (
+    PackageIndexError,
+    nearest,
+    newest_of_minors,
+    releases,
+    unreleased,
 )
 from pytest_simbench.client.system import SystemPython
 from pytest_simbench.ground.errors import SimulatorError
@@ -177,16 +182,13 @@ def test_what_is_wrong_with_one(
 
 
 def test_caches_are_kept_beside_it_unless_the_user_says_where(
-    info: SimulatorInfo, tmp_path: Path
+    info: SimulatorInfo, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     environment = Environment.of(info)
     kept = environment.variables()
     assert kept == {"SIXTH_CACHE": str(environment.folder / "cache" / "kernels")}
-    os.environ["SIXTH_CACHE"] = "elsewhere"
-    try:
-        assert cache_variables(info.caches, tmp_path) == {}
-    finally:
-        del os.environ["SIXTH_CACHE"]
+    monkeypatch.setenv("SIXTH_CACHE", "elsewhere")
+    assert environment.variables() == {}
 
 
 ABSENT = "no_such_module_here"
@@ -208,14 +210,6 @@ def packaged() -> SimulatorInfo:
 def home(monkeypatch: pytest.MonkeyPatch, path: str | Path) -> None:
     """Let another interpreter be the system's."""
     monkeypatch.setattr(SystemPython, "python", Path(path))
-
-
-def script(folder: Path, text: str) -> Path:
-    """An executable that is no Python."""
-    path = folder / "python3"
-    path.write_text(f"#!/bin/sh\n{text}\n")
-    path.chmod(0o755)
-    return path
 
 
 def test_absent_engine(packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -274,25 +268,84 @@ def test_an_engine_that_is_importable_here_runs_here(packaged: SimulatorInfo) ->
     assert interpreter(packaged) is None
 
 
-def test_no_such_interpreter(
-    packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (None, "does not run"),
+        ("exit 1", "does not run"),
+        ("echo hello", "does not run"),
+        ("kill -9 $$", "does not run"),
+        (
+            """echo '{"python": [3, 10, 12], "version": "1", "absent": []}'""",
+            "is Python 3.10.12, older than 3.11",
+        ),
+    ],
+)
+def test_what_is_no_interpreter_for_us(
+    packaged: SimulatorInfo,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    text: str | None,
+    message: str,
 ) -> None:
-    home(monkeypatch, tmp_path / "python3")
-    assert f"{tmp_path / 'python3'} does not run" in str(missing(packaged))
-    assert SystemPython(packaged).version() is None
+    path = tmp_path / "python3"
+    home(monkeypatch, path)
+    if text is not None:
+        path.write_text(f"#!/bin/sh\n{text}\n")
+        path.chmod(0o755)
+    assert f"{path} {message}" in str(missing(packaged))
+    assert SystemPython(packaged).version() == ("1" if "older" in message else None)
 
 
-@pytest.mark.parametrize("text", ["exit 1", "echo hello", "kill -9 $$"])
-def test_something_that_is_no_interpreter(
-    packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, text: str
-) -> None:
-    home(monkeypatch, script(tmp_path, text))
-    assert "does not run" in str(missing(packaged))
+PAGE = """<!DOCTYPE html><html><body>
+<a href="../../files/engine-1.9.0-py3-none-any.whl#sha256=00">engine-1.9.0-py3-none-any.whl</a>
+<a href="engine-1.10.0.tar.gz" data-requires-python="&gt;=3.8">engine-1.10.0.tar.gz</a>
+<a href="engine-1.11.0.tar.gz" data-yanked="broken">engine-1.11.0.tar.gz</a>
+<a href="engine-2.0.0rc1.tar.gz">engine-2.0.0rc1.tar.gz</a>
+<a href="engine-3.0.0.tar.gz" data-requires-python="&gt;=99">engine-3.0.0.tar.gz</a>
+<a href="engine-1.8.0-cp27-cp27m-win32.whl">engine-1.8.0-cp27-cp27m-win32.whl</a>
+<a href="readme.txt">readme.txt</a> <a href="engine.whl">engine.whl</a>
+</body></html>"""
 
 
-def test_python_that_is_too_old(
-    packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    answer = '{"python": [3, 10, 12], "version": "1", "absent": []}'
-    home(monkeypatch, script(tmp_path, f"echo '{answer}'"))
-    assert "is Python 3.10.12, older than 3.11" in str(missing(packaged))
+@pytest.fixture(autouse=True)
+def forget() -> None:
+    package_index.releases.cache_clear()
+
+
+def test_what_can_be_installed_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without yanked ones, pre-releases, and files for other Pythons and machines."""
+    (tmp_path / "engine").mkdir()
+    (tmp_path / "engine" / "index.html").write_text(PAGE)
+    monkeypatch.setenv("PIP_INDEX_URL", tmp_path.as_uri())
+    monkeypatch.setenv("PIP_EXTRA_INDEX_URL", (tmp_path / "empty").as_uri())
+    assert releases("Engine") == ["1.9.0", "1.10.0"]
+    with pytest.raises(PackageIndexError, match=r"no package index tells the releases of nosuch"):
+        releases("nosuch")
+
+
+def test_an_index_that_does_not_answer_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PIP_INDEX_URL", "http://127.0.0.1:9/simple")
+    monkeypatch.setenv("PIP_EXTRA_INDEX_URL", "http://127.0.0.1:9/more")
+    with pytest.raises(PackageIndexError, match=r"127.0.0.1: .*refused.*; check the network"):
+        releases("engine")
+
+
+def test_the_last_of_each_minor_version() -> None:
+    assert newest_of_minors(["3.10.0", "3.2.0", "3.2.7", "3.9.0"]) == ["3.2.7", "3.9.0", "3.10.0"]
+
+
+@pytest.mark.parametrize(
+    ("version", "near"),
+    [("3.5", ["3.1", "3.2", "4.0", "4.1"]), ("9", ["3.1", "3.2", "4.0", "4.1"]),
+     ("1", ["3.0", "3.1", "3.2", "4.0"])],
+)  # fmt: skip
+def test_the_nearest_releases(version: str, near: list[str]) -> None:
+    assert nearest(version, ["3.0", "3.1", "3.2", "4.0", "4.1"]) == near
+
+
+def test_no_release_is_one_sentence() -> None:
+    assert unreleased("engine", "3.0.0", ["3.0", "3.1"]) == ""
+    assert unreleased("engine", "4.0rc1", ["3.0"]) == ""  # whoever asks for one may have it
+    assert "nearest releases are 3.0, 3.1" in unreleased("engine", "3.9", ["3.0", "3.1"])
+    assert "'abc' is no version" in unreleased("engine", "abc", ["3.0"])

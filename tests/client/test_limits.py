@@ -17,9 +17,9 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from pytest_simbench.client import logs
-from pytest_simbench.client.crowding import crowding, scheduled
+from pytest_simbench.client.launch import KEPT, LARGEST
 from pytest_simbench.client.process import WorkerProcess
+from pytest_simbench.client.resources import crowding, scheduled
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.executor import LocalExecutor
@@ -27,7 +27,7 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.repeater import Repeater
-from pytest_simbench.experiment.repetition import Hooks, Repetition
+from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.records.record import Record
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
 from tests.client.failing import STALL, Silent, failure, faulty
@@ -79,15 +79,6 @@ def test_sending_has_the_repetition_s_time_out_too(case: Case) -> None:
     assert "--sim-timeout" in message
 
 
-@pytest.mark.parametrize(
-    ("fault", "phase"),
-    [("StopsBeingMade", "launch"), ("StopsLoading", "load")],
-)
-def test_silence_in_each_phase_is_the_stall_limit(case: Case, fault: str, phase: str) -> None:
-    with at_most(1.5 + STALL):
-        assert failure(faulty(case, fault), Falling(1e6))[:2] == ("WorkerHung", phase)
-
-
 def test_signs_of_life_do_not_put_off_the_repetition_s_time_out(case: Case) -> None:
     with at_most(DEADLINE):
         kind, phase, _ = failure(faulty(case, "Chatters", timeout=DEADLINE))
@@ -95,13 +86,20 @@ def test_signs_of_life_do_not_put_off_the_repetition_s_time_out(case: Case) -> N
 
 
 @pytest.mark.parametrize(
-    ("fault", "kind"),
-    [("HalfAnswer", "WorkerHung"), ("HangsUp", "WorkerExited"), ("Garbage", "WorkerExited")],
+    ("fault", "kind", "phase"),
+    [
+        ("StopsBeingMade", "WorkerHung", "launch"),
+        ("StopsLoading", "WorkerHung", "load"),
+        ("HalfAnswer", "WorkerHung", "fall"),
+        ("HangsUp", "WorkerExited", "fall"),
+        ("Garbage", "WorkerExited", "fall"),
+    ],
 )
-def test_a_connection_that_is_none(case: Case, fault: str, kind: str) -> None:
+def test_silence_and_nonsense_end_by_the_stall_limit(
+    case: Case, fault: str, kind: str, phase: str
+) -> None:
     with at_most(1.5 + STALL):
-        found, phase, _ = failure(faulty(case, fault))
-    assert (found, phase) == (kind, "fall")
+        assert failure(faulty(case, fault), Falling(1e6))[:2] == (kind, phase)
 
 
 def test_a_worker_that_does_not_close(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -113,31 +111,14 @@ def test_a_worker_that_does_not_close(case: Case, monkeypatch: pytest.MonkeyPatc
 def test_a_log_does_not_fill_the_disk(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     assert failure(faulty(case, "FloodsTheLog", stall_timeout=3.0))[0] == "WorkerHung"
     (log,) = (case.folder / "logs").iterdir()
-    assert log.stat().st_size < logs.LARGEST
+    assert log.stat().st_size < LARGEST
 
 
 def test_a_log_is_cut_though_it_grew_at_once(case: Case) -> None:
     record, _ = Repetition(Experiment(faulty(case, "FloodsAtOnce"), Falling()), 1).run()
     assert record.status == "ok"
     (log,) = (case.folder / "logs").iterdir()
-    assert log.stat().st_size < 2 * logs.KEPT
-
-
-@pytest.mark.parametrize("limit", [20.0, 60.0])
-def test_the_limits_are_those_given(case: Case, limit: float) -> None:
-    """Unscaled, on the worker's own clock: the numbers that the process is told."""
-    launch = replace(case, stall_timeout=limit).launch("limits")
-    assert (launch.start_timeout, launch.stall_timeout) == (limit, limit)
-    made: list[WorkerProcess] = []
-    repetition = Repetition(Experiment(replace(case, timeout=limit), Falling()), 1)
-    keep = repetition._made
-    repetition._made = lambda process: (keep(process), made.append(process))  # type: ignore
-    before = time.monotonic()
-    deadlines = []
-    repetition.hooks = Hooks(phase=lambda name: deadlines.extend(p.deadline for p in made))
-    repetition.run()
-    assert deadlines
-    assert all(before + limit <= at <= before + limit + 1.0 for at in deadlines if at)
+    assert log.stat().st_size < 2 * KEPT
 
 
 def interrupt_after(seconds: float, times: int = 1, apart: float = 0.0) -> threading.Thread:
@@ -345,5 +326,5 @@ def test_a_little_waiting_is_not_told(
     monkeypatch: pytest.MonkeyPatch, waited: float, told: bool
 ) -> None:
     """A fifth of the time is the limit: 2.5 of 12.5 s."""
-    monkeypatch.setattr("pytest_simbench.client.crowding.scheduled", lambda pid: (10.0, waited))
+    monkeypatch.setattr("pytest_simbench.client.resources.scheduled", lambda pid: (10.0, waited))
     assert bool(crowding(7)) is told

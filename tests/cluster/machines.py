@@ -43,7 +43,7 @@ def release_in(folder: Path) -> str:
     """The release of MuJoCo that is installed here, as one with an environment of its own in a
     folder of environments: its interpreter is but another name for this one."""
     name = f"mujoco=={adapter('mujoco').info.tested_version}"
-    environment = Environment.of(adapter(name).info, folder)
+    environment = Environment(adapter(name).info, folder / name)
     environment.python.parent.mkdir(parents=True)
     environment.python.write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')
     environment.python.chmod(0o755)

@@ -32,7 +32,7 @@ def test_a_machine_offers_what_is_ready_on_it() -> None:
     found = Node.of("tcp://here:1", "here", offers)
     assert found is not None
     assert found.slots == 3
-    assert found.version("mujoco")
+    assert found.versions["mujoco"]
     assert found.has("mujoco", "headless")
     assert not found.has("pybullet", "headless")
     assert not found.stranger
@@ -49,8 +49,8 @@ def test_a_release_with_an_environment_of_its_own_is_offered_by_its_name(
     found = Node.of("tcp://here:1", "here", here(1))
     assert found is not None
     assert found.has(name, "headless")
-    assert found.version("mujoco") == adapter("mujoco").info.tested_version
-    assert [offer for offer in found.offers if offer.count("==") == 2] == [f"{name}==unknown"]
+    assert found.versions["mujoco"] == adapter("mujoco").info.tested_version
+    assert [(n, v) for n, v in found.versions.items() if "==" in n] == [(name, "unknown")]
     assert f", {name}," in str(found)
     assert str(unmet([lab("lab1", "mujoco==4.0.0")], name, ["headless"])) == (
         f"no node of the cluster offers {name}: lab1 has mujoco 4.0.0; on one of them: "

@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.case import PROTOCOLS, Case
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.protocol import PROTOCOLS
 from pytest_simbench.experiment.repetition import Hooks, Repetition, group
 from pytest_simbench.ground.errors import SimulatorError
-from pytest_simbench.tasks.base import Jitter, Task
+from pytest_simbench.tasks.base import Task
 from tests.tiny import Falling
 
 
@@ -38,18 +37,11 @@ def test_seeds_count_on_from_the_case_s(case: Case) -> None:
     assert experiment.seed() == 40
 
 
-@pytest.mark.parametrize("scale", [0.0, 0.5, 1.0, 2.0])
-def test_the_start_is_disturbed_by_the_case_s_jitter(case: Case, scale: float) -> None:
-    experiment = Experiment(replace(case, jitter=scale), Falling())
-    one = Jitter()
-    expected = Jitter(scale * one.distance, scale * one.angle)
-    assert experiment.scene(7) == Falling().scene(7, expected)
-
-
 def test_the_task_has_its_own_time_out_unless_the_case_gives_one(case: Case) -> None:
     assert Experiment(case, Falling()).timeout == Falling.study_timeout
     experiment = Experiment(replace(case, timeout=5.0, memory_limit=900.0), Falling())
     assert experiment.limits == {"timeout": 5.0, "stall_timeout": 20.0, "memory_limit": 900.0}
+    assert case.launch("limits").stall_timeout == 20.0
 
 
 def test_a_case_of_a_registered_simulator(case: Case) -> None:

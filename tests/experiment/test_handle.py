@@ -1,22 +1,38 @@
-"""Episodes: one at a time, and safe after whatever ends them."""
+"""Episodes: one at a time, and safe after whatever ends them. Their files may come from anybody."""
 
 from __future__ import annotations
 
+import json
 import os
 import signal
+import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from hypothesis.errors import UnsatisfiedAssumption
 
 from pytest_simbench.client.errors import WorkerExited
+from pytest_simbench.client.tape import Operation
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.example import read_example
+from pytest_simbench.experiment.example import (
+    LARGEST,
+    ExampleError,
+    read_example,
+    replay_command,
+    write_example,
+)
 from pytest_simbench.experiment.handle import SimulatorHandle
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.motion.registry import find
 from pytest_simbench.repeatability.__main__ import main
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.tasks.base import cube
+from tests.hostile import assert_harmless_terminal
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
 SCENE = Scene("s", (cube("a", Pose.at(0.0, 0.0, 0.2), WHITE),))
@@ -124,3 +140,259 @@ def test_giving_an_example_up_is_no_failure(handle: SimulatorHandle, tmp_path: P
     with pytest.raises(UnsatisfiedAssumption), handle.episode(SCENE):
         raise UnsatisfiedAssumption
     assert not (tmp_path / "examples").exists()
+
+
+TAPE = [Operation("wait", {"duration": 0.1}, "fall")]
+EVIL = "\x1b]0;owned\x07\x1b[2Jred\r\u202e"
+
+Data = dict[str, Any]
+
+
+@pytest.fixture
+def path(case: Case) -> Path:
+    return write_example(case, "episode", SCENE, TAPE, {"mujoco": "3.0.0"})
+
+
+def changed(path: Path, *keys: Any, to: Any) -> Path:
+    """The file with the value at these keys replaced."""
+    data = place = json.loads(path.read_text())
+    for key in keys[:-1]:
+        place = place[key]
+    place[keys[-1]] = to
+    path.write_text(json.dumps(data))
+    return path
+
+
+def test_what_a_file_says_of_starting_is_not_looked_at(
+    path: Path, case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file of the first schema, made to be passed on."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    victim = tmp_path / "executed"
+    (tmp_path / "evil.py").write_text(f"open({str(victim)!r}, 'w').close()\nclass Evil: pass\n")
+    shell = tmp_path / "shell"
+    shell.write_text(f"#!/bin/sh\ntouch {victim}\n")
+    shell.chmod(0o755)
+    data = json.loads(path.read_text())
+    data["schema"] = 1
+    data["case"] |= {
+        "python": str(shell),
+        "spec": f"popen//python=sh -c 'touch {victim}'",
+        "adapter": "evil:Evil",
+        "environment": {"PYTHONSTARTUP": str(tmp_path / "evil.py"), "LD_PRELOAD": "evil.so"},
+        "stall_timeout": 1e9,
+        "folder": str(tmp_path / "there"),
+        "costly_start": True,
+        "compile_timeout": 1e9,
+    }
+    path.write_text(json.dumps(data))
+    found = read_example(path, tmp_path / "logs").case
+    assert found == Case(
+        test=case.test,
+        simulator="mujoco",
+        mode="headless",
+        profile="tuned",
+        adapter="pytest_simbench.sims.mujoco.adapter:MuJoCo",
+        folder=tmp_path / "logs",
+        compile_timeout=900.0,
+    )
+    assert main([str(path)]) == 0
+    assert not victim.exists()
+    assert not (tmp_path / "there").exists()
+
+
+def test_another_version_is_said(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(path)]) == 0
+    note, result, _ = capsys.readouterr().out.splitlines()
+    assert note.startswith("note: the file was made with mujoco 3.0.0, this is ")
+    assert result == "mujoco headless tuned, t = 0.100 s"
+
+
+def test_the_robot_is_this_machine_s(case: Case, tmp_path: Path) -> None:
+    path = write_example(case, "robot", replace(SCENE, robot=panda(squeeze=10.0)), TAPE)
+    assert "/" not in json.dumps(json.loads(path.read_text())["scene"])  # no path of ours
+    for key, value in (("urdf", "/etc/passwd"), ("packages", {"x": "/"}), ("srdf", "/dev/zero")):
+        changed(path, "scene", "robot", key, to=value)
+    assert read_example(path, tmp_path).scene.robot == panda(squeeze=10.0)
+
+
+def test_another_robot_that_is_built_in(case: Case, tmp_path: Path) -> None:
+    scene = replace(SCENE, robot=find("ur5"))
+    path = write_example(case, "robot", scene, TAPE)
+    assert "/" not in json.dumps(json.loads(path.read_text())["scene"])
+    assert read_example(path, tmp_path).scene == scene
+
+
+def test_a_robot_of_unknown_files_needs_a_word(
+    case: Case, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = replace(SCENE, robot=replace(panda(), name="mine"))
+    path = write_example(case, "robot", scene, TAPE)
+    assert main([str(path)]) == 2
+    assert (
+        "robot 'mine' is not known here (known: panda, so101, ur10, ur5, xarm7)"
+        in capsys.readouterr().err
+    )
+    assert read_example(path, tmp_path, trust_robot=True).scene == scene
+    assert replay_command(path, case, scene).endswith(f"{path.name} --trust-robot")
+    assert main([str(path), "--trust-robot"]) == 0
+
+
+def test_the_line_says_how_it_was_started_here(case: Case, tmp_path: Path) -> None:
+    path = tmp_path / "x y.json"
+    own = replace(case, python=sys.executable)
+    assert replay_command(path, own, SCENE).endswith(f"x y.json' --python={sys.executable}")
+    own = replace(case, spec="ssh=there//python=py")
+    assert replay_command(path, own, SCENE).endswith(" --spec=ssh=there//python=py")
+
+
+def test_another_interpreter_is_the_user_s_to_name(
+    path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = read_example(path, tmp_path, python="/usr/bin/python3").case
+    assert (found.python, found.spec) == ("/usr/bin/python3", None)
+    assert main([str(path), f"--python={sys.executable}"]) == 0
+    assert main([str(path), "--python=/nowhere/python"]) == 1
+    assert "/nowhere/python" in capsys.readouterr().err
+
+
+FOLLOW = {"tick": 0.1, "position": [[0.0]], "velocity": [[0.0]], "effort": [[0.0]]}
+BOX = cube("a", Pose.at(0.0, 0.0, 0.2), WHITE).to_wire()
+
+# Scenes and settings that are none: tests/scene/test_checks.py, tests/simulator/test_settings.py.
+BROKEN: list[tuple[tuple[Any, ...], Any, str]] = [
+    (("schema",), 3, "schema 3, this reads up to 2"),
+    (("schema",), "1", "schema '1'"),
+    (("case",), [1], "its 'case' is no dict"),
+    (("case", "simulator"), "nowhere", "unknown simulator 'nowhere'; choose from dart, drake"),
+    (("case", "simulator"), 3, "its 'simulator' is no str"),
+    (("case", "simulator"), EVIL, r"unknown simulator '\x1b]0;owned"),
+    (("case", "mode"), "magic", "mujoco has no mode 'magic': headless, gui"),
+    (("case", "profile"), "best", "has no settings profile 'best'; choose from default, tuned"),
+    (("case", "changes"), {"timestep": "x"}, "give a finite number"),
+    (("case", "versions"), [1], "holds no episode"),
+    (("scene",), None, "its 'scene' is no dict"),
+    (("scene", "bodies"), [BOX] * 301, "more than 300 bodies"),
+    (("scene", "bodies"), [BOX, BOX], "2 bodies are named 'a'"),
+    (("scene", "bodies"), [3], "holds no episode"),
+    (("scene", "gravity"), [0, 0], "the gravity [m/s^2] of scene 's' is (0, 0)"),
+    (("scene", "robot"), 3, "holds no episode"),
+    (("scene", "robot"), {"name": "panda"}, "holds no episode"),
+    (("scene", "bodies", 0, "mass"), -1, "the mass [kg] of 'a' is -1"),
+    (("scene", "bodies", 0, "name"), EVIL, r"a body has the name '\x1b]0;owned"),
+    (("scene", "bodies", 0, "pose", "quaternion"), [0, 0, 0, 0], "has the length 0; it must be 1"),
+    (("tape",), {}, "its 'tape' is no list"),
+    (("tape",), [3], "an operation is no object"),
+    (("tape", 0, "kind"), "exec", "an operation is 'exec', neither 'follow' nor 'wait'"),
+    (("tape", 0, "phase"), None, "its 'phase' is no str"),
+    (("tape", 0, "arguments"), {"duration": -1}, "has the duration -1"),
+    (("tape", 0, "arguments"), {"duration": 1e9}, "it takes up to 86400 s"),
+    (("tape", 0, "arguments"), {"duration": True}, "has the duration True"),
+    (("tape", 0, "arguments"), {"duration": 1, "op": "close"}, "an operation 'wait' has ["),
+    (("tape", 0), {"kind": "follow", "arguments": FOLLOW, "phase": ""}, "is no array of 0 joints"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("keys", "value", "said"), BROKEN, ids=lambda value: ascii(value)[:30])
+def test_something_else_in_it_is_a_sentence(
+    path: Path, keys: tuple[Any, ...], value: Any, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(changed(path, *keys, to=value))]) == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert told.startswith(str(path))
+    assert told.count("\n") == 1
+    assert_harmless_terminal(told)
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ([[0.0] * 8], "is no array of 9 joints"),
+        ([[0.0] * 9, [0.0]], "is no array of 9 joints"),
+        ([["x"] * 9], "is no array of 9 joints"),
+        ([[None] * 9], "is no array of 9 joints"),
+        ([], "is no array of 9 joints"),
+        ([[0.0] * 9] * 2, "have several lengths"),
+        ([[0.0] * 9] * 10_000, "a motion lasts longer than 600 s"),
+    ],
+    ids=["joints", "ragged", "texts", "none", "empty", "lengths", "long"],
+)
+def test_a_motion_that_is_none(case: Case, tmp_path: Path, rows: Any, said: str) -> None:
+    motion = dict.fromkeys(("position", "velocity", "effort"), rows)
+    if said.endswith("lengths"):
+        motion["effort"] = rows[:1]
+    wrong = [Operation("follow", {"tick": 0.1, **motion})]
+    path = write_example(case, "motion", replace(SCENE, robot=panda()), wrong)
+    with pytest.raises(ExampleError, match=said):
+        read_example(path, tmp_path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "{}", "[1]", "nonsense", '{"case": {"x": 1}, "scene": 1, "tape": []}', "[" * 100_000,
+     '{"schema": 2, "case": NaN}', '{"schema": 2, "case": 1e999}', "\udcff"],
+    ids=range(9),
+)  # fmt: skip
+def test_a_file_that_holds_no_episode(
+    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "x.json"
+    path.write_text(text, errors="surrogateescape")
+    with pytest.raises(ExampleError, match="holds no episode of pytest-simbench: "):
+        read_example(path, tmp_path)
+    assert main([str(path)]) == 2
+    assert capsys.readouterr().err.startswith(f"{path} holds no episode of pytest-simbench: ")
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+    max_leaves=10,
+)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=300)
+@given(
+    where=st.sampled_from([keys for keys, _, _ in BROKEN] + [("case", "test")]),
+    value=JSON,
+)
+def test_whatever_is_in_it_nothing_else_is_raised(
+    path: Path, tmp_path: Path, where: tuple[Any, ...], value: Any
+) -> None:
+    before = path.read_text()
+    try:
+        read_example(changed(path, *where, to=value), tmp_path)
+    except ExampleError as error:
+        assert_harmless_terminal(str(error))
+    finally:
+        path.write_text(before)
+
+
+def test_what_is_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with (tmp_path / "large").open("wb") as file:
+        file.truncate(LARGEST + 1)
+    for name, said in (
+        ("none.json", "No such file"),
+        ("pipe", "it is a pipe"),
+        ("large", "it is larger than 64 MB"),
+    ):
+        assert main([str(tmp_path / name)]) == 2
+        assert said in capsys.readouterr().err
+
+
+def test_a_worker_that_fails_is_a_sentence(
+    path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: object) -> None:
+        from pytest_simbench.client.errors import EngineFailed, Where
+
+        raise EngineFailed(f"no {EVIL}", Where("mujoco", "headless"))
+
+    monkeypatch.setattr("pytest_simbench.repeatability.__main__._replay", fails)
+    assert main([str(path)]) == 1
+    told = capsys.readouterr().err
+    assert told.startswith(r"no \x1b]0;owned")
+    assert_harmless_terminal(told)

@@ -11,10 +11,9 @@ from typing import Any
 
 import pytest
 
-from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.case import PROTOCOLS, Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import expected
-from pytest_simbench.experiment.protocol import PROTOCOLS
 from pytest_simbench.plugin.resume import NotResumed, Resumed
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Record

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.client.answers import Constructed
 from pytest_simbench.client.errors import Where, WorkerError, WorkerExited
-from pytest_simbench.client.launch import Constructed
 from pytest_simbench.measure.results import InconclusiveWarning
 from pytest_simbench.repeatability.attack import Attack, Trial, divergence, effect
 from pytest_simbench.repeatability.episode import Episode, changed

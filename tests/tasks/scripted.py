@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.client.answers import Constructed
 from pytest_simbench.client.errors import Where, WorkerError
-from pytest_simbench.client.launch import Constructed
 from pytest_simbench.client.world import World
 from pytest_simbench.description.robot_files import received
 from pytest_simbench.motion.model import RobotModel
@@ -80,7 +80,7 @@ class ScriptedProcess:
 
     def __init__(self, script: Iterable[Mishap] = (), *, timestep: float = 0.004) -> None:
         self.where = Where("scripted", "headless")
-        self.launch = SimpleNamespace(compile_timeout=0.0, log=None, start_timeout=1.0)
+        self.launch = SimpleNamespace(compile_timeout=0.0, log=None)
         self.deadline: float | None = None
         self.pending = list(script)
         self.timestep = timestep

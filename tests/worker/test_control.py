@@ -1,4 +1,4 @@
-"""The clocks of a busy machine, and the workload that runs beside the stepping."""
+"""The clocks of a busy machine, and of helpers; the workload that runs beside the stepping."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.worker.control import MOST_AT_ONCE, SHARE, Clock, Control, workload
+from pytest_simbench.worker.control import MOST_AT_ONCE, SHARE, Clock, Control, Family, workload
 
 
 @contextmanager
@@ -92,3 +92,22 @@ def test_the_record_gets_means_of_single_runs() -> None:
     assert found["control_runs"] * found["control_wall"] == pytest.approx(control.wall)
     assert 0 <= found["control_waited"] < found["control_wall"]
     assert 1e-6 < found["control_cpu"] < 0.01
+
+
+BURN = "import time\nwhile time.process_time() < 0.3: pass\nprint(flush=True)\ninput()"
+PARENT = f"import subprocess, sys\nsubprocess.run([sys.executable, '-c', {BURN!r}])"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux alone tells who they are")
+@pytest.mark.parametrize("helper", [BURN, PARENT], ids=["child", "child of a child"])
+def test_a_helper_counts_while_it_lives_and_once_it_has_ended(helper: str) -> None:
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    family = Family()
+    before = family.cpu()
+    with subprocess.Popen([sys.executable, "-c", helper], **pipes) as child:
+        assert child.stdout is not None
+        child.stdout.readline()
+        family.meet()
+        living = family.cpu() - before
+        child.communicate(b"\n")
+    assert 0.3 <= living <= family.cpu() - before < 2 * living

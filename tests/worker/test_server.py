@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from collections.abc import Iterator
 from typing import Any
 
+import execnet
 import numpy as np
 import pytest
 
@@ -14,9 +16,8 @@ from pytest_simbench import __version__
 from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.simulator import DivergedError, ParityError, StateError
 from pytest_simbench.worker import stepping
-from pytest_simbench.worker.server import Server, serve
-from pytest_simbench.worker.text import LONGEST
-from pytest_simbench.worker.wire import pack, unpack
+from pytest_simbench.worker.server import Server, peak_rss_mb, reset_peak_rss, serve
+from pytest_simbench.worker.wire import LONGEST, pack, unpack
 from tests.worker.hosted import Hosted
 
 CUBE = Box("cube", (0.05, 0.05, 0.05), Pose.at(0.5, 0.0, 0.5), mass=0.1)
@@ -54,6 +55,7 @@ class Asked:
     def error(self, op: str, **arguments: Any) -> tuple[str, str]:
         """Type and message of what went wrong."""
         answer = self.answer(op, **arguments)
+        assert execnet.loads(execnet.dumps(answer)) == answer
         assert set(answer) == {"error"}
         assert set(answer["error"]) == {"type", "message"}
         return answer["error"]["type"], answer["error"]["message"]
@@ -80,6 +82,14 @@ def ask(monkeypatch: pytest.MonkeyPatch) -> Iterator[Asked]:
     yield Asked()
     for variable in Hosted.info.environment:
         os.environ.pop(variable, None)
+
+
+@pytest.fixture
+def loaded(ask: Asked) -> Asked:
+    """One whose world is loaded."""
+    ask.construct()
+    ask.load()
+    return ask
 
 
 def test_hello(ask: Asked) -> None:
@@ -208,83 +218,69 @@ def test_a_body_with_the_name_of_a_link(ask: Asked) -> None:
     assert Hosted.calls == []
 
 
-def test_what_the_engine_says_while_it_remembers_another_scene(ask: Asked) -> None:
-    ask.construct()
-    ask.load()
-    assert ask("read_back")["body/cube/mass"] == 0.1
+def test_what_the_engine_says_while_it_remembers_another_scene(loaded: Asked) -> None:
+    assert loaded("read_back")["body/cube/mass"] == 0.1
     other = SCENE.with_body(Box("cube", (0.05,) * 3, Pose.at(0.5, 0, 0.5), mass=0.3))
-    assert ask("read_back", remember=other.to_wire())["body/cube/mass"] == 0.3
-    assert ask("read_back")["body/cube/mass"] == 0.1
+    assert loaded("read_back", remember=other.to_wire())["body/cube/mass"] == 0.3
+    assert loaded("read_back")["body/cube/mass"] == 0.1
 
 
-def test_waiting_and_following(ask: Asked) -> None:
-    ask.construct()
-    ask.load()
-    answer = ask("wait", duration=0.04, log_period=0.02)
+def test_waiting_and_following(loaded: Asked) -> None:
+    answer = loaded("wait", duration=0.04, log_period=0.02)
     assert set(answer) == {"log", "time", "joints", "bodies"}
     assert answer["time"] == pytest.approx(0.04)
     assert np.allclose(answer["log"]["time"], [0.02, 0.04])
     assert answer["log"]["bodies"].shape == (2, 1, 13)
     rows = np.zeros((3, 0))
     moved = {"tick": 0.004, "position": rows, "velocity": rows, "effort": rows}
-    answer = ask("follow", **moved, log_period=None)
+    answer = loaded("follow", **moved, log_period=None)
     assert set(answer) == {"log", "time", "joints", "bodies"}
     assert answer["time"] == pytest.approx(0.048)
     assert answer["log"] == {}
     assert [call for call in Hosted.calls if call[0] == "command"] == [("command", [], [], [])] * 2
 
 
-def test_a_log_that_is_none_is_found(ask: Asked, monkeypatch: Any) -> None:
-    ask.construct()
-    ask.load()
+def test_a_log_that_is_none_is_found(loaded: Asked, monkeypatch: Any) -> None:
     monkeypatch.setattr(Hosted, "joint_state", lambda self: np.zeros((2, 1)))
-    kind, message = ask.error("wait", duration=0.04, log_period=0.02)
+    kind, message = loaded.error("wait", duration=0.04, log_period=0.02)
     assert kind == "StateError"
     assert message == (
         "hosted: joint_state() must be an array of float64 (2, 0), not float64 (2, 1)"
     )
 
 
-def test_saved_states_have_names(ask: Asked) -> None:
-    ask.construct()
-    ask.load()
-    ask("save", name="start")
-    ask("wait", duration=0.04, log_period=None)
-    ask("save", name="later")
-    ask("wait", duration=0.04, log_period=None)
-    assert ask("restore", name="start")["time"] == 0.0
-    assert ask("restore", name="later")["time"] == pytest.approx(0.04)
+def test_saved_states_have_names(loaded: Asked) -> None:
+    loaded("save", name="start")
+    loaded("wait", duration=0.04, log_period=None)
+    loaded("save", name="later")
+    loaded("wait", duration=0.04, log_period=None)
+    assert loaded("restore", name="start")["time"] == 0.0
+    assert loaded("restore", name="later")["time"] == pytest.approx(0.04)
 
 
-def test_contacts_and_pictures(ask: Asked) -> None:
-    ask.construct()
-    ask.load()
-    assert ask("contact_count") == 7
-    assert ask("render", width=4, height=3).shape == (3, 4, 3)
+def test_contacts_and_pictures(loaded: Asked) -> None:
+    assert loaded("contact_count") == 7
+    assert loaded("render", width=4, height=3).shape == (3, 4, 3)
 
 
-def test_a_film_is_of_whole_steps_and_of_the_size_asked_for(ask: Asked) -> None:
-    ask.construct()
-    ask.load()
-    assert ask("film", period=0.0085, width=4, height=3) == pytest.approx(0.008)
-    ask("wait", duration=0.016, log_period=None)
-    frames = [sent["frame"] for sent in ask.sent if "frame" in sent]
+def test_a_film_is_of_whole_steps_and_of_the_size_asked_for(loaded: Asked) -> None:
+    assert loaded("film", period=0.0085, width=4, height=3) == pytest.approx(0.008)
+    loaded("wait", duration=0.016, log_period=None)
+    frames = [sent["frame"] for sent in loaded.sent if "frame" in sent]
     assert [frame["time"] for frame in frames] == pytest.approx([0.008, 0.016])
     assert [unpack(frame["picture"]).shape for frame in frames] == [(3, 4, 3)] * 2
-    ask.sent.clear()
-    assert ask("film", period=None, width=4, height=3) is None
-    ask("wait", duration=0.016, log_period=None)
-    assert ask.sent == []
+    loaded.sent.clear()
+    assert loaded("film", period=None, width=4, height=3) is None
+    loaded("wait", duration=0.016, log_period=None)
+    assert loaded.sent == []
 
 
-def test_forces_of_a_pair_are_one_sum_on_the_first_by_name(ask: Asked) -> None:
-    ask.construct()
-    ask.load()
+def test_forces_of_a_pair_are_one_sum_on_the_first_by_name(loaded: Asked) -> None:
     one, two, three = np.arange(1.0, 7.0), np.full(6, 10.0), np.full(6, 0.5)
     Hosted.touching.extend([
         ("cube", "table", one), ("table", "cube", two), ("cube", "table", three), ("a", "b", one),
     ])  # fmt: skip
-    (first, second, wrench), other = ask("contact_forces")
+    (first, second, wrench), other = loaded("contact_forces")
     assert (first, second) == ("cube", "table")
     assert wrench == pytest.approx(one - two + three)
     assert other[:2] == ["a", "b"] or other[:2] == ("a", "b")
@@ -316,14 +312,12 @@ def test_it_waits_for_the_wall_clock_where_asked(ask: Asked) -> None:
     assert ask.server.stepper.real_time is False
 
 
-def test_signs_of_life(ask: Asked, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_signs_of_life(loaded: Asked, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stepping, "HEARTBEAT_PERIOD", -1.0)
-    ask.construct()
-    ask.load()
-    ask("wait", duration=0.2, log_period=None)
-    assert ask.sent
-    assert all(set(sign) == {"alive"} and type(sign["alive"]) is float for sign in ask.sent)
-    assert [sign["alive"] for sign in ask.sent] == pytest.approx([0.1, 0.2])
+    loaded("wait", duration=0.2, log_period=None)
+    assert loaded.sent
+    assert all(set(sign) == {"alive"} and type(sign["alive"]) is float for sign in loaded.sent)
+    assert [sign["alive"] for sign in loaded.sent] == pytest.approx([0.1, 0.2])
 
 
 def test_closing(ask: Asked) -> None:
@@ -341,6 +335,30 @@ class Mute(Exception):
     def __str__(self) -> str:
         raise RuntimeError("no text")
 
+    __repr__ = __str__
+
+
+class MuteParity(Mute, ParityError):
+    """One of ours that has no text either."""
+
+
+class Exiting(Exception):
+    def __str__(self) -> str:
+        raise SystemExit(9)
+
+
+class Letters(str):
+    """A text that is no text to execnet."""
+
+
+class Spelt(Exception):
+    def __str__(self) -> str:
+        return Letters("mine")
+
+
+class Rude(BaseException):
+    """An exception that no `except Exception` sees."""
+
 
 @pytest.mark.parametrize(
     ("error", "kind", "message"),
@@ -356,7 +374,19 @@ class Mute(Exception):
         (ValueError("so"), "EngineError", "ValueError: so"),
         (ValueError(), "EngineError", "ValueError"),
         (KeyboardInterrupt(), "EngineError", "KeyboardInterrupt"),
+        (KeyboardInterrupt("so"), "EngineError", "KeyboardInterrupt: so"),
+        (GeneratorExit("so"), "EngineError", "GeneratorExit: so"),
+        (Rude("so"), "EngineError", "Rude: so"),
         (Mute(), "EngineError", "Mute: (its message cannot be read: RuntimeError)"),
+        (Exiting(), "EngineError", "Exiting: (its message cannot be read: SystemExit)"),
+        (Spelt(), "EngineError", "Spelt: mine"),
+        (MuteParity(), "ParityError", "(its message cannot be read: RuntimeError)"),
+        (
+            SystemExit(Mute()),
+            "SystemExit",
+            "the adapter called sys.exit('(its message cannot be read: RuntimeError)'), status 1",
+        ),
+        (ValueError(b"b", {1: 2}, None), "EngineError", "ValueError: (b'b', {1: 2}, None)"),
         (
             ValueError("x" * 5000),
             "EngineError",
@@ -365,21 +395,19 @@ class Mute(Exception):
     ],
 )
 def test_every_error_is_an_answer(
-    ask: Asked, error: BaseException, kind: str, message: str, capsys: pytest.CaptureFixture[str]
+    loaded: Asked, error: BaseException, kind: str, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    ask.construct()
-    ask.load()
     Hosted.raises.append(error)
-    assert ask.error("wait", duration=0.1, log_period=None) == (kind, message)
+    assert loaded.error("wait", duration=0.1, log_period=None) == (kind, message)
     log = capsys.readouterr().err
     assert log.startswith("Traceback (most recent call last):")
     assert type(error).__name__ in log
     Hosted.raises.clear()
-    assert ask("wait", duration=0.1, log_period=None)["time"] == pytest.approx(0.1)
+    assert loaded("wait", duration=0.1, log_period=None)["time"] == pytest.approx(0.1)
 
 
 def test_an_error_is_an_answer_though_the_log_cannot_be_written(
-    ask: Asked, monkeypatch: pytest.MonkeyPatch
+    loaded: Asked, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Full:
         def write(self, text: str) -> int:
@@ -387,18 +415,16 @@ def test_an_error_is_an_answer_though_the_log_cannot_be_written(
 
         flush = None
 
-    ask.construct()
-    ask.load()
     Hosted.raises.append(ValueError("so"))
     monkeypatch.setattr(sys, "stderr", Full())
-    assert ask.error("wait", duration=0.1, log_period=None) == ("EngineError", "ValueError: so")
+    assert loaded.error("wait", duration=0.1, log_period=None) == ("EngineError", "ValueError: so")
 
 
-def test_the_log_holds_a_long_traceback_cut(ask: Asked, capsys: pytest.CaptureFixture[str]) -> None:
-    ask.construct()
-    ask.load()
+def test_the_log_holds_a_long_traceback_cut(
+    loaded: Asked, capsys: pytest.CaptureFixture[str]
+) -> None:
     Hosted.raises.append(ValueError("x" * 200_000))
-    ask.error("wait", duration=0.1, log_period=None)
+    loaded.error("wait", duration=0.1, log_period=None)
     assert 100_000 < len(capsys.readouterr().err) < 100_100
 
 
@@ -416,3 +442,38 @@ def test_it_serves_until_it_is_told_to_close() -> None:
     assert [(answer["number"], "ok" in answer) for answer in sent] == [(0, True), (1, True)]
     assert sent[1]["ok"] is None
     assert len(requests) == 1
+
+
+CODE = """
+from pytest_simbench.worker.server import peak_rss_mb, reset_peak_rss
+
+def kilobytes(key):
+    with open("/proc/self/status") as status:
+        return next(int(line.split()[1]) for line in status if line.startswith(key))
+
+block = bytearray(b"x") * 100_000_000
+peak, before = peak_rss_mb(), kilobytes("VmHWM")
+del block
+reset_peak_rss()
+print(peak, before, peak_rss_mb(), kilobytes("VmRSS"))
+"""
+
+
+def test_the_peak_is_the_kernel_s_and_starts_anew() -> None:
+    found = subprocess.run(
+        [sys.executable, "-c", CODE], capture_output=True, text=True, check=True
+    ).stdout.split()
+    peak, kilobytes, after, now = map(float, found)
+    assert peak == pytest.approx(kilobytes * 1024 / 1e6, rel=3e-4)  # not MiB: 4.9 % less
+    assert peak > 100
+    assert after < peak - 90
+    assert after == pytest.approx(now * 1024 / 1e6, rel=0.05)
+
+
+def test_where_the_kernel_tells_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*args: object, **options: object) -> None:
+        raise PermissionError("no /proc here")
+
+    monkeypatch.setattr("builtins.open", refused)
+    assert peak_rss_mb() is None
+    reset_peak_rss()

@@ -1,7 +1,8 @@
-"""States that are none, from a real engine with an adapter that errs: found, named, survived."""
+"""States that are none are found and named, and end a repetition of a real engine."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any, ClassVar
@@ -16,14 +17,19 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.records.record import Record
-from pytest_simbench.scene import Box, Pose, Scene, Trajectory
+from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Trajectory
 from pytest_simbench.simulator import ParityError, StateError
 from pytest_simbench.tasks import Stacking
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
-from pytest_simbench.worker.state import check_following, check_start, checked_state
-from tests.client.failing import Silent
+from pytest_simbench.worker.state import (
+    States,
+    check_following,
+    check_start,
+    checked_quantities,
+    checked_state,
+)
+from tests.client.failing import Silent, failure, faulty
 from tests.tiny import Falling
-from tests.worker.misshapen import BODIES, BUILT, JOINTS, LATER, LATER_TIMES, TIMES
 
 ROBOT = Stacking().scene(1, Jitter()).robot
 
@@ -50,98 +56,20 @@ class Turning(Falling):
         return Outcome({"landed": 1.0})
 
 
-def misshapen(case: Case, fault: str) -> Case:
-    adapter = "tests.worker.misshapen:Misshapen"
-    return replace(case, adapter=adapter, environment={"UNRULY": fault}, stall_timeout=60.0)
-
-
-EXPECTED = {
-    "too few joints": "joint_state() must be an array of float64 (2, 9), not float64 (2, 8)",
-    "no velocities": "joint_state() must be an array of float64 (2, 9), not float64 (9,)",
-    "joints transposed": "joint_state() must be an array of float64 (2, 9), not float64 (9, 2)",
-    "joints as a list": "joint_state() must be an array of float64 (2, 9), not a list",
-    "joints of float32": "joint_state() must be an array of float64 (2, 9), not float32 (2, 9)",
-    "joints of int": "joint_state() must be an array of float64 (2, 9), not int64 (2, 9)",
-    "joints of objects": "joint_state() must be an array of float64 (2, 9), not object (2, 9)",
-    "complex joints": "joint_state() must be an array of float64 (2, 9), not complex128 (2, 9)",
-    "joints exchanged": "row 1, 'panda_joint2', starts at (-2.356), where the scene has (-0.7854); "
-    "that is the place of 'panda_joint4', so the order is another",
-    "joints reversed": "row 0, 'panda_joint1', starts at (0.035), where the scene has (0)",
-    "joints not a number": "the state of the joints is not finite after loading",
-    "joints of nothing": "joint_state() must be an array of float64 (2, 9), not a NoneType",
-    "too few bodies": "body_state() must be an array of float64 (N, 13), not float64 (N-1, 13)",
-    "too many bodies": "body_state() must be an array of float64 (N, 13), not float64 (N+1, 13)",
-    "no velocity columns": "body_state() must be an array of float64 (N, 13), not float64 (N, 7)",
-    "bodies of float32": "body_state() must be an array of float64 (N, 13), not float32 (N, 13)",
-    "bodies of objects": "body_state() must be an array of float64 (N, 13), not object (N, 13)",
-    "bodies exchanged": "so the order is another",
-    "quaternion not a number": "must have length 1, but (nan, ",
-    "quaternion of length 2": "must have length 1, but (2, 0, 0, 0) has 2",
-    "quaternion of zeros": "must have length 1, but (0, 0, 0, 0) has 0",
-    "quaternion x y z w": "(w, x, y, z)",
-    "position infinite": "the state of the bodies is not finite after loading",
-    "time as a text": "the time must be a float, not '0.0'",
-    "time of nothing": "the time must be a float, not None",
-    "time complex": "the time must be a float, not 0j",
-    "time an array": "the time must be a float, not array([0.])",
-    "time not a number": "the time must be finite, not nan",
-    "nothing read back": "read_back() must be a dict of numbers by name, not None",
-    "texts read back": "read_back()['gravity'] must be numbers, not 'downward'",
-}
-
-
-def test_all_are_expected() -> None:
-    assert set(EXPECTED) == {*JOINTS, *BODIES, *TIMES, *BUILT}
-
-
-@pytest.mark.parametrize("fault", EXPECTED)
-def test_found_when_the_world_is_loaded(case: Case, fault: str) -> None:
-    free = len(Turning().scene(1, Jitter()).free_bodies)
-    message = EXPECTED[fault]
-    for text, number in (("N-1", free - 1), ("N+1", free + 1), ("N", free)):
-        message = message.replace(f"({text},", f"({number},")
-    record, _ = Repetition(Experiment(misshapen(case, fault), Turning()), 1).run()
-    assert record.error is not None
-    assert (record.error.type, record.error.phase) == ("BadState", "load")
-    assert message in record.error.message
-    assert "mujoco" in record.error.message
-
-
-@pytest.mark.parametrize(
-    ("fault", "message"),
-    [
-        ("later float32", "must be an array of float64 (2, 9), not float32 (2, 9)"),
-        ("later too few", "must be an array of float64 (2, 9), not float64 (2, 8)"),
-        ("later nothing", "joint_state() must be an array of float64 (2, 9), not a NoneType"),
-        ("later a text", "joint_state() must be an array of float64 (2, 9), not a str"),
-        ("joints 1 and 3 exchanged", "panda_joint1, panda_joint3 stand at each other's"),
-        ("time nan", "the time must be finite, not nan"),
-        ("time inf", "the time must be finite, not inf"),
-        ("time stands", "0.35 s after 350 steps of 0.001 s from 0 s on, not 0.3 s"),
-        ("time runs back", "0.35 s after 350 steps of 0.001 s from 0 s on, not 0.25 s"),
-        ("time jumps", "0.35 s after 350 steps of 0.001 s from 0 s on, not 100.35 s"),
-        ("time slow", "0.05 s after 50 steps of 0.001 s from 0 s on, not 0.025 s"),
-    ],
-)
-def test_found_in_a_motion(case: Case, fault: str, message: str) -> None:
-    record, _ = Repetition(Experiment(misshapen(case, fault), Turning()), 1).run()
-    assert record.error is not None
-    assert (record.error.type, record.error.phase) == ("BadState", "turn")
-    assert message in record.error.message
-    assert fault in (*LATER, *LATER_TIMES, "time slow") or "exchanged" in fault
-
-
-def test_an_honest_adapter_passes(case: Case) -> None:
-    record, error = Repetition(Experiment(misshapen(case, "nothing"), Turning()), 1).run()
-    assert error is None
-    assert record.status == "ok"
-
-
 def test_it_ends_that_repetition_alone(case: Case) -> None:
     kept: list[Record] = []
-    experiment = Experiment(misshapen(case, "too few bodies"), Falling())
+    experiment = Experiment(faulty(case, "Lies bodies"), Falling())
     Repeater(experiment, LocalExecutor(1), Silent(), kept.append).run([1, 2])  # type: ignore[arg-type]
     assert [record.status for record in kept] == ["failed", "failed"]
+
+
+def test_joints_in_another_order_are_found_when_they_have_moved(case: Case) -> None:
+    """They all stand at 0 at the start."""
+    record, error = Repetition(Experiment(case, Turning()), 1).run()
+    assert (record.status, error) == ("ok", None)
+    kind, phase, message = failure(faulty(case, "Lies joints"), Turning())
+    assert (kind, phase) == ("BadState", "turn")
+    assert "panda_joint1, panda_joint3 stand at each other's" in message
 
 
 CUBES = tuple(
@@ -163,6 +91,7 @@ def saying(**what: Any) -> Any:
         time=says["time"],
         joint_state=lambda: says["joints"],
         body_state=lambda: says["bodies"],
+        settings=SimpleNamespace(timestep=0.001),
     )
 
 
@@ -185,11 +114,95 @@ def test_a_sound_state_is_given_on() -> None:
     check_start(saying(joints=np.zeros((2, 0)), bodies=np.zeros((0, 13))), Scene("empty"))
 
 
-@pytest.mark.parametrize("time", [True, "0" * 99, None, 0j])
-def test_a_time_that_is_none(time: Any) -> None:
+JOINTS, BODIES = (
+    "joint_state() must be an array of float64 (2, 9)",
+    "body_state() must be an array of float64 (2, 13)",
+)
+ORDER = [0, 3, 2, 1, 4, 5, 6, 7, 8]
+
+
+def put(index: Any, value: Any) -> Callable[[Any], Any]:
+    """Changes one value of a state."""
+
+    def change(state: FloatArray) -> FloatArray:
+        state = state.copy()
+        state[index] = value
+        return state
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("what", "change", "message"),
+    [
+        ("joints", lambda q: q[:, :-1], f"{JOINTS}, not float64 (2, 8)"),
+        ("joints", lambda q: q[0], f"{JOINTS}, not float64 (9,)"),
+        ("joints", lambda q: q.T, f"{JOINTS}, not float64 (9, 2)"),
+        ("joints", lambda q: q.tolist(), f"{JOINTS}, not a list"),
+        ("joints", lambda q: q.astype(np.float32), f"{JOINTS}, not float32 (2, 9)"),
+        ("joints", lambda q: np.zeros_like(q, dtype=int), f"{JOINTS}, not int64 (2, 9)"),
+        ("joints", lambda q: q.astype(object), f"{JOINTS}, not object (2, 9)"),
+        ("joints", lambda q: q.astype(complex), f"{JOINTS}, not complex128 (2, 9)"),
+        ("joints", lambda q: None, f"{JOINTS}, not a NoneType"),
+        ("joints", str, f"{JOINTS}, not a str"),
+        ("joints", lambda q: q[:, ORDER], "row 1, 'panda_joint2', starts at (-2.356), where the "
+         "scene has (-0.7854); that is the place of 'panda_joint4', so the order is another"),
+        ("joints", lambda q: q[:, ::-1].copy(), "row 0, 'panda_joint1', starts at (0.035), where"),
+        ("joints", put((0, 4), np.nan), "the state of the joints is not finite after loading"),
+        ("bodies", lambda b: b[:-1], f"{BODIES}, not float64 (1, 13)"),
+        ("bodies", lambda b: np.vstack([b, b[:1]]), f"{BODIES}, not float64 (3, 13)"),
+        ("bodies", lambda b: b[:, :7], f"{BODIES}, not float64 (2, 7)"),
+        ("bodies", lambda b: b.astype(np.float32), f"{BODIES}, not float32 (2, 13)"),
+        ("bodies", lambda b: b.astype(object), f"{BODIES}, not object (2, 13)"),
+        ("bodies", lambda b: b[::-1].copy(), "so the order is another"),
+        ("bodies", put((0, 3), np.nan), "must have length 1, but (nan, "),
+        ("bodies", put((1, slice(3, 7)), (2.0, 0.0, 0.0, 0.0)), "but (2, 0, 0, 0) has 2"),
+        ("bodies", put((0, slice(3, 7)), 0.0), "must have length 1, but (0, 0, 0, 0) has 0"),
+        ("bodies", lambda b: b[:, [0, 1, 2, 4, 5, 6, 3, 7, 8, 9, 10, 11, 12]], "(w, x, y, z)"),
+        ("bodies", put((0, 0), np.inf), "the state of the bodies is not finite after loading"),
+        ("bodies", put((1, 7), np.inf), "the state of the bodies is not finite after loading"),
+        ("time", str, "the time must be a float, not '0.0'"),
+        ("time", lambda t: None, "the time must be a float, not None"),
+        ("time", complex, "the time must be a float, not 0j"),
+        ("time", bool, "the time must be a float, not False"),
+        ("time", lambda t: np.array([t]), "the time must be a float, not array([0.])"),
+        ("time", lambda t: "0" * 99, f"the time must be a float, not '{'0' * 79}"),
+        ("time", lambda t: np.nan, "the time must be finite, not nan"),
+        ("time", lambda t: np.inf, "the time must be finite, not inf"),
+    ],
+)  # fmt: skip
+def test_what_is_no_state(what: str, change: Callable[[Any], Any], message: str) -> None:
+    sound = saying()
+    says = {"time": sound.time, "joints": sound.joint_state(), "bodies": sound.body_state()}
+    with pytest.raises(StateError, match="^sim: ") as caught:
+        check_start(saying(**{what: change(says[what])}), WORLD)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("found", "message"),
+    [
+        (None, "read_back() must be a dict of numbers by name, not None"),
+        ({"gravity": "downward"}, "read_back()['gravity'] must be numbers, not 'downward'"),
+    ],
+)
+def test_what_is_no_dict_of_quantities(found: Any, message: str) -> None:
+    simulator: Any = SimpleNamespace(info=SimpleNamespace(name="sim"), read_back=lambda: found)
     with pytest.raises(StateError) as caught:
-        checked_state(saying(time=time), WORLD)
-    assert str(caught.value) == f"sim: the time must be a float, not {time!r:.80}"
+        checked_quantities(simulator)
+    assert str(caught.value) == f"sim: {message}"
+
+
+@pytest.mark.parametrize(
+    "time", [0.3, 0.25, 100.35, 0.175], ids=["stands", "back", "jumps", "slow"]
+)
+def test_a_clock_that_goes_otherwise_than_the_steps(time: float) -> None:
+    with pytest.raises(StateError) as caught:
+        States(saying(time=time), WORLD).time_after(350, 0.0)
+    assert str(caught.value) == (
+        f"sim: the time must be 0.35 s after 350 steps of 0.001 s from 0 s on, not {time} s"
+    )
+    assert States(saying(time=0.3504), WORLD).time_after(350, 0.0) == 0.3504
 
 
 @pytest.mark.parametrize(("length", "found"), [(0.9991, ""), (1.0009, ""), (1.0011, "1.001")])
@@ -230,13 +243,6 @@ def test_a_body_starts_as_fast_as_the_scene_says() -> None:
     for speed in (0.0, 1.999):
         with pytest.raises(ParityError, match=f"by up to {2 - speed:.3g} .* the scene's speeds"):
             check_start(changed("bodies", (0, 9), speed), WORLD.with_body(fast))
-
-
-@pytest.mark.parametrize(("what", "index"), [("joints", (0, 8)), ("bodies", (1, 7))])
-def test_what_is_not_finite_at_the_start(what: str, index: Any) -> None:
-    with pytest.raises(StateError) as caught:
-        check_start(changed(what, index, np.inf), WORLD)
-    assert str(caught.value) == f"sim: the state of the {what} is not finite after loading"
 
 
 def test_where_joints_and_bodies_start() -> None:

@@ -1,44 +1,42 @@
-"""The stepping loop on the real MuJoCo."""
+"""The stepping loop: what it asks of a simulator, what it tells it, what its clocks make of it."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
 import numpy as np
 import pytest
-from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.scene import Box, Pose, Robot, Scene, Trajectory
-from pytest_simbench.simulator import DivergedError
+from pytest_simbench.scene import (
+    Box,
+    FloatArray,
+    Pose,
+    Robot,
+    Scene,
+    SceneError,
+    Trajectory,
+    Wrench,
+)
+from pytest_simbench.simulator import DivergedError, NotSupportedError
 from pytest_simbench.worker import control
-from pytest_simbench.worker.stepping import CHECK_PERIOD, Clocks, Film, Stepper
-from tests.worker.toys import Toy
+from pytest_simbench.worker.acting import Acting, prescribed
+from pytest_simbench.worker.stepping import CHECK_PERIOD, Clocks, Stepper
+from tests.worker.hosted import Toy
 
 CUBE = Box("cube", (0.05, 0.05, 0.05), Pose.at(0.5, 0.0, 0.5, yaw=0.3), mass=0.1)
 
 
-@pytest.fixture
-def stepper() -> Iterator[Stepper]:
-    simulator = MuJoCo(MuJoCo.profiles["tuned"])
-    scene = Scene("s", (CUBE,), panda())
-    simulator.load(scene)
-    yield Stepper(simulator, scene, lambda at: None)
-    simulator.close()
-
-
-def test_time_and_clocks_advance_together(stepper: Stepper) -> None:
-    stepper.wait(0.25, None)
-    assert stepper.simulator.time == pytest.approx(0.25)
-    assert stepper.clocks.steps == 250
-    assert stepper.clocks.simulated == pytest.approx(0.25)
-    stepper.wait(0.1, None)
-    assert stepper.clocks.steps == 350
-    assert stepper.clocks.simulated == pytest.approx(0.35)
+def test_time_and_clocks_advance_together() -> None:
+    stepper = stepping(Toy())
+    for duration, steps in ((0.25, 125), (0.1, 175)):
+        stepper.wait(duration, None)
+        assert stepper.clocks.steps == steps
+        assert stepper.clocks.simulated == pytest.approx(stepper.simulator.time) == 0.002 * steps
 
 
 def test_a_state_that_is_sampled_is_not_read_again_to_be_checked() -> None:
@@ -55,7 +53,7 @@ def test_a_state_that_is_sampled_is_not_read_again_to_be_checked() -> None:
 def test_pictures_go_on_from_one_operation_to_the_next() -> None:
     toy, times = Toy(), []
     stepper = stepping(toy)
-    stepper.film = Film(20, lambda: times.append(toy.time))
+    stepper.film = 20, lambda: times.append(toy.time)
     for duration in (0.05, 0.02, 0.06):
         stepper.wait(duration, None)
     assert times == pytest.approx([0.04, 0.08, 0.12])
@@ -185,45 +183,39 @@ def test_a_state_that_is_no_number_is_seen_within_a_tenth_of_a_second(
             setattr(toy, what, np.full_like(getattr(toy, what), np.inf))
 
     monkeypatch.setattr(toy, "step", failing)
-    with pytest.raises(DivergedError, match=f"the state of the {what} is not finite at t = "):
+    with pytest.raises(DivergedError, match=f"{what} is not finite at t = .*timestep=0.002"):
         stepping(toy, robot=panda()).wait(0.5 if at > 0.1 else 0.05, None)
     assert toy.time <= at + 0.1 + 1e-9
 
 
-def test_log_at_its_period(stepper: Stepper) -> None:
+def test_log_at_its_period() -> None:
+    class Rising(Toy):
+        def body_state(self) -> FloatArray:
+            return super().body_state() + self.time
+
+    toy = Rising()
+    toy.joints = np.zeros((2, 9))
+    stepper = stepping(toy, robot=panda())
     log = stepper.wait(0.1, 0.02)
     assert np.allclose(log["time"], [0.02, 0.04, 0.06, 0.08, 0.10])
     assert log["joints"].shape == (5, 2, 9)
     assert log["bodies"].shape == (5, 1, 13)
-    fall = 0.5 - 0.5 * 9.80665 * log["time"] ** 2
-    assert np.allclose(log["bodies"][:, 0, 2], fall, atol=0.002)
-    assert len(stepper.wait(0.01, 0.0)["time"]) == 10
+    assert np.allclose(log["bodies"][:, 0, 2], log["time"])
+    assert len(stepper.wait(0.01, 0.0)["time"]) == 5
     assert stepper.wait(0.01, None) == {}
 
 
-def test_a_motion_shorter_than_the_period_has_no_log(stepper: Stepper) -> None:
+def test_a_motion_shorter_than_the_period_has_no_log() -> None:
     """None at all: arrays of no samples would not have a sample's shape."""
+    stepper = stepping(Toy())
     assert stepper.wait(0.01, 0.05) == {}
     assert len(stepper.wait(0.05, 0.05)["time"]) == 1
 
 
-def test_a_trajectory_is_followed_and_its_end_held(stepper: Stepper) -> None:
-    start = stepper.simulator.joint_state()[0]
-    s = np.linspace(0, 1, 126)[:, None]
-    blend = 10 * s**3 - 15 * s**4 + 6 * s**5
-    slope = (30 * s**2 - 60 * s**3 + 30 * s**4) / 0.5
-    way = np.array([0.3, 0.2, -0.2, 0.3, 0.2, 0.3, 0.4, -0.01, -0.01])
-    trajectory = Trajectory(0.004, start + blend * way, slope * way, np.zeros((126, 9)))
-    stepper.follow(trajectory, None)
-    assert np.abs(stepper.simulator.joint_state()[0] - start - way)[:7].max() < 0.02
-    stepper.wait(0.5, None)
-    assert np.abs(stepper.simulator.joint_state()[0] - start - way)[:7].max() < 0.02
-
-
 def test_a_slow_window_takes_at_most_half_of_the_time(
-    stepper: Stepper, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    pictures = []
+    pictures, stepper = [], stepping(Toy(burn=0.0001))
 
     def draw() -> None:
         began = time.perf_counter()
@@ -240,19 +232,103 @@ def test_a_slow_window_takes_at_most_half_of_the_time(
     assert sum(pictures) <= elapsed / 2 + pictures[-1]
 
 
-def test_a_state_that_is_no_number_is_an_error(stepper: Stepper) -> None:
-    stepper.simulator.data.qpos[0] = np.nan  # type: ignore[attr-defined]
-    with pytest.raises(DivergedError, match=r"joints is not finite at t = .*timestep=0.001"):
-        stepper.wait(1.0, None)
+PULL = Wrench(force=(1.0, 0.0, 0.0), start=0.003, end=0.007)
+PULLED = Scene("pulled", (Box("a", (0.1,) * 3, Pose.at(0.0, 0.0, 1.0), 1.0, wrenches=(PULL,)),))
+BELT = Box(
+    "belt",
+    (1.0, 0.2, 0.1),
+    Pose.at(0.0, 0.0, 0.5),
+    linear_velocity=(0.5, 0.0, 0.0),
+    angular_velocity=(0.0, 0.0, 2.0),
+    prescribed=True,
+)
 
 
-def test_save_and_restore_repeat_the_same_future(stepper: Stepper) -> None:
-    stepper.wait(0.3, None)
-    simulator = stepper.simulator
-    saved = simulator.save()
-    stepper.wait(0.3, None)
-    first = simulator.body_state().copy(), simulator.joint_state().copy()
-    simulator.restore(saved)
-    stepper.wait(0.3, None)
-    assert np.array_equal(first[0], simulator.body_state())
-    assert np.array_equal(first[1], simulator.joint_state())
+class Told(Toy):
+    """Notes what it is told."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.pushed: list[float] = []
+        self.led: list[tuple[FloatArray, FloatArray]] = []
+
+    def push(self, wrenches: FloatArray) -> None:
+        self.pushed.append(float(wrenches[0, 0]))
+
+    def lead(self, before: FloatArray, after: FloatArray) -> None:
+        self.led.append((before, after))
+
+
+def told(scene: Scene, steps: int) -> Told:
+    simulator = Told()
+    acting = Acting.of(simulator, scene)
+    assert acting is not None
+    simulator.pushed.clear()
+    simulator.led.clear()
+    act = acting.steps()
+    for _ in range(steps):
+        act()
+        simulator.step()
+    return simulator
+
+
+def test_a_force_is_told_while_it_acts_and_once_that_it_ended() -> None:
+    # steps of 2 ms; the first is told whatever acts, since nobody knows what was before
+    assert told(PULLED, 8).pushed == pytest.approx([0.0, 0.5, 1.0, 0.5, 0.0])
+
+
+def test_it_is_told_in_each_step_of_a_wait() -> None:
+    simulator = Told()
+    acting = Acting.of(simulator, PULLED)
+    simulator.pushed.clear()
+    Stepper(simulator, PULLED, lambda at: None, acting).wait(0.016, None)
+    assert simulator.pushed == pytest.approx([0.0, 0.5, 1.0, 0.5, 0.0])
+
+
+def test_a_motion_goes_on_from_the_simulators_time() -> None:
+    simulator = Told()
+    acting = Acting.of(simulator, Scene("s", (BELT,)))
+    assert acting is not None
+    simulator.steps = 100  # restored
+    acting.steps()()
+    before, after = simulator.led[-1]
+    assert before[0] == pytest.approx(prescribed(BELT, 0.2))
+    assert after[0, :3] == pytest.approx([0.101, 0.0, 0.5])
+    assert Pose.from_array(after[0]).yaw == pytest.approx(0.404)
+    assert after[0, 7:] == pytest.approx([0.5, 0.0, 0.0, 0.0, 0.0, 2.0])
+
+
+def test_where_nothing_acts_nobody_is_told() -> None:
+    assert (
+        Acting.of(Toy(), Scene("s", (Box("a", (0.1,) * 3, Pose.at(0.0, 0.0, 1.0), 1.0),))) is None
+    )
+
+
+@pytest.mark.parametrize(
+    ("scene", "what"),
+    [(PULLED, "forces on bodies"), (Scene("s", (BELT,)), "bodies that move as prescribed")],
+)
+def test_who_takes_none_says_so_before_the_first_step(scene: Scene, what: str) -> None:
+    with pytest.raises(NotSupportedError, match=f"toy has no {what}"):
+        Acting.of(Toy(), scene)
+
+
+def test_a_prescribed_body_is_neither_free_of_its_motion_nor_fixed() -> None:
+    scene = Scene("s", (BELT,))
+    assert scene.free_bodies == scene.prescribed_bodies == (BELT,)
+    assert not scene.fixed_bodies
+    assert Scene.from_wire(scene.to_wire()) == scene
+    assert "prescribed" not in BELT.changed(prescribed=False, mass=1.0).to_wire()
+    with pytest.raises(SceneError, match="moves as prescribed, so it has no mass"):
+        BELT.changed(mass=1.0)
+
+
+def test_a_turn_about_any_axis_keeps_the_quaternion_a_unit() -> None:
+    row = prescribed(BELT.changed(angular_velocity=(0.3, -1.0, 2.0)), 7.3)
+    assert np.linalg.norm(row[3:7]) == pytest.approx(1.0)
+
+
+def test_what_only_slides_keeps_its_orientation() -> None:
+    turned = Pose.at(0.0, 0.0, 0.5, yaw=0.3)
+    row = prescribed(BELT.changed(angular_velocity=(0.0, 0.0, 0.0), pose=turned), 2.0)
+    assert row == pytest.approx([1.0, 0.0, 0.5, *turned.quaternion, 0.5, 0, 0, 0, 0, 0])

@@ -16,7 +16,7 @@ from pytest_simbench.worker.watching import Watch
 from pytest_simbench.worker.wire import pack
 from tests.conftest import ADAPTERS
 from tests.worker.cheats import CUBE, LATER, UNTIL
-from tests.worker.toys import Toy
+from tests.worker.hosted import Toy
 
 Operation = tuple[str, dict[str, Any]]
 """A request to a worker, and its arguments."""

@@ -1,13 +1,14 @@
-"""Arrays survive the wire."""
+"""Arrays and texts of exceptions survive the wire, whatever they hold."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from pytest_simbench.worker.wire import pack, unpack
+from pytest_simbench.worker.wire import LONGEST, LONGEST_LOGGED, named, pack, readable, told, unpack
 
 arrays = npst.arrays(
     st.sampled_from([np.float64, np.int64, np.uint8, np.bool_]),
@@ -37,3 +38,37 @@ def test_what_the_wire_carries() -> None:
     back[0, 0] = 7.0  # it may be written to
     assert pack(["a", None, 1, {"b": (2.5,)}]) == ["a", None, 1, {"b": [2.5]}]
     assert unpack({"a": [1, {"b": None}]}) == {"a": [1, {"b": None}]}
+
+
+def test_how_much_is_kept() -> None:
+    assert (LONGEST, LONGEST_LOGGED) == (2000, 100_000)
+    assert readable("x" * 2000) == "x" * 2000
+    assert readable("x" * 2001) == "x" * 2000 + " ... (1 more characters)"
+    assert readable("abcdef", 4) == "abcd ... (2 more characters)"
+    assert told(ValueError("abcdef"), 4) == "abcd ... (2 more characters)"
+
+
+def test_half_a_character_is_written_out() -> None:
+    assert readable("a\ud800b") == "a\\ud800b"
+    assert readable("\u00e4\u2713") == "\u00e4\u2713"
+
+
+class Mute(Exception):
+    def __str__(self) -> str:
+        raise RuntimeError("no text")
+
+
+@pytest.mark.parametrize(
+    ("error", "message", "name"),
+    [
+        (ValueError("so"), "so", "ValueError: so"),
+        (ValueError(), "", "ValueError"),
+        (
+            Mute(),
+            "(its message cannot be read: RuntimeError)",
+            "Mute: (its message cannot be read: RuntimeError)",
+        ),
+    ],
+)
+def test_type_and_message(error: Exception, message: str, name: str) -> None:
+    assert (told(error), named(error)) == (message, name)
