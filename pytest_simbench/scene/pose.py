@@ -19,7 +19,12 @@ Quaternion = tuple[float, float, float, float]
 def rotation_matrix(quaternion: Sequence[float] | FloatArray) -> FloatArray:
     """Rotation matrix (3, 3) of a quaternion w, x, y, z, which is normalised first."""
     q = np.asarray(quaternion, dtype=float)
-    w, x, y, z = q / np.linalg.norm(q)
+    return unit_rotation(q / np.linalg.norm(q))
+
+
+def unit_rotation(unit: FloatArray) -> FloatArray:
+    """The same of unit quaternions, (4,) or (4, n), without normalising: (3, 3) or (3, 3, n)."""
+    w, x, y, z = unit
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
