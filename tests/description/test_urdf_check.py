@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from pytest_simbench.client.errors import EngineFailed
 from pytest_simbench.description.links import check_names, check_robot
-from pytest_simbench.description.mesh_check import LARGEST_MESH, TRIANGLE
+from pytest_simbench.description.mesh_check import LARGEST_MESH
+from pytest_simbench.description.stl import read_stl, written_stl
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.motion.model import RobotModel
@@ -57,10 +58,8 @@ SOUND = """<robot name="arm">
 
 def stl(corners: float = 1.0) -> bytes:
     """A tetrahedron as binary STL."""
-    triangles = np.zeros(4, TRIANGLE)
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) * corners
-    triangles["corners"] = points[[[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]]
-    return b"\0" * 80 + len(triangles).to_bytes(4, "little") + triangles.tobytes()
+    return written_stl(points[[[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]])
 
 
 @pytest.fixture
@@ -304,11 +303,8 @@ def test_meshes_that_some_engine_cannot_read(robot: Robot) -> None:
     facet = "facet normal 0 0 1\nouter loop\n" + "vertex 0 0 1\n" * 3 + "endloop\nendfacet\n"
     (folder / "ascii.stl").write_text(f"solid a\n{facet}endsolid a\n")
     (folder / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    flat = np.frombuffer(stl(), TRIANGLE, offset=84).copy()
-    flat["corners"][..., 2] = 0.5
-    (folder / "flat.stl").write_bytes(stl()[:84] + flat.tobytes())
-    many = np.zeros(200_001, TRIANGLE)
-    (folder / "many.stl").write_bytes(b"\0" * 80 + len(many).to_bytes(4, "little") + many.tobytes())
+    (folder / "flat.stl").write_bytes(written_stl(read_stl(stl()) * [1.0, 1.0, 0.0]))
+    (folder / "many.stl").write_bytes(written_stl(np.zeros((200_001, 3, 3))))
     for name, said in (
         ("ascii.stl", "holds no binary STL mesh"),
         ("a.obj", "is no mesh that every engine reads; give a binary .stl file"),
