@@ -11,7 +11,8 @@ import numpy as np
 from pytest_simbench.description.urdf import ROOT, MovingJoint, PreparedRobot
 from pytest_simbench.description.urdf_check import read_xml
 from pytest_simbench.ground.errors import DescriptionError
-from pytest_simbench.scene import Closure, FloatArray, Pose, Robot, Scene, SceneError, Vector3
+from pytest_simbench.scene import Closure, FloatArray, Pose, Robot, Scene, SceneError
+from pytest_simbench.scene.pose import vector3
 
 
 def link_poses(prepared: PreparedRobot, positions: Mapping[str, float]) -> dict[str, Pose]:
@@ -64,10 +65,7 @@ def reduced(prepared: PreparedRobot) -> tuple[Closure, ...]:
 def _reduced(prepared: PreparedRobot, closure: Closure) -> Closure:
     robot = prepared.robot
     names, points = [], []
-    for name, point in (
-        (closure.first, closure.first_point),
-        (closure.second, closure.second_point),
-    ):
+    for name, point in closure.sides:
         if name not in prepared.places:
             raise DescriptionError(
                 f"a closure of {robot.name} holds link {name!r}, which is none of {robot.urdf}; "
@@ -75,7 +73,7 @@ def _reduced(prepared: PreparedRobot, closure: Closure) -> Closure:
             )
         link, pose = prepared.places[name]
         names.append(link)
-        points.append(_vector(pose.rotation() @ np.asarray(point) + pose.position))
+        points.append(vector3(pose.rotation() @ np.asarray(point) + pose.position))
     if names[0] == names[1]:
         raise DescriptionError(
             f"a closure of {robot.name} holds {closure.first!r} at {closure.second!r}, and no "
@@ -107,17 +105,9 @@ def ends(
     poses = link_poses(prepared, dict(zip(robot.joint_names, positions, strict=True)))
     first, second = (
         np.asarray(poses[link].rotation() @ np.asarray(point) + poses[link].position)
-        for link, point in (
-            (closure.first, closure.first_point),
-            (closure.second, closure.second_point),
-        )
+        for link, point in closure.sides
     )
     return first, second
-
-
-def _vector(values: FloatArray) -> Vector3:
-    x, y, z = (float(value) for value in values)
-    return (x, y, z)
 
 
 def joined(prepared: PreparedRobot) -> frozenset[frozenset[str]]:

@@ -13,9 +13,9 @@ from collections.abc import Iterable, Mapping
 from itertools import combinations
 from typing import Any
 
-from pytest_simbench.description.urdf import pose_of_rpy, write_origin
+from pytest_simbench.description.urdf import numbers, pose_of_rpy, write_origin
 from pytest_simbench.description.urdf_check import FIXED, MOVING
-from pytest_simbench.scene import Pose
+from pytest_simbench.scene import Pose, Vector3
 from pytest_simbench.simulator import DescriptionError
 
 TURNS = 2 * math.pi
@@ -120,23 +120,28 @@ def add_tool(
             f"there is a link {name!r} already; name it as tool_frame, without xyz and rpy"
         )
     ET.SubElement(robot, "link", name=name)
-    joint = ET.SubElement(robot, "joint", name=joint_name, type=FIXED)
-    ET.SubElement(joint, "parent", link=link)
-    ET.SubElement(joint, "child", link=name)
+    robot.append(_fixed(joint_name, link, name, pose))
+
+
+def _fixed(name: str, parent: str, child: str, pose: Pose) -> ET.Element:
+    """A joint that holds one link at a pose in another."""
+    joint = ET.Element("joint", name=name, type=FIXED)
+    ET.SubElement(joint, "parent", link=parent)
+    ET.SubElement(joint, "child", link=child)
     write_origin(joint, pose)
+    return joint
 
 
-def _numbers(joint: ET.Element, tag: str, key: str, default: str) -> tuple[float, ...]:
+def _numbers(joint: ET.Element, tag: str, key: str, default: str) -> Vector3:
     """Three numbers of a joint's part."""
     part = joint.find(tag)
     text = default if part is None else part.get(key, default)
     try:
-        x, y, z = map(float, text.split())
+        return numbers(text)
     except ValueError:
         raise DescriptionError(
             f"joint {joint.get('name')!r} has <{tag} {key}={text[:80]!r}>; give 3 numbers"
         ) from None
-    return x, y, z
 
 
 MOUNT_JOINT = "mount_of_the_hand"
@@ -170,12 +175,8 @@ def mounted(arm: ET.Element, hand: ET.Element, root: str, mount: str, pose: Pose
             raise DescriptionError(
                 f"arm and hand both have the {element.tag} {element.get('name')!r}; rename one"
             )
-    joint = ET.Element("joint", name=MOUNT_JOINT, type="fixed")
-    ET.SubElement(joint, "parent", link=mount)
-    ET.SubElement(joint, "child", link=root)
-    write_origin(joint, pose)
     whole = ET.Element("robot", arm.attrib)
-    whole.extend([*arm, *parts, joint])
+    whole.extend([*arm, *parts, _fixed(MOUNT_JOINT, mount, root, pose)])
     return whole
 
 

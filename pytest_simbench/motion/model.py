@@ -60,9 +60,8 @@ class RobotModel:
     def reach(self) -> float:
         """How far the tool can be from the axis of the first joint at most [m]: the lengths from
         joint to joint, and to the tool frame."""
-        ends = [self.pin.jointPlacements[joint] for joint in range(2, self.arm + 1)]
-        ends.append(self.pin.frames[self.tool].placement)
-        return sum(float(np.linalg.norm(end.translation)) for end in ends)
+        tool = self.pin.frames[self.tool].placement.translation
+        return self.wrist_reach + float(np.linalg.norm(tool))
 
     @property
     def wrist_reach(self) -> float:

@@ -11,7 +11,7 @@ from pytest_simbench.scene.body import WOOD, Body, Colour, Solid
 from pytest_simbench.scene.checks import SceneError, check_number, check_numbers
 from pytest_simbench.scene.overlap import Corners, Hull
 from pytest_simbench.scene.polytope import EVEN, MOST, Polytope, polytope
-from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
+from pytest_simbench.scene.pose import FloatArray, Pose, Vector3, vector3
 
 
 @dataclass(frozen=True)
@@ -230,8 +230,7 @@ class ConvexMesh(Body, kind="convex_mesh"):
 
     @property
     def extents(self) -> Vector3:
-        x, y, z = (2 * np.abs(self.vertices).max(axis=0)).tolist()
-        return (x, y, z)
+        return vector3(2 * np.abs(self.vertices).max(axis=0))
 
     @property
     def volume(self) -> float:

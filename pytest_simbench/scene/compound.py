@@ -10,7 +10,7 @@ import numpy as np
 from pytest_simbench.scene.body import WOOD, Body, Colour, Solid
 from pytest_simbench.scene.checks import SceneError
 from pytest_simbench.scene.overlap import Corners
-from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
+from pytest_simbench.scene.pose import FloatArray, Pose, Vector3, vector3
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,7 @@ class Compound(Body, kind="compound"):
     @property
     def extents(self) -> Vector3:
         axes = np.concatenate([np.eye(3), -np.eye(3)])
-        x, y, z = (2 * self.reach(axes).reshape(2, 3).max(axis=0)).tolist()
-        return (x, y, z)
+        return vector3(2 * self.reach(axes).reshape(2, 3).max(axis=0))
 
     @property
     def volume(self) -> float:

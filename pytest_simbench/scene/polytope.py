@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_simbench.scene.checks import SceneError
-from pytest_simbench.scene.pose import FloatArray, Pose, Vector3, quaternion_of
+from pytest_simbench.scene.pose import FloatArray, Pose, Vector3, quaternion_of, vector3
 
 MOST = 64
 """Corners of a mesh, as many as the engine that takes fewest does, of hulls for a GPU."""
@@ -182,10 +182,5 @@ def principal(points: Sequence[Sequence[float]] | FloatArray) -> tuple[tuple[Vec
     if not found.aligned:
         turn = np.linalg.eigh(found.inertia)[1]
         turn[:, 0] *= np.sign(np.linalg.det(turn))
-    vertices = tuple(_triple(row) for row in (found.points - found.centroid) @ turn)
+    vertices = tuple(vector3(row) for row in (found.points - found.centroid) @ turn)
     return vertices, Pose.from_array([*found.centroid, *quaternion_of(turn)])
-
-
-def _triple(row: FloatArray) -> Vector3:
-    x, y, z = row.tolist()
-    return (x, y, z)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,12 @@ from pytest_simbench.scene.wire import Wire
 FloatArray = NDArray[np.float64]
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
+
+
+def vector3(values: Iterable[float]) -> Vector3:
+    """Three numbers as plain ones."""
+    x, y, z = map(float, values)
+    return x, y, z
 
 
 def rotation_matrix(quaternion: Sequence[float] | FloatArray) -> FloatArray:

@@ -101,11 +101,10 @@ class Manipulator(Arm):
             The motion, sampled at every step, and what a perfect follower's throw would be.
         """
         gripper = self.gripper
-        trajectory, perfect = self._planned(
-            lambda: self.planner.throw(
+        with self.world.stopwatch.measuring("plan"):
+            trajectory, perfect = self.planner.throw(
                 self.arm, goal, gripper.closed, gripper.opened, fraction, feasible=feasible
             )
-        )
         self.held = None
         self.planning.detach()
         return self.follow(trajectory, log_period=0.0), perfect
@@ -152,8 +151,8 @@ class Manipulator(Arm):
 
     def _leave(self) -> str | None:
         """Straight up where something stands too near to plan from here."""
-        self._refresh()
-        touching = self.planning.collision(self.arm)
+        with self._planning():
+            touching = self.planning.collision(self.arm)
         if touching is None:
             return None
         self._released = tuple(name for name in touching if name in self.world.poses())
@@ -168,12 +167,10 @@ class Manipulator(Arm):
 
     def _plan_choice(self, tools: list[Pose], ignored: tuple[str, ...] = ()) -> Choice:
         """The tool pose among equivalent ones to go to, and the arm joints `APPROACH` above it."""
-        self._refresh()
-        return self._planned(
-            lambda: choose(
+        with self._planning():
+            return choose(
                 self.planning, tools, self.approach, self.home, self.arm, self.rng, ignored
             )
-        )
 
 
 def cannot_handle(

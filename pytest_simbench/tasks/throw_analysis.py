@@ -8,7 +8,7 @@ so hid a release that was late.)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import coal
@@ -331,7 +331,7 @@ class Thrown:
         elif self.free == len(self.motion):
             found["kept"] = "the cube never left the hand"
         if self.strain is not None:
-            found["limits"] = self.strain.to_wire()
+            found["limits"] = asdict(self.strain)
         if self.flight is not None:
             first, last = self.flight.first, self.flight.last
             found["release"] = {

@@ -69,15 +69,15 @@ def test_samples_are_taken_between_steps_and_the_last_state_holds() -> None:
 def test_consecutive_seeds_go_through_the_tosses_of_a_half_once() -> None:
     task = Tossing(FLIGHTS)
     assert task.repetitions == 2
-    assert {task.toss(seed).index for seed in range(2022, 2024)} == {1, 3}
-    assert task.sample(2022) == ("cube_tosses", task.toss(2022).index)
-    assert Tossing(FLIGHTS, half="chosen_on").toss(2022).index == 2
+    assert {task.real(seed).index for seed in range(2022, 2024)} == {1, 3}
+    assert task.sample(2022) == ("cube_tosses", task.real(2022).index)
+    assert Tossing(FLIGHTS, half="chosen_on").real(2022).index == 2
     assert Tossing(FLIGHTS, most=1).repetitions == 1
 
 
 def test_the_scene_starts_as_the_toss_did_and_is_not_disturbed() -> None:
     task = Tossing(FLIGHTS)
-    toss = task.toss(5)
+    toss = task.real(5)
     (box,) = task.scene(5, Jitter()).bodies
     assert box.pose == toss.start
     assert box.linear_velocity == (1.0, -0.5, 0.0)
