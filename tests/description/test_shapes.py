@@ -33,26 +33,6 @@ def test_reach_of_a_box() -> None:
     assert reaches[(0.577, 0.577, 0.577)] == pytest.approx(6 / np.sqrt(3))
 
 
-@pytest.mark.parametrize(
-    "other",
-    [
-        placed(box_corners((0.1, 0.2, 0.3)), Pose.at(0.001, 0, 0)),
-        placed(box_corners((0.1, 0.2, 0.3)), Pose.at(0, 0, 0, yaw=0.1)),
-        box_corners((0.1, 0.2, 0.301)),
-    ],
-    ids=["moved", "turned", "longer"],
-)
-def test_another_box_reaches_elsewhere(other: np.ndarray) -> None:
-    assert np.abs(reach(other) - reach(box_corners((0.1, 0.2, 0.3)))).max() > 4e-4
-
-
-def test_the_order_of_shapes_does_not_matter() -> None:
-    mirrored = [reach(placed(box_corners((1, 1, 1)), Pose.at(x, 0, 0))) for x in (-2.0, 2.0)]
-    first, second = outlines("a", mirrored, []), outlines("a", mirrored[::-1], [])
-    np.testing.assert_array_equal(first["a/boxes"], second["a/boxes"])
-    assert first["a/meshes"].shape == (0, 26)
-
-
 def stl_binary() -> bytes:
     floats = np.zeros(12, "<f4")
     floats[3:] = TRIANGLE.ravel()

@@ -19,7 +19,6 @@ from pytest_simbench.description.stl import read_stl, written_stl
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.motion.model import RobotModel
-from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Box, Gripper, Joint, Pose, Robot, Scene, SceneError
 from pytest_simbench.simulator import DescriptionError, PreparedRobot
 from tests.hostile import assert_harmless_terminal
@@ -108,10 +107,6 @@ def test_the_sound_one_is_taken(robot: Robot) -> None:
     prepared = PreparedRobot(robot)
     assert [joint.name for joint in prepared.joints] == ["shoulder", "slide"]
     RobotModel(robot)
-
-
-def test_the_panda_is_taken() -> None:
-    check_robot(panda())
 
 
 HAND = '<mesh filename="meshes/hand.stl"/>'

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from pytest_simbench.description.shapes import DIRECTIONS
-from pytest_simbench.motion.panda import panda
 from pytest_simbench.parity.quantities import expected_quantities, touches
 from pytest_simbench.scene import Box, Capsule, FloatArray, Gripper, Joint, Pose, Robot, Scene
 from pytest_simbench.simulator import PreparedRobot
@@ -263,11 +262,3 @@ def test_shares_of_what_can_be_touched(arm: Robot) -> None:
     }
     still = {"ground", "body/shelf", "link/base"}
     assert all(len(pair) == 2 and not pair <= still for pair in asked)
-
-
-def test_the_pandas_links_do_not_meet_each_other() -> None:
-    found = expected_quantities(Scene("s", (), panda()), Settings())
-    hands = {name: list(v) for name, v in found.items() if name.endswith("touches")}
-    assert hands.pop("link/base/touches") == [0, 0, 0]
-    assert len(hands) == 9
-    assert all(value == [1, 0, 0] for value in hands.values())

@@ -32,29 +32,6 @@ SIGNS = list(product((-1.0, 1.0), repeat=3))
 UNIT = Box("unit", (1.0, 1.0, 1.0), Pose())
 
 
-def test_inertia_of_a_box() -> None:
-    box = Box("b", (1.0, 2.0, 3.0), Pose(), mass=12.0)
-    assert np.allclose(box.inertia(), [4 + 9, 1 + 9, 1 + 4])
-
-
-@given(st.floats(0.0, 2.0))
-def test_depth_along_an_axis(x: float) -> None:
-    other = UNIT.moved_to(Pose.at(x, 0, 0))
-    depth = penetration(UNIT, other)
-    assert max(depth, 0.0) == pytest.approx(max(1.0 - x, 0.0), abs=1e-9)
-
-
-@given(st.tuples(*[st.floats(-1.5, 1.5)] * 3), st.floats(-math.pi, math.pi))
-def test_penetration_is_symmetric(at: tuple[float, float, float], yaw: float) -> None:
-    other = UNIT.moved_to(Pose.at(*at, yaw=yaw))
-    assert penetration(UNIT, other) == pytest.approx(penetration(other, UNIT), abs=1e-9)
-
-
-def test_turned_by_45_degrees_reaches_farther() -> None:
-    other = UNIT.moved_to(Pose.at(1.1, 0, 0, yaw=math.pi / 4))
-    assert penetration(UNIT, other) == pytest.approx(0.5 + math.sqrt(0.5) - 1.1)
-
-
 def test_what_is_as_by_default_is_not_written() -> None:
     """Fingerprints of a scene are made of what it writes, and stay as they were."""
     assert list(UNIT.to_wire()) == ["name", "size", "pose", "mass", "friction", "colour"]

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.scene import Box, Gripper, Joint, Pose, Robot, Scene, SceneError
+from pytest_simbench.scene import Box, Gripper, Joint, Pose, Scene, SceneError
 from tests.hostile import HOSTILE, assert_harmless_terminal
 
 BOX = Box("a", (0.1, 0.1, 0.1), Pose.at(0, 0, 0.5), mass=1.0)
@@ -170,7 +170,3 @@ def test_no_number_that_arrives_is_none(place: tuple[Any, ...], value: Any) -> N
     inside[place[-1]] = value
     with pytest.raises(SceneError):
         Scene.from_wire(data)
-
-
-def test_a_robot_travels_unchanged() -> None:
-    assert Robot.from_wire(json.loads(json.dumps(panda().to_wire()))) == panda()

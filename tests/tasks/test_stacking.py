@@ -16,7 +16,6 @@ from pytest_simbench.motion.registry import find
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, Pose
 from pytest_simbench.tasks import Jitter, Stacking
-from pytest_simbench.tasks.base import Randomness
 from pytest_simbench.tasks.stacking import GRID, TABLE, TOWERS, Place, _placed, _strict
 from tests.motion.small_arm import TOML, URDF, small_arm
 from tests.tasks.scripted import (
@@ -298,13 +297,6 @@ def test_the_scene_is_the_studys() -> None:
     assert scene.robot is not None
     assert scene.robot.base == Pose()
     assert (scene.robot.gripper.opened, scene.robot.gripper.closed) == (0.035, 0.0)
-
-
-def test_the_start_is_disturbed_by_the_first_generator_of_the_seed() -> None:
-    """Published seeds have their starts."""
-    rng = Randomness.of(2022).start
-    expected = [Jitter().disturbed(Pose.at(x, y, 0.325), rng) for x, y in GRID]
-    assert [body.pose for body in Stacking().scene(2022, Jitter()).free_bodies] == expected
 
 
 def test_the_places_in_their_order() -> None:
