@@ -42,7 +42,7 @@ class PlanningScene:
     Attributes:
         scale: the same.
         opening: position of each finger that is assumed in every check [m, or rad].
-        held: name of the cube in the hand, or None.
+        held: name of the cube in the hand (`attach`), or None.
     """
 
     def __init__(self, model: RobotModel, scene: Scene, scale: float = 1.0) -> None:
@@ -50,6 +50,7 @@ class PlanningScene:
         self.scale = scale
         self.opening = model.robot.gripper.opened
         self.held: str | None = None
+        self._active_for: tuple[str | None, tuple[str, ...]] | None = None
         geometry = _links(model.robot, last_change(model.robot)).copy()
         self._links = list(range(len(geometry.geometryObjects)))
         inverse = model.base.inverse()
@@ -104,19 +105,12 @@ class PlanningScene:
         for name, pose in poses.items():
             shape = self._geometry.geometryObjects[self._bodies[name]]
             shape.placement = inverse * pin.SE3(pose.matrix())
-        self._activate()
 
     def attach(self, name: str, in_tool: Pose) -> None:
         """From now on cube `name` moves with the hand, at `in_tool` in the tool frame."""
         self.held = name
         rider = self._geometry.geometryObjects[self._riding[name]]
         rider.placement = self._tool_in_joint * pin.SE3(in_tool.matrix())
-        self._activate()
-
-    def detach(self) -> None:
-        """The hand is empty again."""
-        self.held = None
-        self._activate()
 
     @property
     def held_body(self) -> Body | None:
@@ -167,8 +161,11 @@ class PlanningScene:
         ]
         return np.concatenate(corners)
 
-    def _activate(self, ignored: Iterable[str] = ()) -> None:
+    def _activate(self, ignored: tuple[str, ...]) -> None:
         """Switch off the pairs of ignored bodies, of the held cube's place, of cubes not held."""
+        if self._active_for == (self.held, ignored):
+            return
+        self._active_for = self.held, ignored
         off = {self._bodies[name] for name in ignored}
         if self.held is not None:
             off.add(self._bodies[self.held])
@@ -192,17 +189,9 @@ class PlanningScene:
         self, path: FloatArray, *, ignored: Iterable[str] = (), margin: bool = True
     ) -> tuple[str, str] | None:
         """The same for positions along a path, (n, arm)."""
-        ignored = tuple(ignored)
-        if ignored:
-            self._activate(ignored)
-        try:
-            return self._first(path, self._wide if margin else self._exact)
-        finally:
-            if ignored:
-                self._activate()
-
-    def _first(self, path: FloatArray, data: pin.GeometryData) -> tuple[str, str] | None:
+        self._activate(tuple(ignored))
         model, geometry = self.model, self._geometry
+        data = self._wide if margin else self._exact
         fingers = np.full(len(model.robot.joints) - model.arm, self.opening)
         for arm in path:
             q = np.concatenate([arm, fingers])

@@ -83,14 +83,8 @@ class MotionPlanner:
                 raise InCollision(f"{what} in collision: {' and '.join(touching)}")
         path = self._shortened(self._search(start, goal))
         parts = [straight_move(a, b, self.limits, speed=speed) for a, b in pairwise(path)]
-        return self._trajectory(
-            Timed(
-                np.concatenate([part.position for part in parts]),
-                np.concatenate([part.velocity for part in parts]),
-                np.concatenate([part.acceleration for part in parts]),
-            ),
-            fingers,
-        )
+        whole = Timed(*map(np.concatenate, zip(*parts, strict=True)))
+        return self._trajectory(whole, fingers)
 
     def move_linear(
         self,

@@ -99,8 +99,7 @@ def feasible_swing(
         return line_move(start, goal, model.limits, (SPEED_SHARE, acceleration, JERK_SHARE))
 
     def strain(timed: Timed) -> float:
-        rows = (timed.position, timed.velocity, timed.acceleration)
-        return float(np.abs(model.effort_shares(gravity, *rows, held)).max())
+        return float(np.abs(model.effort_shares(gravity, *timed, held)).max())
 
     low, high = 0.0, 1.0
     for _ in range(8):

@@ -237,7 +237,6 @@ class ExternalSimulator(Simulator):
         program: that runs; None before `load`.
         folder: the program's, for the world's files.
         scene: that was loaded.
-        steps: made since `load`.
         start_limit, answer_limit, end_limit: wall time for starting and for building the world,
             for any other call, and for ending [s]. The first two are less than the 60 s of silence
             after which the client kills a worker: so the message is the program's own.
@@ -284,7 +283,7 @@ class ExternalSimulator(Simulator):
         """Ask the program to end; it is killed if it does not."""
 
     def load(self, scene: Scene) -> None:
-        self.scene, self.steps = scene, 0
+        self.scene, self._steps = scene, 0
         self._folder = tempfile.TemporaryDirectory(
             prefix=f"simbench-{self.info.name}-", ignore_cleanup_errors=True
         )
@@ -316,19 +315,15 @@ class ExternalSimulator(Simulator):
         """
         with self.asking("stepping"):
             passed = self.make_steps(steps)
-        self.steps += steps
-        if passed != self.steps:
+        self._steps += steps
+        if passed != self._steps:
             raise SimulatorError(
-                f"{self.info.title} has made {passed} steps and should have made {self.steps}: "
+                f"{self.info.title} has made {passed} steps and should have made {self._steps}: "
                 "its time moves by itself or in other steps, so it is not in lock-step"
             )
 
     def step(self) -> None:
         self.advance(1)
-
-    @property
-    def time(self) -> float:
-        return self.steps * self.settings.timestep
 
     def close(self) -> None:
         if self.program is not None:

@@ -205,7 +205,7 @@ class Arm:
         self._released_at = self.world.time
         self._released = (self.held,) if self.held else self._released
         self.held = None
-        self.planning.detach()
+        self.planning.held = None
         self._move_fingers(self.gripper.opened, RELEASE_TIME)
 
     @property

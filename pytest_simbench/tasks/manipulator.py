@@ -106,7 +106,7 @@ class Manipulator(Arm):
                 self.arm, goal, gripper.closed, gripper.opened, fraction, feasible=feasible
             )
         self.held = None
-        self.planning.detach()
+        self.planning.held = None
         return self.follow(trajectory, log_period=0.0), perfect
 
     def try_retreat(self) -> str | None:

@@ -98,7 +98,7 @@ def test_a_held_cube_moves_with_the_hand(
     assert planning.collision(low, margin=False) is None
     planning.attach("cube_02", Pose.at(0.0, 0.0, 0.02))
     assert planning.collision(low, margin=False) == ("held cube_02", "cube_01")
-    planning.detach()
+    planning.held = None
     assert planning.collision(low, margin=False) is None
 
 

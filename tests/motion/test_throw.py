@@ -41,7 +41,7 @@ def efforts(timed: Timed) -> FloatArray:
     model.gravity.linear = GRAVITY
     data = model.createData()
     rows = []
-    for arm, rate, change in zip(timed.position, timed.velocity, timed.acceleration, strict=True):
+    for arm, rate, change in zip(*timed, strict=True):
         q = np.concatenate([arm, np.full(model.nq - 7, 0.025)])
         v, a = (np.concatenate([part, np.zeros(model.nv - 7)]) for part in (rate, change))
         mass = pin.crba(model, data, q)
@@ -88,8 +88,7 @@ def test_any_swing_is_feasible(
     goal[1] += last[2]
     held = Box("cube", (0.05,) * 3, Pose(), mass=mass)
     timed, _ = feasible_swing(MODEL, start, goal, GRAVITY, held)
-    rows = timed.position, timed.velocity, timed.acceleration
-    assert np.abs(MODEL.effort_shares(GRAVITY, *rows, held)).max() <= EFFORT_SHARE
+    assert np.abs(MODEL.effort_shares(GRAVITY, *timed, held)).max() <= EFFORT_SHARE
     assert np.abs(timed.velocity / VELOCITY).max() <= SPEED_SHARE + 1e-9
 
 

@@ -110,10 +110,10 @@ class Outside(ExternalSimulator):
         return np.asarray(self._ask("joint_state"))
 
     def save(self) -> Any:
-        return self.steps, self._ask("save")
+        return self._steps, self._ask("save")
 
     def restore(self, state: Any) -> None:
-        self.steps, inside = state
+        self._steps, inside = state
         self._ask("restore", inside)
 
     def contact_count(self) -> int:
