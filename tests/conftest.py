@@ -7,6 +7,7 @@ import os
 import signal
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 # pytester takes out again what a test imports first; of matplotlib a part would then come twice.
 import matplotlib.backends.backend_agg
@@ -17,6 +18,7 @@ from hypothesis import settings
 
 from pytest_simbench.client import reaper
 from pytest_simbench.client.environments import interpreter, missing
+from pytest_simbench.data import DataMissing, read
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter, registered
@@ -71,6 +73,14 @@ def case_of(case: Case, name: str) -> Case:
         folder=case.folder,
         stall_timeout=120.0 if info.costly_start else case.stall_timeout,
     )
+
+
+def measured(name: str) -> Any:
+    """A set of measured data. Skips the test where it is not on this machine."""
+    try:
+        return read(name)
+    except DataMissing as error:
+        pytest.skip(str(error))
 
 
 def workers() -> set[psutil.Process]:

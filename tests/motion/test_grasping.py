@@ -14,10 +14,10 @@ from pytest_simbench.motion import grasping as grasps
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import PlanningError
 from pytest_simbench.motion.grasping import CLEARANCE, GRASP_LINK, choose, grasp_of, grasping
-from pytest_simbench.motion.kinematics import tool_over, top_down_grasps
+from pytest_simbench.motion.kinematics import top_down_grasps
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.registry import find
-from pytest_simbench.scene import FloatArray, Pose, Scene
+from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.tasks import Stacking
 from pytest_simbench.tasks.base import Jitter
 
@@ -118,13 +118,3 @@ def test_the_nearest_positions_alone_leave_cubes_of_the_ur5(
     monkeypatch.setattr(grasps, "FURTHER_RESTARTS", 0)
     problems = choices("ur5")
     assert any(problem.startswith("in collision: upper_arm") for problem in problems)
-
-
-def test_what_cannot_be_reached_is_told() -> None:
-    robot = find("panda")
-    model = RobotModel(robot)
-    planning = PlanningScene(model, Stacking().scene(2022, Jitter()))
-    home = robot.column("initial_position")[: model.arm]
-    tools = [tool_over(Pose.at(2.0, 0.0, 0.5), 0.0)]
-    with pytest.raises(PlanningError, match="unreachable"):
-        choose(planning, tools, 0.1, home, home, np.random.default_rng(0))

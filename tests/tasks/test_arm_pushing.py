@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pytest_simbench.data import DataError, DataMissing, read
+from pytest_simbench.data import DataError
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
@@ -19,6 +19,7 @@ from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks import ArmPushing
 from pytest_simbench.tasks.arm_pushing import compared, described, world_start
+from tests.conftest import measured
 
 URDF = """<robot name="arm">
   <joint name="m1n6s300_joint_1" type="continuous"><limit lower="-6" upper="6"/></joint>
@@ -61,10 +62,7 @@ def test_a_tool_is_tracked_to_a_micrometre_and_held_joints_stay() -> None:
 
 
 def test_the_cube_goes_where_the_real_one_went(case: Case) -> None:
-    try:
-        task = ArmPushing(read("arm_pushes"))
-    except DataMissing as error:
-        pytest.skip(str(error))
+    task = ArmPushing(measured("arm_pushes"))
     record, error = Repetition(Experiment(case, task), 1).run()
     assert error is None
     assert record.details["hand_error"] < 1e-3  # rad

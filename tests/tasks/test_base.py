@@ -118,15 +118,7 @@ def test_parameters_are_flat_and_name_every_rule() -> None:
         "task.duration": 0.6, "task.inner.low": 1.0, "task.inner.high": 2.0
     }  # fmt: skip
     assert LeaningTowers().parameters()["task.margins"] == (0.008, 0.010, 0.012)
-    ours, study = Stacking().parameters(), Stacking().study().parameters()
-    assert {name: value for name, value in study.items() if value != ours[name]} == {
-        "task.spare_cubes": False,
-        "task.release_height": 0.02,
-        "task.count_after_retreat": True,
-        "task.finger_closed": 0.02,
-        "task.speeds.carry": 1.0,
-        "task.speeds.contact": 1.0,
-    }
+    assert Stacking().study().parameters()["task.speeds.contact"] == 1.0
 
 
 def test_a_task_of_one_version_is_its_own_smoke_and_study() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pytest_simbench.data import DataMissing, Toss, Tosses, read
+from pytest_simbench.data import Toss, Tosses
 from pytest_simbench.data.tosses import EDGE, RATE
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.executor import LocalExecutor
@@ -19,7 +19,7 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray
 from pytest_simbench.tasks import Jitter, Tossing
 from pytest_simbench.tasks.tossing import off
-from tests.conftest import case_of
+from tests.conftest import case_of, measured
 
 SPIN = np.array([3.0, -7.0, 5.0])
 """[rad/s], in the body and, since all of a cube's moments are equal, in the world."""
@@ -127,10 +127,7 @@ def test_a_free_flight_is_the_closed_form_and_one_worker_serves_all(case: Case, 
 
 @pytest.mark.parametrize("name", ["mujoco", "pybullet"])
 def test_real_tosses_end_near_where_they_ended(case: Case, name: str) -> None:
-    try:
-        tosses = read("cube_tosses")
-    except DataMissing as error:
-        pytest.skip(str(error))
+    tosses = measured("cube_tosses")
     real = replace(case_of(case, name), profile="real")
     records = tossed(real, Tossing(tosses), range(1, 13))
     errors = [record.metrics["position_error"] for record in records]
@@ -143,10 +140,7 @@ def test_real_tosses_end_near_where_they_ended(case: Case, name: str) -> None:
 
 def test_without_friction_the_cube_slides_on(case: Case) -> None:
     """The score is of the physics: a wrong coefficient is seen."""
-    try:
-        tosses = read("cube_tosses")
-    except DataMissing as error:
-        pytest.skip(str(error))
+    tosses = measured("cube_tosses")
     good, bad = (
         np.mean([r.metrics["position_error"] for r in tossed(case, task, range(1, 7))])
         for task in (Tossing(tosses), Tossing(tosses, friction=0.0))
