@@ -68,6 +68,7 @@ class Arm:
 
     Attributes:
         world: the simulated world.
+        home: arm joints where it begins, (arm,) [rad].
         arm: commanded arm joints, (arm,) [rad].
         fingers: commanded finger position [m], of a jaw that turns [rad].
         grasp: how the hand grasps a cube.
@@ -94,7 +95,7 @@ class Arm:
             self.grasp = grasp_of(robot, CUBE_SIZE * scale, scale)
             self.planning = PlanningScene(self.model, world.scene, scale)
             self.planner = MotionPlanner(self.model, self.planning, rng, world.scene.gravity)
-        self.arm = robot.column("initial_position")[: self.model.arm]
+        self.home = self.arm = robot.column("initial_position")[: self.model.arm]
         self.fingers = self.gripper.opened
         self.held: str | None = None
         self._released: tuple[str, ...] = ()

@@ -17,7 +17,7 @@ from pytest_simbench.tasks import Jitter, Stacking
 from pytest_simbench.tasks.arm import FULL_SPEED, LostCube, Speeds
 from pytest_simbench.tasks.base import Randomness
 from pytest_simbench.tasks.manipulator import Manipulator
-from tests.tasks.scripted import Mishap, ScriptedProcess, ScriptedWorld, drop, move, put, slip
+from tests.tasks.scripted import Mishap, ScriptedProcess, ScriptedWorld, drop, move, slip
 
 CUBE = "cube_11"
 """In the middle of the grid, straight before the arm."""
@@ -35,6 +35,11 @@ class Arm:
         self.world = ScriptedWorld(self.process, scene)
         self.process.where.phase = "it"
         self.manipulator = Manipulator(self.world, Randomness.of(seed).planner, speeds)
+
+    def put(self, name: str, pose: Pose) -> None:
+        """A cube is elsewhere, and the world has been looked at since."""
+        self.process.poses[name] = pose
+        self.world.wait(0.1)
 
     @property
     def tools(self) -> list[Pose]:
@@ -97,8 +102,7 @@ def test_the_place_may_turn_by_quarters_only() -> None:
     """The cube's own yaw to the place's, whichever side was grasped."""
     for yaw in (0.0, 0.3, -0.7):
         arm = Arm()
-        arm.process.poses[CUBE] = Pose.at(0.3, 0.0, 0.325, yaw=yaw)
-        arm.world.wait(0.1)
+        arm.put(CUBE, Pose.at(0.3, 0.0, 0.325, yaw=yaw))
         arm.manipulator.pick(CUBE)
         arm.manipulator.place(PLACE)
         turn = arm.process.poses[CUBE].yaw / (np.pi / 2)
@@ -166,8 +170,7 @@ def test_a_cube_lost_on_the_way_is_lost_before_it_would_be_placed() -> None:
 
 def test_it_looks_where_the_cube_is_now() -> None:
     arm = Arm()
-    arm.process.poses[CUBE] = Pose.at(0.35, 0.05, 0.325, yaw=0.2)
-    arm.world.wait(0.1)
+    arm.put(CUBE, Pose.at(0.35, 0.05, 0.325, yaw=0.2))
     arm.manipulator.pick(CUBE)
     assert arm.tools[2].position == pytest.approx([0.35, 0.05, 0.325], abs=1e-4)
 
@@ -184,9 +187,8 @@ def test_a_cube_beside_another_is_grasped_across() -> None:
     """A neighbour 1 mm away leaves no room for a finger on two of the four sides."""
     arm = Arm()
     x, y, z = arm.process.scene.body(CUBE).pose.position
-    arm.process.poses["cube_01"] = Pose.at(x, y + 0.051, z)
-    arm.process.poses["cube_02"] = Pose.at(x, y - 0.051, z)
-    arm.world.wait(0.1)
+    arm.put("cube_01", Pose.at(x, y + 0.051, z))
+    arm.put("cube_02", Pose.at(x, y - 0.051, z))
     arm.manipulator.pick(CUBE)
     opening = arm.tools[1].rotation()[:, 1]
     assert np.abs(opening) == pytest.approx([1.0, 0.0, 0.0], abs=1e-3)
@@ -198,10 +200,9 @@ def test_the_fingers_may_touch_the_cube_that_they_grasp() -> None:
     x, y, _ = arm.process.scene.body(CUBE).pose.position
     half = 0.7 / 2
     standing = Pose((x, y, 0.3355), (np.cos(half), np.sin(half), 0.0, 0.0))
-    arm.process.poses[CUBE] = standing
-    arm.process.poses["cube_01"] = Pose.at(x + 0.051, y, 0.325)
-    arm.process.poses["cube_02"] = Pose.at(x - 0.051, y, 0.325)
-    arm.world.wait(0.1)
+    arm.put(CUBE, standing)
+    arm.put("cube_01", Pose.at(x + 0.051, y, 0.325))
+    arm.put("cube_02", Pose.at(x - 0.051, y, 0.325))
     arm.manipulator.pick(CUBE)
     assert np.abs(arm.tools[1].rotation()[:, 1]) == pytest.approx([0.0, 1.0, 0.0], abs=1e-3)
 
@@ -210,14 +211,12 @@ def test_what_cannot_be_grasped_says_why() -> None:
     walled = Arm()
     x, y, z = walled.process.scene.body(CUBE).pose.position
     for k, (dx, dy) in enumerate(((0.051, 0), (-0.051, 0), (0, 0.051), (0, -0.051)), start=1):
-        walled.process.poses[f"cube_0{k}"] = Pose.at(x + dx, y + dy, z)
-    walled.world.wait(0.1)
+        walled.put(f"cube_0{k}", Pose.at(x + dx, y + dy, z))
     with pytest.raises(PlanningError, match=r"in collision: panda_\w*finger\w* and cube_0\d"):
         walled.manipulator.pick(CUBE)
     assert walled.manipulator.held is None
     far = Arm()
-    far.process.poses[CUBE] = Pose.at(-2.0, 0.0, 0.025)
-    far.world.wait(0.1)
+    far.put(CUBE, Pose.at(-2.0, 0.0, 0.025))
     with pytest.raises(PlanningError, match=r"unreachable: tool at \(-2\.000"):
         far.manipulator.pick(CUBE)
     assert far.manipulator.recover() is None
@@ -254,8 +253,7 @@ def test_a_cube_that_cannot_be_put_back_is_let_go_where_it_is() -> None:
     arm = Arm()
     origin = arm.process.poses[CUBE]
     arm.manipulator.pick(CUBE)
-    arm.process.poses["cube_01"] = origin.translated(z=0.001)
-    arm.world.wait(0.1)
+    arm.put("cube_01", origin.translated(z=0.001))
     problem = arm.manipulator.recover()
     assert problem is not None
     assert problem.startswith("could not put back: in collision: ")
@@ -280,8 +278,7 @@ def test_recovering_leaves_a_cube_that_stands_too_near_to_plan_from() -> None:
     over = arm.process.scene.body(CUBE).pose.translated(z=0.06)
     manipulator.go_to_pose(tool_over(over, 0.0), speed=0.5)
     x, y, z = manipulator.tool.position
-    arm.process.poses["cube_12"] = Pose.at(x, y + 0.085, z)  # in the air, beside a fingertip
-    arm.world.wait(0.1)
+    arm.put("cube_12", Pose.at(x, y + 0.085, z))  # in the air, beside a fingertip
     with pytest.raises(PlanningError, match="start in collision"):
         manipulator.pick("cube_03")
     assert manipulator.recover() is None
@@ -299,8 +296,7 @@ def test_a_retreat_may_touch_the_cube_it_let_go_but_nothing_else() -> None:
     other = Arm()
     other.manipulator.pick(CUBE)
     other.manipulator.place(PLACE)
-    put("cube_01", Pose.at(0.5, 0.0, 0.52))(other.process)
-    other.world.wait(0.1)
+    other.put("cube_01", Pose.at(0.5, 0.0, 0.52))
     problem = other.manipulator.try_retreat()
     assert problem is not None
     assert problem.startswith("could not retreat: straight line blocked: ")
