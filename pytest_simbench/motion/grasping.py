@@ -39,13 +39,11 @@ class Grasp:
 
     Attributes:
         touching: position of each finger that touches the cube [m, or rad].
-        opened: position of each finger before and after [m, or rad].
         beside: how far aside the hand comes down, along minus y of its tool frame [m]; 0 for
             parallel fingers.
     """
 
     touching: float
-    opened: float
     beside: float = 0.0
 
 
@@ -57,8 +55,8 @@ def grasp_of(robot: Robot, width: float, scale: float) -> Grasp:
         scale: of the scene over the study's.
     """
     if robot.tool_frame != GRASP_LINK:
-        return Grasp(width / 2, robot.gripper.opened)
-    return Grasp(_jaw_at(robot, width), robot.gripper.opened, CLEARANCE * scale)
+        return Grasp(width / 2)
+    return Grasp(_jaw_at(robot, width), CLEARANCE * scale)
 
 
 def grasping(robot: Robot, width: float, scale: float, wide: bool = False) -> Robot:

@@ -77,8 +77,7 @@ class RobotModel:
     @property
     def has_parallel_fingers(self) -> bool:
         """Whether the hand is two fingers that slide."""
-        kinds = [joint.shortname() for joint in list(self.pin.joints)[self.arm + 1 :]]
-        return len(kinds) == 2 and all(kind.startswith("JointModelP") for kind in kinds)
+        return len(self._fingers) == 2 and self.finger_unit == "m"
 
     @property
     def finger_unit(self) -> str:

@@ -161,17 +161,14 @@ class ArmPushing(MicoTask):
             motion = world.follow(trajectory, log_period=TICK)
         world.mark("end")
         assert motion is not None  # a log was asked for
-        states = np.vstack([world_start(course.start), motion.bodies[:, 0, :7]])
+        states = np.vstack([course.start.as_array(), motion.bodies[:, 0, :7]])
         metrics, details = compared(states, course.real)
         off = float(np.abs(motion.joints[-1, 0] - course.path[-1]).max())
         return Outcome(metrics, {"run": self.real(seed).name, **details, "hand_error": off})
 
     def _course(self, seed: int) -> Course:
-        return course(self.real(seed), self.arm(np.zeros(6)), self.marker(), self.marker_aside)
-
-    def marker(self) -> Pose:
-        """Of the marker body on link 6: the mean over the runs that are not held out."""
-        return marker(self.runs, self.arm(np.zeros(6)))
+        robot = self.arm(np.zeros(6))
+        return course(self.real(seed), robot, marker(self.runs, robot), self.marker_aside)
 
     def _trajectory(self, path: FloatArray, gravity: FloatArray) -> Trajectory:
         velocity = np.gradient(path, TICK, axis=0)
@@ -182,7 +179,7 @@ class ArmPushing(MicoTask):
 
 
 def compared(moved: FloatArray, real: FloatArray) -> tuple[dict[str, float | None], dict[str, Any]]:
-    """Metrics and details of a cube's motion and the real one's, rows as of `world_start`, (n, 7);
+    """Metrics and details of a cube's motion and the real one's, rows of `Pose.as_array`, (n, 7);
     the longer motion is cut."""
     n = min(len(moved), len(real))
     moved, real = moved[:n], real[:n]
@@ -200,11 +197,6 @@ def compared(moved: FloatArray, real: FloatArray) -> tuple[dict[str, float | Non
         "real_turn": turns[1],
         "delay": _half_way(moved, way[1]) - _half_way(real, way[1]),
     }
-
-
-def world_start(pose: Pose) -> FloatArray:
-    """A row for the state before the first step, (7,)."""
-    return np.array([*pose.position, *pose.quaternion])
 
 
 def calibrated(runs: ArmRuns) -> str:
@@ -248,8 +240,8 @@ def arm(urdf: Path, finger_angle: float, start: tuple[float, ...]) -> Robot:
 
 @cache
 def marker(runs: ArmRuns, robot: Robot) -> Pose:
-    """Of the marker body in the frame of link 6, from the beginnings of the runs, when all joints
-    were at 0."""
+    """Of the marker body in the frame of link 6: the mean over the runs that are not held out, from
+    their beginnings, when all joints were at 0."""
     tool = RobotModel(robot).tool_pose(np.zeros(len(JOINTS))).inverse()
     rows = []
     for run in runs.of(PUSH, "chosen_on"):

@@ -16,10 +16,8 @@ from pytest_simbench.description.shapes import (
     placed,
     reach,
     round_reach,
-    shape_points,
 )
 from pytest_simbench.description.stl import written_stl
-from pytest_simbench.description.urdf import Shape
 from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import DescriptionError
 
@@ -59,15 +57,6 @@ def test_the_corners_of_a_box() -> None:
 def test_a_frame_is_turned_and_then_moved() -> None:
     there = placed(np.array([[1.0, 2.0, 3.0]]), Pose.at(10, 20, 30, yaw=np.pi / 2))
     np.testing.assert_allclose(there, [[8, 21, 33]])
-
-
-def test_shapes_of_a_link_in_its_frame(tmp_path: Path) -> None:
-    (tmp_path / "c.obj").write_bytes(obj_text())
-    pose, up = Pose.at(0, 0, 5), np.array([0.0, 0.0, 5.0])
-    mesh = shape_points(Shape(pose, mesh=str(tmp_path / "c.obj")))
-    np.testing.assert_array_equal(mesh, mesh_points(str(tmp_path / "c.obj")) + up)
-    box = shape_points(Shape(pose, size=(2, 4, 6)))
-    np.testing.assert_array_equal(box, box_corners((2, 4, 6)) + up)
 
 
 def test_reach_of_what_is_round() -> None:
@@ -111,12 +100,6 @@ def test_many_triangles_have_few_corners(tmp_path: Path) -> None:
     points = mesh_points(str(tmp_path / "a.stl"))
     assert points.dtype == np.float64
     np.testing.assert_array_equal(points, TRIANGLE[np.lexsort(TRIANGLE.T[::-1])])
-
-
-def test_a_mesh_may_be_a_solid_in_binary(tmp_path: Path) -> None:
-    """Some programs begin a binary file's header with "solid", as a text file begins."""
-    (tmp_path / "a.stl").write_bytes(b"solid" + stl_binary()[5:])
-    assert len(mesh_points(str(tmp_path / "a.stl"))) == 3
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks import ArmPushing
-from pytest_simbench.tasks.arm_pushing import compared, described, world_start
+from pytest_simbench.tasks.arm_pushing import compared, described
 from tests.conftest import measured
 
 URDF = """<robot name="arm">
@@ -81,7 +81,7 @@ def test_each_metric_is_of_its_axis_and_turns_are_within_half_a_turn() -> None:
     def way(x: float, y: float, turn: float, rows: int = 101) -> FloatArray:
         shares = np.minimum(np.linspace(0.0, 100.0 / 101 * rows, rows) / 50.0, 1.0)
         poses = (Pose.at(s * x, 0.2 + s * y, 0.02, yaw=np.radians(170 + s * turn)) for s in shares)
-        return np.array([world_start(pose) for pose in poses])
+        return np.array([pose.as_array() for pose in poses])
 
     metrics, details = compared(way(0.08, 0.05, -10.0), way(0.1, 0.0, 30.0))
     assert metrics["displacement"] == pytest.approx(0.08)

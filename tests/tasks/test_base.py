@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from pytest_simbench.motion.registry import find
-from pytest_simbench.scene import Box, Pose
+from pytest_simbench.scene import Pose
 from pytest_simbench.tasks import Jitter, LeaningTowers, Stacking, Task, Throwing
-from pytest_simbench.tasks.base import CUBE_MASS, CUBE_SIZE, STUDY_TOLERANCE, Randomness, cube
+from pytest_simbench.tasks.base import Randomness
 from tests.tiny import Falling
 
 AXES = ("x", "y", "angle")
@@ -94,12 +94,6 @@ def test_three_generators_by_seed() -> None:
 
 
 FIRST_DRAWS = [0.4435521581217913, 0.021836641555814107, 0.6603664734664141]
-
-
-def test_a_cube() -> None:
-    pose, colour = Pose.at(1, 2, 3), (0.1, 0.2, 0.3, 1.0)
-    assert cube("it", pose, colour) == Box("it", (0.05,) * 3, pose, mass=0.1, colour=colour)
-    assert (CUBE_SIZE, CUBE_MASS, STUDY_TOLERANCE) == (0.05, 0.1, 0.05)
 
 
 @dataclass(frozen=True)
