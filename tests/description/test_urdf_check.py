@@ -61,11 +61,10 @@ def stl(corners: float = 1.0) -> bytes:
     return written_stl(points[[[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]])
 
 
-@pytest.fixture
-def robot(tmp_path: Path) -> Robot:
-    folder = tmp_path / "arm"
+def described(folder: Path, urdf: str) -> Robot:
+    """The robot of a description like `SOUND`, its files in a folder that is made."""
     (folder / "meshes").mkdir(parents=True)
-    (folder / "arm.urdf").write_text(SOUND)
+    (folder / "arm.urdf").write_text(urdf)
     (folder / "arm.srdf").write_text('<robot name="arm"/>')
     (folder / "meshes" / "hand.stl").write_bytes(stl(0.1))
     joints = (Joint("shoulder", 100, 10, 10, 0.1, 0.0), Joint("slide", 100, 10, 10, 0.1, 0.0))
@@ -78,6 +77,11 @@ def robot(tmp_path: Path) -> Robot:
         Gripper(("slide",), 0.05, 0.0, 10.0),
         "tip",
     )
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Robot:
+    return described(tmp_path / "arm", SOUND)
 
 
 def written(robot: Robot, text: str | bytes) -> Robot:
@@ -203,6 +207,7 @@ INERTIA = 'ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"'
         (LIMIT, LIMIT.replace('upper="2"', 'upper="inf"'), "give finite numbers"),
         (LIMIT, LIMIT.replace('effort="10"', 'effort="-10"'), "has the effort limit '-10'"),
         (LIMIT, LIMIT.replace('velocity="1"', 'velocity="-1"'), "has the velocity limit '-1'"),
+        (LIMIT, LIMIT.replace('velocity="1"', ""), "has <limit velocity=''>; give a number"),
         (AXIS, AXIS + '<mimic joint="slide"/>', ""),
         (AXIS, AXIS + '<mimic joint="end"/>', "follows 'end', which is no moving joint"),
         (AXIS, AXIS + '<mimic joint="shoulder"/>', "follows itself (<mimic>)"),
