@@ -81,7 +81,9 @@ class MotionPlanner:
             touching = self.scene.collision(arm)
             if touching is not None:
                 raise InCollision(f"{what} in collision: {' and '.join(touching)}")
-        path = self._shortened(self._search(start, goal))
+        with _OMPL:
+            path = self._search(start, goal, int(self.rng.integers(1, 2**31)))
+        path = self._shortened(path)
         parts = [straight_move(a, b, self.limits, speed=speed) for a, b in pairwise(path)]
         whole = Timed(*map(np.concatenate, zip(*parts, strict=True)))
         return self._trajectory(whole, fingers)
@@ -191,12 +193,8 @@ class MotionPlanner:
         effort[:, self.model.arm :] = 0.0  # the squeeze is the fingers' own drive alone
         return Trajectory(TICK, position, velocity, effort)
 
-    def _search(self, start: FloatArray, goal: FloatArray) -> FloatArray:
+    def _search(self, start: FloatArray, goal: FloatArray, seed: int) -> FloatArray:
         """RRTConnect from start to goal, way points (n, arm)."""
-        with _OMPL:
-            return self._search_alone(start, goal, int(self.rng.integers(1, 2**31)))
-
-    def _search_alone(self, start: FloatArray, goal: FloatArray, seed: int) -> FloatArray:
         util.setLogLevel(util.LogLevel.LOG_NONE)
         util.RNG.setSeed(seed)
         arm = self.model.arm

@@ -221,14 +221,14 @@ class Body(_Placed):
     def solids(self) -> list[Solid]:
         """What the body is drawn with."""
 
-    @abstractmethod
     def core(self, share: float) -> tuple[Core, float]:
-        """What is left when the body loses a layer, and how thick that is [m].
+        """What is left when a body of one shape loses a layer, and how thick that is [m].
 
         Of what has edges the layer is `share` of half its shortest edge, and the core with a layer
         around it is the body with its edges rounded. Of spheres and capsules it is the radius, and
         they are whole again. A mesh loses nothing.
         """
+        raise NotImplementedError
 
     def reach(self, directions: FloatArray) -> FloatArray:
         """How far the body reaches from its centre in directions of its frame (n, 3) [m], (n,)."""
