@@ -23,12 +23,8 @@ def read_stl(data: bytes) -> FloatArray:
 
 
 def written_stl(corners: ArrayLike, normals: ArrayLike = 0.0) -> bytes:
-    """A file of triangles.
-
-    Args:
-        corners: of each, (n, 3, 3), counter-clockwise from outside.
-        normals: of each, (n, 3).
-    """
+    """A file of triangles: their corners, (n, 3, 3), counter-clockwise from outside, and normals,
+    (n, 3)."""
     triangles = np.zeros(len(np.asarray(corners)), TRIANGLE)
     triangles["corners"], triangles["normal"] = corners, normals
     return bytes(HEADER - 4) + np.uint32(len(triangles)).tobytes() + triangles.tobytes()

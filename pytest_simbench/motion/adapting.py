@@ -70,10 +70,7 @@ def _negligible(mass: ET.Element) -> bool:
 
 
 def lock_joints(robot: ET.Element, positions: Mapping[str, float]) -> None:
-    """Make joints fixed ones, where they stand at some position.
-
-    Args:
-        positions: of joints that move, by name [rad] or [m]; others are left as they are.
+    """Make joints that move, by name, fixed ones, where they stand at some position [rad] or [m].
 
     Raises:
         DescriptionError: a number of such a joint cannot be read.
@@ -100,12 +97,7 @@ def lock_joints(robot: ET.Element, positions: Mapping[str, float]) -> None:
 def add_tool(
     robot: ET.Element, link: str, pose: Pose, name: str = TOOL_LINK, joint_name: str = TOOL_JOINT
 ) -> None:
-    """Add a link without mass at the tool centre point.
-
-    Args:
-        link: that carries it.
-        pose: in that link.
-        name, joint_name: of the new link and its joint.
+    """Add a link without mass at the tool centre point, which is at a pose in another link.
 
     Raises:
         DescriptionError: there is no such link, or one with the new link's name.
@@ -200,13 +192,10 @@ def _end(joint: ET.Element, tag: str) -> str:
 
 
 def pairs_not_checked(urdf: ET.Element, lists: Iterable[ET.Element]) -> ET.Element:
-    """The SRDF of a robot: the link pairs that its lists name, and every pair that one joint joins.
+    """The SRDF of a robot: the link pairs that the SRDF of arm and hand name, and every pair that
+    one joint joins.
 
     Links that are fixed to each other move as one, so the neighbours of one are those of all.
-
-    Args:
-        urdf: of the whole robot.
-        lists: SRDF of arm and hand.
     """
     links = {link.get("name", "") for link in urdf.findall("link")}
     found = {

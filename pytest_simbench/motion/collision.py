@@ -36,11 +36,8 @@ class PlanningScene:
     Link pairs listed in the SRDF are not checked. The root link is fixed and not checked
     against the world.
 
-    Args:
-        scale: of the scene's lengths over those of the study's.
-
     Attributes:
-        scale: the same.
+        scale: of the scene's lengths over those of the study's.
         opening: position of each finger that is assumed in every check [m, or rad].
         held: name of the cube in the hand (`attach`), or None.
     """
@@ -119,11 +116,8 @@ class PlanningScene:
 
     def front(self, above: float) -> tuple[float, float]:
         """The face with which the closed hand pushes along its tool frame's x [m]: how far it
-        stands before the tool centre point, and how wide it is.
-
-        Args:
-            above: how far above the tool centre point it may touch what it pushes [m].
-        """
+        stands before the tool centre point, and how wide it is. It may touch what it pushes up to
+        `above` that point [m]."""
         model = self.model
         points = self._hand(model.robot.gripper.closed, above, model.arm)
         depth = float(points[:, 0].max())
@@ -141,14 +135,8 @@ class PlanningScene:
         return float(self._hand(opening, above, self.model.arm + 1)[:, 1].min(initial=np.inf))
 
     def _hand(self, opening: float, above: float, first: int) -> FloatArray:
-        """Corners of the hand's part at most so far above the tool centre point, in the tool frame,
-        (n, 3).
-
-        Args:
-            opening: position of each finger [m, or rad].
-            above: [m]
-            first: joint that carries the first link of the part.
-        """
+        """Corners of the hand's part at most so far above the tool centre point [m], in the tool
+        frame, (n, 3), from the link that joint `first` carries on; the fingers at `opening`."""
         model = self.model
         fingers = np.full(len(model.robot.joints) - model.arm, opening)
         q = np.concatenate([model.robot.column("initial_position")[: model.arm], fingers])
@@ -210,11 +198,7 @@ class PlanningScene:
 @lru_cache(maxsize=64)
 def _links(robot: Robot, changed: tuple[int, ...]) -> pin.GeometryModel:
     """The shapes of a robot's links and the pairs to check, made once: each repetition asks for it.
-
-    Args:
-        robot: whose files are sound.
-        changed: see `last_change`.
-    """
+    Its files are sound."""
     model = RobotModel(robot).pin
     urdf = ET.tostring(description_xml(robot), encoding="unicode")
     geometry = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION, package_dirs=[])
@@ -228,13 +212,10 @@ def _links(robot: Robot, changed: tuple[int, ...]) -> pin.GeometryModel:
 
 
 def convex_hull(points: FloatArray) -> coal.Convex:
-    """The hull of points as a shape, with the points in its corners alone.
+    """The hull of points, (n, 3) [m], as a shape, with the points in its corners alone.
 
     Coal's own (`buildConvexRepresentation`) keeps those within as corners without neighbours. Its
     search for the farthest corner ends there: with the UR5's links it missed 119 of 368 contacts.
-
-    Args:
-        points: (n, 3) [m].
     """
     hull = ConvexHull(points)
     number = np.zeros(len(points), dtype=int)

@@ -48,12 +48,7 @@ class Grasp:
 
 
 def grasp_of(robot: Robot, width: float, scale: float) -> Grasp:
-    """How a robot of `grasping`, or one with parallel fingers, grasps a cube.
-
-    Args:
-        width: of the cube [m].
-        scale: of the scene over the study's.
-    """
+    """How a robot of `grasping`, or one with parallel fingers, grasps a cube of that width [m]."""
     if robot.tool_frame != GRASP_LINK:
         return Grasp(width / 2)
     return Grasp(_jaw_at(robot, width), CLEARANCE * scale)

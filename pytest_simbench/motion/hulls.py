@@ -39,13 +39,8 @@ class Cuts(NamedTuple):
 def with_hulls(
     kept: dict[str, Any], corners: int, cuts: Mapping[str, Cuts] | None = None
 ) -> dict[str, Any]:
-    """A description's content (`robot_files.content`) with hulls for its meshes.
-
-    Args:
-        kept: the content.
-        corners: of each hull at most.
-        cuts: of the links whose meshes are cut into slices, by name.
-    """
+    """A description's content (`robot_files.content`) with hulls of at most so many corners for its
+    meshes, those of some links, by name, cut into slices before."""
     urdf, meshes = ET.fromstring(kept["urdf"]), {}
     for link in urdf.iter("link"):
         cut = (cuts or {}).get(link.get("name", ""))

@@ -12,12 +12,7 @@ T = TypeVar("T")
 
 
 class Table:
-    """One table of a file; `close` complains of what nobody took.
-
-    Args:
-        data: the table.
-        where: file and table, for messages.
-    """
+    """One table of a file; `close` complains of what nobody took. Messages begin with `where`."""
 
     def __init__(self, data: Mapping[str, Any], where: str) -> None:
         self.where = where

@@ -36,10 +36,7 @@ def implausible(scene: Scene, bodies: FloatArray) -> str | None:
 
     Looked at after every motion and wait, in the pytest process: under a millisecond for 21
     cubes. What is only there for a moment, the depth of a hard impact, is not looked for.
-
-    Args:
-        scene: whose bodies they are.
-        bodies: rows of the free bodies, (n_free, 13), as `World.bodies`.
+    States are rows as of `World.bodies`, (n_free, 13).
     """
     if not len(bodies):
         return None

@@ -23,11 +23,8 @@ digits, and files of meshes are written with it."""
 class Polytope:
     """The convex hull of points.
 
-    Args:
-        points: (n, 3) [m].
-
     Attributes:
-        points: as given.
+        points: as given, (n, 3) [m].
         faces: numbers of the points around each face, counter-clockwise from outside.
 
     Raises:
@@ -160,14 +157,12 @@ def polytope(points: tuple[Vector3, ...]) -> Polytope:
 
 
 def principal(points: Sequence[Sequence[float]] | FloatArray) -> tuple[tuple[Vector3, ...], Pose]:
-    """The corners of the convex hull of any points, in the frame that a `ConvexMesh` must have: its
-    origin is the hull's centroid, and its axes are the principal axes of inertia.
+    """The corners of the convex hull of 4 to `MOST` points in any frame, (n, 3) [m], in the frame
+    that a `ConvexMesh` must have: its origin is the hull's centroid, and its axes are the principal
+    axes of inertia.
 
         vertices, frame = principal(points)
         rock = ConvexMesh("rock", vertices, pose * frame, mass=1.0)
-
-    Args:
-        points: in any frame, (n, 3) [m], 4 to `MOST` of them.
 
     Returns:
         The corners, and the pose of their frame in that of the points. Axes that are principal ones

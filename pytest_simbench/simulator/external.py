@@ -121,11 +121,7 @@ class Program:
             self._deadline = outer
 
     def wait_until(self, ready: Callable[[], bool], seconds: float) -> None:
-        """Wait until the program is ready, or answers.
-
-        Args:
-            ready: whether it is; asked again and again.
-            seconds: wall time [s].
+        """Wait until the program is ready; it is asked again and again, for so much wall time [s].
 
         Raises:
             SimulatorError: as of `within`.

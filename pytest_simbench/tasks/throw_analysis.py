@@ -91,13 +91,8 @@ def impact(
 
 
 def may_touch(poses: FloatArray, cube: int, edge: float) -> BoolArray:
-    """At which samples one of the cubes may touch another one or the ground before the next, (n,).
-
-    Args:
-        poses: of all cubes, (n, m, 7).
-        cube: which one it is about.
-        edge: of every cube [m].
-    """
+    """At which samples one of the cubes may touch another one or the ground before the next, (n,);
+    poses are of all cubes, (n, m, 7), and each has the same edge [m]."""
     touch, centres, strides = TOUCH * edge / CUBE_SIZE, poses[:, :, :3], _strides(poses)
     between = np.linalg.norm(centres - centres[:, [cube]], axis=2) - np.sqrt(3) * edge
     reach = edge / 2 * np.abs(rotations(poses[:, cube, 3:7])[:, 2]).sum(axis=1)
@@ -188,13 +183,8 @@ class Flight:
 
 
 def unclenched(fingers: FloatArray, least: float = UNCLENCHED) -> BoolArray:
-    """At which samples the fingers do not press any more, (n,).
-
-    Args:
-        fingers: positions of the finger joints [m], (n, n_fingers); in the first sample
-            they hold the cube.
-        least: by which they have opened then [m].
-    """
+    """At which samples the fingers do not press any more, (n,): all have opened by `least` [m].
+    Positions are (n, n_fingers) [m]; in the first sample the fingers hold the cube."""
     return np.asarray((fingers - fingers[0] > least).all(axis=1))
 
 
