@@ -75,10 +75,7 @@ class ArmFollowing(MicoTask):
 
     The control law runs on its own reference, as if the drives followed it: the joints are sent
     where the integral of the commanded velocities is. Nothing else is known of the arm: no effort
-    is fed forward.
-
-    Attributes:
-        most: how many of the runs; None: all.
+    is fed forward. At `most` so many of the runs are followed; None: all.
     """
 
     name: ClassVar[str] = "arm_following"

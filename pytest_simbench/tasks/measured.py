@@ -14,11 +14,8 @@ M = TypeVar("M", bound=Motion)
 
 
 class MeasuredTask(Task, Generic[M]):
-    """A task against measured data. Its start is not disturbed: there is one truth for one start.
-
-    Attributes:
-        data: name of the data set.
-    """
+    """A task against the measured data of that name. Its start is not disturbed: there is one truth
+    for one start."""
 
     study_timeout: ClassVar[float] = 300.0
     shares_worker: ClassVar[bool] = True

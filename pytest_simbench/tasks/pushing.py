@@ -241,11 +241,8 @@ class Pushing(Task):
 
 @dataclass(frozen=True)
 class CurvePushing(Pushing):
-    """Push a block round a curve. A task of its own: a line and a curve are no rivals in a table.
-
-    Attributes:
-        turn: as of `Pushing`, by default 45 degrees; then the radius is 25 cm.
-    """
+    """Push a block round a curve, by default of 45 degrees and a radius of 25 cm. A task of its own:
+    a line and a curve are no rivals in a table."""
 
     name: ClassVar[str] = "pushing_curve"
 
