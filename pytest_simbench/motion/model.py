@@ -1,10 +1,11 @@
-"""Kinematics and dynamics of the robot, by Pinocchio."""
+"""Kinematics and dynamics of the robot, by Pinocchio, and how large its scenes are."""
 
 from __future__ import annotations
 
+import math
 import os
 from contextlib import suppress
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -172,6 +173,37 @@ class RobotModel:
             model.appendBodyToJoint(tool.parentJoint, inertia, tool.placement)
             self._loaded[key] = model
         return self._loaded[key]
+
+
+FULL_REACH = 0.85
+"""An arm of this reach (`RobotModel.reach`) does a task where the study has it [m]: that of the
+Kinova Mico2, the smallest one that was seen to. The Panda's is 1.09."""
+
+FULL_WRIST_REACH = 0.80
+"""The same for grasps from above, of the reach without the hand (`RobotModel.wrist_reach`) [m]: a
+hand that points down reaches no farther. The xArm 7, the smallest one that was seen to stack in the
+study's layout, has 0.82."""
+
+
+@cache
+def scale_of(robot: Robot) -> float:
+    """All lengths of a robot's scene over those of the study's layout: in tenths, at most 1.
+
+    A scene shrinks towards the world's origin: all lengths take the scale. Densities, friction and
+    gravity stay. So masses go with the third power. Accelerations stay with gravity, so the speeds
+    and times of what falls go with the square root.
+    """
+    return _tenths(RobotModel(robot).reach / FULL_REACH)
+
+
+@cache
+def grasping_scale_of(robot: Robot) -> float:
+    """The same for a scene in which cubes are grasped from above."""
+    return _tenths(RobotModel(robot).wrist_reach / FULL_WRIST_REACH)
+
+
+def _tenths(share: float) -> float:
+    return min(10, max(1, math.floor(10.0 * share))) / 10.0
 
 
 def last_change(robot: Robot) -> tuple[int, ...]:

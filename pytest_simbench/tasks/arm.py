@@ -119,7 +119,7 @@ class Arm:
     def go_to_pose(self, tool: Pose, *, speed: float) -> None:
         """Collision-free motion of the tool centre point to a pose in the world.
 
-        `robot.kinematics.tool_over` gives the pose of a tool that points down.
+        `motion.kinematics.tool_over` gives the pose of a tool that points down.
 
         Args:
             speed: share of the joint velocity limits.

@@ -9,9 +9,8 @@ import pytest
 
 from pytest_simbench.motion import registry
 from pytest_simbench.motion.errors import RobotError
-from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.model import FULL_WRIST_REACH, RobotModel, grasping_scale_of, scale_of
 from pytest_simbench.motion.registry import find
-from pytest_simbench.motion.scale import FULL_WRIST_REACH, grasping_scale_of, scale_of
 
 MODULE = """
 from dataclasses import replace
