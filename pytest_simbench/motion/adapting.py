@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping
 from itertools import combinations
 from typing import Any
 
+from pytest_simbench.description.links import joint_motion
 from pytest_simbench.description.urdf import numbers, pose_of_rpy, write_origin
 from pytest_simbench.description.urdf_check import FIXED, MOVING
 from pytest_simbench.scene import Pose, Vector3
@@ -78,15 +79,9 @@ def lock_joints(robot: ET.Element, positions: Mapping[str, float]) -> None:
     for joint in robot.findall("joint"):
         if joint.get("name") not in positions or joint.get("type") not in MOVING:
             continue
-        position = positions[joint.get("name", "")]
-        axis = _numbers(joint, "axis", "xyz", "1 0 0")
+        axis, position = _numbers(joint, "axis", "xyz", "1 0 0"), positions[joint.get("name", "")]
         origin = pose_of_rpy(*(_numbers(joint, "origin", key, "0 0 0") for key in ("xyz", "rpy")))
-        if joint.get("type") == "prismatic":
-            moved = Pose.at(*(part * position for part in axis))
-        else:
-            sine = math.sin(position / 2)
-            x, y, z = (part * sine for part in axis)
-            moved = Pose(quaternion=(math.cos(position / 2), x, y, z))
+        moved = joint_motion(joint.get("type", ""), axis, position)
         for tag in ("origin", "mimic"):
             for element in joint.findall(tag):
                 joint.remove(element)
