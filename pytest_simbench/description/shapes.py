@@ -73,13 +73,11 @@ def outlines(
     Returns:
         Of each kind the reaches in an order of their own, (n_shapes, 26) [m].
     """
-    kinds = zip(OUTLINES, (boxes, meshes, rounds), strict=True)
-    return {f"{prefix}/{kind}": _ordered(shapes) for kind, shapes in kinds}
-
-
-def _ordered(reaches: Iterable[FloatArray]) -> FloatArray:
-    rows = np.array(list(reaches), dtype=float).reshape(-1, len(DIRECTIONS))
-    return np.asarray(rows[order_of(rows)])
+    found = {}
+    for kind, reaches in zip(OUTLINES, (boxes, meshes, rounds), strict=True):
+        rows = np.array(list(reaches), dtype=float).reshape(-1, len(DIRECTIONS))
+        found[f"{prefix}/{kind}"] = np.asarray(rows[order_of(rows)])
+    return found
 
 
 def order_of(reaches: Sequence[FloatArray] | FloatArray) -> list[int]:

@@ -240,11 +240,7 @@ def _below(placement: pin.SE3, shape: coal.CollisionGeometry, above: float) -> F
     corners = corners @ placement.rotation.T + placement.translation
     low = corners[:, 2] >= -above
     # what cuts the plane between any two corners lies in the shape, and all edges are among them
-    a, b = _segments(corners[low], corners[~low])
+    inside, outside = corners[low], corners[~low]
+    a, b = np.repeat(inside, len(outside), axis=0), np.tile(outside, (len(inside), 1))
     share = ((-above - a[:, 2]) / (b[:, 2] - a[:, 2]))[:, None]
-    return np.concatenate([corners[low], a + share * (b - a)])
-
-
-def _segments(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """All segments from one set of points to another, their ends (n * m, 3) each."""
-    return np.repeat(first, len(second), axis=0), np.tile(second, (len(first), 1))
+    return np.concatenate([inside, a + share * (b - a)])

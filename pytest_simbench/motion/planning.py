@@ -24,9 +24,8 @@ from pytest_simbench.motion.throw import (
     Throw,
     feasible_swing,
     released,
-    study_swing,
 )
-from pytest_simbench.motion.timing import TICK, Timed, along_path, straight_move
+from pytest_simbench.motion.timing import TICK, Timed, along_path, straight_move, synchronised_move
 from pytest_simbench.scene import FloatArray, Pose, Trajectory
 
 __all__ = ["MotionPlanner", "PlanningError"]
@@ -174,7 +173,7 @@ class MotionPlanner:
         timed, duration = (
             feasible_swing(self.model, start, goal, self.gravity, self.scene.held_body)
             if feasible
-            else study_swing(self.model, start, goal)
+            else synchronised_move(start, goal, self.limits)
         )
         throw = released(self.model, timed, duration, fraction, self.scene.scale)
         fingers = np.where(np.arange(len(timed.position)) >= throw.row, opened, closed)

@@ -76,9 +76,10 @@ class Settling(Task):
     def __post_init__(self) -> None:
         object.__setattr__(self, "premises", tuple(self.premises))
         if self.world.robot is not None or not self.world.free_bodies:
+            has = "no free body" if self.world.robot is None else "a robot"
             raise SceneError(
-                f"scene {self.world.name!r} has {_what(self.world)}; Settling takes scenes of free "
-                "bodies without a robot"
+                f"scene {self.world.name!r} has {has}; Settling takes scenes of free bodies "
+                "without a robot"
             )
         names = {body.name for body in self.world.free_bodies}
         for premise in self.premises:
@@ -161,10 +162,6 @@ class Settling(Task):
             "tilts": {name: round(tilt, 4) for name, tilt in tilts.items()},
         }
         return Outcome(metrics, details, reasons=tuple(f"not: {text}" for text in failed))
-
-
-def _what(scene: Scene) -> str:
-    return "no free body" if scene.robot is None else "a robot"
 
 
 def _file_frame(body: Body) -> Pose:

@@ -28,9 +28,9 @@ from pytest_simbench.motion.throw import (
     Throw,
     feasible_swing,
     released,
-    study_swing,
     swing_of,
 )
+from pytest_simbench.motion.timing import synchronised_move
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Pose, Robot, Scene
 from pytest_simbench.tasks.arm import LostCube, Speeds
@@ -257,7 +257,7 @@ def perfect_throw(
     timed, duration = (
         feasible_swing(model, start, goal, np.array(STANDARD_GRAVITY), held)
         if feasible
-        else study_swing(model, start, goal)
+        else synchronised_move(start, goal, model.limits)
     )
     return released(model, timed, duration, release_fraction, scale)
 

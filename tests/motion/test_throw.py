@@ -17,9 +17,8 @@ from pytest_simbench.motion.throw import (
     feasible_swing,
     landing_x,
     released,
-    study_swing,
 )
-from pytest_simbench.motion.timing import TICK, Timed
+from pytest_simbench.motion.timing import TICK, Timed, synchronised_move
 from pytest_simbench.scene import Box, FloatArray, Pose
 
 MODEL = RobotModel(panda())
@@ -65,7 +64,7 @@ def test_the_swing_is_feasible_with_margins() -> None:
 
 def test_the_studys_swing_is_not() -> None:
     """The audit: 119.5 % of joint 2's 87 N m without the cube; 121.8 with it."""
-    timed, duration = study_swing(MODEL, START, GOAL)
+    timed, duration = synchronised_move(START, GOAL, LIMITS)
     assert duration == pytest.approx(1.464, abs=0.001)
     worst = np.abs(efforts(timed) / EFFORT_LIMITS).max(axis=0)
     assert worst.argmax() == 1
@@ -129,7 +128,7 @@ def test_the_throw_reaches_the_pyramid() -> None:
     assert np.linalg.norm(throw.velocity) == pytest.approx(2.79, abs=0.005)
     assert duration == pytest.approx(1.640264, abs=1e-5)
     assert throw.landing(GRAVITY) == pytest.approx(1.36671, abs=1e-4)
-    study = released(MODEL, *study_swing(MODEL, START, GOAL), 0.5)
+    study = released(MODEL, *synchronised_move(START, GOAL, LIMITS), 0.5)
     assert study.landing(GRAVITY) == pytest.approx(1.352, abs=0.001)  # REFERENCE_STUDY
     assert np.allclose(study.velocity, [2.75, 0.0, -0.13], atol=0.04)
 

@@ -84,6 +84,7 @@ def test_composition_multiplies_matrices(a: Pose, b: Pose) -> None:
 @given(poses())
 def test_inverse_undoes(a: Pose) -> None:
     assert np.allclose((a * a.inverse()).matrix(), np.eye(4), atol=1e-9)
+    assert Pose.from_array(a.as_array()) == a
 
 
 @given(st.floats(-math.pi + 1e-6, math.pi - 1e-6))
