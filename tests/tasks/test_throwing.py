@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -235,40 +236,35 @@ def test_the_study_counts_it_all_the_same() -> None:
     assert values(outcome) == {"moved": 0.5, "hit": 1.0, "moved_otherwise": 3.0}
 
 
-def test_both_are_told_apart() -> None:
-    """One falls by itself, one is pushed by the thrown cube."""
-    outcome, _ = thrown(*collapse(3), pushed={"pyramid_6": (0.08, 0.0, 0.0)})
-    assert values(outcome) == {"moved": 1 / 6, "hit": 1.0, "moved_otherwise": 1.0}
+def creep(by: float) -> list[Mishap]:
+    """Within 40 s, in steps."""
+    return [Mishap("settle", k / 10, move("pyramid_6", y=by / 399)) for k in range(1, 400)]
 
 
-@pytest.mark.parametrize("phase", ["pick", "wind up", "settle"])
-def test_knocked_before_or_after_the_throw_is_no_hit(phase: str) -> None:
-    """By the arm, or because the ground shakes."""
-    outcome, _ = thrown(Mishap(phase, 0.1, move("pyramid_1", y=-0.1)))
-    assert values(outcome) == {"moved": 0.0, "hit": 0.0, "moved_otherwise": 1.0}
+LONG, AWAY = Throwing(settle=40.0), {"pyramid_6": (0.08, 0.0, 0.0)}
 
 
-@pytest.mark.parametrize(("push", "moved"), [(0.02, 0), (0.028, 0), (0.032, 1), (0.049, 1)])
-def test_creep_is_no_hit(push: float, moved: int) -> None:
-    """The thrown cube pushes one a little; within the next minute it creeps on to 6 cm. It is the
-    throw's doing where that carried it most of the way."""
-    creep = [
-        Mishap("settle", k / 10, move("pyramid_6", y=(0.06 - push) / 399)) for k in range(1, 400)
-    ]
-    outcome, _ = thrown(*creep, task=Throwing(settle=40.0), pushed={"pyramid_6": (0.0, push, 0.0)})
-    assert values(outcome) == {"moved": moved / 6, "hit": moved, "moved_otherwise": 1 - moved}
-
-
-def test_what_is_pushed_away_may_creep_on() -> None:
-    creep = [Mishap("settle", k / 10, move("pyramid_6", y=0.0005)) for k in range(1, 400)]
-    outcome, _ = thrown(*creep, task=Throwing(settle=40.0), pushed={"pyramid_6": (0.0, 0.06, 0.0)})
-    assert values(outcome) == {"moved": 1 / 6, "hit": 1.0, "moved_otherwise": 0.0}
-
-
-def test_pushed_away_and_back_is_not_moved() -> None:
-    back = Mishap("settle", 2.0, move("pyramid_6", x=-0.08))
-    outcome, _ = thrown(back, pushed={"pyramid_6": (0.08, 0.0, 0.0)})
-    assert values(outcome) == NOTHING_MOVED
+@pytest.mark.parametrize(
+    ("task", "script", "pushed", "moved", "otherwise"),
+    [
+        (TASK, collapse(3), AWAY, 1, 1),  # one falls by itself, one is pushed by the thrown cube
+        *((TASK, [Mishap(phase, 0.1, move("pyramid_1", y=-0.1))], {}, 0, 1)  # by the arm
+          for phase in ("pick", "wind up", "settle")),
+        # pushed a little, and creeps on to 6 cm: the throw's doing where that is most of the way
+        *((LONG, creep(0.06 - push), {"pyramid_6": (0.0, push, 0.0)}, moved, 1 - moved)
+          for push, moved in ((0.02, 0), (0.028, 0), (0.032, 1), (0.049, 1))),
+        (LONG, creep(0.2), {"pyramid_6": (0.0, 0.06, 0.0)}, 1, 0),  # pushed away, and creeps on
+        (TASK, [Mishap("settle", 2.0, move("pyramid_6", x=-0.08))], AWAY, 0, 0),  # and back
+        (Throwing(settle=0.01), [], AWAY, 1, 0),  # at once, after a wait too short for a sample
+        (TASK, [Mishap("settle start", 0.9, move("pyramid_1", y=-0.2))], {}, 0, 0),  # it settles
+    ],
+)  # fmt: skip
+def test_which_cubes_count(
+    task: Throwing, script: list[Mishap], pushed: dict[str, Any], moved: int, otherwise: int
+) -> None:
+    outcome, _ = thrown(*script, task=task, pushed=pushed)
+    hit = float(moved > 0)
+    assert values(outcome) == {"moved": moved / 6, "hit": hit, "moved_otherwise": otherwise}
 
 
 def test_it_is_counted_a_minute_after() -> None:
@@ -276,18 +272,6 @@ def test_it_is_counted_a_minute_after() -> None:
     assert outcome.metrics["moved_otherwise"] == 1.0
     settle = [asked for asked in process.asked if asked.phase == "settle"]
     assert sum(asked.duration for asked in settle) == pytest.approx(60.0)
-
-
-def test_it_may_be_counted_at_once() -> None:
-    """After a wait too short for a sample."""
-    outcome, _ = thrown(task=Throwing(settle=0.01), pushed={"pyramid_6": (0.1, 0.0, 0.0)})
-    assert values(outcome) == {"moved": 1 / 6, "hit": 1.0, "moved_otherwise": 0.0}
-
-
-def test_places_are_taken_when_the_start_has_settled() -> None:
-    """Within the first second the pyramid may move."""
-    outcome, _ = thrown(Mishap("settle start", 0.9, move("pyramid_1", y=-0.2)))
-    assert values(outcome) == NOTHING_MOVED
 
 
 def test_the_integrators_part_is_apart() -> None:
