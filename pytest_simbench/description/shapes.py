@@ -64,15 +64,8 @@ def outlines(
     meshes: Iterable[FloatArray],
     rounds: Iterable[FloatArray] = (),
 ) -> dict[str, FloatArray]:
-    """The quantities `boxes`, `meshes` and `rounds` of a body or link named `prefix`.
-
-    Args:
-        prefix: of the quantities' names.
-        boxes, meshes, rounds: each shape by its `reach`.
-
-    Returns:
-        Of each kind the reaches in an order of their own, (n_shapes, 26) [m].
-    """
+    """The quantities `boxes`, `meshes` and `rounds` of a body or link named `prefix`: of each kind
+    the shapes' reaches in an order of their own, (n_shapes, 26) [m]."""
     found = {}
     for kind, reaches in zip(OUTLINES, (boxes, meshes, rounds), strict=True):
         rows = np.array(list(reaches), dtype=float).reshape(-1, len(DIRECTIONS))

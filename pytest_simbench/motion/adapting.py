@@ -31,11 +31,8 @@ TOOL_LINK, TOOL_JOINT = "tool_centre_point", "joint_of_the_tool_centre_point"
 
 
 def bound_joints(robot: ET.Element) -> bool:
-    """Give joints that turn without end limits: planning and engines need them.
-
-    Returns:
-        Whether there were any.
-    """
+    """Give joints that turn without end limits: planning and engines need them. Whether there were
+    any."""
     endless = [joint for joint in robot.findall("joint") if joint.get("type") == "continuous"]
     for joint in endless:
         joint.set("type", "revolute")
@@ -48,11 +45,8 @@ def bound_joints(robot: ET.Element) -> bool:
 
 
 def free_frames(robot: ET.Element) -> bool:
-    """Take the mass from links that only mark a frame: a body of no inertia has none.
-
-    Returns:
-        Whether there were any.
-    """
+    """Take the mass from links that only mark a frame: a body of no inertia has none. Whether there
+    were any."""
     found = False
     for link in robot.findall("link"):
         masses = link.findall("inertial/mass")

@@ -168,10 +168,7 @@ def _free(
     ignored: Sequence[str],
     restarts: int,
 ) -> Choice:
-    """
-    Raises:
-        PlanningError: it is out of reach, or touches something.
-    """
+    """One of them; raises `PlanningError` where it is out of reach, or touches something."""
 
     def wanted(arm: FloatArray) -> bool:
         return restarts == RESTARTS or scene.collision(arm, ignored=ignored) is None

@@ -218,10 +218,7 @@ def last_change(robot: Robot) -> tuple[int, ...]:
 @lru_cache(maxsize=64)
 def _checked(robot: Robot, changed: tuple[int, ...]) -> pin.Model:
     """Pinocchio's model of a robot whose files are sound, read once: each repetition asks for it.
-
-    Raises:
-        DescriptionError: the URDF cannot be read.
-    """
+    Raises `DescriptionError` for a URDF that cannot be read."""
     check_robot(robot)
     try:
         model = pin.buildModelFromUrdf(robot.urdf, mimic=False)

@@ -268,11 +268,8 @@ class ExternalSimulator(Simulator):
 
     @abstractmethod
     def make_steps(self, steps: int) -> int:
-        """Have the program make so many steps, and return when they are made.
-
-        Returns:
-            The number of steps since `build`, by the program's own count or clock.
-        """
+        """Have the program make so many steps, and return when they are made; the number of steps
+        since `build`, by the program's own count or clock."""
 
     @abstractmethod
     def ask_to_end(self) -> None:
