@@ -167,11 +167,6 @@ def test_a_hand_of_three_fingers_and_one_of_one(tmp_path: Path) -> None:
     assert read_robot(small_arm(tmp_path, toml, jaw)).gripper.couplings == ()
 
 
-def test_two_parallel_fingers() -> None:
-    assert RobotModel(panda()).has_parallel_fingers
-    assert RobotModel(find("ur5")).has_parallel_fingers
-
-
 Change = Callable[[str], str]
 
 

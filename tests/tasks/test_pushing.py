@@ -24,7 +24,7 @@ from pytest_simbench.tasks import CurvePushing, Jitter, Pushing
 from pytest_simbench.tasks.pushing import BLOCK_SIZE, START, lever, smallest_turning_radius
 from tests.conftest import case_of
 from tests.motion.small_arm import small_arm
-from tests.tasks.scripted import Mishap, ScriptedProcess, fail, move, perform, slip
+from tests.tasks.scripted import Mishap, ScriptedProcess, fail, move, perform, put, slip
 
 LINE, CURVE = Pushing(), CurvePushing()
 EXACT = Jitter(0.0, 0.0)
@@ -109,7 +109,9 @@ def test_a_heading_beyond_half_a_turn_is_off_by_what_is_left() -> None:
 
 
 def test_a_block_that_stays_is_a_whole_way_off() -> None:
-    stays = PushedProcess([Mishap("push", 0.0, out_of_the_way), Mishap("settle", 0.5, back)])
+    stays = PushedProcess(
+        [Mishap("push", 0.0, out_of_the_way), Mishap("settle", 0.5, put("block", START))]
+    )
     outcome, _ = perform(LINE, jitter=EXACT, process=stays)
     assert outcome.metrics["position_error"] == pytest.approx(0.2)
     assert stays.counts == [(0, 1)]
@@ -118,10 +120,6 @@ def test_a_block_that_stays_is_a_whole_way_off() -> None:
 
 def out_of_the_way(process: ScriptedProcess) -> None:
     process.grip = Pose()
-    process.poses["block"] = START
-
-
-def back(process: ScriptedProcess) -> None:
     process.poses["block"] = START
 
 
