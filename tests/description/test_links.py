@@ -56,9 +56,7 @@ def test_axes_are_pinocchios() -> None:
 
 
 def four_bar() -> Robot:
-    robot = FourBarClosure().build().robot
-    assert robot is not None
-    return robot
+    return FourBarClosure().build().robot
 
 
 def test_points_of_a_link_that_became_part_of_another_are_in_its_frame() -> None:

@@ -90,7 +90,6 @@ def test_no_path_is_sent() -> None:
 
 def test_what_arrives_is_the_same_robot(elsewhere: Path) -> None:
     there = Scene.from_wire(received(sent())).robot
-    assert there is not None
     assert Path(there.urdf).parent == elsewhere
     ours, theirs = PreparedRobot(panda()), PreparedRobot(there)
     assert list(ours.links) == list(theirs.links)

@@ -38,7 +38,6 @@ def test_a_file_says_everything(tmp_path: Path) -> None:
     assert robot.friction == 1.0
     assert not robot.self_collide
     limits = robot.limits
-    assert limits is not None
     assert limits.velocity == (2, 2, 2)  # the URDF's
     assert limits.acceleration == (8, 8, 8)
     assert limits.jerk == (800, 800, 800)
@@ -59,7 +58,6 @@ def test_what_a_file_says_besides(tmp_path: Path) -> None:
     assert robot.column("effort_limit")[:3].tolist() == [40, 40, 40]
     assert robot.column("armature")[:3].tolist() == [0.02] * 3
     limits = robot.limits
-    assert limits is not None
     assert limits.velocity == (1, 1.5, 2)
     assert limits.jerk == (50, 50, 50)
     assert limits.levers == (1, 0.9, 0.5)

@@ -143,7 +143,6 @@ def test_landing_is_on_the_parabola_on_the_way_down(
 ) -> None:
     sideways = np.array([0.5, 0.0, -9.80665])  # gravity need not be plumb
     landed = landing_x(np.array([x, 0.1, z]), np.array([vx, 1.0, vz]), sideways)
-    assert landed is not None
     times = np.roots([-9.80665 / 2, vz, z - 0.05])
     t = float(times.real.max())
     assert landed == pytest.approx(x + vx * t + 0.25 * t * t, abs=1e-9)

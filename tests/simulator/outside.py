@@ -83,7 +83,6 @@ class Outside(ExternalSimulator):
         Raises:
             SimulatorError: it raised something.
         """
-        assert self._connection is not None
         self._connection.send((name, *arguments))
         well, answer = self._connection.recv()
         if not well:

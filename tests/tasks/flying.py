@@ -138,7 +138,6 @@ class FlyingProcess(ScriptedProcess):
         super()._command(position)
 
     def _tool_velocity(self) -> FloatArray:
-        assert self.model is not None
         arm = self.model.arm
         return self.model.tool_velocity(self.position[:arm], self._rates[:arm])
 

@@ -45,7 +45,6 @@ class Arm:
     def tools(self) -> list[Pose]:
         """Where the tool was commanded to at the end of each motion."""
         scene = self.world.scene
-        assert scene.robot is not None
         model = RobotModel(scene.robot)
         return [model.tool_pose(end[:7]) for end in self.ends]
 
@@ -241,7 +240,6 @@ def test_a_cube_that_cannot_be_put_back_is_let_go_where_it_is(arm: Arm) -> None:
     arm.manipulator.pick(CUBE)
     arm.put("cube_01", origin.translated(z=0.001))
     problem = arm.manipulator.recover()
-    assert problem is not None
     assert problem.startswith("could not put back: in collision: ")
     assert arm.manipulator.held is None
     (_, pose) = arm.process.released[0]
@@ -271,7 +269,6 @@ def test_a_retreat_may_touch_the_cube_it_let_go_but_nothing_else(holding: Arm) -
     other.manipulator.place(PLACE)
     other.put("cube_01", Pose.at(0.5, 0.0, 0.52))
     problem = other.manipulator.try_retreat()
-    assert problem is not None
     assert problem.startswith("could not retreat: straight line blocked: ")
     assert "cube_01" in problem
 
@@ -346,7 +343,6 @@ def test_a_trajectory_of_ones_own_ends_where_the_next_motion_begins(arm: Arm) ->
     goal = start + np.array([0.1, 0, 0, 0, 0, 0, 0, -0.01, -0.01])
     rows = start + np.linspace(0.0, 1.0, 101)[:, None] * (goal - start)
     motion = arm.manipulator.follow(Trajectory(0.01, rows, 0 * rows, 0 * rows), log_period=0.1)
-    assert motion is not None
     assert len(motion) == 10
     assert arm.manipulator.arm == pytest.approx(goal[:7])
     assert arm.manipulator.fingers == pytest.approx(goal[-1])

@@ -205,14 +205,12 @@ def test_the_smallest_arm_pushes_too(case: Case) -> None:
     record, error = Repetition(Experiment(case, LINE), 1).run()
     assert error is None
     assert "failed_push" not in record.details
-    assert record.metrics["position_error"] is not None
     assert record.metrics["position_error"] < 0.0025
     assert record.metrics["tipped"] == 0.0
 
 
 def test_what_a_robot_cannot_do_is_a_sentence(tmp_path: Path) -> None:
     problem = LINE.on(read_robot(small_arm(tmp_path))).problem()
-    assert problem is not None
     assert "cannot push the block: unreachable" in problem
 
 
@@ -223,9 +221,7 @@ def test_on_simulators(case: Case, name: str, task: Pushing) -> None:
     record, error = Repetition(Experiment(case_of(case, name), task), 1).run()
     assert error is None
     assert "failed_push" not in record.details
-    assert record.metrics["position_error"] is not None
     assert record.metrics["position_error"] < 0.005
-    assert record.metrics["heading_error"] is not None
     assert record.metrics["heading_error"] < 1.0
     assert record.metrics["tipped"] == 0.0
 

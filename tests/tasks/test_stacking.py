@@ -301,7 +301,6 @@ def test_the_scene_is_the_studys() -> None:
     colours = [body.colour for body in scene.free_bodies]
     assert colours[0] != colours[1]
     assert colours == [colours[0], colours[1]] * 10 + [colours[0]]
-    assert scene.robot is not None
     assert scene.robot.base == Pose()
     assert (scene.robot.gripper.opened, scene.robot.gripper.closed) == (0.035, 0.0)
 
@@ -355,7 +354,6 @@ def test_another_robot_stacks_in_the_same_world() -> None:
     assert scene.bodies == pandas.bodies
     assert task.smoke() == Stacking(towers=1, levels=2, settle=2.0, robot=ur5)
     study = task.study().scene(3, Jitter()).robot
-    assert study is not None
     assert study.gripper == replace(ur5.gripper, closed=0.02)
 
 

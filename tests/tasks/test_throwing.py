@@ -291,11 +291,9 @@ def test_the_integrators_part_is_apart() -> None:
 def test_what_a_robot_cannot_do_is_a_sentence(tmp_path: Path) -> None:
     robot = read_robot(small_arm(tmp_path))
     problem = TASK.on(robot).problem()
-    assert problem is not None
     assert "'small' has no swing for the throw: write one into its file" in problem
     swing = robot.column("initial_position")[:3]
     problem = TASK.on(replace(robot, swing=(tuple(swing), tuple(swing)))).problem()
-    assert problem is not None
     assert "'small' cannot handle a cube at (" in problem
     assert TASK.problem() is None
 
@@ -362,7 +360,6 @@ def test_all_its_motions_are_feasible(seed: int) -> None:
     for task in (TASK, TASK.study()):
         _, process = perform(task, seed=seed, process=FlyingProcess())
         model, cube = process.model, process.scene.body(PROJECTILE)
-        assert model is not None
         for asked in process.asked:
             if asked.kind == "follow":
                 position, velocity = (asked.arguments[k][:, :7] for k in ("position", "velocity"))
