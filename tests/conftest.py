@@ -7,6 +7,7 @@ import os
 import signal
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 # pytester takes out again what a test imports first; of matplotlib a part would then come twice.
 import matplotlib.backends.backend_agg
@@ -17,6 +18,7 @@ from hypothesis import settings
 
 from pytest_simbench.client import reaper
 from pytest_simbench.client.environments import interpreter, missing
+from pytest_simbench.data import DataMissing, read
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter, registered
@@ -73,6 +75,14 @@ def case_of(case: Case, name: str) -> Case:
     )
 
 
+def measured(name: str) -> Any:
+    """A set of measured data. Skips the test where it is not on this machine."""
+    try:
+        return read(name)
+    except DataMissing as error:
+        pytest.skip(str(error))
+
+
 def workers() -> set[psutil.Process]:
     """Living processes that this one's workers are, or that these left behind."""
     return set(reaper.marked(reaper.new_mark().partition(".")[0]))
@@ -98,7 +108,6 @@ SLOW = {
     "test_planted_changes_are_found_where_they_are",
     "test_shrinks_to_the_smallest_amount",
     "test_the_file_has_what_the_command_finds",
-    "test_the_jitter_moves_and_turns_every_cube_both_ways",
     "test_the_order_of_the_cubes_is_by_seed",
     "test_the_shares_are_of_all_places_also_of_those_never_filled",
     "test_without_a_change_one_row_in_twenty_has_one_at_most",

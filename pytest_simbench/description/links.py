@@ -12,13 +12,14 @@ from pytest_simbench.description.urdf import ROOT, MovingJoint, PreparedRobot
 from pytest_simbench.description.urdf_check import read_xml
 from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.scene import Closure, FloatArray, Pose, Robot, Scene, SceneError, Vector3
+from pytest_simbench.scene.pose import vector3
 
 
 def link_poses(prepared: PreparedRobot, positions: Mapping[str, float]) -> dict[str, Pose]:
     """Pose in the world of every link's frame, by name, at joint positions [rad or m]."""
     poses = {prepared.root: Pose()}
     for joint in prepared.joints:  # parents first
-        moved = _motion(joint, positions[joint.name])
+        moved = joint_motion(joint.kind, joint.axis, positions[joint.name])
         poses[joint.child] = poses[joint.parent] * joint.origin * moved
     return poses
 
@@ -29,19 +30,19 @@ def motion_subspace(joint: MovingJoint) -> FloatArray:
     Angular velocity first [rad/s], then the linear velocity of the frame's origin [m/s]
     (Featherstone, Rigid Body Dynamics Algorithms, section 3.5).
     """
-    axis = _unit(joint)
+    axis = _unit(joint.axis)
     still = np.zeros(3)
     return np.concatenate([axis, still] if joint.kind == "revolute" else [still, axis])
 
 
-def _unit(joint: MovingJoint) -> FloatArray:
-    axis = np.asarray(joint.axis, dtype=float)
-    return np.asarray(axis / np.linalg.norm(axis))
+def _unit(axis: Vector3) -> FloatArray:
+    return np.asarray(np.array(axis) / np.linalg.norm(axis))
 
 
-def _motion(joint: MovingJoint, position: float) -> Pose:
-    x, y, z = (float(value) for value in _unit(joint))
-    if joint.kind == "prismatic":
+def joint_motion(kind: str, axis: Vector3, position: float) -> Pose:
+    """Of a joint's child, from where it is at position 0, at a position [rad or m]."""
+    x, y, z = vector3(_unit(axis))
+    if kind == "prismatic":
         return Pose((x * position, y * position, z * position))
     s = float(np.sin(position / 2))
     return Pose(quaternion=(float(np.cos(position / 2)), x * s, y * s, z * s))
@@ -64,10 +65,7 @@ def reduced(prepared: PreparedRobot) -> tuple[Closure, ...]:
 def _reduced(prepared: PreparedRobot, closure: Closure) -> Closure:
     robot = prepared.robot
     names, points = [], []
-    for name, point in (
-        (closure.first, closure.first_point),
-        (closure.second, closure.second_point),
-    ):
+    for name, point in closure.sides:
         if name not in prepared.places:
             raise DescriptionError(
                 f"a closure of {robot.name} holds link {name!r}, which is none of {robot.urdf}; "
@@ -75,7 +73,7 @@ def _reduced(prepared: PreparedRobot, closure: Closure) -> Closure:
             )
         link, pose = prepared.places[name]
         names.append(link)
-        points.append(_vector(pose.rotation() @ np.asarray(point) + pose.position))
+        points.append(vector3(pose.rotation() @ np.asarray(point) + pose.position))
     if names[0] == names[1]:
         raise DescriptionError(
             f"a closure of {robot.name} holds {closure.first!r} at {closure.second!r}, and no "
@@ -107,17 +105,9 @@ def ends(
     poses = link_poses(prepared, dict(zip(robot.joint_names, positions, strict=True)))
     first, second = (
         np.asarray(poses[link].rotation() @ np.asarray(point) + poses[link].position)
-        for link, point in (
-            (closure.first, closure.first_point),
-            (closure.second, closure.second_point),
-        )
+        for link, point in closure.sides
     )
     return first, second
-
-
-def _vector(values: FloatArray) -> Vector3:
-    x, y, z = (float(value) for value in values)
-    return (x, y, z)
 
 
 def joined(prepared: PreparedRobot) -> frozenset[frozenset[str]]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pytest_simbench.description.stl import read_stl
 from pytest_simbench.ground.files import FileError, read_file
 
 LARGEST_MESH = 16 * 2**20
@@ -22,12 +23,6 @@ THINNEST = 1e-6
 """Extent in the shortest direction over that in the longest."""
 
 PACKAGE = "package://"
-
-HEADER = 84
-"""Of a binary STL file [bytes]: 80, and the number of triangles (uint32)."""
-
-TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-"""One record a triangle after that."""
 
 
 def mesh_path(filename: str, urdf: str, packages: Mapping[str, str]) -> Path:
@@ -77,13 +72,12 @@ def check_mesh(path: Path) -> None:
     """Raise `FileError` unless a file is a binary STL mesh that has a convex hull."""
     if path.suffix.lower() != ".stl":
         raise FileError(f"{path} is no mesh that every engine reads; give a binary .stl file")
-    data = read_file(path, LARGEST_MESH, "the mesh")
-    count = int.from_bytes(data[80:HEADER], "little")
-    if len(data) != HEADER + count * TRIANGLE.itemsize or not count:
+    triangles = read_stl(read_file(path, LARGEST_MESH, "the mesh"))
+    if not (count := len(triangles)):
         raise FileError(f"{path} holds no binary STL mesh; write it anew from a mesh editor")
     if count > MOST_TRIANGLES:
         raise FileError(f"{path} has {count} triangles; simplify it to {MOST_TRIANGLES} or fewer")
-    points = np.frombuffer(data, TRIANGLE, offset=HEADER)["corners"].reshape(-1, 3).astype(float)
+    points = triangles.reshape(-1, 3)
     if not (np.abs(points) <= FARTHEST).all():  # false for NaN
         raise FileError(f"{path} has a vertex that is not finite, or more than {FARTHEST:g} away")
     spread = np.linalg.eigvalsh(np.cov(points.T))

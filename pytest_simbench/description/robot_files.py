@@ -28,11 +28,8 @@ CONTENT = "content"
 
 
 def description_xml(robot: Robot, name_of: Callable[[Path], str] = str) -> ET.Element:
-    """Links and joints of a robot's URDF, collision shapes only, its meshes named anew.
-
-    Args:
-        robot: whose files are read and checked.
-        name_of: what to call a mesh file; by default its absolute path.
+    """Links and joints of a robot's URDF, collision shapes only, its meshes named anew by
+    `name_of`, by default with their absolute paths.
 
     Raises:
         DescriptionError: a file is missing or wrong; says which.

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pytest_simbench.description.mesh_check import HEADER, TRIANGLE
+from pytest_simbench.description.stl import read_stl, written_stl
 from pytest_simbench.description.urdf import Shape
 from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.scene import FloatArray, Polytope, Pose
@@ -64,22 +64,13 @@ def outlines(
     meshes: Iterable[FloatArray],
     rounds: Iterable[FloatArray] = (),
 ) -> dict[str, FloatArray]:
-    """The quantities `boxes`, `meshes` and `rounds` of a body or link named `prefix`.
-
-    Args:
-        prefix: of the quantities' names.
-        boxes, meshes, rounds: each shape by its `reach`.
-
-    Returns:
-        Of each kind the reaches in an order of their own, (n_shapes, 26) [m].
-    """
-    kinds = zip(OUTLINES, (boxes, meshes, rounds), strict=True)
-    return {f"{prefix}/{kind}": _ordered(shapes) for kind, shapes in kinds}
-
-
-def _ordered(reaches: Iterable[FloatArray]) -> FloatArray:
-    rows = np.array(list(reaches), dtype=float).reshape(-1, len(DIRECTIONS))
-    return np.asarray(rows[order_of(rows)])
+    """The quantities `boxes`, `meshes` and `rounds` of a body or link named `prefix`: of each kind
+    the shapes' reaches in an order of their own, (n_shapes, 26) [m]."""
+    found = {}
+    for kind, reaches in zip(OUTLINES, (boxes, meshes, rounds), strict=True):
+        rows = np.array(list(reaches), dtype=float).reshape(-1, len(DIRECTIONS))
+        found[f"{prefix}/{kind}"] = np.asarray(rows[order_of(rows)])
+    return found
 
 
 def order_of(reaches: Sequence[FloatArray] | FloatArray) -> list[int]:
@@ -116,55 +107,32 @@ def write_obj(path: Path, mesh: Polytope) -> Path:
 
 def write_stl(path: Path, mesh: Polytope) -> Path:
     """Write a hull as a binary STL file; the path."""
-    path.write_bytes(stl_bytes(mesh))
+    path.write_bytes(written_stl(mesh.points[np.array(mesh.triangles)]))
     return path
-
-
-def stl_bytes(mesh: Polytope) -> bytes:
-    """A hull as a binary STL file."""
-    triangles = np.zeros(len(mesh.triangles), TRIANGLE)
-    triangles["corners"] = mesh.points[np.array(mesh.triangles)]
-    count = np.uint32(len(triangles)).tobytes()
-    return bytes(HEADER - len(count)) + count + triangles.tobytes()
 
 
 def mesh_points(path: str) -> FloatArray:
     """The distinct corners of a mesh, (n, 3) [m].
 
     Raises:
-        DescriptionError: the file is neither STL nor OBJ.
+        DescriptionError: the file is neither binary STL nor OBJ.
     """
     return _mesh_points(path, Path(path).stat().st_mtime_ns)
 
 
 @lru_cache(maxsize=64)
 def _mesh_points(path: str, _changed: int) -> FloatArray:
-    reader = {".stl": _stl_points, ".obj": _obj_points}.get(Path(path).suffix.lower())
-    points = reader(Path(path)) if reader else None
-    if points is None or not len(points):
+    reader = {".stl": read_stl, ".obj": _read_obj}.get(Path(path).suffix.lower())
+    points = np.empty(0) if reader is None else reader(Path(path).read_bytes())
+    if not len(points):
         raise DescriptionError(f"{path} is no STL or OBJ file: collision meshes must be one")
-    return np.unique(points, axis=0)
+    return np.unique(points.reshape(-1, 3), axis=0)
 
 
-def _stl_points(path: Path) -> FloatArray | None:
-    data = path.read_bytes()
-    count = int.from_bytes(data[80:HEADER], "little")
-    if len(data) == HEADER + count * TRIANGLE.itemsize:
-        triangles = np.frombuffer(data, TRIANGLE, count, HEADER)
-        return np.asarray(triangles["corners"], dtype=float).reshape(-1, 3)
-    if not data.lstrip().startswith(b"solid"):
-        return None
-    return _points_after("vertex", data)
-
-
-def _obj_points(path: Path) -> FloatArray | None:
-    return _points_after("v", path.read_bytes())
-
-
-def _points_after(word: str, data: bytes) -> FloatArray | None:
+def _read_obj(data: bytes) -> FloatArray:
     lines = (line.split() for line in data.decode("utf-8", "replace").splitlines())
     try:
-        rows = [[float(x) for x in line[1:4]] for line in lines if line and line[0] == word]
+        rows = [[float(x) for x in line[1:4]] for line in lines if line and line[0] == "v"]
         return np.array(rows, dtype=float).reshape(-1, 3)
     except ValueError:
-        return None
+        return np.empty((0, 3))

@@ -63,10 +63,7 @@ def distinct(starts: Sequence[Start], tolerance: float = 1e-6) -> int:
     """How many of the starts are different, seen from the first body of each.
 
     Starts that place the same things alike elsewhere on a table are one experiment, done again.
-
-    Args:
-        starts: of the same bodies.
-        tolerance: up to which positions [m] and quaternions are the same.
+    Positions [m] and quaternions are the same up to `tolerance`.
     """
     seen: list[FloatArray] = []
     for start in starts:

@@ -20,6 +20,7 @@ import numpy as np
 from pytest_simbench.description.urdf_check import Description
 from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.scene import FloatArray, Pose, Robot, Vector3
+from pytest_simbench.scene.pose import vector3
 from pytest_simbench.scene.wire import Wire
 
 ROOT = "base"
@@ -152,7 +153,7 @@ class PreparedRobot:
                 self._descend(child, into, origin, joints, raw)
                 continue
             limit, told = _required(joint, "limit").attrib, joint.find("axis")
-            axis = _vector("1 0 0" if told is None else told.attrib["xyz"])
+            axis = numbers("1 0 0" if told is None else told.attrib["xyz"])
             self.joints.append(MovingJoint(moved, kind, into, child, origin, axis))
             self.limits[moved] = np.array([float(limit["lower"]), float(limit["upper"])])
             self.velocity_limits[moved] = float(limit["velocity"])
@@ -175,7 +176,7 @@ class PreparedRobot:
         for collision in element.findall("collision"):
             box, mesh = collision.find("geometry/box"), collision.find("geometry/mesh")
             if box is not None:
-                link.shapes.append(Shape(origin_of(collision), size=_vector(box.attrib["size"])))
+                link.shapes.append(Shape(origin_of(collision), size=numbers(box.attrib["size"])))
             elif mesh is not None:
                 path = self._description.mesh(mesh.attrib["filename"])
                 link.shapes.append(Shape(origin_of(collision), mesh=path))
@@ -213,9 +214,13 @@ def _required(element: ET.Element, tag: str) -> ET.Element:
     return found
 
 
-def _vector(text: str) -> Vector3:
-    x, y, z = (float(part) for part in text.split())
-    return (x, y, z)
+def numbers(text: str) -> Vector3:
+    """The three numbers of an attribute.
+
+    Raises:
+        ValueError: they are none.
+    """
+    return vector3(map(float, text.split()))
 
 
 def origin_of(element: ET.Element) -> Pose:
@@ -223,9 +228,8 @@ def origin_of(element: ET.Element) -> Pose:
     origin = element.find("origin")
     if origin is None:
         return Pose()
-    return pose_of_rpy(
-        _vector(origin.attrib.get("xyz", "0 0 0")), _vector(origin.attrib.get("rpy", "0 0 0"))
-    )
+    xyz, rpy = (numbers(origin.attrib.get(key, "0 0 0")) for key in ("xyz", "rpy"))
+    return pose_of_rpy(xyz, rpy)
 
 
 def pose_of_rpy(xyz: Sequence[float], rpy: Sequence[float]) -> Pose:

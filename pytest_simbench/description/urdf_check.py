@@ -245,8 +245,8 @@ class Description:
             self.refuse(
                 joint, f"may go from {lower:g} to {upper:g}; lower must be below upper", limit
             )
-        for key in ("effort", "velocity"):
-            if self.number(joint, limit, key, "0") < 0:
+        for key, default in (("effort", "0"), ("velocity", "")):
+            if self.number(joint, limit, key, default) < 0:
                 value = limit.get(key)
                 self.refuse(joint, f"has the {key} limit {value!r}; it must be positive", limit)
 

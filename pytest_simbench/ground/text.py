@@ -40,11 +40,8 @@ def in_one_line(text: str, longest: int = LONGEST_LINE) -> str:
 def for_markdown(text: str, *, cell: bool = False) -> str:
     """`text` in one line, so that Markdown (GitHub's too) shows it as it is.
 
-    No picture, link, heading, list, HTML, formula or mention of a person comes of it.
-
-    Args:
-        text: any.
-        cell: it stands in a table, where no block can begin.
+    No picture, link, heading, list, HTML, formula or mention of a person comes of it. In a `cell`
+    of a table no block can begin.
     """
     text = _MARKUP.sub(lambda found: found[0] if found[1] else f"\\{found[0]}", in_one_line(text))
     text = _LINKED.sub(rf"\g<0>{BLANK}", text)

@@ -13,9 +13,10 @@ from collections.abc import Iterable, Mapping
 from itertools import combinations
 from typing import Any
 
-from pytest_simbench.description.urdf import pose_of_rpy, write_origin
+from pytest_simbench.description.links import joint_motion
+from pytest_simbench.description.urdf import numbers, pose_of_rpy, write_origin
 from pytest_simbench.description.urdf_check import FIXED, MOVING
-from pytest_simbench.scene import Pose
+from pytest_simbench.scene import Pose, Vector3
 from pytest_simbench.simulator import DescriptionError
 
 TURNS = 2 * math.pi
@@ -30,11 +31,8 @@ TOOL_LINK, TOOL_JOINT = "tool_centre_point", "joint_of_the_tool_centre_point"
 
 
 def bound_joints(robot: ET.Element) -> bool:
-    """Give joints that turn without end limits: planning and engines need them.
-
-    Returns:
-        Whether there were any.
-    """
+    """Give joints that turn without end limits: planning and engines need them. Whether there were
+    any."""
     endless = [joint for joint in robot.findall("joint") if joint.get("type") == "continuous"]
     for joint in endless:
         joint.set("type", "revolute")
@@ -47,11 +45,8 @@ def bound_joints(robot: ET.Element) -> bool:
 
 
 def free_frames(robot: ET.Element) -> bool:
-    """Take the mass from links that only mark a frame: a body of no inertia has none.
-
-    Returns:
-        Whether there were any.
-    """
+    """Take the mass from links that only mark a frame: a body of no inertia has none. Whether there
+    were any."""
     found = False
     for link in robot.findall("link"):
         masses = link.findall("inertial/mass")
@@ -70,10 +65,7 @@ def _negligible(mass: ET.Element) -> bool:
 
 
 def lock_joints(robot: ET.Element, positions: Mapping[str, float]) -> None:
-    """Make joints fixed ones, where they stand at some position.
-
-    Args:
-        positions: of joints that move, by name [rad] or [m]; others are left as they are.
+    """Make joints that move, by name, fixed ones, where they stand at some position [rad] or [m].
 
     Raises:
         DescriptionError: a number of such a joint cannot be read.
@@ -81,15 +73,9 @@ def lock_joints(robot: ET.Element, positions: Mapping[str, float]) -> None:
     for joint in robot.findall("joint"):
         if joint.get("name") not in positions or joint.get("type") not in MOVING:
             continue
-        position = positions[joint.get("name", "")]
-        axis = _numbers(joint, "axis", "xyz", "1 0 0")
+        axis, position = _numbers(joint, "axis", "xyz", "1 0 0"), positions[joint.get("name", "")]
         origin = pose_of_rpy(*(_numbers(joint, "origin", key, "0 0 0") for key in ("xyz", "rpy")))
-        if joint.get("type") == "prismatic":
-            moved = Pose.at(*(part * position for part in axis))
-        else:
-            sine = math.sin(position / 2)
-            x, y, z = (part * sine for part in axis)
-            moved = Pose(quaternion=(math.cos(position / 2), x, y, z))
+        moved = joint_motion(joint.get("type", ""), axis, position)
         for tag in ("origin", "mimic"):
             for element in joint.findall(tag):
                 joint.remove(element)
@@ -100,12 +86,7 @@ def lock_joints(robot: ET.Element, positions: Mapping[str, float]) -> None:
 def add_tool(
     robot: ET.Element, link: str, pose: Pose, name: str = TOOL_LINK, joint_name: str = TOOL_JOINT
 ) -> None:
-    """Add a link without mass at the tool centre point.
-
-    Args:
-        link: that carries it.
-        pose: in that link.
-        name, joint_name: of the new link and its joint.
+    """Add a link without mass at the tool centre point, which is at a pose in another link.
 
     Raises:
         DescriptionError: there is no such link, or one with the new link's name.
@@ -120,23 +101,28 @@ def add_tool(
             f"there is a link {name!r} already; name it as tool_frame, without xyz and rpy"
         )
     ET.SubElement(robot, "link", name=name)
-    joint = ET.SubElement(robot, "joint", name=joint_name, type=FIXED)
-    ET.SubElement(joint, "parent", link=link)
-    ET.SubElement(joint, "child", link=name)
+    robot.append(_fixed(joint_name, link, name, pose))
+
+
+def _fixed(name: str, parent: str, child: str, pose: Pose) -> ET.Element:
+    """A joint that holds one link at a pose in another."""
+    joint = ET.Element("joint", name=name, type=FIXED)
+    ET.SubElement(joint, "parent", link=parent)
+    ET.SubElement(joint, "child", link=child)
     write_origin(joint, pose)
+    return joint
 
 
-def _numbers(joint: ET.Element, tag: str, key: str, default: str) -> tuple[float, ...]:
+def _numbers(joint: ET.Element, tag: str, key: str, default: str) -> Vector3:
     """Three numbers of a joint's part."""
     part = joint.find(tag)
     text = default if part is None else part.get(key, default)
     try:
-        x, y, z = map(float, text.split())
+        return numbers(text)
     except ValueError:
         raise DescriptionError(
             f"joint {joint.get('name')!r} has <{tag} {key}={text[:80]!r}>; give 3 numbers"
         ) from None
-    return x, y, z
 
 
 MOUNT_JOINT = "mount_of_the_hand"
@@ -170,12 +156,8 @@ def mounted(arm: ET.Element, hand: ET.Element, root: str, mount: str, pose: Pose
             raise DescriptionError(
                 f"arm and hand both have the {element.tag} {element.get('name')!r}; rename one"
             )
-    joint = ET.Element("joint", name=MOUNT_JOINT, type="fixed")
-    ET.SubElement(joint, "parent", link=mount)
-    ET.SubElement(joint, "child", link=root)
-    write_origin(joint, pose)
     whole = ET.Element("robot", arm.attrib)
-    whole.extend([*arm, *parts, joint])
+    whole.extend([*arm, *parts, _fixed(MOUNT_JOINT, mount, root, pose)])
     return whole
 
 
@@ -199,13 +181,10 @@ def _end(joint: ET.Element, tag: str) -> str:
 
 
 def pairs_not_checked(urdf: ET.Element, lists: Iterable[ET.Element]) -> ET.Element:
-    """The SRDF of a robot: the link pairs that its lists name, and every pair that one joint joins.
+    """The SRDF of a robot: the link pairs that the SRDF of arm and hand name, and every pair that
+    one joint joins.
 
     Links that are fixed to each other move as one, so the neighbours of one are those of all.
-
-    Args:
-        urdf: of the whole robot.
-        lists: SRDF of arm and hand.
     """
     links = {link.get("name", "") for link in urdf.findall("link")}
     found = {

@@ -36,13 +36,10 @@ class PlanningScene:
     Link pairs listed in the SRDF are not checked. The root link is fixed and not checked
     against the world.
 
-    Args:
-        scale: of the scene's lengths over those of the study's.
-
     Attributes:
-        scale: the same.
+        scale: of the scene's lengths over those of the study's.
         opening: position of each finger that is assumed in every check [m, or rad].
-        held: name of the cube in the hand, or None.
+        held: name of the cube in the hand (`attach`), or None.
     """
 
     def __init__(self, model: RobotModel, scene: Scene, scale: float = 1.0) -> None:
@@ -50,6 +47,7 @@ class PlanningScene:
         self.scale = scale
         self.opening = model.robot.gripper.opened
         self.held: str | None = None
+        self._active_for: tuple[str | None, tuple[str, ...]] | None = None
         geometry = _links(model.robot, last_change(model.robot)).copy()
         self._links = list(range(len(geometry.geometryObjects)))
         inverse = model.base.inverse()
@@ -104,19 +102,12 @@ class PlanningScene:
         for name, pose in poses.items():
             shape = self._geometry.geometryObjects[self._bodies[name]]
             shape.placement = inverse * pin.SE3(pose.matrix())
-        self._activate()
 
     def attach(self, name: str, in_tool: Pose) -> None:
         """From now on cube `name` moves with the hand, at `in_tool` in the tool frame."""
         self.held = name
         rider = self._geometry.geometryObjects[self._riding[name]]
         rider.placement = self._tool_in_joint * pin.SE3(in_tool.matrix())
-        self._activate()
-
-    def detach(self) -> None:
-        """The hand is empty again."""
-        self.held = None
-        self._activate()
 
     @property
     def held_body(self) -> Body | None:
@@ -125,11 +116,8 @@ class PlanningScene:
 
     def front(self, above: float) -> tuple[float, float]:
         """The face with which the closed hand pushes along its tool frame's x [m]: how far it
-        stands before the tool centre point, and how wide it is.
-
-        Args:
-            above: how far above the tool centre point it may touch what it pushes [m].
-        """
+        stands before the tool centre point, and how wide it is. It may touch what it pushes up to
+        `above` that point [m]."""
         model = self.model
         points = self._hand(model.robot.gripper.closed, above, model.arm)
         depth = float(points[:, 0].max())
@@ -147,14 +135,8 @@ class PlanningScene:
         return float(self._hand(opening, above, self.model.arm + 1)[:, 1].min(initial=np.inf))
 
     def _hand(self, opening: float, above: float, first: int) -> FloatArray:
-        """Corners of the hand's part at most so far above the tool centre point, in the tool frame,
-        (n, 3).
-
-        Args:
-            opening: position of each finger [m, or rad].
-            above: [m]
-            first: joint that carries the first link of the part.
-        """
+        """Corners of the hand's part at most so far above the tool centre point [m], in the tool
+        frame, (n, 3), from the link that joint `first` carries on; the fingers at `opening`."""
         model = self.model
         fingers = np.full(len(model.robot.joints) - model.arm, opening)
         q = np.concatenate([model.robot.column("initial_position")[: model.arm], fingers])
@@ -167,8 +149,11 @@ class PlanningScene:
         ]
         return np.concatenate(corners)
 
-    def _activate(self, ignored: Iterable[str] = ()) -> None:
+    def _activate(self, ignored: tuple[str, ...]) -> None:
         """Switch off the pairs of ignored bodies, of the held cube's place, of cubes not held."""
+        if self._active_for == (self.held, ignored):
+            return
+        self._active_for = self.held, ignored
         off = {self._bodies[name] for name in ignored}
         if self.held is not None:
             off.add(self._bodies[self.held])
@@ -192,17 +177,9 @@ class PlanningScene:
         self, path: FloatArray, *, ignored: Iterable[str] = (), margin: bool = True
     ) -> tuple[str, str] | None:
         """The same for positions along a path, (n, arm)."""
-        ignored = tuple(ignored)
-        if ignored:
-            self._activate(ignored)
-        try:
-            return self._first(path, self._wide if margin else self._exact)
-        finally:
-            if ignored:
-                self._activate()
-
-    def _first(self, path: FloatArray, data: pin.GeometryData) -> tuple[str, str] | None:
+        self._activate(tuple(ignored))
         model, geometry = self.model, self._geometry
+        data = self._wide if margin else self._exact
         fingers = np.full(len(model.robot.joints) - model.arm, self.opening)
         for arm in path:
             q = np.concatenate([arm, fingers])
@@ -221,11 +198,7 @@ class PlanningScene:
 @lru_cache(maxsize=64)
 def _links(robot: Robot, changed: tuple[int, ...]) -> pin.GeometryModel:
     """The shapes of a robot's links and the pairs to check, made once: each repetition asks for it.
-
-    Args:
-        robot: whose files are sound.
-        changed: see `last_change`.
-    """
+    Its files are sound."""
     model = RobotModel(robot).pin
     urdf = ET.tostring(description_xml(robot), encoding="unicode")
     geometry = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION, package_dirs=[])
@@ -239,13 +212,10 @@ def _links(robot: Robot, changed: tuple[int, ...]) -> pin.GeometryModel:
 
 
 def convex_hull(points: FloatArray) -> coal.Convex:
-    """The hull of points as a shape, with the points in its corners alone.
+    """The hull of points, (n, 3) [m], as a shape, with the points in its corners alone.
 
     Coal's own (`buildConvexRepresentation`) keeps those within as corners without neighbours. Its
     search for the farthest corner ends there: with the UR5's links it missed 119 of 368 contacts.
-
-    Args:
-        points: (n, 3) [m].
     """
     hull = ConvexHull(points)
     number = np.zeros(len(points), dtype=int)
@@ -270,11 +240,7 @@ def _below(placement: pin.SE3, shape: coal.CollisionGeometry, above: float) -> F
     corners = corners @ placement.rotation.T + placement.translation
     low = corners[:, 2] >= -above
     # what cuts the plane between any two corners lies in the shape, and all edges are among them
-    a, b = _segments(corners[low], corners[~low])
+    inside, outside = corners[low], corners[~low]
+    a, b = np.repeat(inside, len(outside), axis=0), np.tile(outside, (len(inside), 1))
     share = ((-above - a[:, 2]) / (b[:, 2] - a[:, 2]))[:, None]
-    return np.concatenate([corners[low], a + share * (b - a)])
-
-
-def _segments(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """All segments from one set of points to another, their ends (n * m, 3) each."""
-    return np.repeat(first, len(second), axis=0), np.tile(second, (len(first), 1))
+    return np.concatenate([inside, a + share * (b - a)])

@@ -87,12 +87,7 @@ class _Hand(NamedTuple):
 
 
 class _Reader:
-    """Reads one file.
-
-    Args:
-        table: its content.
-        folder: where its paths begin.
-    """
+    """Reads one file, whose paths begin in `folder`."""
 
     def __init__(self, table: Table, folder: Path) -> None:
         self.table, self.folder = table, folder

@@ -39,26 +39,19 @@ class Grasp:
 
     Attributes:
         touching: position of each finger that touches the cube [m, or rad].
-        opened: position of each finger before and after [m, or rad].
         beside: how far aside the hand comes down, along minus y of its tool frame [m]; 0 for
             parallel fingers.
     """
 
     touching: float
-    opened: float
     beside: float = 0.0
 
 
 def grasp_of(robot: Robot, width: float, scale: float) -> Grasp:
-    """How a robot of `grasping`, or one with parallel fingers, grasps a cube.
-
-    Args:
-        width: of the cube [m].
-        scale: of the scene over the study's.
-    """
+    """How a robot of `grasping`, or one with parallel fingers, grasps a cube of that width [m]."""
     if robot.tool_frame != GRASP_LINK:
-        return Grasp(width / 2, robot.gripper.opened)
-    return Grasp(_jaw_at(robot, width), robot.gripper.opened, CLEARANCE * scale)
+        return Grasp(width / 2)
+    return Grasp(_jaw_at(robot, width), CLEARANCE * scale)
 
 
 def grasping(robot: Robot, width: float, scale: float, wide: bool = False) -> Robot:
@@ -175,10 +168,7 @@ def _free(
     ignored: Sequence[str],
     restarts: int,
 ) -> Choice:
-    """
-    Raises:
-        PlanningError: it is out of reach, or touches something.
-    """
+    """One of them; raises `PlanningError` where it is out of reach, or touches something."""
 
     def wanted(arm: FloatArray) -> bool:
         return restarts == RESTARTS or scene.collision(arm, ignored=ignored) is None

@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from pytest_simbench.description.mesh_check import TRIANGLE
 from pytest_simbench.description.robot_files import digest
-from pytest_simbench.description.urdf import pose_of_rpy
+from pytest_simbench.description.stl import read_stl, written_stl
+from pytest_simbench.description.urdf import origin_of
 from pytest_simbench.scene import FloatArray
 
 AXES = ("x", "y", "z")
@@ -39,13 +39,8 @@ class Cuts(NamedTuple):
 def with_hulls(
     kept: dict[str, Any], corners: int, cuts: Mapping[str, Cuts] | None = None
 ) -> dict[str, Any]:
-    """A description's content (`robot_files.content`) with hulls for its meshes.
-
-    Args:
-        kept: the content.
-        corners: of each hull at most.
-        cuts: of the links whose meshes are cut into slices, by name.
-    """
+    """A description's content (`robot_files.content`) with hulls of at most so many corners for its
+    meshes, those of some links, by name, cut into slices before."""
     urdf, meshes = ET.fromstring(kept["urdf"]), {}
     for link in urdf.iter("link"):
         cut = (cuts or {}).get(link.get("name", ""))
@@ -55,7 +50,7 @@ def with_hulls(
                 continue
             at = list(link).index(collision)
             link.remove(collision)
-            triangles = _triangles(kept["meshes"][mesh.get("filename", "")])
+            triangles = read_stl(kept["meshes"][mesh.get("filename", "")])
             for points in _slices(triangles, collision, cut):
                 points = points[ConvexHull(points).vertices]
                 hull = stl(points[extreme(points, corners)])
@@ -68,20 +63,13 @@ def with_hulls(
     return {"urdf": ET.tostring(urdf, encoding="unicode"), "meshes": meshes}
 
 
-def _triangles(data: bytes) -> FloatArray:
-    """Of a binary STL, (n, 3, 3)."""
-    return np.asarray(np.frombuffer(data, TRIANGLE, offset=84)["corners"], dtype=float)
-
-
 def _slices(triangles: FloatArray, collision: ET.Element, cut: Cuts | None) -> Iterator[FloatArray]:
     """The points of each slice of a link's mesh, in the mesh's own frame, (n, 3) each."""
     points = triangles.reshape(-1, 3)
     if cut is None:
         yield points
         return
-    origin = collision.find("origin")
-    attributes = {} if origin is None else origin.attrib
-    frame = pose_of_rpy(*(_three(attributes.get(key, "0 0 0")) for key in ("xyz", "rpy")))
+    frame = origin_of(collision)
     axis = AXES.index(cut.axis)
     height = points @ frame.rotation()[axis] + frame.position[axis]
     edges = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
@@ -105,11 +93,6 @@ def _crossings(edges: FloatArray, heights: FloatArray, plane: float) -> FloatArr
     return np.asarray(a + share * (b - a))
 
 
-def _three(text: str) -> tuple[float, float, float]:
-    x, y, z = map(float, text.split())
-    return x, y, z
-
-
 def extreme(points: FloatArray, count: int) -> FloatArray:
     """Which points, (n, 3), lie farthest out in so many directions, evenly spread; each once.
 
@@ -125,11 +108,9 @@ def extreme(points: FloatArray, count: int) -> FloatArray:
 def stl(points: FloatArray) -> bytes:
     """The convex hull of points, (n, 3), as a binary STL, its faces turned outwards."""
     hull = ConvexHull(points)
-    triangles = np.zeros(len(hull.simplices), TRIANGLE)
     corners = hull.points[hull.simplices]
     normals = hull.equations[:, :3]
     a, b, c = corners.transpose(1, 0, 2)
     inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), normals) < 0
     corners[inwards] = corners[inwards][:, ::-1]
-    triangles["corners"], triangles["normal"] = corners, normals
-    return bytes(80) + np.uint32(len(triangles)).tobytes() + triangles.tobytes()
+    return written_stl(corners, normals)

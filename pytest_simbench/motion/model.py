@@ -1,10 +1,11 @@
-"""Kinematics and dynamics of the robot, by Pinocchio."""
+"""Kinematics and dynamics of the robot, by Pinocchio, and how large its scenes are."""
 
 from __future__ import annotations
 
+import math
 import os
 from contextlib import suppress
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -60,9 +61,8 @@ class RobotModel:
     def reach(self) -> float:
         """How far the tool can be from the axis of the first joint at most [m]: the lengths from
         joint to joint, and to the tool frame."""
-        ends = [self.pin.jointPlacements[joint] for joint in range(2, self.arm + 1)]
-        ends.append(self.pin.frames[self.tool].placement)
-        return sum(float(np.linalg.norm(end.translation)) for end in ends)
+        tool = self.pin.frames[self.tool].placement.translation
+        return self.wrist_reach + float(np.linalg.norm(tool))
 
     @property
     def wrist_reach(self) -> float:
@@ -78,8 +78,7 @@ class RobotModel:
     @property
     def has_parallel_fingers(self) -> bool:
         """Whether the hand is two fingers that slide."""
-        kinds = [joint.shortname() for joint in list(self.pin.joints)[self.arm + 1 :]]
-        return len(kinds) == 2 and all(kind.startswith("JointModelP") for kind in kinds)
+        return len(self._fingers) == 2 and self.finger_unit == "m"
 
     @property
     def finger_unit(self) -> str:
@@ -176,6 +175,37 @@ class RobotModel:
         return self._loaded[key]
 
 
+FULL_REACH = 0.85
+"""An arm of this reach (`RobotModel.reach`) does a task where the study has it [m]: that of the
+Kinova Mico2, the smallest one that was seen to. The Panda's is 1.09."""
+
+FULL_WRIST_REACH = 0.80
+"""The same for grasps from above, of the reach without the hand (`RobotModel.wrist_reach`) [m]: a
+hand that points down reaches no farther. The xArm 7, the smallest one that was seen to stack in the
+study's layout, has 0.82."""
+
+
+@cache
+def scale_of(robot: Robot) -> float:
+    """All lengths of a robot's scene over those of the study's layout: in tenths, at most 1.
+
+    A scene shrinks towards the world's origin: all lengths take the scale. Densities, friction and
+    gravity stay. So masses go with the third power. Accelerations stay with gravity, so the speeds
+    and times of what falls go with the square root.
+    """
+    return _tenths(RobotModel(robot).reach / FULL_REACH)
+
+
+@cache
+def grasping_scale_of(robot: Robot) -> float:
+    """The same for a scene in which cubes are grasped from above."""
+    return _tenths(RobotModel(robot).wrist_reach / FULL_WRIST_REACH)
+
+
+def _tenths(share: float) -> float:
+    return min(10, max(1, math.floor(10.0 * share))) / 10.0
+
+
 def last_change(robot: Robot) -> tuple[int, ...]:
     """When the files were written that describe a robot [ns]: what was read before may be stale."""
     found = []
@@ -188,10 +218,7 @@ def last_change(robot: Robot) -> tuple[int, ...]:
 @lru_cache(maxsize=64)
 def _checked(robot: Robot, changed: tuple[int, ...]) -> pin.Model:
     """Pinocchio's model of a robot whose files are sound, read once: each repetition asks for it.
-
-    Raises:
-        DescriptionError: the URDF cannot be read.
-    """
+    Raises `DescriptionError` for a URDF that cannot be read."""
     check_robot(robot)
     try:
         model = pin.buildModelFromUrdf(robot.urdf, mimic=False)

@@ -24,9 +24,8 @@ from pytest_simbench.motion.throw import (
     Throw,
     feasible_swing,
     released,
-    study_swing,
 )
-from pytest_simbench.motion.timing import TICK, Timed, along_path, straight_move
+from pytest_simbench.motion.timing import TICK, Timed, along_path, straight_move, synchronised_move
 from pytest_simbench.scene import FloatArray, Pose, Trajectory
 
 __all__ = ["MotionPlanner", "PlanningError"]
@@ -81,16 +80,12 @@ class MotionPlanner:
             touching = self.scene.collision(arm)
             if touching is not None:
                 raise InCollision(f"{what} in collision: {' and '.join(touching)}")
-        path = self._shortened(self._search(start, goal))
+        with _OMPL:
+            path = self._search(start, goal, int(self.rng.integers(1, 2**31)))
+        path = self._shortened(path)
         parts = [straight_move(a, b, self.limits, speed=speed) for a, b in pairwise(path)]
-        return self._trajectory(
-            Timed(
-                np.concatenate([part.position for part in parts]),
-                np.concatenate([part.velocity for part in parts]),
-                np.concatenate([part.acceleration for part in parts]),
-            ),
-            fingers,
-        )
+        whole = Timed(*map(np.concatenate, zip(*parts, strict=True)))
+        return self._trajectory(whole, fingers)
 
     def move_linear(
         self,
@@ -178,7 +173,7 @@ class MotionPlanner:
         timed, duration = (
             feasible_swing(self.model, start, goal, self.gravity, self.scene.held_body)
             if feasible
-            else study_swing(self.model, start, goal)
+            else synchronised_move(start, goal, self.limits)
         )
         throw = released(self.model, timed, duration, fraction, self.scene.scale)
         fingers = np.where(np.arange(len(timed.position)) >= throw.row, opened, closed)
@@ -197,12 +192,8 @@ class MotionPlanner:
         effort[:, self.model.arm :] = 0.0  # the squeeze is the fingers' own drive alone
         return Trajectory(TICK, position, velocity, effort)
 
-    def _search(self, start: FloatArray, goal: FloatArray) -> FloatArray:
+    def _search(self, start: FloatArray, goal: FloatArray, seed: int) -> FloatArray:
         """RRTConnect from start to goal, way points (n, arm)."""
-        with _OMPL:
-            return self._search_alone(start, goal, int(self.rng.integers(1, 2**31)))
-
-    def _search_alone(self, start: FloatArray, goal: FloatArray, seed: int) -> FloatArray:
         util.setLogLevel(util.LogLevel.LOG_NONE)
         util.RNG.setSeed(seed)
         arm = self.model.arm

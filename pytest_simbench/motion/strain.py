@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -35,10 +35,6 @@ class Strain:
     @property
     def largest(self) -> float:
         return max(self.velocity, self.acceleration, self.torque)
-
-    def to_wire(self) -> dict[str, float]:
-        """Plain data."""
-        return asdict(self)
 
 
 def strain(

@@ -30,9 +30,8 @@ from scipy.optimize import linprog
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import PlanningError, RobotError
 from pytest_simbench.motion.grasping import grasp_of, grasping
-from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.model import RobotModel, grasping_scale_of
 from pytest_simbench.motion.registry import find
-from pytest_simbench.motion.scale import grasping_scale_of
 from pytest_simbench.motion.throw import LANDING_HEIGHT, SPEED_SHARE, feasible_swing, released
 from pytest_simbench.scene import STANDARD_GRAVITY, Box, FloatArray, Pose, Robot, Scene
 

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
 from pytest_simbench.motion.errors import RobotError
 
+T = TypeVar("T")
+
 
 class Table:
-    """One table of a file; `close` complains of what nobody took.
-
-    Args:
-        data: the table.
-        where: file and table, for messages.
-    """
+    """One table of a file; `close` complains of what nobody took. Messages begin with `where`."""
 
     def __init__(self, data: Mapping[str, Any], where: str) -> None:
         self.where = where
@@ -50,17 +47,19 @@ class Table:
 
     def names(self, key: str) -> dict[str, str]:
         """A table of texts."""
-        inner = self.table(key)
-        found = {name: inner.text(name) for name in list(inner._left)}
-        inner.close()
-        return found
+        return self._each(key, Table.text)
 
     def numbers(self, key: str) -> dict[str, float]:
         """A table of numbers."""
+        return self._each(key, Table.number)
+
+    def tables(self, key: str) -> dict[str, Table]:
+        """A table of tables."""
+        return self._each(key, Table.table)
+
+    def _each(self, key: str, read: Callable[[Table, str], T]) -> dict[str, T]:
         inner = self.table(key)
-        found = {name: inner.number(name) for name in list(inner._left)}
-        inner.close()
-        return found
+        return {name: read(inner, name) for name in list(inner._left)}
 
     def number(self, key: str, default: float | None = None, *, least: float = -1e6) -> float:
         """A finite number of at least `least`."""
@@ -79,13 +78,6 @@ class Table:
         if not isinstance(value, list) or not value:
             raise self.error(key, "give it a list of numbers")
         return tuple(self._number(key, item, -1e6) for item in value)
-
-    def tables(self, key: str) -> dict[str, Table]:
-        """A table of tables."""
-        inner = self.table(key)
-        found = {name: inner.table(name) for name in list(inner._left)}
-        inner.close()
-        return found
 
     def each(
         self, key: str, count: int, default: Any = None, *, least: float = -1e6

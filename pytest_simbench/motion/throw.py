@@ -1,8 +1,8 @@
 """The throw: a swing of the arm, timed so that the arm can do it, that lets a cube go on its way.
 
 The time-optimal swing at the arm's velocity, acceleration and jerk limits, which the reference
-study commands, asks more of joint 2 than its motor gives. `feasible_swing` takes the same way
-within the limits of the motors too.
+study commands (`synchronised_move`), asks 1.2 times of joint 2 what its motor gives.
+`feasible_swing` takes the same way within the limits of the motors too.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from pytest_simbench.motion.errors import PlanningError, RobotError
 from pytest_simbench.motion.model import RobotModel
-from pytest_simbench.motion.timing import TICK, Timed, line_move, synchronised_move
+from pytest_simbench.motion.timing import TICK, Timed, line_move
 from pytest_simbench.scene import Body, FloatArray, Robot
 
 EFFORT_SHARE = 0.9
@@ -76,12 +76,6 @@ def swing_of(robot: Robot) -> tuple[FloatArray, FloatArray]:
     return np.array(start), np.array(end)
 
 
-def study_swing(model: RobotModel, start: FloatArray, goal: FloatArray) -> tuple[Timed, float]:
-    """The study's: full speed, every joint on a profile of its own, ending together; with its exact
-    duration [s]. Infeasible: joint 2 would need 1.2 times what its motor gives."""
-    return synchronised_move(start, goal, model.limits)
-
-
 def feasible_swing(
     model: RobotModel, start: FloatArray, goal: FloatArray, gravity: FloatArray, held: Body | None
 ) -> tuple[Timed, float]:
@@ -99,8 +93,7 @@ def feasible_swing(
         return line_move(start, goal, model.limits, (SPEED_SHARE, acceleration, JERK_SHARE))
 
     def strain(timed: Timed) -> float:
-        rows = (timed.position, timed.velocity, timed.acceleration)
-        return float(np.abs(model.effort_shares(gravity, *rows, held)).max())
+        return float(np.abs(model.effort_shares(gravity, *timed, held)).max())
 
     low, high = 0.0, 1.0
     for _ in range(8):

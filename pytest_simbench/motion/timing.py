@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import ruckig
@@ -14,8 +14,7 @@ TICK = 0.004
 """Time between two set points [s]."""
 
 
-@dataclass(frozen=True)
-class Timed:
+class Timed(NamedTuple):
     """Arm motion on a grid of `TICK`: position, velocity, acceleration, each (n, arm)."""
 
     position: FloatArray

@@ -137,11 +137,7 @@ class Lasting:
         self._first = {name: np.copy(reported[name]) for name in constants(reported, scene)}
 
     def check(self, reported: Mapping[str, Any], time: float) -> None:
-        """Hold a later reading against the first one.
-
-        Args:
-            reported: all that the engine tells now.
-            time: simulated [s].
+        """Hold all that the engine tells at a later simulated time [s] against the first reading.
 
         Raises:
             ParityError: something that lasts is another one now; the message gives both values of

@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.description.mesh_check import HEADER, TRIANGLE
+from pytest_simbench.description.stl import read_stl
 from pytest_simbench.description.urdf import MovingJoint, PreparedRobot
 from pytest_simbench.scene import FloatArray, Pose, Robot, Vector3
 from pytest_simbench.scene.wire import Wire
@@ -35,10 +35,7 @@ class Mesh:
     @classmethod
     def from_stl(cls, path: str | Path) -> Mesh:
         """The triangles of a binary STL file, the only form that a checked robot has."""
-        data = Path(path).read_bytes()
-        count = int.from_bytes(data[HEADER - 4 : HEADER], "little")
-        triangles = np.frombuffer(data, TRIANGLE, count, HEADER)
-        corners = triangles["corners"].reshape(-1, 3)
+        corners = read_stl(Path(path).read_bytes()).reshape(-1, 3)
         vertices, faces = np.unique(corners, axis=0, return_inverse=True)
         return cls(vertices.astype(np.float32), faces.reshape(-1, 3).astype(np.int32))
 

@@ -11,16 +11,12 @@ from pytest_simbench.scene.body import WOOD, Body, Colour, Solid
 from pytest_simbench.scene.checks import SceneError, check_number, check_numbers
 from pytest_simbench.scene.overlap import Corners, Hull
 from pytest_simbench.scene.polytope import EVEN, MOST, Polytope, polytope
-from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
+from pytest_simbench.scene.pose import FloatArray, Pose, Vector3, vector3
 
 
 @dataclass(frozen=True)
 class Box(Body, kind="box"):
-    """A box.
-
-    Attributes:
-        size: full edge lengths x, y, z [m].
-    """
+    """A box; `size` is its full edge lengths x, y, z [m]."""
 
     name: str
     size: Vector3
@@ -57,11 +53,7 @@ class Box(Body, kind="box"):
 
 @dataclass(frozen=True)
 class Sphere(Body, kind="sphere"):
-    """A ball.
-
-    Attributes:
-        radius: [m].
-    """
+    """A ball; its radius is in [m]."""
 
     name: str
     radius: float
@@ -112,12 +104,7 @@ class _Tube(Body):
 
 
 class Cylinder(_Tube, kind="cylinder"):
-    """A cylinder along its own z axis.
-
-    Attributes:
-        radius: [m].
-        length: along the axis [m].
-    """
+    """A cylinder along its own z axis; `radius` and `length` are in [m]."""
 
     @property
     def extents(self) -> Vector3:
@@ -141,12 +128,8 @@ class Cylinder(_Tube, kind="cylinder"):
 
 
 class Capsule(_Tube, kind="capsule"):
-    """A cylinder along its own z axis with half a ball on each end.
-
-    Attributes:
-        radius: [m].
-        length: of the cylinder between the half balls [m].
-    """
+    """A cylinder along its own z axis with half a ball on each end; `radius` and `length`, of the
+    cylinder between the half balls, are in [m]."""
 
     @property
     def extents(self) -> Vector3:
@@ -230,8 +213,7 @@ class ConvexMesh(Body, kind="convex_mesh"):
 
     @property
     def extents(self) -> Vector3:
-        x, y, z = (2 * np.abs(self.vertices).max(axis=0)).tolist()
-        return (x, y, z)
+        return vector3(2 * np.abs(self.vertices).max(axis=0))
 
     @property
     def volume(self) -> float:

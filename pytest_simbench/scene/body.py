@@ -22,7 +22,7 @@ from pytest_simbench.scene.overlap import Core
 from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
 from pytest_simbench.scene.wire import Wire
 
-NONE: Vector3 = (0.0, 0.0, 0.0)
+ZERO: Vector3 = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,8 +38,8 @@ class Wrench(Wire):
         SceneError: a number that is none, or an end that is not after the start.
     """
 
-    force: Vector3 = NONE
-    torque: Vector3 = NONE
+    force: Vector3 = ZERO
+    torque: Vector3 = ZERO
     start: float = 0.0
     end: float = LARGEST
 
@@ -64,8 +64,6 @@ class Wrench(Wire):
 Colour = tuple[float, float, float, float]
 
 WOOD: Colour = (0.72, 0.56, 0.38, 1.0)
-
-STILL: Vector3 = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -125,8 +123,8 @@ class Body(_Placed):
         SceneError: a body that cannot exist; the message names body and value.
     """
 
-    linear_velocity: Vector3 = STILL
-    angular_velocity: Vector3 = STILL
+    linear_velocity: Vector3 = ZERO
+    angular_velocity: Vector3 = ZERO
     restitution: float = 0.0
     linear_damping: float = 0.0
     angular_damping: float = 0.0
@@ -187,7 +185,7 @@ class Body(_Placed):
     @property
     def parts(self) -> tuple[Body, ...]:
         """The convex shapes that it is made of, as fixed bodies whose poses are in its frame."""
-        still = {"linear_velocity": STILL, "angular_velocity": STILL, "wrenches": ()}
+        still = {"linear_velocity": ZERO, "angular_velocity": ZERO, "wrenches": ()}
         alone = {"linear_damping": 0.0, "angular_damping": 0.0, "moments": None}
         return (self.changed(pose=Pose(), mass=0.0, prescribed=False, **still, **alone),)
 
@@ -223,14 +221,14 @@ class Body(_Placed):
     def solids(self) -> list[Solid]:
         """What the body is drawn with."""
 
-    @abstractmethod
     def core(self, share: float) -> tuple[Core, float]:
-        """What is left when the body loses a layer, and how thick that is [m].
+        """What is left when a body of one shape loses a layer, and how thick that is [m].
 
         Of what has edges the layer is `share` of half its shortest edge, and the core with a layer
         around it is the body with its edges rounded. Of spheres and capsules it is the radius, and
         they are whole again. A mesh loses nothing.
         """
+        raise NotImplementedError
 
     def reach(self, directions: FloatArray) -> FloatArray:
         """How far the body reaches from its centre in directions of its frame (n, 3) [m], (n,)."""

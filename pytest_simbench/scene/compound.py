@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from itertools import product
 
 import numpy as np
 
 from pytest_simbench.scene.body import WOOD, Body, Colour, Solid
 from pytest_simbench.scene.checks import SceneError
-from pytest_simbench.scene.overlap import Corners
-from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
+from pytest_simbench.scene.pose import FloatArray, Pose, Vector3, vector3
 
 
 @dataclass(frozen=True)
@@ -64,8 +62,7 @@ class Compound(Body, kind="compound"):
     @property
     def extents(self) -> Vector3:
         axes = np.concatenate([np.eye(3), -np.eye(3)])
-        x, y, z = (2 * self.reach(axes).reshape(2, 3).max(axis=0)).tolist()
-        return (x, y, z)
+        return vector3(2 * self.reach(axes).reshape(2, 3).max(axis=0))
 
     @property
     def volume(self) -> float:
@@ -84,15 +81,6 @@ class Compound(Body, kind="compound"):
     def solids(self) -> list[Solid]:
         placed = [(shape.pose, solid) for shape in self.shapes for solid in shape.solids()]
         return [replace(solid, pose=pose * solid.pose) for pose, solid in placed]
-
-    def core(self, share: float) -> tuple[Corners, float]:
-        """The corners of the boxes around its shapes; `share` has no meaning for it."""
-        corners = list(product((-0.5, 0.5), repeat=3))
-        boxes = [
-            np.array(corners) * shape.extents @ shape.pose.rotation().T + shape.pose.position
-            for shape in self.shapes
-        ]
-        return Corners(np.concatenate(boxes)), 0.0
 
     def reach(self, directions: FloatArray) -> FloatArray:
         return np.asarray(np.max([shape.reach_placed(directions) for shape in self.shapes], axis=0))

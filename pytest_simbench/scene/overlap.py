@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from pytest_simbench.scene.pose import FloatArray
+from pytest_simbench.scene.pose import FloatArray, unit_rotation
 
 PARALLEL = 1e-9
 """Two edges whose directions' product is shorter than this are parallel and give no axis."""
@@ -16,13 +16,8 @@ PARALLEL = 1e-9
 
 def rotations(quaternions: FloatArray) -> FloatArray:
     """Rotation matrices (n, 3, 3) of quaternions w, x, y, z, (n, 4), normalised first."""
-    w, x, y, z = (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
+    unit = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
+    return np.moveaxis(unit_rotation(unit.T), 2, 0)
 
 
 def overlaps(

@@ -16,12 +16,16 @@ def combined(scene: Scene, rule: str) -> tuple[Scene, str]:
 
     Args:
         scene: whose pairs have friction by `Scene.friction_rule`.
-        rule: the engine's, one of `RULES`.
+        rule: the engine's, one of `RULES`; empty where nobody knows it: each surface then keeps its
+            own, and that the pairs are not known is told.
 
     Returns:
         The scene as the engine is to have it, and a sentence on the pair whose friction is farthest
         from the one asked for; empty where all are right to 0.001.
     """
+    if not rule:
+        unknown = "what the friction of two surfaces is where they differ, the adapter does not say"
+        return scene, unknown if len(scene.frictions) > 1 else ""
     names = ["the ground", *(body.name for body in scene.bodies)]
     own = [scene.ground_friction, *(body.friction for body in scene.bodies)]
     still = [True, *(body.fixed for body in scene.bodies)]

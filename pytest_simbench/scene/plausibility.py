@@ -11,12 +11,11 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pytest_simbench.scene.bodies import Box
 from pytest_simbench.scene.overlap import overlaps, rotations
 from pytest_simbench.scene.penetration import penetration
-from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
+from pytest_simbench.scene.pose import FloatArray, Pose
 from pytest_simbench.scene.scene import Scene
 
 DEEPEST = 1 / 3
@@ -37,10 +36,7 @@ def implausible(scene: Scene, bodies: FloatArray) -> str | None:
 
     Looked at after every motion and wait, in the pytest process: under a millisecond for 21
     cubes. What is only there for a moment, the depth of a hard impact, is not looked for.
-
-    Args:
-        scene: whose bodies they are.
-        bodies: rows of the free bodies, (n_free, 13), as `World.bodies`.
+    States are rows as of `World.bodies`, (n_free, 13).
     """
     if not len(bodies):
         return None
@@ -50,9 +46,10 @@ def implausible(scene: Scene, bodies: FloatArray) -> str | None:
         return f"the state of {free[row].name!r} is not finite"
     position = bodies[:, :3]
     half = np.array([body.extents for body in free]) / 2
-    for k in np.flatnonzero(~_inside(position, scene.room)):
+    x, y, height = scene.room
+    beyond = (np.abs(position[:, :2]) > (x, y)).any(axis=1) | (position[:, 2] > height)
+    for k in np.flatnonzero(beyond):
         at = ", ".join(f"{value:.3g}" for value in position[k])
-        x, y, height = scene.room
         return (
             f"{free[k].name!r} left the room: it is at ({at}) m, and the room of scene "
             f"{scene.name!r} goes {x:g} m to each side in x, {y:g} m in y, and {height:g} m up"
@@ -66,21 +63,12 @@ def implausible(scene: Scene, bodies: FloatArray) -> str | None:
     return _too_deep(scene, bodies)
 
 
-def _inside(position: FloatArray, room: Vector3) -> NDArray[np.bool_]:
-    """Whether each centre is within the walls and under the ceiling, (n,)."""
-    x, y, height = room
-    within: NDArray[np.bool_] = (np.abs(position[:, :2]) <= (x, y)).all(axis=1) & (
-        position[:, 2] <= height
-    )
-    return within
-
-
 def _too_deep(scene: Scene, bodies: FloatArray) -> str | None:
     """The first body that is inside the ground or another body."""
-    names = [body.name for body in (*scene.free_bodies, *scene.fixed_bodies)]
+    everything = (*scene.free_bodies, *scene.fixed_bodies)
+    names = [body.name for body in everything]
     fixed = [body.pose.as_array() for body in scene.fixed_bodies]
     states = np.concatenate([bodies[:, :7], np.reshape(fixed, (-1, 7))])
-    everything = (*scene.free_bodies, *scene.fixed_bodies)
     half = np.array([body.extents for body in everything]) / 2
     boxes = np.array([isinstance(body, Box) for body in everything])
     limit = 2 * half.min(axis=1) * DEEPEST

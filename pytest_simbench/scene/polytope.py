@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_simbench.scene.checks import SceneError
-from pytest_simbench.scene.pose import FloatArray, Pose, Vector3, quaternion_of
+from pytest_simbench.scene.pose import FloatArray, Pose, Vector3, quaternion_of, vector3
 
 MOST = 64
 """Corners of a mesh, as many as the engine that takes fewest does, of hulls for a GPU."""
@@ -23,11 +23,8 @@ digits, and files of meshes are written with it."""
 class Polytope:
     """The convex hull of points.
 
-    Args:
-        points: (n, 3) [m].
-
     Attributes:
-        points: as given.
+        points: as given, (n, 3) [m].
         faces: numbers of the points around each face, counter-clockwise from outside.
 
     Raises:
@@ -160,14 +157,12 @@ def polytope(points: tuple[Vector3, ...]) -> Polytope:
 
 
 def principal(points: Sequence[Sequence[float]] | FloatArray) -> tuple[tuple[Vector3, ...], Pose]:
-    """The corners of the convex hull of any points, in the frame that a `ConvexMesh` must have: its
-    origin is the hull's centroid, and its axes are the principal axes of inertia.
+    """The corners of the convex hull of 4 to `MOST` points in any frame, (n, 3) [m], in the frame
+    that a `ConvexMesh` must have: its origin is the hull's centroid, and its axes are the principal
+    axes of inertia.
 
         vertices, frame = principal(points)
         rock = ConvexMesh("rock", vertices, pose * frame, mass=1.0)
-
-    Args:
-        points: in any frame, (n, 3) [m], 4 to `MOST` of them.
 
     Returns:
         The corners, and the pose of their frame in that of the points. Axes that are principal ones
@@ -182,10 +177,5 @@ def principal(points: Sequence[Sequence[float]] | FloatArray) -> tuple[tuple[Vec
     if not found.aligned:
         turn = np.linalg.eigh(found.inertia)[1]
         turn[:, 0] *= np.sign(np.linalg.det(turn))
-    vertices = tuple(_triple(row) for row in (found.points - found.centroid) @ turn)
+    vertices = tuple(vector3(row) for row in (found.points - found.centroid) @ turn)
     return vertices, Pose.from_array([*found.centroid, *quaternion_of(turn)])
-
-
-def _triple(row: FloatArray) -> Vector3:
-    x, y, z = row.tolist()
-    return (x, y, z)

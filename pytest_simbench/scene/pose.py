@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,10 +16,21 @@ Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 
+def vector3(values: Iterable[float]) -> Vector3:
+    """Three numbers as plain ones."""
+    x, y, z = map(float, values)
+    return x, y, z
+
+
 def rotation_matrix(quaternion: Sequence[float] | FloatArray) -> FloatArray:
     """Rotation matrix (3, 3) of a quaternion w, x, y, z, which is normalised first."""
     q = np.asarray(quaternion, dtype=float)
-    w, x, y, z = q / np.linalg.norm(q)
+    return unit_rotation(q / np.linalg.norm(q))
+
+
+def unit_rotation(unit: FloatArray) -> FloatArray:
+    """The same of unit quaternions, (4,) or (4, n), without normalising: (3, 3) or (3, 3, n)."""
+    w, x, y, z = unit
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

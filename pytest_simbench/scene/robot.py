@@ -115,8 +115,13 @@ class Closure(Wire):
             check_name(name, "a link of a closure")
         if self.first == self.second:
             raise SceneError(f"a closure holds link {self.first!r} at itself")
-        for point in (self.first_point, self.second_point):
+        for _, point in self.sides:
             check_numbers(point, 3, f"a point [m] of the closure of {self.first!r}")
+
+    @property
+    def sides(self) -> tuple[tuple[str, Vector3], tuple[str, Vector3]]:
+        """Both links, each with its point."""
+        return (self.first, self.first_point), (self.second, self.second_point)
 
 
 @dataclass(frozen=True)

@@ -38,9 +38,7 @@ class Wire:
         return cls(**{name: _made(value, hints.get(name)) for name, value in data.items()})
 
 
-@cache
-def _hints(cls: type) -> dict[str, Any]:
-    return get_type_hints(cls)
+_hints = cache(get_type_hints)
 
 
 def _plain(value: Any) -> Any:

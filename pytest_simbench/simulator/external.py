@@ -121,11 +121,7 @@ class Program:
             self._deadline = outer
 
     def wait_until(self, ready: Callable[[], bool], seconds: float) -> None:
-        """Wait until the program is ready, or answers.
-
-        Args:
-            ready: whether it is; asked again and again.
-            seconds: wall time [s].
+        """Wait until the program is ready; it is asked again and again, for so much wall time [s].
 
         Raises:
             SimulatorError: as of `within`.
@@ -237,7 +233,6 @@ class ExternalSimulator(Simulator):
         program: that runs; None before `load`.
         folder: the program's, for the world's files.
         scene: that was loaded.
-        steps: made since `load`.
         start_limit, answer_limit, end_limit: wall time for starting and for building the world,
             for any other call, and for ending [s]. The first two are less than the 60 s of silence
             after which the client kills a worker: so the message is the program's own.
@@ -273,18 +268,15 @@ class ExternalSimulator(Simulator):
 
     @abstractmethod
     def make_steps(self, steps: int) -> int:
-        """Have the program make so many steps, and return when they are made.
-
-        Returns:
-            The number of steps since `build`, by the program's own count or clock.
-        """
+        """Have the program make so many steps, and return when they are made; the number of steps
+        since `build`, by the program's own count or clock."""
 
     @abstractmethod
     def ask_to_end(self) -> None:
         """Ask the program to end; it is killed if it does not."""
 
     def load(self, scene: Scene) -> None:
-        self.scene, self.steps = scene, 0
+        self.scene, self._steps = scene, 0
         self._folder = tempfile.TemporaryDirectory(
             prefix=f"simbench-{self.info.name}-", ignore_cleanup_errors=True
         )
@@ -316,19 +308,15 @@ class ExternalSimulator(Simulator):
         """
         with self.asking("stepping"):
             passed = self.make_steps(steps)
-        self.steps += steps
-        if passed != self.steps:
+        self._steps += steps
+        if passed != self._steps:
             raise SimulatorError(
-                f"{self.info.title} has made {passed} steps and should have made {self.steps}: "
+                f"{self.info.title} has made {passed} steps and should have made {self._steps}: "
                 "its time moves by itself or in other steps, so it is not in lock-step"
             )
 
     def step(self) -> None:
         self.advance(1)
-
-    @property
-    def time(self) -> float:
-        return self.steps * self.settings.timestep
 
     def close(self) -> None:
         if self.program is not None:

@@ -11,7 +11,6 @@ from importlib.util import find_spec
 from pytest_simbench.ground.errors import NotSupportedError, SimulatorError
 from pytest_simbench.ground.versions import BUILD, VersionedName, release_numbers
 from pytest_simbench.scene import Robot, Scene
-from pytest_simbench.scene.pair_friction import combined
 
 
 class Capability(StrEnum):
@@ -238,39 +237,25 @@ class SimulatorInfo:
         return ("headless", "gui") if Capability.WINDOW in self.capabilities else ("headless",)
 
 
-def check_shapes(info: SimulatorInfo, scene: Scene) -> None:
-    """Raise `NotSupportedError` for a body of several shapes on a simulator that has none."""
-    if "compound" in scene.words and Capability.COMPOUND not in info.capabilities:
-        raise NotSupportedError(
-            f"{info.name} has bodies of one shape alone, and scene {scene.name!r} has one of more"
-        )
+BEYOND = {
+    "compound": (
+        Capability.COMPOUND,
+        "has bodies of one shape alone, and scene {!r} has one of more",
+    ),
+    "loop": (
+        Capability.LOOPS,
+        "closes no loops of links, and the robot of scene {!r} has one",
+    ),
+    "self_collide": (
+        Capability.SELF_COLLIDE,
+        "has links of a robot pass through each other, and those of scene {!r} are to collide",
+    ),
+}
+"""By word of a scene: what a simulator needs for it, and what to say of one that lacks it."""
 
 
-def with_friction_rule(info: SimulatorInfo, scene: Scene) -> tuple[Scene, list[str]]:
-    """The scene with frictions for the simulator's rule, and what that leaves wrong.
-
-    Without a rule each surface has its own, and that the pairs are not known is told.
-    """
-    if not info.friction_rule:
-        unknown = "what the friction of two surfaces is where they differ, the adapter does not say"
-        return scene, [unknown] if len(scene.frictions) > 1 else []
-    made, problem = combined(scene, info.friction_rule)
-    return made, [problem] if problem else []
-
-
-def check_loops(info: SimulatorInfo, scene: Scene) -> None:
-    """Raise `NotSupportedError` for a scene with loops on a simulator that closes none."""
-    if "loop" in scene.words and Capability.LOOPS not in info.capabilities:
-        raise NotSupportedError(
-            f"{info.name} closes no loops of links, and the robot of scene {scene.name!r} has one"
-        )
-
-
-def check_self_collision(info: SimulatorInfo, scene: Scene) -> None:
-    """Raise `NotSupportedError` for a robot whose links collide with each other, on a simulator
-    that has them pass through each other."""
-    if "self_collide" in scene.words and Capability.SELF_COLLIDE not in info.capabilities:
-        raise NotSupportedError(
-            f"{info.name} has links of a robot pass through each other, and those of scene "
-            f"{scene.name!r} are to collide"
-        )
+def check_supported(info: SimulatorInfo, scene: Scene) -> None:
+    """Raise `NotSupportedError` for a scene that holds what the simulator is not able to."""
+    for word, (capability, problem) in BEYOND.items():
+        if word in scene.words and capability not in info.capabilities:
+            raise NotSupportedError(f"{info.name} {problem.format(scene.name)}")

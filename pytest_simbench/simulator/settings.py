@@ -25,11 +25,8 @@ or wait of a task is shorter."""
 
 @dataclass(frozen=True)
 class Settings:
-    """Base of each adapter's settings: frozen, plain values, every one of them in the record.
-
-    Attributes:
-        timestep: integration step [s].
-    """
+    """Base of each adapter's settings: frozen, plain values, every one of them in the record; the
+    integration step `timestep` is in [s]."""
 
     timestep: float = 0.002
 

@@ -6,9 +6,9 @@ The verbs that tasks are made of: `go_to`, `go_to_pose`, `move_straight`, `move_
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
@@ -30,8 +30,6 @@ RELEASE_TIME = 0.2
 IN_HAND = 0.04
 """A cube whose centre is farther than this from the tool centre point is not held [m]. It goes
 with the scene's scale."""
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -70,6 +68,7 @@ class Arm:
 
     Attributes:
         world: the simulated world.
+        home: arm joints where it begins, (arm,) [rad].
         arm: commanded arm joints, (arm,) [rad].
         fingers: commanded finger position [m], of a jaw that turns [rad].
         grasp: how the hand grasps a cube.
@@ -96,7 +95,7 @@ class Arm:
             self.grasp = grasp_of(robot, CUBE_SIZE * scale, scale)
             self.planning = PlanningScene(self.model, world.scene, scale)
             self.planner = MotionPlanner(self.model, self.planning, rng, world.scene.gravity)
-        self.arm = robot.column("initial_position")[: self.model.arm]
+        self.home = self.arm = robot.column("initial_position")[: self.model.arm]
         self.fingers = self.gripper.opened
         self.held: str | None = None
         self._released: tuple[str, ...] = ()
@@ -113,15 +112,14 @@ class Arm:
         Raises:
             PlanningError: start or goal touch something, or no way was found.
         """
-        self._refresh()
-        self.follow(
-            self._planned(lambda: self.planner.move_to(self.arm, goal, self.fingers, speed=speed))
-        )
+        with self._planning():
+            trajectory = self.planner.move_to(self.arm, goal, self.fingers, speed=speed)
+        self.follow(trajectory)
 
     def go_to_pose(self, tool: Pose, *, speed: float) -> None:
         """Collision-free motion of the tool centre point to a pose in the world.
 
-        `robot.kinematics.tool_over` gives the pose of a tool that points down.
+        `motion.kinematics.tool_over` gives the pose of a tool that points down.
 
         Args:
             speed: share of the joint velocity limits.
@@ -129,13 +127,11 @@ class Arm:
         Raises:
             PlanningError: the pose is out of reach, touches something, or no way was found.
         """
-        self._refresh()
-        goal = self._planned(
-            lambda: inverse_kinematics(
+        with self._planning():
+            goal = inverse_kinematics(
                 self.model, tool, self.arm, self.rng,
                 wanted=lambda arm: self.planning.collision(arm) is None,
-            )
-        )  # fmt: skip
+            )  # fmt: skip
         self.go_to(goal, speed=speed)
 
     def move_straight(self, tool: Pose, *, speed: float, ignored: tuple[str, ...] = ()) -> None:
@@ -148,14 +144,11 @@ class Arm:
         Raises:
             PlanningError: the line leaves the workspace, or something else is in the way.
         """
-        self._refresh()
-        self.follow(
-            self._planned(
-                lambda: self.planner.move_linear(
-                    self.arm, tool, self.fingers, ignored=ignored, speed=speed
-                )
+        with self._planning():
+            trajectory = self.planner.move_linear(
+                self.arm, tool, self.fingers, ignored=ignored, speed=speed
             )
-        )
+        self.follow(trajectory)
 
     def move_along(
         self,
@@ -176,12 +169,10 @@ class Arm:
         Raises:
             PlanningError: the path leaves the workspace, or something else is in the way.
         """
-        self._refresh()
-        trajectory = self._planned(
-            lambda: self.planner.move_along(
+        with self._planning():
+            trajectory = self.planner.move_along(
                 self.arm, poses, self.fingers, tool_speed=tool_speed, ignored=ignored
             )
-        )
         return self.follow(trajectory, log_period=log_period)
 
     def follow(self, trajectory: Trajectory, *, log_period: float | None = None) -> Motion | None:
@@ -215,7 +206,7 @@ class Arm:
         self._released_at = self.world.time
         self._released = (self.held,) if self.held else self._released
         self.held = None
-        self.planning.detach()
+        self.planning.held = None
         self._move_fingers(self.gripper.opened, RELEASE_TIME)
 
     @property
@@ -237,21 +228,19 @@ class Arm:
         return self.world.time - self._released_at
 
     def _move_fingers(self, target: float, hold: float) -> None:
-        self.follow(
-            self._planned(lambda: self.planner.move_fingers(self.arm, self.fingers, target, hold))
-        )
-
-    def _planned(self, plan: Callable[[], T]) -> T:
         with self.world.stopwatch.measuring("plan"):
-            return plan()
+            trajectory = self.planner.move_fingers(self.arm, self.fingers, target, hold)
+        self.follow(trajectory)
 
-    def _refresh(self) -> None:
-        """Take the cubes' present poses over into the planning scene."""
+    @contextmanager
+    def _planning(self) -> Iterator[None]:
+        """What is done is planning, among the cubes as they lie now; its time is measured."""
         with self.world.stopwatch.measuring("plan"):
             self.planning.update(self.world.poses())
             self.planning.opening = self.fingers if self.held is None else self.grasp.touching
             if self.held is not None and self.planning.held != self.held:
                 self.planning.attach(self.held, self._grip)
+            yield
 
     def _in_hand(self) -> bool:
         if self.held is None:

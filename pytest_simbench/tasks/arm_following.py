@@ -75,10 +75,7 @@ class ArmFollowing(MicoTask):
 
     The control law runs on its own reference, as if the drives followed it: the joints are sent
     where the integral of the commanded velocities is. Nothing else is known of the arm: no effort
-    is fed forward.
-
-    Attributes:
-        most: how many of the runs; None: all.
+    is fed forward. At `most` so many of the runs are followed; None: all.
     """
 
     name: ClassVar[str] = "arm_following"
@@ -109,14 +106,14 @@ class ArmFollowing(MicoTask):
         return replace(self, most=SMALLEST)
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
-        run = self.run(seed)
+        run = self.real(seed)
         at = np.median(run.cube[:QUIET], axis=0)
         lying = Pose.at(float(at[0]), float(at[1]), CUBE_SIZE / 2, yaw=yaw(at))
         start = np.radians(self.initial[run.experiment])
         return self.with_cube("arm following", lying, start)
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
-        run = self.run(seed)
+        run = self.real(seed)
         time, real = self.seen(run)
         with world.stopwatch.measuring("plan"):
             trajectory = self.trajectory(run.experiment, float(time[-1]))

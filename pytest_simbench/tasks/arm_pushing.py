@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -79,7 +79,7 @@ class Course(NamedTuple):
 
 
 @dataclass(frozen=True)
-class MicoTask(MeasuredTask):
+class MicoTask(MeasuredTask[ArmRun]):
     """A task of the Kinova Mico2 and a cube, against the runs of the real ones.
 
     What the source does not tell was calibrated on the runs that are not held out: angle of the
@@ -102,15 +102,9 @@ class MicoTask(MeasuredTask):
     marker_aside: float = MARKER_ASIDE
     friction: float = FRICTION
 
-    def run(self, seed: int) -> ArmRun:
-        """The one of a seed."""
-        run: ArmRun = self.chosen[self.place(seed)]  # type: ignore[assignment]
-        return run
-
     def parameters(self) -> dict[str, Any]:
-        """The runs by their digest, and on which ones fingers, friction and marker were found."""
-        told = {f"task.{item.name}": getattr(self, item.name) for item in fields(self)}
-        return {**told, "task.runs": self.runs.digest, "task.calibrated_on": calibrated(self.runs)}
+        """And on which runs fingers, friction and marker were found."""
+        return {**super().parameters(), "task.calibrated_on": calibrated(self.runs)}
 
     def with_cube(self, name: str, cube: Pose, start: FloatArray) -> Scene:
         """The scene of that name: the cube at a pose, the arm's joints at `start`, (6,) [rad]."""
@@ -167,17 +161,14 @@ class ArmPushing(MicoTask):
             motion = world.follow(trajectory, log_period=TICK)
         world.mark("end")
         assert motion is not None  # a log was asked for
-        states = np.vstack([world_start(course.start), motion.bodies[:, 0, :7]])
+        states = np.vstack([course.start.as_array(), motion.bodies[:, 0, :7]])
         metrics, details = compared(states, course.real)
         off = float(np.abs(motion.joints[-1, 0] - course.path[-1]).max())
-        return Outcome(metrics, {"run": self.run(seed).name, **details, "hand_error": off})
+        return Outcome(metrics, {"run": self.real(seed).name, **details, "hand_error": off})
 
     def _course(self, seed: int) -> Course:
-        return course(self.run(seed), self.arm(np.zeros(6)), self.marker(), self.marker_aside)
-
-    def marker(self) -> Pose:
-        """Of the marker body on link 6: the mean over the runs that are not held out."""
-        return marker(self.runs, self.arm(np.zeros(6)))
+        robot = self.arm(np.zeros(6))
+        return course(self.real(seed), robot, marker(self.runs, robot), self.marker_aside)
 
     def _trajectory(self, path: FloatArray, gravity: FloatArray) -> Trajectory:
         velocity = np.gradient(path, TICK, axis=0)
@@ -188,7 +179,7 @@ class ArmPushing(MicoTask):
 
 
 def compared(moved: FloatArray, real: FloatArray) -> tuple[dict[str, float | None], dict[str, Any]]:
-    """Metrics and details of a cube's motion and the real one's, rows as of `world_start`, (n, 7);
+    """Metrics and details of a cube's motion and the real one's, rows of `Pose.as_array`, (n, 7);
     the longer motion is cut."""
     n = min(len(moved), len(real))
     moved, real = moved[:n], real[:n]
@@ -206,11 +197,6 @@ def compared(moved: FloatArray, real: FloatArray) -> tuple[dict[str, float | Non
         "real_turn": turns[1],
         "delay": _half_way(moved, way[1]) - _half_way(real, way[1]),
     }
-
-
-def world_start(pose: Pose) -> FloatArray:
-    """A row for the state before the first step, (7,)."""
-    return np.array([*pose.position, *pose.quaternion])
 
 
 def calibrated(runs: ArmRuns) -> str:
@@ -254,8 +240,8 @@ def arm(urdf: Path, finger_angle: float, start: tuple[float, ...]) -> Robot:
 
 @cache
 def marker(runs: ArmRuns, robot: Robot) -> Pose:
-    """Of the marker body in the frame of link 6, from the beginnings of the runs, when all joints
-    were at 0."""
+    """Of the marker body in the frame of link 6: the mean over the runs that are not held out, from
+    their beginnings, when all joints were at 0."""
     tool = RobotModel(robot).tool_pose(np.zeros(len(JOINTS))).inverse()
     rows = []
     for run in runs.of(PUSH, "chosen_on"):

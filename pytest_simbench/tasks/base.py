@@ -197,13 +197,8 @@ def distance(a: Pose, b: Pose) -> float:
 
 
 class Randomness(NamedTuple):
-    """Independent random generators of a repetition, one for each thing that chance decides.
-
-    Attributes:
-        start: disturbs the start.
-        order: of the cubes.
-        planner: whatever the planner draws.
-    """
+    """Independent random generators of a repetition, one for each thing that chance decides: the
+    disturbance of the start, the order of the cubes, whatever the planner draws."""
 
     start: np.random.Generator
     order: np.random.Generator

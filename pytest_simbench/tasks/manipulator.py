@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pytest_simbench.client.world import Motion, World
+from pytest_simbench.client.world import Motion
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import PlanningError, Unreachable
 from pytest_simbench.motion.grasping import CLEARANCE, GRASP_LINK, Choice, choose, grasp_of
@@ -15,7 +15,7 @@ from pytest_simbench.motion.kinematics import inverse_kinematics, tool_over, top
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.throw import Throw
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene
-from pytest_simbench.tasks.arm import Arm, LostCube, Speeds
+from pytest_simbench.tasks.arm import Arm, LostCube
 from pytest_simbench.tasks.base import CUBE_SIZE
 
 APPROACH = 0.10
@@ -27,28 +27,12 @@ PUT_BACK_HEIGHT = 0.005
 
 
 class Manipulator(Arm):
-    """An arm with what the tasks do to cubes.
+    """An arm with what the tasks do to cubes."""
 
-    Args:
-        rng: of the repetition; drives everything random in planning.
-        speeds: of its motions.
-        scale: of the scene's lengths over those of the study's.
-
-    Attributes:
-        approach: `APPROACH`, scaled [m].
-        home: where the arm begins, (arm,) [rad].
-    """
-
-    def __init__(
-        self,
-        world: World,
-        rng: np.random.Generator,
-        speeds: Speeds | None = None,
-        scale: float = 1.0,
-    ) -> None:
-        super().__init__(world, rng, speeds, scale)
-        self.approach = APPROACH * scale
-        self.home = self.arm.copy()
+    @property
+    def approach(self) -> float:
+        """`APPROACH`, scaled [m]."""
+        return APPROACH * self.scale
 
     def pick(self, name: str) -> None:
         """Grasp a cube from above and lift it by `approach`.
@@ -101,13 +85,12 @@ class Manipulator(Arm):
             The motion, sampled at every step, and what a perfect follower's throw would be.
         """
         gripper = self.gripper
-        trajectory, perfect = self._planned(
-            lambda: self.planner.throw(
+        with self.world.stopwatch.measuring("plan"):
+            trajectory, perfect = self.planner.throw(
                 self.arm, goal, gripper.closed, gripper.opened, fraction, feasible=feasible
             )
-        )
         self.held = None
-        self.planning.detach()
+        self.planning.held = None
         return self.follow(trajectory, log_period=0.0), perfect
 
     def try_retreat(self) -> str | None:
@@ -152,8 +135,8 @@ class Manipulator(Arm):
 
     def _leave(self) -> str | None:
         """Straight up where something stands too near to plan from here."""
-        self._refresh()
-        touching = self.planning.collision(self.arm)
+        with self._planning():
+            touching = self.planning.collision(self.arm)
         if touching is None:
             return None
         self._released = tuple(name for name in touching if name in self.world.poses())
@@ -168,12 +151,10 @@ class Manipulator(Arm):
 
     def _plan_choice(self, tools: list[Pose], ignored: tuple[str, ...] = ()) -> Choice:
         """The tool pose among equivalent ones to go to, and the arm joints `APPROACH` above it."""
-        self._refresh()
-        return self._planned(
-            lambda: choose(
+        with self._planning():
+            return choose(
                 self.planning, tools, self.approach, self.home, self.arm, self.rng, ignored
             )
-        )
 
 
 def cannot_handle(

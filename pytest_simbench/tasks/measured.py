@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar
+from dataclasses import fields
+from typing import Any, ClassVar, Generic, TypeVar
 
-from pytest_simbench.data.measured import Motion
+from pytest_simbench.data.measured import Measured, Motion
 from pytest_simbench.tasks.base import Task
 
+M = TypeVar("M", bound=Motion)
 
-class MeasuredTask(Task):
-    """A task against measured data. Its start is not disturbed: there is one truth for one start.
 
-    Attributes:
-        data: name of the data set.
-    """
+class MeasuredTask(Task, Generic[M]):
+    """A task against the measured data of that name. Its start is not disturbed: there is one truth
+    for one start."""
 
     study_timeout: ClassVar[float] = 300.0
     shares_worker: ClassVar[bool] = True
@@ -23,7 +23,7 @@ class MeasuredTask(Task):
 
     @property
     @abstractmethod
-    def chosen(self) -> Sequence[Motion]:
+    def chosen(self) -> Sequence[M]:
         """The motions that repetitions go through."""
 
     @property
@@ -32,9 +32,16 @@ class MeasuredTask(Task):
         return len(self.chosen)
 
     def sample(self, seed: int) -> tuple[str, int]:
-        return self.data, self.chosen[self.place(seed)].number
+        return self.data, self.real(seed).number
 
-    def place(self, seed: int) -> int:
-        """Which of the motions is that of a seed: consecutive seeds go through all of them before
-        one comes again."""
-        return seed % len(self.chosen)
+    def real(self, seed: int) -> M:
+        """The motion of a seed: consecutive seeds go through all of them before one comes again."""
+        return self.chosen[seed % len(self.chosen)]
+
+    def parameters(self) -> dict[str, Any]:
+        """The data by their digest."""
+        told = {f"task.{item.name}": getattr(self, item.name) for item in fields(self)}  # type: ignore[arg-type]
+        return {
+            name: value.digest if isinstance(value, Measured) else value
+            for name, value in told.items()
+        }

@@ -20,9 +20,8 @@ from pytest_simbench.client.world import Motion, World
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import PlanningError, Unreachable
 from pytest_simbench.motion.kinematics import inverse_kinematics, tool_over, tool_path
-from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.model import RobotModel, scale_of
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.motion.scale import scale_of
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene, Vector3
 from pytest_simbench.tasks.arm import Arm
@@ -241,11 +240,8 @@ class Pushing(Task):
 
 @dataclass(frozen=True)
 class CurvePushing(Pushing):
-    """Push a block round a curve. A task of its own: a line and a curve are no rivals in a table.
-
-    Attributes:
-        turn: as of `Pushing`, by default 45 degrees; then the radius is 25 cm.
-    """
+    """Push a block round a curve, by default of 45 degrees and a radius of 25 cm. It is a task of
+    its own: a line and a curve are no rivals in a table."""
 
     name: ClassVar[str] = "pushing_curve"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -37,8 +37,9 @@ class RestsOn:
 
     body: str
     support: str
-    within: float
-    tilt: float
+    _: KW_ONLY
+    within: float = 0.02
+    tilt: float = 20.0
 
     def __str__(self) -> str:
         return (
@@ -47,9 +48,7 @@ class RestsOn:
         )
 
 
-def rests_on(body: str, support: str, *, within: float = 0.02, tilt: float = 20.0) -> RestsOn:
-    """The premise that a body ends on another one, see `RestsOn`."""
-    return RestsOn(body, support, within, tilt)
+rests_on = RestsOn
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Task 1 of the reference study: 21 cubes on a table, 15 of them to be stacked in 3 towers of 5.
 
 All lengths here are those of the study's scene. That of a smaller arm is smaller
-(`robot.scale.grasping_scale_of`): places, cubes and thresholds shrink alike.
+(`motion.model.grasping_scale_of`): places, cubes and thresholds shrink alike.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 
 from pytest_simbench.client.world import World
 from pytest_simbench.motion.grasping import grasping
+from pytest_simbench.motion.model import grasping_scale_of
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.planning import PlanningError
-from pytest_simbench.motion.scale import grasping_scale_of
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, Pose, Robot, Scene
 from pytest_simbench.tasks.arm import FULL_SPEED, LostCube, Speeds

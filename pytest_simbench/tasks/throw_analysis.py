@@ -8,7 +8,7 @@ so hid a release that was late.)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import coal
@@ -91,51 +91,45 @@ def impact(
 
 
 def may_touch(poses: FloatArray, cube: int, edge: float) -> BoolArray:
-    """At which samples one of the cubes may touch another one or the ground before the next, (n,).
-
-    Args:
-        poses: of all cubes, (n, m, 7).
-        cube: which one it is about.
-        edge: of every cube [m].
-    """
-    touch, box = TOUCH * edge / CUBE_SIZE, coal.Box(edge, edge, edge)
-    centres = poses[:, :, :3]
-    strides = np.linalg.norm(np.diff(centres, axis=0, prepend=centres[:1]), axis=2)
+    """At which samples one of the cubes may touch another one or the ground before the next, (n,);
+    poses are of all cubes, (n, m, 7), and each has the same edge [m]."""
+    touch, centres, strides = TOUCH * edge / CUBE_SIZE, poses[:, :, :3], _strides(poses)
     between = np.linalg.norm(centres - centres[:, [cube]], axis=2) - np.sqrt(3) * edge
     reach = edge / 2 * np.abs(rotations(poses[:, cube, 3:7])[:, 2]).sum(axis=1)
     found = centres[:, cube, 2] - reach <= touch + strides[:, cube]
     for row, other in np.argwhere(between <= touch + strides + strides[:, [cube]]):
         if other != cube and not found[row]:
-            apart = _distance(box, poses[row, cube], poses[row, other])
+            apart = _distance(edge, poses[row, cube], poses[row, other])
             found[row] = apart <= touch + strides[row, cube] + strides[row, other]
     return np.asarray(found)
+
+
+def _strides(poses: FloatArray) -> FloatArray:
+    """How far each cube moved since the sample before [m], (n, m)."""
+    centres = poses[:, :, :3]
+    return np.asarray(np.linalg.norm(np.diff(centres, axis=0, prepend=centres[:1]), axis=2))
 
 
 class _Chain:
     """Motion and contact of the bodies of a log, body 0 the thrown cube."""
 
     def __init__(self, time: FloatArray, poses: FloatArray, edge: float) -> None:
-        self.time = time
-        self.poses = poses
+        self.time, self.poses, self.edge = time, poses, edge
         self.earlier = np.maximum(np.searchsorted(time, time - WINDOW, side="right") - 1, 0)
         centres = poses[:, :, :3]
         self._scale = edge / CUBE_SIZE
         moved = np.linalg.norm(centres - centres[self.earlier], axis=2)
         self.moving = moved > MOTION * self._scale
-        self.strides = np.linalg.norm(np.diff(centres, axis=0, prepend=centres[:1]), axis=2)
-        self._box = coal.Box(edge, edge, edge)
+        self.strides = _strides(poses)
 
     def touched(self, a: int, b: int, k: int, since: int = 0) -> bool:
         """Whether two bodies touched within `WINDOW` before sample k."""
         touch = TOUCH * self._scale
         return any(
-            self._distance(row, a, b) <= touch + self.strides[row, a] + self.strides[row, b]
+            _distance(self.edge, self.poses[row, a], self.poses[row, b])
+            <= touch + self.strides[row, a] + self.strides[row, b]
             for row in range(max(int(self.earlier[k]), since), k + 1)
         )
-
-    def _distance(self, row: int, a: int, b: int) -> float:
-        """Between their surfaces [m], negative where they overlap."""
-        return _distance(self._box, self.poses[row, a], self.poses[row, b])
 
     def calm_after(self, began: int) -> int:
         """The first sample after `began` that ends `CALM` without motion, or the last."""
@@ -148,9 +142,9 @@ class _Chain:
         return len(self.time) - 1
 
 
-def _distance(box: coal.Box, a: FloatArray, b: FloatArray) -> float:
-    """Between the surfaces of two boxes at poses, (7,) each [m]."""
-    result = coal.DistanceResult()
+def _distance(edge: float, a: FloatArray, b: FloatArray) -> float:
+    """Between the surfaces of two cubes at poses, (7,) each [m], negative where they overlap."""
+    box, result = coal.Box(edge, edge, edge), coal.DistanceResult()
     coal.distance(box, _placed(a), box, _placed(b), coal.DistanceRequest(), result)
     return float(result.min_distance)
 
@@ -189,13 +183,8 @@ class Flight:
 
 
 def unclenched(fingers: FloatArray, least: float = UNCLENCHED) -> BoolArray:
-    """At which samples the fingers do not press any more, (n,).
-
-    Args:
-        fingers: positions of the finger joints [m], (n, n_fingers); in the first sample
-            they hold the cube.
-        least: by which they have opened then [m].
-    """
+    """At which samples the fingers do not press any more, (n,): all have opened by `least` [m].
+    Positions are (n, n_fingers) [m]; in the first sample the fingers hold the cube."""
     return np.asarray((fingers - fingers[0] > least).all(axis=1))
 
 
@@ -331,7 +320,7 @@ class Thrown:
         elif self.free == len(self.motion):
             found["kept"] = "the cube never left the hand"
         if self.strain is not None:
-            found["limits"] = self.strain.to_wire()
+            found["limits"] = asdict(self.strain)
         if self.flight is not None:
             first, last = self.flight.first, self.flight.last
             found["release"] = {

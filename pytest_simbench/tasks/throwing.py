@@ -6,7 +6,7 @@ landing is computed from the state at the release, and what the simulated flight
 the integrator's part.
 
 All lengths here are those of the study's scene. That of a smaller arm is smaller
-(`robot.scale.grasping_scale_of`), and its throw slower: speeds of flights go with the square root.
+(`motion.model.grasping_scale_of`), and its throw slower: speeds of flights go with the square root.
 """
 
 from __future__ import annotations
@@ -21,17 +21,16 @@ import numpy as np
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.motion.errors import PlanningError, RobotError
 from pytest_simbench.motion.grasping import grasping
-from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.model import RobotModel, grasping_scale_of
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.motion.scale import grasping_scale_of
 from pytest_simbench.motion.throw import (
     LANDING_HEIGHT,
     Throw,
     feasible_swing,
     released,
-    study_swing,
     swing_of,
 )
+from pytest_simbench.motion.timing import synchronised_move
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Pose, Robot, Scene
 from pytest_simbench.tasks.arm import LostCube, Speeds
@@ -258,7 +257,7 @@ def perfect_throw(
     timed, duration = (
         feasible_swing(model, start, goal, np.array(STANDARD_GRAVITY), held)
         if feasible
-        else study_swing(model, start, goal)
+        else synchronised_move(start, goal, model.limits)
     )
     return released(model, timed, duration, release_fraction, scale)
 

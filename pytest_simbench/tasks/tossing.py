@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
@@ -32,7 +32,7 @@ CUBE = "cube"
 
 
 @dataclass(frozen=True)
-class Tossing(MeasuredTask):
+class Tossing(MeasuredTask[Toss]):
     """Toss a cube as it was really tossed.
 
     Lengths and velocities are taken as the source has them, though all its lengths read 2 % short
@@ -69,23 +69,11 @@ class Tossing(MeasuredTask):
         """The tosses that repetitions go through, in the order of their numbers."""
         return self.tosses.half(self.half)[: self.most]
 
-    def toss(self, seed: int) -> Toss:
-        """The one of a seed."""
-        return self.chosen[self.place(seed)]
-
     def smoke(self) -> Tossing:
         return replace(self, most=SMALLEST)
 
-    def parameters(self) -> dict[str, Any]:
-        """The tosses by their digest."""
-        told = replace(self, tosses=Tosses(())).__dict__
-        return {
-            **{f"task.{name}": value for name, value in told.items()},
-            "task.tosses": self.tosses.digest,
-        }
-
     def scene(self, seed: int, jitter: Jitter) -> Scene:
-        toss = self.toss(seed)
+        toss = self.real(seed)
         box = Box(
             CUBE,
             (cube.EDGE,) * 3,
@@ -100,7 +88,7 @@ class Tossing(MeasuredTask):
         return Scene("tossing", (box,), ground_friction=self.friction)
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
-        toss = self.toss(seed)
+        toss = self.real(seed)
         start = Motion(np.array([world.time]), world.joints[None], world.bodies[None])
         with world.phase("toss"):
             flown = world.wait(toss.duration, log_period=0.0)

@@ -66,10 +66,6 @@ class LeaningTowers(Task):
         saved = [name for name in old if name not in new]
         return f"saves {' and '.join(saved)} from toppling" if saved else ""
 
-    def overhang(self, margin: float) -> float:
-        """How far each cube of a tower stands beyond the one below [m]."""
-        return (CUBE_SIZE - 2 * margin) / self.levels
-
     def tower_of(self, number: int) -> int:
         """The tower, from 1, of a cube's number in scene order, from 0."""
         return number // self.levels + 1
@@ -77,8 +73,9 @@ class LeaningTowers(Task):
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         cubes: list[Box] = []
         for tower, margin in enumerate(self.margins):
+            overhang = (CUBE_SIZE - 2 * margin) / self.levels
             for level in range(self.levels):
-                x, z = self.overhang(margin) * level, CUBE_SIZE * (level + 0.5)
+                x, z = overhang * level, CUBE_SIZE * (level + 0.5)
                 pose = Pose.at(0.4 + x, SPACING * tower, z)
                 colour = ORANGE if level % 2 else WHITE
                 cubes.append(cube(f"cube_{len(cubes) + 1:02d}", pose, colour))

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.mesh_check import TRIANGLE
 from pytest_simbench.description.robot_files import description_xml, digest
 from pytest_simbench.description.shapes import mesh_points
+from pytest_simbench.description.stl import written_stl
 from pytest_simbench.scene import (
     Box,
     Capsule,
@@ -172,10 +172,8 @@ def _scaled(mesh: ET.Element, folder: Path) -> None:
     """A mesh 1.3 times as large, as an STL file of its own beside the description."""
     points = 1.3 * mesh_points(str(folder / mesh.attrib["filename"]))
     corners = np.resize(points, (3 * math.ceil(len(points) / 3), 3)).reshape(-1, 3, 3)
-    record = np.zeros(len(corners), TRIANGLE)
-    record["corners"] = corners
     path = folder / "scaled.stl"
-    path.write_bytes(bytes(80) + len(corners).to_bytes(4, "little") + record.tobytes())
+    path.write_bytes(written_stl(corners))
     mesh.attrib["filename"] = path.name
 
 

@@ -28,14 +28,12 @@ from pytest_simbench.parity.compare import check
 from pytest_simbench.parity.memory import remembering
 from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import Scene, Trajectory
+from pytest_simbench.scene.pair_friction import combined
 from pytest_simbench.simulator import Simulator, SimulatorError, SimulatorInfo
 from pytest_simbench.simulator.info import (
     alternatives,
-    check_loops,
-    check_self_collision,
-    check_shapes,
+    check_supported,
     importable,
-    with_friction_rule,
 )
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.worker.acting import Acting
@@ -152,10 +150,9 @@ class Server:
         simulator = self._constructed()
         world = Scene.from_wire(received(scene))
         check_names(world)
-        check_loops(simulator.info, world)
-        check_self_collision(simulator.info, world)
-        check_shapes(simulator.info, world)
-        world, excused = with_friction_rule(simulator.info, world)
+        check_supported(simulator.info, world)
+        world, inexact = combined(world, simulator.info.friction_rule)
+        excused = [inexact] if inexact else []
         simulator.load(world)
         self.scene = world
         acting = Acting.of(simulator, world)

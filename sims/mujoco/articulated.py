@@ -15,7 +15,7 @@ import numpy as np
 
 from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED
 from pytest_simbench.description.robot_files import digest, keep
-from pytest_simbench.description.shapes import stl_bytes
+from pytest_simbench.description.stl import written_stl
 from pytest_simbench.description.urdf import Link, MovingJoint, Shape, write_joint, write_link
 from pytest_simbench.scene import FloatArray, Gripper, Joint, Polytope, Pose, Robot, Vector3
 from pytest_simbench.scene.polytope import MOST
@@ -217,7 +217,8 @@ class Tree:
             raise self.reading.refuse_shape(geom)
         if gap:
             self._coarse[link.name] = max(gap, self._coarse.get(link.name, 0.0))
-        data = stl_bytes(Polytope(points))
+        hull = Polytope(points)
+        data = written_stl(hull.points[np.array(hull.triangles)])
         name = f"{digest(data)}.stl"
         self._meshes[name] = data
         return Shape(pose, mesh=name)

@@ -16,6 +16,7 @@ from pytest_simbench.description.links import (
     motion_subspace,
     reduced,
 )
+from pytest_simbench.laws.base import Law
 from pytest_simbench.laws.domino import DominoWave
 from pytest_simbench.laws.loops import FourBarClosure
 from pytest_simbench.motion.model import RobotModel
@@ -23,7 +24,7 @@ from pytest_simbench.motion.panda import panda
 from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import Closure, Pose, Robot, Scene, SceneError
 from pytest_simbench.simulator import DescriptionError, NotSupportedError, PreparedRobot
-from pytest_simbench.simulator.info import check_loops, check_self_collision
+from pytest_simbench.simulator.info import check_supported
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.simulator.settings import Settings
 
@@ -55,9 +56,7 @@ def test_axes_are_pinocchios() -> None:
 
 
 def four_bar() -> Robot:
-    robot = FourBarClosure().build().robot
-    assert robot is not None
-    return robot
+    return FourBarClosure().build().robot
 
 
 def test_points_of_a_link_that_became_part_of_another_are_in_its_frame() -> None:
@@ -93,37 +92,29 @@ def test_a_link_is_not_held_at_itself() -> None:
         Closure("a", "a")
 
 
-def test_who_closes_no_loops_says_so() -> None:
-    info = replace(adapter("mujoco").info, name="mysim", capabilities=frozenset())
-    with pytest.raises(NotSupportedError, match="mysim closes no loops of links, and the robot of"):
-        check_loops(info, FourBarClosure().build())
-    check_loops(info, Scene("empty"))
+@pytest.mark.parametrize(
+    ("law", "message"),
+    [
+        (FourBarClosure(), "mysim closes no loops of links, and the robot of scene 'four_bar"),
+        (DominoWave(), "mysim has links of a robot pass through each other, and those of scene 'd"),
+    ],
+)
+def test_who_lacks_what_a_scene_needs_says_so(law: Law, message: str) -> None:
+    able = adapter("mujoco").info
+    unable, scene = replace(able, name="mysim", capabilities=frozenset()), law.build()
+    with pytest.raises(NotSupportedError, match=message):
+        check_supported(unable, scene)
+    check_supported(able, scene)
+    check_supported(unable, Scene("empty"))
 
 
-def test_closures_travel_and_robots_without_any_look_as_before() -> None:
+def test_closures_and_collisions_travel_and_other_robots_look_as_before() -> None:
     robot = four_bar()
     assert Robot.from_wire(robot.to_wire()) == robot
-    assert "closures" not in replace(robot, closures=()).to_wire()
-
-
-def test_who_has_links_pass_through_each_other_says_so() -> None:
-    info = replace(adapter("mujoco").info, name="mysim", capabilities=frozenset())
-    scene = DominoWave().build()
-    message = "mysim has links of a robot pass through each other, and those of scene 'domino_wave'"
-    with pytest.raises(NotSupportedError, match=message):
-        check_self_collision(info, scene)
-    assert scene.robot is not None
-    passing = replace(scene, robot=replace(scene.robot, self_collide=False))
-    check_self_collision(info, passing)
-    check_self_collision(info, Scene("empty"))
-    check_self_collision(adapter("mujoco").info, scene)
-
-
-def test_it_travels_and_other_robots_look_as_before() -> None:
     colliding = replace(panda(), self_collide=True)
     assert Robot.from_wire(colliding.to_wire()).self_collide
     assert not Robot.from_wire(panda().to_wire()).self_collide
-    assert "self_collide" not in panda().to_wire()
+    assert not {"closures", "self_collide"} & panda().to_wire().keys()
 
 
 def test_links_that_one_joint_joins_never_collide() -> None:

@@ -1,4 +1,4 @@
-"""Reaches tell shapes apart, and meshes are read from STL (binary, text) and OBJ files."""
+"""Reaches tell shapes apart, and meshes are read from binary STL and OBJ files."""
 
 from __future__ import annotations
 
@@ -16,9 +16,8 @@ from pytest_simbench.description.shapes import (
     placed,
     reach,
     round_reach,
-    shape_points,
 )
-from pytest_simbench.description.urdf import Shape
+from pytest_simbench.description.stl import written_stl
 from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import DescriptionError
 
@@ -32,31 +31,6 @@ def test_reach_of_a_box() -> None:
     assert reaches[(0.577, 0.577, 0.577)] == pytest.approx(6 / np.sqrt(3))
 
 
-@pytest.mark.parametrize(
-    "other",
-    [
-        placed(box_corners((0.1, 0.2, 0.3)), Pose.at(0.001, 0, 0)),
-        placed(box_corners((0.1, 0.2, 0.3)), Pose.at(0, 0, 0, yaw=0.1)),
-        box_corners((0.1, 0.2, 0.301)),
-    ],
-    ids=["moved", "turned", "longer"],
-)
-def test_another_box_reaches_elsewhere(other: np.ndarray) -> None:
-    assert np.abs(reach(other) - reach(box_corners((0.1, 0.2, 0.3)))).max() > 4e-4
-
-
-def test_the_order_of_shapes_does_not_matter() -> None:
-    mirrored = [reach(placed(box_corners((1, 1, 1)), Pose.at(x, 0, 0))) for x in (-2.0, 2.0)]
-    first, second = outlines("a", mirrored, []), outlines("a", mirrored[::-1], [])
-    np.testing.assert_array_equal(first["a/boxes"], second["a/boxes"])
-    assert first["a/meshes"].shape == (0, 26)
-
-
-def stl_text() -> bytes:
-    corners = "\n".join(f"vertex {x} {y} {z}" for x, y, z in TRIANGLE)
-    return f"solid t\nfacet normal 0 0 1\nouter loop\n{corners}\nendloop\nendfacet\nend".encode()
-
-
 def stl_binary() -> bytes:
     floats = np.zeros(12, "<f4")
     floats[3:] = TRIANGLE.ravel()
@@ -68,9 +42,7 @@ def obj_text() -> bytes:
     return f"# t\n{corners}\nvn 0 0 1\nf 1 2 3\n".encode()
 
 
-@pytest.mark.parametrize(
-    ("name", "data"), [("a.stl", stl_text()), ("b.STL", stl_binary()), ("c.obj", obj_text())]
-)
+@pytest.mark.parametrize(("name", "data"), [("b.STL", stl_binary()), ("c.obj", obj_text())])
 def test_meshes_are_read(tmp_path: Path, name: str, data: bytes) -> None:
     (tmp_path / name).write_bytes(data)
     points = mesh_points(str(tmp_path / name))
@@ -85,15 +57,6 @@ def test_the_corners_of_a_box() -> None:
 def test_a_frame_is_turned_and_then_moved() -> None:
     there = placed(np.array([[1.0, 2.0, 3.0]]), Pose.at(10, 20, 30, yaw=np.pi / 2))
     np.testing.assert_allclose(there, [[8, 21, 33]])
-
-
-def test_shapes_of_a_link_in_its_frame(tmp_path: Path) -> None:
-    (tmp_path / "c.obj").write_bytes(obj_text())
-    pose, up = Pose.at(0, 0, 5), np.array([0.0, 0.0, 5.0])
-    mesh = shape_points(Shape(pose, mesh=str(tmp_path / "c.obj")))
-    np.testing.assert_array_equal(mesh, mesh_points(str(tmp_path / "c.obj")) + up)
-    box = shape_points(Shape(pose, size=(2, 4, 6)))
-    np.testing.assert_array_equal(box, box_corners((2, 4, 6)) + up)
 
 
 def test_reach_of_what_is_round() -> None:
@@ -132,30 +95,11 @@ def test_directions_are_unit_vectors_to_faces_edges_and_corners() -> None:
     assert len(np.unique(DIRECTIONS.round(6), axis=0)) == 26
 
 
-@pytest.mark.parametrize(
-    "text",
-    [b"  \nsolid \xff\nvertex 1 2 3 4\n\nvertex 4 5 6", b"solid\nvertex 1 2 3\nvertex 4 5 6"],
-)
-def test_a_text_that_is_odd_but_stl(tmp_path: Path, text: bytes) -> None:
-    """Blank lines, a name in another encoding, numbers too many."""
-    (tmp_path / "a.stl").write_bytes(text + b"\n" + b" " * 84)
-    np.testing.assert_array_equal(mesh_points(str(tmp_path / "a.stl")), [[1, 2, 3], [4, 5, 6]])
-
-
 def test_many_triangles_have_few_corners(tmp_path: Path) -> None:
-    floats = np.zeros((1, 12), "<f4")
-    floats[0, 3:] = TRIANGLE.ravel()
-    record = floats.tobytes() + bytes(2)
-    (tmp_path / "a.stl").write_bytes(bytes(80) + (300).to_bytes(4, "little") + 300 * record)
+    (tmp_path / "a.stl").write_bytes(written_stl([TRIANGLE] * 300))
     points = mesh_points(str(tmp_path / "a.stl"))
     assert points.dtype == np.float64
     np.testing.assert_array_equal(points, TRIANGLE[np.lexsort(TRIANGLE.T[::-1])])
-
-
-def test_a_mesh_may_be_a_solid_in_binary(tmp_path: Path) -> None:
-    """Some programs begin a binary file's header with "solid", as a text file begins."""
-    (tmp_path / "a.stl").write_bytes(b"solid" + stl_binary()[5:])
-    assert len(mesh_points(str(tmp_path / "a.stl"))) == 3
 
 
 @pytest.mark.parametrize(

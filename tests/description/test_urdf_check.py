@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 
 from pytest_simbench.client.errors import EngineFailed
 from pytest_simbench.description.links import check_names, check_robot
-from pytest_simbench.description.mesh_check import LARGEST_MESH, TRIANGLE
+from pytest_simbench.description.mesh_check import LARGEST_MESH
+from pytest_simbench.description.stl import read_stl, written_stl
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.motion.model import RobotModel
-from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Box, Gripper, Joint, Pose, Robot, Scene, SceneError
 from pytest_simbench.simulator import DescriptionError, PreparedRobot
 from tests.hostile import assert_harmless_terminal
@@ -57,17 +57,14 @@ SOUND = """<robot name="arm">
 
 def stl(corners: float = 1.0) -> bytes:
     """A tetrahedron as binary STL."""
-    triangles = np.zeros(4, TRIANGLE)
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) * corners
-    triangles["corners"] = points[[[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]]
-    return b"\0" * 80 + len(triangles).to_bytes(4, "little") + triangles.tobytes()
+    return written_stl(points[[[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]])
 
 
-@pytest.fixture
-def robot(tmp_path: Path) -> Robot:
-    folder = tmp_path / "arm"
+def described(folder: Path, urdf: str) -> Robot:
+    """The robot of a description like `SOUND`, its files in a folder that is made."""
     (folder / "meshes").mkdir(parents=True)
-    (folder / "arm.urdf").write_text(SOUND)
+    (folder / "arm.urdf").write_text(urdf)
     (folder / "arm.srdf").write_text('<robot name="arm"/>')
     (folder / "meshes" / "hand.stl").write_bytes(stl(0.1))
     joints = (Joint("shoulder", 100, 10, 10, 0.1, 0.0), Joint("slide", 100, 10, 10, 0.1, 0.0))
@@ -80,6 +77,11 @@ def robot(tmp_path: Path) -> Robot:
         Gripper(("slide",), 0.05, 0.0, 10.0),
         "tip",
     )
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Robot:
+    return described(tmp_path / "arm", SOUND)
 
 
 def written(robot: Robot, text: str | bytes) -> Robot:
@@ -109,10 +111,6 @@ def test_the_sound_one_is_taken(robot: Robot) -> None:
     prepared = PreparedRobot(robot)
     assert [joint.name for joint in prepared.joints] == ["shoulder", "slide"]
     RobotModel(robot)
-
-
-def test_the_panda_is_taken() -> None:
-    check_robot(panda())
 
 
 HAND = '<mesh filename="meshes/hand.stl"/>'
@@ -209,6 +207,7 @@ INERTIA = 'ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"'
         (LIMIT, LIMIT.replace('upper="2"', 'upper="inf"'), "give finite numbers"),
         (LIMIT, LIMIT.replace('effort="10"', 'effort="-10"'), "has the effort limit '-10'"),
         (LIMIT, LIMIT.replace('velocity="1"', 'velocity="-1"'), "has the velocity limit '-1'"),
+        (LIMIT, LIMIT.replace('velocity="1"', ""), "has <limit velocity=''>; give a number"),
         (AXIS, AXIS + '<mimic joint="slide"/>', ""),
         (AXIS, AXIS + '<mimic joint="end"/>', "follows 'end', which is no moving joint"),
         (AXIS, AXIS + '<mimic joint="shoulder"/>', "follows itself (<mimic>)"),
@@ -304,11 +303,8 @@ def test_meshes_that_some_engine_cannot_read(robot: Robot) -> None:
     facet = "facet normal 0 0 1\nouter loop\n" + "vertex 0 0 1\n" * 3 + "endloop\nendfacet\n"
     (folder / "ascii.stl").write_text(f"solid a\n{facet}endsolid a\n")
     (folder / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    flat = np.frombuffer(stl(), TRIANGLE, offset=84).copy()
-    flat["corners"][..., 2] = 0.5
-    (folder / "flat.stl").write_bytes(stl()[:84] + flat.tobytes())
-    many = np.zeros(200_001, TRIANGLE)
-    (folder / "many.stl").write_bytes(b"\0" * 80 + len(many).to_bytes(4, "little") + many.tobytes())
+    (folder / "flat.stl").write_bytes(written_stl(read_stl(stl()) * [1.0, 1.0, 0.0]))
+    (folder / "many.stl").write_bytes(written_stl(np.zeros((200_001, 3, 3))))
     for name, said in (
         ("ascii.stl", "holds no binary STL mesh"),
         ("a.obj", "is no mesh that every engine reads; give a binary .stl file"),
@@ -357,9 +353,7 @@ def test_whatever_an_attribute_holds_it_is_sound_or_refused(
     attributes = [(element, key) for element in xml.iter() for key in element.attrib]
     element, key = attributes[place]
     element.set(key, value)
-    written(
-        robot, ET.tostring(xml, encoding="utf-8", xml_declaration=True) if _plain(value) else b""
-    )
+    written(robot, ET.tostring(xml, encoding="utf-8", xml_declaration=True))
     try:
         prepared = PreparedRobot(robot)
     except DescriptionError as error:
@@ -369,12 +363,3 @@ def test_whatever_an_attribute_holds_it_is_sound_or_refused(
         assert np.isfinite([link.mass, *link.centre, *link.inertia.flat]).all()
     assert all(np.isfinite(limits).all() for limits in prepared.limits.values())
     ET.fromstring(prepared.to_urdf())
-
-
-def _plain(value: str) -> bool:
-    """Whether XML can hold it."""
-    try:
-        value.encode()
-    except UnicodeEncodeError:
-        return False
-    return True

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from pytest_simbench.description.mesh_check import TRIANGLE
 from pytest_simbench.description.robot_files import content_of
+from pytest_simbench.description.stl import read_stl, written_stl
 from pytest_simbench.motion.errors import RobotError
 from pytest_simbench.motion.files import read_robot
 from pytest_simbench.motion.hulls import Cuts, extreme, stl, with_hulls
@@ -35,10 +35,9 @@ def test_a_box_keeps_its_corners_and_its_faces_look_outwards() -> None:
     points = np.vstack([corners, inside])
     kept = points[extreme(points, 500)]
     assert {tuple(point) for point in kept} == {tuple(point) for point in corners}
-    data = stl(kept)
-    triangles = np.frombuffer(data, TRIANGLE, offset=84)
-    assert int.from_bytes(data[80:84], "little") == len(triangles) == 12
-    a, b, c = triangles["corners"].astype(float).transpose(1, 0, 2)
+    triangles = read_stl(stl(kept))
+    assert len(triangles) == 12
+    a, b, c = triangles.transpose(1, 0, 2)
     volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6  # positive: all outwards
     assert volume == pytest.approx(0.3 * 0.1 * 0.02, rel=1e-5)
 
@@ -47,22 +46,19 @@ def test_slices_fill_the_part_and_keep_to_their_planes() -> None:
     """An L, cut where its arms meet, is two boxes; one hull of it would fill the corner."""
     lying = [[x, y, z] for x in (0.0, 0.1) for y in (0.0, 0.02) for z in (0.0, 0.03)]
     standing = [[x, y, z] for x in (0.0, 0.02) for y in (0.02, 0.1) for z in (0.0, 0.03)]
-    halves = [np.frombuffer(stl(np.array(part)), TRIANGLE, offset=84) for part in (lying, standing)]
-    both = np.concatenate(halves)
-    data = bytes(80) + np.uint32(len(both)).tobytes() + both.tobytes()
+    halves = [read_stl(stl(np.array(part))) for part in (lying, standing)]
+    data = written_stl(np.concatenate(halves))
     urdf = """<robot name="r"><link name="l"><collision><origin xyz="0 0.3 0" rpy="0 0 0"/>
         <geometry><mesh filename="l.stl"/></geometry></collision></link></robot>"""
     cut = {"l": Cuts("y", (0.32,))}
     kept = with_hulls({"urdf": urdf, "meshes": {"l.stl": data}}, 500, cut)
-    parts = [
-        np.frombuffer(part, TRIANGLE, offset=84)["corners"] for part in kept["meshes"].values()
-    ]
+    parts = map(read_stl, kept["meshes"].values())
     volumes = [ConvexHull(part.reshape(-1, 3)).volume for part in parts]
     assert sorted(volumes) == pytest.approx([0.08 * 0.02 * 0.03, 0.1 * 0.02 * 0.03], rel=1e-5)
     assert kept["urdf"].count("<collision>") == 2
     whole = with_hulls({"urdf": urdf, "meshes": {"l.stl": data}}, 500)
-    (hull,) = [np.frombuffer(part, TRIANGLE, offset=84) for part in whole["meshes"].values()]
-    assert ConvexHull(hull["corners"].reshape(-1, 3)).volume > 1.5 * sum(volumes)
+    (hull,) = map(read_stl, whole["meshes"].values())
+    assert ConvexHull(hull.reshape(-1, 3)).volume > 1.5 * sum(volumes)
 
 
 @pytest.mark.parametrize(

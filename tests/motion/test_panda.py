@@ -15,7 +15,6 @@ from pytest_simbench.tasks.base import CUBE_SIZE
 def test_a_finger_squeezes_with_25_newtons(task: Stacking | Throwing) -> None:
     """On a cube of 5 cm, by the drive's own law, which is also the drive's limit."""
     robot = task.scene(1, Jitter()).robot
-    assert robot is not None
     for joint in robot.joints[7:]:
         penetration = CUBE_SIZE / 2 - robot.gripper.closed
         assert joint.stiffness * penetration == pytest.approx(25.0)
@@ -38,7 +37,6 @@ def test_limits_are_the_descriptions_and_the_data_sheets() -> None:
         if joint.find("limit") is not None
     }
     found = robot.limits
-    assert found is not None
     for index, joint in enumerate(robot.joints[:7]):
         assert joint.effort_limit == float(limits[joint.name]["effort"])
         assert found.velocity[index] == float(limits[joint.name]["velocity"])

@@ -9,9 +9,8 @@ import pytest
 
 from pytest_simbench.motion import registry
 from pytest_simbench.motion.errors import RobotError
-from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.model import FULL_WRIST_REACH, RobotModel, grasping_scale_of, scale_of
 from pytest_simbench.motion.registry import find
-from pytest_simbench.motion.scale import FULL_WRIST_REACH, grasping_scale_of, scale_of
 
 MODULE = """
 from dataclasses import replace
@@ -83,10 +82,3 @@ def test_the_so101_has_a_smaller_one() -> None:
     reach = RobotModel(robot).wrist_reach
     assert reach == pytest.approx(0.379, abs=1e-3)  # of the URDF
     assert 0.4 <= reach / FULL_WRIST_REACH < 0.5
-
-
-def test_the_hand_is_what_reach_has_and_wrist_reach_has_not() -> None:
-    for name in ("panda", "so101"):
-        model = RobotModel(find(name))
-        hand = model.pin.frames[model.tool].placement.translation
-        assert model.reach - model.wrist_reach == pytest.approx(float((hand**2).sum() ** 0.5))

@@ -18,7 +18,6 @@ OTHER = replace(TRUE, gravity=(0.0, 0.0, -1.0)).with_pose("cube", Pose.at(0.3, 0
 
 class Helper:
     def __init__(self) -> None:
-        assert TRUE.robot is not None
         self.prepared = PreparedRobot(TRUE.robot)
         self.cube = TRUE.body("cube")
 

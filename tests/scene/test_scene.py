@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -26,15 +27,12 @@ def test_two_bodies_of_one_name_are_an_error() -> None:
 def test_overlapping_bodies_are_an_error_that_names_both() -> None:
     with pytest.raises(SceneError, match="'a' and 'b' overlap by 10.0 mm"):
         Scene("s", (box("a", 0.0), box("b", 0.04)))
-
-
-def test_touching_bodies_are_fine() -> None:
-    Scene("s", (box("a", 0.0), box("b", 0.05)))
+    Scene("s", (box("a", 0.0), box("b", 0.05)))  # they touch
 
 
 def test_a_scene_travels_unchanged() -> None:
     scene = Scene("s", (box("a", 0.0), Box("t", (1, 1, 0.1), Pose.at(0, 0, -0.05))), panda())
-    assert Scene.from_wire(scene.to_wire()) == scene
+    assert Scene.from_wire(json.loads(json.dumps(scene.to_wire()))) == scene
 
 
 def test_an_unknown_body_lists_the_known_ones() -> None:
@@ -83,11 +81,6 @@ def test_composition_multiplies_matrices(a: Pose, b: Pose) -> None:
 @given(poses())
 def test_inverse_undoes(a: Pose) -> None:
     assert np.allclose((a * a.inverse()).matrix(), np.eye(4), atol=1e-9)
-
-
-@given(poses())
-def test_a_pose_travels_unchanged(a: Pose) -> None:
-    assert Pose.from_wire(a.to_wire()) == a
     assert Pose.from_array(a.as_array()) == a
 
 

@@ -20,10 +20,10 @@ from pytest_simbench.sims.genesis.engine import quick_inspection
 from scipy.spatial import ConvexHull
 
 from pytest_simbench.client.errors import EngineFailed
+from pytest_simbench.description.stl import written_stl
 from pytest_simbench.scene import Gripper, Joint, Robot, Scene, Trajectory
 from pytest_simbench.testing import scenes
 
-from ..description.test_urdf_check import TRIANGLE
 from .worlds import Worlds
 
 EGG = """<robot name="egg">
@@ -90,10 +90,7 @@ def test_hulls_of_more_than_500_faces_are_kept_whole(worlds: Worlds, tmp_path: P
     points *= [[0.03, 0.04, 0.06]] / np.linalg.norm(points, axis=1, keepdims=True)
     faces = ConvexHull(points).simplices
     assert len(faces) > 500
-    triangles = np.zeros(len(faces), TRIANGLE)
-    triangles["corners"] = points[faces]
-    header = b"\0" * 80 + len(faces).to_bytes(4, "little")
-    (tmp_path / "egg.stl").write_bytes(header + triangles.tobytes())
+    (tmp_path / "egg.stl").write_bytes(written_stl(points[faces]))
     (tmp_path / "egg.urdf").write_text(EGG)
     joint = Joint("turn", 100.0, 10.0, 50.0, 0.1, 0.0)
     hand = Gripper((), 0.0, 0.0, 0.0)

@@ -7,18 +7,16 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from multiprocessing.connection import Client, Connection
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 from pytest_simbench.sims.mujoco.settings import MuJoCoSettings
 
-from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.scene import Scene
 from pytest_simbench.simulator import Capability, Settings, SimulatorError, SimulatorInfo
 from pytest_simbench.simulator.external import ExternalSimulator
 
@@ -30,6 +28,11 @@ class OutsideSettings(MuJoCoSettings):
     """Adds `fault`, what the program does wrong; "" for nothing."""
 
     fault: str = ""
+
+
+def _asked(name: str) -> Callable[..., Any]:
+    """A method that the program answers."""
+    return lambda self, *arguments: self._ask(name, *arguments)
 
 
 class Outside(ExternalSimulator):
@@ -80,7 +83,6 @@ class Outside(ExternalSimulator):
         Raises:
             SimulatorError: it raised something.
         """
-        assert self._connection is not None
         self._connection.send((name, *arguments))
         well, answer = self._connection.recv()
         if not well:
@@ -91,36 +93,19 @@ class Outside(ExternalSimulator):
         with self.asking(f"asked for {name}"):
             return self._call(name, *arguments)
 
-    def read_back(self) -> dict[str, Any]:
-        return dict(self._ask("read_back"))
-
-    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
-        self._ask("command", position, velocity, effort)
-
-    def push(self, wrenches: FloatArray) -> None:
-        self._ask("push", wrenches)
-
-    def lead(self, before: FloatArray, after: FloatArray) -> None:
-        self._ask("lead", before, after)
-
-    def body_state(self) -> FloatArray:
-        return np.asarray(self._ask("body_state"))
-
-    def joint_state(self) -> FloatArray:
-        return np.asarray(self._ask("joint_state"))
+    read_back = _asked("read_back")
+    command = _asked("command")
+    push = _asked("push")
+    lead = _asked("lead")
+    body_state = _asked("body_state")
+    joint_state = _asked("joint_state")
+    contact_count = _asked("contact_count")
+    contact_forces = _asked("contact_forces")
+    render = _asked("render")
 
     def save(self) -> Any:
-        return self.steps, self._ask("save")
+        return self._steps, self._ask("save")
 
     def restore(self, state: Any) -> None:
-        self.steps, inside = state
+        self._steps, inside = state
         self._ask("restore", inside)
-
-    def contact_count(self) -> int:
-        return int(self._ask("contact_count"))
-
-    def contact_forces(self) -> Iterable[tuple[str, str, FloatArray]]:
-        return list(self._ask("contact_forces"))
-
-    def render(self, width: int, height: int) -> NDArray[np.uint8]:
-        return np.asarray(self._ask("render", width, height))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import pytest
@@ -37,6 +36,8 @@ def test_texts_become_values(name: str, text: Any, value: Any) -> None:
         ({"solref": "1"}, "mujoco.solref=1: give 2 numbers, separated by '/'"),
         ({"timestep": "fast"}, "mujoco.timestep=fast: give a finite number"),
         ({"timestep": -1}, "mujoco.timestep=-1: give a number of seconds from 1e-06 to 0.01667"),
+        ({"timestep": 0.0}, "mujoco.timestep=0: give a number of seconds from 1e-06 to 0.01667"),
+        ({"timestep": "0.0167"}, "mujoco.timestep=0.0167: give a number of seconds"),
         ({"timestep": 1e9}, "mujoco.timestep=1e[+]09: give a number of seconds"),
         ({"timestep": "inf"}, "mujoco.timestep=inf: give a finite number"),
         ({"timestep": float("nan")}, "mujoco.timestep=nan: give a finite number"),
@@ -56,16 +57,6 @@ def test_texts_become_values(name: str, text: Any, value: Any) -> None:
 def test_bad_changes(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(SettingsError, match=message):
         changed(MuJoCoSettings(), changes, "mujoco")
-
-
-@pytest.mark.parametrize("timestep", [1e9, 0.05, 0.0167, math.inf, math.nan, 0.0, -0.001])
-def test_a_time_step_too_coarse_for_the_tasks_is_refused(timestep: float) -> None:
-    """Two steps of 1e9 s once made a throw that hit."""
-    with pytest.raises(
-        SettingsError,
-        match="timestep=.*: give a (number of seconds from 1e-06 to 0.01667|finite number)",
-    ):
-        changed(MuJoCoSettings(), {"timestep": str(timestep)}, "mujoco")
 
 
 def test_every_profile_of_every_engine_has_a_time_step_that_is_fine_enough() -> None:

@@ -70,15 +70,6 @@ class FlyingProcess(ScriptedProcess):
         self._speeds = None
         return answer
 
-    def do_wait(self, duration: float, log_period: float | None) -> dict[str, Any]:
-        self.position = self._commanded  # where the fingers stand on a cube is not their command
-        return super().do_wait(duration, log_period)
-
-    def do_load(self, scene: dict[str, Any], parity: bool) -> dict[str, Any]:
-        answer = super().do_load(scene, parity)
-        self._commanded = self.position
-        return answer
-
     def _delayed(self, tick: float, position: FloatArray) -> FloatArray:
         rows = len(position) if np.isinf(self.late) else round(self.late / tick)
         fingers = position[:, -2:].copy()
@@ -144,11 +135,9 @@ class FlyingProcess(ScriptedProcess):
             self._rates = np.array([np.interp(self.time, times, column) for column in rows.T])
         else:
             self._rates = np.zeros_like(position)
-        self._commanded = position
         super()._command(position)
 
     def _tool_velocity(self) -> FloatArray:
-        assert self.model is not None
         arm = self.model.arm
         return self.model.tool_velocity(self.position[:arm], self._rates[:arm])
 

@@ -195,7 +195,6 @@ class ScriptedProcess:
 
     def tool(self) -> Pose:
         """Pose of the tool centre point."""
-        assert self.model is not None
         return self.model.tool_pose(self.position[: self.model.arm])
 
     def _command(self, position: FloatArray) -> None:

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pytest_simbench.data import DataMissing, read
 from pytest_simbench.data.pushes import COMMANDS, FREE, PUSH, ArmRun, ArmRuns, Command
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
@@ -17,15 +16,13 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.tasks import ArmFollowing, CorrectedArmFollowing
 from pytest_simbench.tasks.arm_following import CONTROL_PERIOD, REACHED, hands, reference, started
 from pytest_simbench.tasks.arm_pushing import arm
+from tests.conftest import measured
 from tests.tasks.reached import reached
 
 
 @pytest.fixture(scope="module")
 def runs() -> ArmRuns:
-    try:
-        found: ArmRuns = read("arm_pushes")
-    except DataMissing as error:
-        pytest.skip(str(error))
+    found: ArmRuns = measured("arm_pushes")
     return found
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pytest_simbench.data import DataError, DataMissing, read
+from pytest_simbench.data import DataError
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
@@ -18,7 +18,8 @@ from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks import ArmPushing
-from pytest_simbench.tasks.arm_pushing import compared, described, world_start
+from pytest_simbench.tasks.arm_pushing import compared, described
+from tests.conftest import measured
 
 URDF = """<robot name="arm">
   <joint name="m1n6s300_joint_1" type="continuous"><limit lower="-6" upper="6"/></joint>
@@ -61,16 +62,13 @@ def test_a_tool_is_tracked_to_a_micrometre_and_held_joints_stay() -> None:
 
 
 def test_the_cube_goes_where_the_real_one_went(case: Case) -> None:
-    try:
-        task = ArmPushing(read("arm_pushes"))
-    except DataMissing as error:
-        pytest.skip(str(error))
+    task = ArmPushing(measured("arm_pushes"))
     record, error = Repetition(Experiment(case, task), 1).run()
     assert error is None
     assert record.details["hand_error"] < 1e-3  # rad
     assert record.metrics["displacement_error"] < 0.01
     assert record.metrics["turn_error"] < 5.0
-    assert record.notes.sample == ("arm_pushes", task.run(record.seed).number)
+    assert record.notes.sample == ("arm_pushes", task.real(record.seed).number)
     assert record.settings["task.half"] == "held_out"
     assert record.settings["task.calibrated_on"] == "CubeExp 1, 5, 9, 13, 17, 33"
     assert task.references["displacement"] == pytest.approx(0.095, abs=0.003)
@@ -83,7 +81,7 @@ def test_each_metric_is_of_its_axis_and_turns_are_within_half_a_turn() -> None:
     def way(x: float, y: float, turn: float, rows: int = 101) -> FloatArray:
         shares = np.minimum(np.linspace(0.0, 100.0 / 101 * rows, rows) / 50.0, 1.0)
         poses = (Pose.at(s * x, 0.2 + s * y, 0.02, yaw=np.radians(170 + s * turn)) for s in shares)
-        return np.array([world_start(pose) for pose in poses])
+        return np.array([pose.as_array() for pose in poses])
 
     metrics, details = compared(way(0.08, 0.05, -10.0), way(0.1, 0.0, 30.0))
     assert metrics["displacement"] == pytest.approx(0.08)

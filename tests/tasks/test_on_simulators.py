@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import pytest
 
@@ -14,10 +14,9 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.records.record import Record
-from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.tasks import Jitter, Stacking, Throwing
+from pytest_simbench.tasks import Stacking, Throwing
 from tests.conftest import ADAPTERS, able_to, case_of
 
 THROW = Throwing(settle=1.0)
@@ -52,7 +51,6 @@ def test_the_throw_hits(any_case: Case) -> None:
     assert error is None
     assert record.metrics["hit"] == 1.0
     assert record.metrics["lost_in_transit"] == 0.0
-    assert record.metrics["landing_error"] is not None
     # within 3 cm; Genesis' contacts are softer (docs/engines/genesis.md)
     assert record.metrics["landing_error"] < (0.05 if any_case.simulator == "genesis" else 0.03)
 
@@ -69,26 +67,6 @@ DRAWN = [
     if name in able_to(Capability.DETERMINISTIC) and not adapter(name).info.costly_start
 ]
 """Of a slow engine the kit asks the same with a shorter motion (`window_changes_nothing`)."""
-
-
-@dataclass(frozen=True)
-class FarAway(Stacking):
-    """Half of the cubes lie where the arm cannot reach them."""
-
-    def scene(self, seed: int, jitter: Jitter) -> Scene:
-        scene = super().scene(seed, jitter)
-        for k in range(1, 21, 2):
-            scene = scene.with_pose(f"cube_{k:02d}", Pose.at(-2.0, 0.2 * k, 0.025))
-        return scene
-
-
-def test_unreachable_cubes_are_counted_and_the_task_goes_on(case: Case) -> None:
-    record, error = Repetition(Experiment(case, FarAway(towers=1, levels=3, settle=0.5)), 3).run()
-    assert error is None
-    failed = record.details["failed_picks"]
-    assert record.metrics["failed_picks"] == len(failed) >= 1
-    assert all(pick["reason"].startswith("unreachable: tool at (-2.000") for pick in failed)
-    assert record.metrics["at_end_strict"] == 1.0
 
 
 @pytest.mark.skipif(shutil.which("Xvfb") is None, reason="no Xvfb: apt-get install xvfb")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pytest_simbench.data import DataMissing, Toss, Tosses, read
+from pytest_simbench.data import Toss, Tosses
 from pytest_simbench.data.tosses import EDGE, RATE
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.executor import LocalExecutor
@@ -19,7 +19,7 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray
 from pytest_simbench.tasks import Jitter, Tossing
 from pytest_simbench.tasks.tossing import off
-from tests.conftest import case_of
+from tests.conftest import case_of, measured
 
 SPIN = np.array([3.0, -7.0, 5.0])
 """[rad/s], in the body and, since all of a cube's moments are equal, in the world."""
@@ -69,15 +69,15 @@ def test_samples_are_taken_between_steps_and_the_last_state_holds() -> None:
 def test_consecutive_seeds_go_through_the_tosses_of_a_half_once() -> None:
     task = Tossing(FLIGHTS)
     assert task.repetitions == 2
-    assert {task.toss(seed).index for seed in range(2022, 2024)} == {1, 3}
-    assert task.sample(2022) == ("cube_tosses", task.toss(2022).index)
-    assert Tossing(FLIGHTS, half="chosen_on").toss(2022).index == 2
+    assert {task.real(seed).index for seed in range(2022, 2024)} == {1, 3}
+    assert task.sample(2022) == ("cube_tosses", task.real(2022).index)
+    assert Tossing(FLIGHTS, half="chosen_on").real(2022).index == 2
     assert Tossing(FLIGHTS, most=1).repetitions == 1
 
 
 def test_the_scene_starts_as_the_toss_did_and_is_not_disturbed() -> None:
     task = Tossing(FLIGHTS)
-    toss = task.toss(5)
+    toss = task.real(5)
     (box,) = task.scene(5, Jitter()).bodies
     assert box.pose == toss.start
     assert box.linear_velocity == (1.0, -0.5, 0.0)
@@ -127,10 +127,7 @@ def test_a_free_flight_is_the_closed_form_and_one_worker_serves_all(case: Case, 
 
 @pytest.mark.parametrize("name", ["mujoco", "pybullet"])
 def test_real_tosses_end_near_where_they_ended(case: Case, name: str) -> None:
-    try:
-        tosses = read("cube_tosses")
-    except DataMissing as error:
-        pytest.skip(str(error))
+    tosses = measured("cube_tosses")
     real = replace(case_of(case, name), profile="real")
     records = tossed(real, Tossing(tosses), range(1, 13))
     errors = [record.metrics["position_error"] for record in records]
@@ -143,10 +140,7 @@ def test_real_tosses_end_near_where_they_ended(case: Case, name: str) -> None:
 
 def test_without_friction_the_cube_slides_on(case: Case) -> None:
     """The score is of the physics: a wrong coefficient is seen."""
-    try:
-        tosses = read("cube_tosses")
-    except DataMissing as error:
-        pytest.skip(str(error))
+    tosses = measured("cube_tosses")
     good, bad = (
         np.mean([r.metrics["position_error"] for r in tossed(case, task, range(1, 7))])
         for task in (Tossing(tosses), Tossing(tosses, friction=0.0))
