@@ -12,8 +12,7 @@ from scipy.integrate import quad
 
 from pytest_simbench.client.world import World
 from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, watch
-from pytest_simbench.laws.joints import Y
-from pytest_simbench.laws.mechanisms import MOUNT, Part, mechanism
+from pytest_simbench.laws.mechanisms import MOUNT, Part, Y, mechanism
 from pytest_simbench.scene import FloatArray, Scene, Vector3
 from pytest_simbench.simulator import Capability
 
@@ -102,9 +101,7 @@ def passages(plates: int) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class DominoWave(
-    Law, name="domino_wave", phenomenon="mechanisms", quantity="speed of the wave", unit="m/s"
-):
+class DominoWave(Law, phenomenon="mechanisms", quantity="speed of the wave", unit="m/s"):
     """In a row of plates hinged at their feet each strikes the next, inelastically, and all that
     fell stay together and push: a train of one degree of freedom between impacts (van Leeuwen, The
     domino effect, Am. J. Phys. 78, 721, 2010, without friction; `passages`). The speed is that from

@@ -10,31 +10,9 @@ import numpy as np
 from scipy.optimize import brentq
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import (
-    GRAVITY,
-    Law,
-    Reading,
-    Watched,
-    stillness,
-    watched,
-)
-from pytest_simbench.laws.mechanisms import Part, mechanism
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, follow, stillness
+from pytest_simbench.laws.mechanisms import STRONG, Part, mechanism
 from pytest_simbench.scene import Scene, Trajectory
-
-STRONG = 1e4
-"""Effort limit of a drive that is to obey its law [N m]."""
-
-
-def follow(world: World, rows: Trajectory) -> Watched:
-    """Have the drives follow, and see every step.
-
-    Raises:
-        ValueError: the engine told no step.
-    """
-    motion = world.follow(rows, log_period=0.0)
-    if motion is None or not len(motion):
-        raise ValueError("a motion was asked for step by step, and none came back")
-    return watched(motion)
 
 
 def held(position: float, seconds: float, velocity: float = 0.0, effort: float = 0.0) -> Trajectory:
@@ -60,7 +38,7 @@ class _Driven(Law, phenomenon="joints", quantity="angle", unit="rad"):
 
 
 @dataclass(frozen=True)
-class StepResponse(_Driven, name="step_response"):
+class StepResponse(_Driven):
     """A critically damped drive that is told to go from x0 to 0 is at x0 (1 + w t) exp(-w t), with
     w^2 = k / I. Tolerance: |v| dt + |a| t dt at the largest, x0 w / e and x0 w^2."""
 
@@ -82,7 +60,7 @@ class StepResponse(_Driven, name="step_response"):
 
 
 @dataclass(frozen=True)
-class SpringAndDamper(_Driven, name="spring_damper"):
+class SpringDamper(_Driven):
     """A weakly damped one swings: x0 exp(-z w t) (cos(u t) + z w / u sin(u t)), u = w sqrt(1 -
     z^2). Tolerance as of `StepResponse`, with |v| up to x0 w."""
 
@@ -105,7 +83,7 @@ class SpringAndDamper(_Driven, name="spring_damper"):
 
 
 @dataclass(frozen=True)
-class EffortLimit(_Driven, name="effort_limit"):
+class EffortLimit(_Driven):
     """A drive told to go far away pushes with its limit and no more: x = (F / I) t^2 / 2.
     Tolerance: (F / I) t dt."""
 
@@ -122,7 +100,7 @@ class EffortLimit(_Driven, name="effort_limit"):
 
 
 @dataclass(frozen=True)
-class Tracking(_Driven, name="tracking"):
+class Tracking(_Driven):
     """A drive that is told position and velocity of a steady turn follows it: x = v t (1 - exp(-w
     t)) from rest, critically damped. Tolerance: late by one step, and a set point of the end of
     each step holds from its beginning on: 2 v dt."""
@@ -142,7 +120,7 @@ class Tracking(_Driven, name="tracking"):
 
 
 @dataclass(frozen=True)
-class Sag(Law, name="sag", phenomenon="joints", quantity="angle", unit="rad"):
+class Sag(Law, phenomenon="joints", quantity="angle", unit="rad"):
     """A level rod on a spring sags until k x = m g l cos x. Tolerance: what gravity turns it by
     within one step, (g / l) dt^2, and rounding."""
 
@@ -163,7 +141,7 @@ class Sag(Law, name="sag", phenomenon="joints", quantity="angle", unit="rad"):
 
 
 @dataclass(frozen=True)
-class FeedForward(Sag, name="feed_forward"):
+class FeedForward(Sag):
     """The same rod is told the torque that gravity asks for, m g l: it stays level. Tolerance as
     of `Sag`."""
 

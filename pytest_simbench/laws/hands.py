@@ -7,13 +7,20 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, rounding, stillness
+from pytest_simbench.laws.base import (
+    GRAVITY,
+    Law,
+    Reading,
+    Watched,
+    follow,
+    rounding,
+    solved,
+    stillness,
+)
 from pytest_simbench.laws.contact import tilt
-from pytest_simbench.laws.drives import STRONG, follow
-from pytest_simbench.laws.mechanisms import Part, mechanism
+from pytest_simbench.laws.mechanisms import STRONG, Part, mechanism
 from pytest_simbench.laws.sticking import SHARES, fan
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
@@ -86,32 +93,7 @@ class _Grip(Law, phenomenon="grasping"):
 
 
 @dataclass(frozen=True)
-class GripSlips(_Grip, name="grip_slips", quantity="acceleration", unit="m/s^2"):
-    """Two fingers that press with F carry 2 mu F and no more (Coulomb): a cube of 1.15 times that
-    weight slips down with a = g - 2 mu F / m. Tolerance: its speed is late by one step at either
-    end of the time T over which it is taken: 2 g dt / T."""
-
-    load: float = 1.15
-
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, self.close())
-        along = seen.bodies[:, 0, 7:10] @ np.array(self.pull()) / GRAVITY
-        used = (seen.t > 0.06) & (seen.t < 0.22)
-        found = float(np.polyfit(seen.t[used], along[used], 1)[0])
-        allowed = 2 * GRAVITY * seen.dt / 0.16 + rounding(1.0, seen.steps)
-        return Reading(found, GRAVITY * (1 - 1 / self.load), allowed)
-
-
-@dataclass(frozen=True)
-class GripSlipsDiagonally(GripSlips, name="grip_slips_diagonally"):
-    """The same when the load pulls at 45 degrees, within the plane of the fingers: a friction
-    pyramid holds up to sqrt(2) times as much there."""
-
-    aside: ClassVar[float] = math.pi / 4
-
-
-@dataclass(frozen=True)
-class GripHolds(_Grip, name="grip_holds", quantity="way in the hand in 0.35 s", unit="m"):
+class GripHolds(_Grip, quantity="way in the hand in 0.35 s", unit="m"):
     """A cube of 0.8 times what the fingers carry stays where it is in the hand, from 0.15 s on.
     Tolerance: an equilibrium, g dt^2."""
 
@@ -130,6 +112,31 @@ class GripHolds(_Grip, name="grip_holds", quantity="way in the hand in 0.35 s", 
 
         way = float(np.linalg.norm(in_hand(-1) - in_hand(int(np.argmax(seen.t > 0.15)))))
         return Reading(way, 0.0, stillness(seen.dt, 0.5))
+
+
+@dataclass(frozen=True)
+class GripSlips(_Grip, quantity="acceleration", unit="m/s^2"):
+    """Two fingers that press with F carry 2 mu F and no more (Coulomb): a cube of 1.15 times that
+    weight slips down with a = g - 2 mu F / m. Tolerance: its speed is late by one step at either
+    end of the time T over which it is taken: 2 g dt / T."""
+
+    load: float = 1.15
+
+    def measure(self, world: World) -> Reading:
+        seen = follow(world, self.close())
+        along = seen.bodies[:, 0, 7:10] @ np.array(self.pull()) / GRAVITY
+        used = (seen.t > 0.06) & (seen.t < 0.22)
+        found = float(np.polyfit(seen.t[used], along[used], 1)[0])
+        allowed = 2 * GRAVITY * seen.dt / 0.16 + rounding(1.0, seen.steps)
+        return Reading(found, GRAVITY * (1 - 1 / self.load), allowed)
+
+
+@dataclass(frozen=True)
+class GripSlipsDiagonally(GripSlips):
+    """The same when the load pulls at 45 degrees, within the plane of the fingers: a friction
+    pyramid holds up to sqrt(2) times as much there."""
+
+    aside: ClassVar[float] = math.pi / 4
 
 
 BLOCK: Vector3 = (0.1, 0.1, 0.1)
@@ -163,7 +170,7 @@ class _Push(Law, phenomenon="pushing", unit="m"):
 
 
 @dataclass(frozen=True)
-class PushForce(_Push, name="push_force", quantity="lag of the bar"):
+class PushForce(_Push, quantity="lag of the bar"):
     """The bar hangs on a spring that pulls it on: it lags behind by mu m g / k while it pushes a
     block steadily (Coulomb, Hooke). Tolerance: what gravity moves within one step, g dt^2, and the
     bar late by two steps, as of `Tracking`: 2 v dt."""
@@ -177,7 +184,7 @@ class PushForce(_Push, name="push_force", quantity="lag of the bar"):
 
 
 @dataclass(frozen=True)
-class PushStraight(_Push, name="push_straight", quantity="distance from its place at the bar"):
+class PushStraight(_Push, quantity="distance from its place at the bar"):
     """A block that is pushed in its middle stays at the bar: it neither runs ahead, nor turns, nor
     is it entered. Tolerance as of `PushForce`."""
 
@@ -187,46 +194,6 @@ class PushStraight(_Push, name="push_straight", quantity="distance from its plac
         off = float(np.linalg.norm(seen.bodies[-1, 0, :2] - place))
         allowed = 2 * self.speed * seen.dt + stillness(seen.dt, 0.1)
         return Reading(off, 0.0, allowed)
-
-
-@dataclass(frozen=True)
-class PushTips(
-    Law, name="push_tips", phenomenon="pushing", quantity="depth at which it tips", unit="m"
-):
-    """A block that is pushed at the height h slides when its depth is more than 2 mu h / (1 + mu^2)
-    and tips when it is less, all friction alike: the ground pulls with F = mu N, the bar holds its
-    back down with mu F, and torques are taken about its front edge. Six depths, pushed by one bar.
-    Turned by 0.05 rad it has tipped. Tolerance: half of the gap between the depths on either side;
-    no step."""
-
-    friction: float = 0.5
-    height: float = 0.2
-    seconds: float = 0.6
-
-    @property
-    def critical(self) -> float:
-        """Depth [m]."""
-        return 2 * self.friction * self.height / (1 + self.friction**2)
-
-    def build(self) -> Scene:
-        bar = Part(
-            "bar", (1.0, 0.0, 0.0), mass=20.0, inertia=(5.0,) * 3, slides=True,
-            shape=(0.05, 1.2, 0.004), stiffness=1e5, damping=4e3, effort=STRONG,
-        )  # fmt: skip
-        at = Pose.at(0.0, 0.0, self.height)
-        robot = mechanism("ram", bar, base=at, friction=self.friction)
-        blocks = []
-        for k, share in enumerate(SHARES):
-            depth = share * self.critical
-            place = Pose.at(0.025 + depth / 2, 0.2 * (k - 2.5), 0.15)
-            blocks.append(Box(f"block {k}", (depth, 0.1, 0.3), place, 0.5, self.friction))
-        return Scene(self.name, tuple(blocks), robot, ground_friction=self.friction)
-
-    def measure(self, world: World) -> Reading:
-        time = np.array([[0.0], [self.seconds]])
-        speed = np.full((2, 1), 0.1)
-        follow(world, Trajectory(self.seconds, 0.1 * time, speed, 0 * speed))
-        return fan(self.critical, [tilt(row) < 0.05 for row in world.bodies])
 
 
 SIDE, HEIGHT = 0.2, 0.04
@@ -243,7 +210,7 @@ FEET: FloatArray = np.array([[-INSIDE, -SIDE / 2], [-INSIDE, SIDE / 2], [2 * INS
 
 
 @dataclass(frozen=True)
-class PushTurns(Law, name="push_turns", phenomenon="pushing", quantity="angle turned", unit="rad"):
+class PushTurns(Law, phenomenon="pushing", quantity="angle turned", unit="rad"):
     """A block that slides is pushed beside its centre, and turns as its limit surface says.
 
     The friction that the ground can give a sliding body is a surface in the space of force and
@@ -308,10 +275,9 @@ class PushTurns(Law, name="push_turns", phenomenon="pushing", quantity="angle tu
         def change(_: float, state: FloatArray) -> FloatArray:
             return np.concatenate([state[3:], self.acceleration(state[2], state[3:])])
 
-        times, start = np.linspace(0.0, seconds, 100), [0.0, 0.0, 0.0, self.speed, 0.0, 0.0]
-        found = solve_ivp(change, (0.0, seconds), start, "DOP853", times, rtol=1e-9, atol=1e-12).y
-        pulled = [self.acceleration(state[2], state[3:])[2] for state in found.T]
-        return np.array([found[2], found[5], pulled])
+        found = solved(change, [0.0, 0.0, 0.0, self.speed, 0.0, 0.0], seconds, 100, 1e-9)
+        pulled = [self.acceleration(state[2], state[3:])[2] for state in found]
+        return np.array([found[:, 2], found[:, 5], pulled])
 
     def read(self, seen: Watched) -> Reading:
         row, time = seen.bodies[-1, 0], seen.end
@@ -319,3 +285,41 @@ class PushTurns(Law, name="push_turns", phenomenon="pushing", quantity="angle tu
         allowed = (abs(rate[-1]) + float(np.abs(pulled).max()) * time) * seen.dt
         found = 2 * math.atan2(float(row[6]), float(row[3]))
         return Reading(found, float(angle[-1]), float(allowed) + rounding(1.0, seen.steps))
+
+
+@dataclass(frozen=True)
+class PushTips(Law, phenomenon="pushing", quantity="depth at which it tips", unit="m"):
+    """A block that is pushed at the height h slides when its depth is more than 2 mu h / (1 + mu^2)
+    and tips when it is less, all friction alike: the ground pulls with F = mu N, the bar holds its
+    back down with mu F, and torques are taken about its front edge. Six depths, pushed by one bar.
+    Turned by 0.05 rad it has tipped. Tolerance: half of the gap between the depths on either side;
+    no step."""
+
+    friction: float = 0.5
+    height: float = 0.2
+    seconds: float = 0.6
+
+    @property
+    def critical(self) -> float:
+        """Depth [m]."""
+        return 2 * self.friction * self.height / (1 + self.friction**2)
+
+    def build(self) -> Scene:
+        bar = Part(
+            "bar", (1.0, 0.0, 0.0), mass=20.0, inertia=(5.0,) * 3, slides=True,
+            shape=(0.05, 1.2, 0.004), stiffness=1e5, damping=4e3, effort=STRONG,
+        )  # fmt: skip
+        at = Pose.at(0.0, 0.0, self.height)
+        robot = mechanism("ram", bar, base=at, friction=self.friction)
+        blocks = []
+        for k, share in enumerate(SHARES):
+            depth = share * self.critical
+            place = Pose.at(0.025 + depth / 2, 0.2 * (k - 2.5), 0.15)
+            blocks.append(Box(f"block {k}", (depth, 0.1, 0.3), place, 0.5, self.friction))
+        return Scene(self.name, tuple(blocks), robot, ground_friction=self.friction)
+
+    def measure(self, world: World) -> Reading:
+        time = np.array([[0.0], [self.seconds]])
+        speed = np.full((2, 1), 0.1)
+        follow(world, Trajectory(self.seconds, 0.1 * time, speed, 0 * speed))
+        return fan(self.critical, [tilt(row) < 0.05 for row in world.bodies])

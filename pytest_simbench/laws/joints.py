@@ -1,4 +1,4 @@
-"""Laws of joints that move freely, pendulums and sliders, and of what a joint transmits."""
+"""Laws of joints that move freely, pendulums and sliders."""
 
 from __future__ import annotations
 
@@ -7,19 +7,14 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
-from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, LONG, Law, Reading, Watched, rounding, watch
-from pytest_simbench.laws.mechanisms import INERTIA_OF_A_POINT, MOUNT, Part, mechanism
+from pytest_simbench.laws.base import GRAVITY, LONG, Law, Reading, Watched, solved
+from pytest_simbench.laws.mechanisms import INERTIA_OF_A_POINT, MOUNT, Part, Y, mechanism
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Scene, Vector3
-from pytest_simbench.simulator import Capability
-
-Y: Vector3 = (0.0, 1.0, 0.0)
 
 
-class Passive(Law, phenomenon="joints"):
+class Passive(Law, name="", phenomenon="joints"):
     """A mechanism without drives that falls under gravity."""
 
     gravity: ClassVar[Vector3] = STANDARD_GRAVITY
@@ -46,10 +41,7 @@ class Passive(Law, phenomenon="joints"):
             return np.concatenate([v, pin.aba(model, data, q, v, no_effort)])
 
         start = np.concatenate([robot.column("initial_position"), np.zeros(n)])
-        times = np.linspace(0.0, seconds, 200)
-        found = solve_ivp(
-            change, (0.0, seconds), start, "DOP853", times, rtol=1e-10, atol=1e-12
-        ).y.T
+        found = solved(change, start, seconds, 200)
         bent = np.array([change(0.0, state)[n:] for state in found])
         return found[:, :n], found[:, n:], bent
 
@@ -74,7 +66,9 @@ def model_of(robot: Robot, gravity: Vector3):  # type: ignore[no-untyped-def]  #
     return model
 
 
-class Motion(Passive, quantity="largest distance of a joint from its place", unit="rad or m"):
+class Motion(
+    Passive, name="", quantity="largest distance of a joint from its place", unit="rad or m"
+):
     """Where the joints are after a time, by the equations of motion."""
 
     def read(self, seen: Watched) -> Reading:
@@ -120,7 +114,7 @@ def _period(length: float, angle: float, mass: float, inertia: float) -> float:
 
 
 @dataclass(frozen=True)
-class PendulumPeriod(Passive, name="pendulum_period", quantity="period", unit="s"):
+class PendulumPeriod(Passive, quantity="period", unit="s"):
     """A pendulum that is let go at the angle a swings with the period T = 4 sqrt(I / m g l)
     K(sin^2(a / 2)), K the complete elliptic integral of the first kind (Landau, Lifshitz,
     Mechanics, section 11). Tolerance: late by one step, at each end of the period."""
@@ -143,7 +137,7 @@ class PendulumPeriod(Passive, name="pendulum_period", quantity="period", unit="s
 
 
 @dataclass(frozen=True)
-class CompoundPendulum(PendulumPeriod, name="compound_pendulum"):
+class CompoundPendulum(PendulumPeriod):
     """A heavy body on a hinge: its moment of inertia about its centre counts (Huygens, Steiner):
     I = m l^2 + I_c. Tolerance as of `PendulumPeriod`."""
 
@@ -163,9 +157,7 @@ class CompoundPendulum(PendulumPeriod, name="compound_pendulum"):
 
 
 @dataclass(frozen=True)
-class TwoPendulums(
-    Passive, name="two_pendulums", quantity="larger error of the two periods", unit="s"
-):
+class TwoPendulums(Passive, quantity="larger error of the two periods", unit="s"):
     """Two pendulums that hang on one fixed mount do not know of each other (Newton: what cannot
     move transmits no motion): each swings with its own period, that of `PendulumPeriod`, whatever
     the other's length, mass and swing. Tolerance as there."""
@@ -204,7 +196,7 @@ class TwoPendulums(
 
 
 @dataclass(frozen=True)
-class PendulumEnergy(_Energy, name="pendulum_energy"):
+class PendulumEnergy(_Energy):
     """The energy of a pendulum that swings by 1.5 rad stays what it was. Tolerance: the potential
     energy is late by one step against the kinetic one, P dt with P the largest power; a symplectic
     method of the first order is off by half of that, and does not drift (Hairer, Lubich, Wanner,
@@ -217,7 +209,7 @@ class PendulumEnergy(_Energy, name="pendulum_energy"):
 
 
 @dataclass(frozen=True)
-class PendulumEnergyDrift(PendulumEnergy, name="pendulum_energy_drift"):
+class PendulumEnergyDrift(PendulumEnergy):
     """Over 100 periods the energy of that pendulum stays what it was, too. Tolerance as of
     `PendulumEnergy`, whatever the number of periods: what a symplectic method is off by swings with
     the pendulum and does not add up. Only rounding does. The protocol `smoke` takes 4 periods."""
@@ -231,7 +223,7 @@ class PendulumEnergyDrift(PendulumEnergy, name="pendulum_energy_drift"):
 
 
 @dataclass(frozen=True)
-class DoublePendulum(Motion, name="double_pendulum"):
+class DoublePendulum(Motion):
     """Two pendulums, one hung on the other (Lagrange), against the equations of motion. Tolerance:
     late by one step, and a velocity that is late by one step all the time: |v| dt + |a| t dt."""
 
@@ -244,7 +236,7 @@ class DoublePendulum(Motion, name="double_pendulum"):
 
 
 @dataclass(frozen=True)
-class DoublePendulumEnergy(_Energy, name="double_pendulum_energy"):
+class DoublePendulumEnergy(_Energy):
     """The energy of a double pendulum stays what it was. Tolerance: the power is late by one step
     all the time, the step times the sum of its changes. Its mass matrix changes with its position,
     so that semi-implicit Euler is not symplectic, and the bound of `PendulumEnergy` does not
@@ -260,7 +252,7 @@ class DoublePendulumEnergy(_Energy, name="double_pendulum_energy"):
 
 
 @dataclass(frozen=True)
-class SwingingSlider(Motion, name="swinging_slider"):
+class SwingingSlider(Motion):
     """A mass slides without friction along a rod that swings: Coriolis force, centrifugal force and
     gravity, r'' = r q'^2 + g cos q, (I + m r^2) q'' = -m g r sin q - 2 m r r' q'. Tolerance as of
     `DoublePendulum`."""
@@ -273,7 +265,7 @@ class SwingingSlider(Motion, name="swinging_slider"):
 
 
 @dataclass(frozen=True)
-class SphericalPendulum(Motion, name="spherical_pendulum"):
+class SphericalPendulum(Motion):
     """A bob on two crossed hinges that moves out of their planes: gyroscopic terms of three
     dimensions, against the equations of motion. Tolerance as of `DoublePendulum`."""
 
@@ -284,92 +276,3 @@ class SphericalPendulum(Motion, name="spherical_pendulum"):
     def parts(self) -> tuple[Part, ...]:
         bob = Part("across", Y, centre=(0.0, 0.1, -0.5), start=0.3, inertia=(0.02, 0.04, 0.03))
         return Part("along", (1.0, 0.0, 0.0), start=0.8), bob
-
-
-LOOKS = 20
-"""How often the joint is asked, at even times."""
-
-MASS = 2.0
-"""Of the bob [kg]."""
-
-
-@dataclass(frozen=True)
-class _Loaded(Passive, phenomenon="mechanisms"):
-    """A pendulum whose bob hangs aside of its plane: its hinge carries a force, and a torque
-    across its axis."""
-
-    needs: ClassVar[tuple[Capability, ...]] = (Capability.JOINT_WRENCHES,)
-
-    length: ClassVar[float] = 0.5
-    aside: ClassVar[float] = 0.3
-    angle: ClassVar[float] = 2.0
-
-    seconds: float = 1.2
-
-    def parts(self) -> tuple[Part, ...]:
-        centre = (0.0, self.aside, -self.length)
-        return (Part("swing", Y, centre=centre, mass=MASS, start=self.angle),)
-
-    @property
-    def slow(self) -> float:
-        """m g l / I about the hinge [1/s^2]."""
-        return MASS * GRAVITY * self.length / (MASS * self.length**2 + INERTIA_OF_A_POINT)
-
-    def carried(self, angle: float) -> FloatArray:
-        """The hinge's wrench on the rod at an angle [rad] while it swings, (6,).
-
-        Newton: F = m (a - g) with the bob's acceleration, along and across the rod; the speed of
-        the swing is that of energy conservation. Of the torque about the hinge, the part about its
-        axis is 0, and that across it is the bob's way aside times F.
-        """
-        bend = -self.slow * math.sin(angle)
-        inward = np.array([math.sin(angle), 0.0, math.cos(angle)])
-        onward = np.array([-math.cos(angle), 0.0, math.sin(angle)])
-        acceleration = self.length * (self.rate(angle) ** 2 * inward + bend * onward)
-        force = MASS * (acceleration + np.array([0.0, 0.0, GRAVITY]))
-        torque = np.cross([0.0, self.aside, 0.0], force)
-        return np.concatenate([force, torque])
-
-    def rate(self, angle: float) -> float:
-        """Of the swing at an angle, by energy conservation [rad/s], (its size)."""
-        fallen = math.cos(angle) - math.cos(self.angle)
-        return math.sqrt(max(0.0, 2 * self.slow * fallen))
-
-    def compare(self, world: World, which: slice) -> Reading:
-        """The largest error of force or torque, and by how much they change in a step."""
-        errors = []
-        for _ in range(LOOKS):
-            dt = watch(world, self.seconds / LOOKS).dt
-            told = world.joint_wrenches()[0] - self.carried(float(world.joints[0, 0]))
-            errors.append(float(np.linalg.norm(told[which])))
-        angles = np.linspace(-self.angle, self.angle, 401)
-        right = np.array([self.carried(angle)[which] for angle in angles])
-        bend = np.linalg.norm(np.gradient(right, angles, axis=0), axis=1)
-        fastest = max(a * self.rate(angle) for a, angle in zip(bend, angles, strict=True))
-        scale = float(np.linalg.norm(right, axis=1).max())
-        return Reading(max(errors), 0.0, 2 * float(fastest) * dt + rounding(scale, 1))
-
-
-@dataclass(frozen=True)
-class PendulumForce(
-    _Loaded, name="pendulum_force", quantity="largest error of the hinge's force", unit="N"
-):
-    """The hinge of a pendulum carries F = m (a - g): along the rod m g cos q + m l w^2, and across
-    it what an inertia about the bob's centre asks for (Newton; Huygens, Horologium oscillatorium,
-    1673). Tolerance: what is told is of the last step, whose begin is one step ago, and the speed
-    was late by one then: two steps, 2 dt times the largest |dF/dt| of the swing."""
-
-    def measure(self, world: World) -> Reading:
-        return self.compare(world, slice(0, 3))
-
-
-@dataclass(frozen=True)
-class PendulumTorque(
-    _Loaded, name="pendulum_torque", quantity="largest error of the hinge's torque", unit="N m"
-):
-    """The hinge of a pendulum whose bob hangs aside of its plane carries a torque across its axis,
-    the bob's way aside times the force, and none about it (Euler's second law). Tolerance as of
-    `PendulumForce`, of the torque."""
-
-    def measure(self, world: World) -> Reading:
-        return self.compare(world, slice(3, 6))

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from pytest_simbench.description.links import ends, reduced
-from pytest_simbench.laws.base import Reading, Watched, rounding
-from pytest_simbench.laws.joints import Motion, Passive, Y, model_of
-from pytest_simbench.laws.mechanisms import MOUNT, Part, mechanism
+from pytest_simbench.laws.base import Reading, Watched, rounding, solved
+from pytest_simbench.laws.joints import Motion, Passive, model_of
+from pytest_simbench.laws.mechanisms import MOUNT, Part, Y, mechanism
 from pytest_simbench.scene import Closure, FloatArray, Scene, Vector3
 from pytest_simbench.simulator import Capability, PreparedRobot
 
@@ -84,12 +83,10 @@ class _FourBar(Passive, phenomenon="mechanisms"):
             v_slope = (potential(s + H) - potential(s - H)) / (2 * H)
             return [rate, -(v_slope + m_slope * rate**2 / 2) / inertia(s)]
 
-        times = np.linspace(0.0, seconds, 200)
-        start = [self.crank, 0.0]
-        s, rate = solve_ivp(change, (0.0, seconds), start, "DOP853", times, rtol=1e-8, atol=1e-10).y
+        s, rate = solved(change, [self.crank, 0.0], seconds, 200, 1e-8).T
         q = np.array([four_bar(value) for value in s])
         v = np.array([slope(value) for value in s]) * rate[:, None]
-        return q, v, np.gradient(v, times, axis=0)
+        return q, v, np.gradient(v, seconds / 199, axis=0)
 
 
 def four_bar(crank: float) -> FloatArray:
@@ -115,9 +112,7 @@ def slope(crank: float) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class FourBarClosure(
-    _FourBar, name="four_bar_closure", quantity="largest opening of the loop", unit="mm"
-):
+class FourBarClosure(_FourBar, quantity="largest opening of the loop", unit="mm"):
     """A loop stays closed: in a four-bar linkage that swings, the coupler's end is where the
     rocker's is (Freudenstein, Approximate synthesis of four-bar linkages, 1955: the loop equation).
     Tolerance: one end is late by one step, the speed of the crank's end times dt; rounding of one
@@ -139,7 +134,7 @@ class FourBarClosure(
 
 
 @dataclass(frozen=True)
-class FourBarSwing(_FourBar, Motion, name="four_bar_swing"):
+class FourBarSwing(_FourBar, Motion):
     """A four-bar linkage that is let go swings as its one degree of freedom has it: Lagrange's
     equation of the crank's angle, coupler and rocker by the loop equation. Tolerance as of
     `DoublePendulum`."""

@@ -22,6 +22,11 @@ FREE = 1e-6
 than a millionth of all that acts here. Of 0, engines that divide by a stiffness make no number, and
 others no drive; one whose drives are no springs needs the small effort."""
 
+STRONG = 1e4
+"""Effort limit of a drive that is to obey its law [N m]."""
+
+Y: Vector3 = (0.0, 1.0, 0.0)
+
 MOUNT = "mount"
 """The part that is fixed in the world."""
 

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, stillness, watch
-from pytest_simbench.laws.drives import STRONG, follow
-from pytest_simbench.laws.mechanisms import Part, mechanism
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, follow, rounding, stillness, watch
+from pytest_simbench.laws.mechanisms import STRONG, Part, mechanism
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Trajectory, Vector3
 
 SLAB: Vector3 = (0.1, 0.1, 0.02)
@@ -74,12 +73,8 @@ def acceleration(
 
 
 @dataclass(frozen=True)
-class StickAngle(
-    Law,
-    name="stick_angle_x",
-    phenomenon="sticking",
-    quantity="tangent of the steepest slope that holds",
-    unit="",
+class StickAngleX(
+    Law, phenomenon="sticking", quantity="tangent of the steepest slope that holds", unit=""
 ):
     """A slab on a slope stays up to the angle atan mu and slides above it (Coulomb; Amontons): six
     slopes, from 0.92 to 1.08 mu. It slides where it has gone half as far as the least steep one
@@ -110,14 +105,14 @@ class StickAngle(
 
 
 @dataclass(frozen=True)
-class StickAngleAcross(StickAngle, name="stick_angle_y"):
+class StickAngleY(StickAngleX):
     """The same in the direction y."""
 
     direction: float = math.pi / 2
 
 
 @dataclass(frozen=True)
-class StickAngleDiagonal(StickAngle, name="stick_angle_diagonal"):
+class StickAngleDiagonal(StickAngleX):
     """The same along a diagonal, where a friction pyramid holds up to sqrt(2) mu, or only up to
     mu / sqrt(2)."""
 
@@ -125,7 +120,7 @@ class StickAngleDiagonal(StickAngle, name="stick_angle_diagonal"):
 
 
 @dataclass(frozen=True)
-class Creep(Law, name="creep", phenomenon="sticking", quantity="way in 1 s", unit="m"):
+class Creep(Law, phenomenon="sticking", quantity="way in 1 s", unit="m"):
     """A slab on a slope of 0.8 mu stays where it is. Tolerance: an equilibrium, g dt^2; it is
     looked at from 0.2 s on."""
 
@@ -144,7 +139,7 @@ class Creep(Law, name="creep", phenomenon="sticking", quantity="way in 1 s", uni
 
 
 @dataclass(frozen=True)
-class Carried(Law, name="carried", phenomenon="sticking", quantity="way on the carriage", unit="m"):
+class Carried(Law, phenomenon="sticking", quantity="way on the carriage", unit="m"):
     """A box on a carriage that starts with less than mu g goes with it: it stays where it lies on
     the carriage. Tolerance: an equilibrium in the carriage's frame, g dt^2, and the carriage's
     motion late by one step, a dt^2."""

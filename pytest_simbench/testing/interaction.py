@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pytest_simbench.laws.contact import DeadLanding
+from pytest_simbench.laws.impact import DeadLanding
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.testing import scenes

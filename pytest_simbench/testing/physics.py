@@ -7,10 +7,16 @@ import pytest
 
 from pytest_simbench.laws.contact import RestDepth, Tower
 from pytest_simbench.laws.drives import StepResponse
-from pytest_simbench.laws.free import FallSpeed, ObliqueGravity, rotation_of
+from pytest_simbench.laws.free import (
+    FallSpeed,
+    ObliqueGravity,
+    Spin,
+    TumbleEnergy,
+    TumbleMomentum,
+    rotation_of,
+)
 from pytest_simbench.laws.rolling import RollingCylinder, SlipToRoll
 from pytest_simbench.laws.sliding import SlideDiagonal, SlideX
-from pytest_simbench.laws.spinning import Spin, TumbleEnergy, TumbleMomentum
 from pytest_simbench.laws.sticking import Creep
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes

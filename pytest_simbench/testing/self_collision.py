@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pytest_simbench.laws.joints import Y
-from pytest_simbench.laws.mechanisms import MOUNT, Part, mechanism
+from pytest_simbench.laws.mechanisms import MOUNT, Part, Y, mechanism
 from pytest_simbench.scene import FloatArray, Scene, Vector3
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing.checks import check

@@ -1,22 +1,96 @@
-"""Laws of impacts that bounce."""
+"""Laws of impacts, dead ones and such that bounce."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
 
 from pytest_simbench.client.world import World
 from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, rounding, watch
-from pytest_simbench.scene import Pose, Scene, Sphere
+from pytest_simbench.laws.contact import CUBE, EDGE
+from pytest_simbench.scene import Box, Pose, Scene, Sphere
 
 RADIUS = 0.05
 """[m]."""
 
 
 @dataclass(frozen=True)
-class BounceHeight(
-    Law, name="bounce_height", phenomenon="impact", quantity="height of the bounce", unit="m"
-):
+class LandingTime(Law, phenomenon="impact", quantity="time of the landing", unit="s"):
+    """A cube let go at the height h lands after sqrt(2 h / g): its speed is the largest then.
+    Tolerance: late by one step, and read to one step."""
+
+    height: float = 0.5
+
+    def build(self) -> Scene:
+        cube = Box("cube", CUBE, Pose.at(0.0, 0.0, EDGE / 2 + self.height), 1.0)
+        return Scene(self.name, (cube,))
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, 1.5 * math.sqrt(2 * self.height / GRAVITY))
+        found = float(seen.t[int(np.argmin(seen.bodies[:, 0, 9]))])
+        return Reading(found, math.sqrt(2 * self.height / GRAVITY), 2 * seen.dt)
+
+
+@dataclass(frozen=True)
+class DeadLanding(LandingTime, quantity="rise after the landing", unit="m"):
+    """It does not rise again: e = 0 (Newton). Tolerance: the impact is late by one step, so that
+    it is pushed out of the ground by v dt."""
+
+    def measure(self, world: World) -> Reading:
+        fall = math.sqrt(2 * self.height / GRAVITY)
+        seen = watch(world, 2 * fall)
+        landed = seen.bodies[seen.t > 1.1 * fall, 0, 2] - EDGE / 2
+        rise = max(0.0, float(landed.max()))
+        return seen.reading(rise, 0.0, GRAVITY * fall, 1.0)
+
+
+@dataclass(frozen=True)
+class _Collision(Law, phenomenon="impact", unit="m/s"):
+    """A cube hits another one that is at rest, face on face, on ground without friction."""
+
+    masses: ClassVar[tuple[float, float]] = (1.0, 2.0)
+
+    speed: float = 1.0
+
+    @property
+    def common(self) -> float:
+        """Speed of the common centre of mass [m/s]."""
+        return self.speed * self.masses[0] / sum(self.masses)
+
+    def build(self) -> Scene:
+        at = Pose.at(0.0, 0.0, EDGE / 2)
+        velocity = (self.speed, 0.0, 0.0)
+        one = Box("one", CUBE, at, self.masses[0], 0.0, linear_velocity=velocity)
+        two = Box("two", CUBE, at.translated(EDGE + 0.1), self.masses[1], 0.0)
+        return Scene(self.name, (one, two), ground_friction=0.0)
+
+
+@dataclass(frozen=True)
+class DeadCollision(_Collision, quantity="speed of the cube that was hit"):
+    """With e = 0 both go on with the common speed m1 v / (m1 + m2). Tolerance: what gravity changes
+    within one step, g dt: an impact is solved at once, whatever the step."""
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, 0.3)
+        return seen.reading(seen.bodies[-1, 1, 7], self.common, GRAVITY, 1.0)
+
+
+@dataclass(frozen=True)
+class CollisionMomentum(_Collision, quantity="speed of the common centre of mass"):
+    """Whatever else happens, momentum stays: (m1 v1 + m2 v2) / (m1 + m2) is what it was. Tolerance
+    as of `DeadCollision`."""
+
+    def measure(self, world: World) -> Reading:
+        seen = watch(world, 0.3)
+        found = float(seen.bodies[-1, :, 7] @ self.masses) / sum(self.masses)
+        return seen.reading(found, self.common, 0.0, 2.0)
+
+
+@dataclass(frozen=True)
+class BounceHeight(Law, phenomenon="impact", quantity="height of the bounce", unit="m"):
     """A ball let go at the height h rises again to e^2 h (Newton's coefficient of restitution).
     Tolerance: the impact is late by one step, in its place and in its speed, 2 v dt."""
 
@@ -48,9 +122,7 @@ class BounceHeight(
 
 
 @dataclass(frozen=True)
-class BounceRatio(
-    BounceHeight, name="bounce_ratio", quantity="second bounce over the first", unit=""
-):
+class BounceRatio(BounceHeight, quantity="second bounce over the first", unit=""):
     """Each bounce is e^2 times as high as the one before. Tolerance: twice that of a bounce, as a
     share of the first."""
 
@@ -64,9 +136,7 @@ class BounceRatio(
 
 
 @dataclass(frozen=True)
-class ElasticChain(
-    Law, name="elastic_chain", phenomenon="impact", quantity="speed of the last ball", unit="m/s"
-):
+class ElasticChain(Law, phenomenon="impact", quantity="speed of the last ball", unit="m/s"):
     """A ball hits a row of three equal ones, all elastic and without friction: the last one goes on
     with its speed, the others rest (Mariotte; Newton's cradle). The balls stand 1 cm apart, so that
     the impacts come one after the other. Tolerance: what gravity changes within one step, g dt: an
@@ -95,12 +165,8 @@ class ElasticChain(
 
 
 @dataclass(frozen=True)
-class ObliqueBounce(
-    Law,
-    name="oblique_bounce_slip",
-    phenomenon="impact",
-    quantity="level speed after the bounce",
-    unit="m/s",
+class ObliqueBounceSlip(
+    Law, phenomenon="impact", quantity="level speed after the bounce", unit="m/s"
 ):
     """A ball that hits the ground aslant, without spin, slips all the time when mu is small: its
     level speed loses mu (1 + e) v (Routh, Rigid Dynamics; Coulomb's law for impulses). Tolerance:
@@ -142,9 +208,9 @@ class ObliqueBounce(
 
 
 @dataclass(frozen=True)
-class ObliqueBounceStick(ObliqueBounce, name="oblique_bounce_stick"):
+class ObliqueBounceStick(ObliqueBounceSlip):
     """Where mu is large it sticks, and leaves rolling: 5/7 of its level speed is left, whatever mu
-    and e. Tolerance as of `ObliqueBounce`."""
+    and e. Tolerance as of `ObliqueBounceSlip`."""
 
     friction: float = 0.8
     level: float = 2.0
