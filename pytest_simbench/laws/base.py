@@ -103,12 +103,17 @@ class Law(Task):
     def build(self) -> Scene:
         """The scene."""
 
+    def commands(self) -> Trajectory | None:
+        """Set points of the drives; None: nothing is told, and `seconds` pass."""
+        return None
+
     def measure(self, world: World) -> Reading:
         """Let time pass in a freshly loaded world, and read. By default it is watched once."""
-        return self.read(watch(world, self.seconds))
+        rows = self.commands()
+        return self.read(watch(world, self.seconds) if rows is None else follow(world, rows))
 
     def read(self, seen: Watched) -> Reading:
-        """Read a motion that was watched for `seconds`, of a law that does not `measure` itself."""
+        """Read the motion that was watched, of a law that does not `measure` itself."""
         raise NotImplementedError
 
     def parameters(self) -> dict[str, Any]:
@@ -189,6 +194,12 @@ def watch(world: World, duration: float) -> Watched:
 def follow(world: World, rows: Trajectory) -> Watched:
     """The same while the drives follow set points."""
     return _watched(world.follow(rows, log_period=0.0))
+
+
+def held(position: float, seconds: float, velocity: float = 0.0, effort: float = 0.0) -> Trajectory:
+    """One joint told to be at `position` [rad or m] at the end, moving there at `velocity`."""
+    ends = np.array([[position - velocity * seconds], [position]])
+    return Trajectory(seconds, ends, np.full((2, 1), velocity), np.full((2, 1), effort))
 
 
 def _watched(motion: Motion | None) -> Watched:

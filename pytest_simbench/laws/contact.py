@@ -9,7 +9,16 @@ from typing import ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, solved, stillness, watch
+from pytest_simbench.laws.base import (
+    GRAVITY,
+    Law,
+    Reading,
+    Watched,
+    rounding,
+    solved,
+    stillness,
+    watch,
+)
 from pytest_simbench.laws.sticking import SHARES, WEDGE, fan, slope_pose
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Vector3, rotation_matrix
 from pytest_simbench.simulator import Capability
@@ -140,9 +149,8 @@ class TippingEdge(Law, phenomenon="stacking", quantity="largest overhang that st
             bodies.append(Box(f"cube {k}", CUBE, place, 1.0))
         return Scene(self.name, tuple(bodies))
 
-    def measure(self, world: World) -> Reading:
-        world.wait(self.seconds)
-        return fan(EDGE / 2, [tilt(row) > 0.05 for row in world.bodies])
+    def read(self, seen: Watched) -> Reading:
+        return fan(EDGE / 2, [tilt(row) > 0.05 for row in seen.bodies[-1]])
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.integrate import quad
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, watch
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, watch
 from pytest_simbench.laws.mechanisms import MOUNT, Part, Y, mechanism
 from pytest_simbench.scene import FloatArray, Scene, Vector3
 from pytest_simbench.simulator import Capability
@@ -125,9 +125,8 @@ class DominoWave(Law, phenomenon="mechanisms", quantity="speed of the wave", uni
         first, last = (float(times[0]) if len(times) else math.inf for times in passed)
         way, seconds = PITCH * len(exact), float(exact.sum())
         right = way / seconds
-        allowed = right * 2 * len(exact) * seen.dt / seconds
         speed = way / (last - first) if last > first else 0.0
-        return Reading(speed, right, allowed + rounding(right, seen.steps))
+        return seen.reading(speed, right, right * 2 * len(exact) / seconds, right)
 
 
 def fall() -> float:

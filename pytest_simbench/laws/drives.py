@@ -6,25 +6,21 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
 from scipy.optimize import brentq
 
-from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, follow, stillness
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, held, stillness
 from pytest_simbench.laws.mechanisms import STRONG, Part, mechanism
 from pytest_simbench.scene import Scene, Trajectory
-
-
-def held(position: float, seconds: float, velocity: float = 0.0, effort: float = 0.0) -> Trajectory:
-    """One joint told to be at `position` [rad or m] at the end, moving there at `velocity`."""
-    ends = np.array([[position - velocity * seconds], [position]])
-    return Trajectory(seconds, ends, np.full((2, 1), velocity), np.full((2, 1), effort))
 
 
 class _Driven(Law, phenomenon="joints", quantity="angle", unit="rad"):
     """A wheel of 0.5 kg m^2 on a vertical axis, and its drive."""
 
     inertia: ClassVar[float] = 0.5
+    goal: ClassVar[float] = 0.0
+
+    def commands(self) -> Trajectory:
+        return held(self.goal, self.seconds)
 
     def wheel(
         self, stiffness: float, damping: float, start: float = 0.0, effort: float = STRONG
@@ -50,8 +46,7 @@ class StepResponse(_Driven):
         k, d = self.inertia * self.rate**2, 2 * self.inertia * self.rate
         return self.wheel(k, d, self.start)
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, held(0.0, self.seconds))
+    def read(self, seen: Watched) -> Reading:
         t = seen.end
         x = self.rate * t
         exact = self.start * (1 + x) * math.exp(-x)
@@ -73,8 +68,7 @@ class SpringDamper(_Driven):
         d = 2 * self.damping * self.inertia * self.rate
         return self.wheel(self.inertia * self.rate**2, d, self.start)
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, held(0.0, self.seconds))
+    def read(self, seen: Watched) -> Reading:
         t, w, z = seen.end, self.rate, self.damping
         u = w * math.sqrt(1 - z * z)
         exact = self.start * math.exp(-z * w * t)
@@ -87,14 +81,15 @@ class EffortLimit(_Driven):
     """A drive told to go far away pushes with its limit and no more: x = (F / I) t^2 / 2.
     Tolerance: (F / I) t dt."""
 
+    goal: ClassVar[float] = 5.0
+
     effort: float = 2.0
     seconds: float = 0.5
 
     def build(self) -> Scene:
         return self.wheel(2000.0, 20.0, effort=self.effort)
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, held(5.0, self.seconds))
+    def read(self, seen: Watched) -> Reading:
         t, pull = seen.end, self.effort / self.inertia
         return seen.reading(seen.joints[-1, 0, 0], pull * t * t / 2, pull * t, 1.0)
 
@@ -112,8 +107,10 @@ class Tracking(_Driven):
     def build(self) -> Scene:
         return self.wheel(self.inertia * self.rate**2, 2 * self.inertia * self.rate)
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, held(self.speed * self.seconds, self.seconds, self.speed))
+    def commands(self) -> Trajectory:
+        return held(self.speed * self.seconds, self.seconds, self.speed)
+
+    def read(self, seen: Watched) -> Reading:
         t = seen.end
         exact = self.speed * t * (1 - math.exp(-self.rate * t))
         return seen.reading(seen.joints[-1, 0, 0], exact, 2 * self.speed, 1.0)
@@ -147,6 +144,8 @@ class FeedForward(Sag):
 
     seconds: float = 1.0
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, held(0.0, self.seconds, effort=-GRAVITY))
+    def commands(self) -> Trajectory:
+        return held(0.0, self.seconds, effort=-GRAVITY)
+
+    def read(self, seen: Watched) -> Reading:
         return Reading(float(seen.joints[-1, 0, 0]), 0.0, stillness(seen.dt, 1.0))

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, LONG, Law, Reading, Watched, rounding, solved, watch
+from pytest_simbench.laws.base import GRAVITY, LONG, Law, Reading, Watched, solved, watch
 from pytest_simbench.scene import Box, Cylinder, FloatArray, Pose, Scene, Vector3, Wrench
 
 FREE = "free motion"
@@ -135,9 +135,7 @@ class Spin(Law, phenomenon=FREE, quantity="angular velocity", unit="rad/s"):
         return Scene(self.name, (body,), gravity=WEIGHTLESS)
 
     def read(self, seen: Watched) -> Reading:
-        return Reading(
-            float(seen.bodies[-1, 0, 12]), self.spin, rounding(2 * self.spin, seen.steps)
-        )
+        return seen.reading(seen.bodies[-1, 0, 12], self.spin, 0.0, 2 * self.spin)
 
 
 @dataclass(frozen=True)
@@ -169,8 +167,7 @@ class FreeTop(Law, phenomenon=FREE, quantity="angle from the attitude", unit="ra
         moments = self.build().bodies[0].inertia()
         momentum = moments * self.omega
         change = float(np.linalg.norm(np.cross(momentum / moments[0], self.omega)))
-        allowed = (change * t + float(np.linalg.norm(self.omega))) * seen.dt
-        return Reading(float(off), 0.0, allowed + rounding(1.0, seen.steps))
+        return seen.reading(float(off), 0.0, change * t + float(np.linalg.norm(self.omega)), 1.0)
 
 
 @dataclass(frozen=True)
@@ -211,12 +208,22 @@ class _Tumble(Law, phenomenon=FREE):
         second = [(np.cross(i * change(w), w) + np.cross(i * w, change(w))) / i for w in found]
         return found, np.array(second)
 
-    def late(self, dt: float, seconds: float) -> float:
-        """By what share of itself the angular velocity may be off: the step times the sum of its
-        second derivative."""
+    def late(self, seconds: float) -> float:
+        """By what share of itself the angular velocity may be off for each second of a step: the
+        sum of its second derivative."""
         omega, second = self.fastest(seconds)
         total = float(np.linalg.norm(second, axis=1).mean()) * seconds
-        return dt * total / float(np.linalg.norm(omega, axis=1).mean())
+        return total / float(np.linalg.norm(omega, axis=1).mean())
+
+    def spun(self, seen: Watched) -> FloatArray:
+        """Angular velocity in the body's frame as it was seen, (n, 3)."""
+        rows = seen.bodies[:, 0]
+        return np.asarray(rotation_of(rows[:, 3:7]).inv().apply(rows[:, 10:]))
+
+    def energy(self, seen: Watched) -> float:
+        """By what share of itself the rotational energy is off at most."""
+        start = self.inertia @ np.square(self.omega)
+        return float(np.abs(np.square(self.spun(seen)) @ self.inertia / start - 1).max())
 
 
 @dataclass(frozen=True)
@@ -227,12 +234,7 @@ class TumbleEnergy(_Tumble, quantity="change of the energy", unit="%"):
     seconds: float = 4.0
 
     def read(self, seen: Watched) -> Reading:
-        rows = seen.bodies[:, 0]
-        omega = rotation_of(rows[:, 3:7]).inv().apply(rows[:, 10:])
-        start = float(self.inertia @ np.square(self.omega)) / 2
-        worst = float(np.abs(np.square(omega) @ self.inertia / 2 / start - 1).max())
-        allowed = 2 * self.late(seen.dt, self.seconds) + rounding(2.0, seen.steps)
-        return Reading(100 * worst, 0.0, 100 * allowed)
+        return seen.reading(100 * self.energy(seen), 0.0, 200 * self.late(self.seconds), 200.0)
 
 
 @dataclass(frozen=True)
@@ -244,13 +246,10 @@ class TumbleMomentum(_Tumble, quantity="change of the angular momentum", unit="%
 
     def read(self, seen: Watched) -> Reading:
         start = self.inertia * self.omega
-        rows = seen.bodies[:, 0]
-        turn = rotation_of(rows[:, 3:7])
-        now = turn.apply(self.inertia * turn.inv().apply(rows[:, 10:]))
+        now = rotation_of(seen.bodies[:, 0, 3:7]).apply(self.inertia * self.spun(seen))
         worst = float(np.linalg.norm(now - start, axis=1).max() / np.linalg.norm(start))
-        fastest = float(np.linalg.norm(self.omega))
-        allowed = self.late(seen.dt, self.seconds) + fastest * seen.dt + rounding(2.0, seen.steps)
-        return Reading(100 * worst, 0.0, 100 * allowed)
+        late = self.late(self.seconds) + float(np.linalg.norm(self.omega))
+        return seen.reading(100 * worst, 0.0, 100 * late, 200.0)
 
 
 @dataclass(frozen=True)
@@ -267,16 +266,10 @@ class _TumbleDrift(_Tumble):
     def smoke(self) -> Self:
         return replace(self, seconds=3.0)
 
-    def rates(self) -> tuple[FloatArray, FloatArray]:
-        """Angular velocity and acceleration in the body's frame, exactly, at even times, (n, 3)."""
+    def rates(self) -> FloatArray:
+        """Angular acceleration in the body's frame, exactly, at even times, (n, 3)."""
         omega, _ = self.fastest(self.seconds)
-        i = self.inertia
-        return omega, np.asarray(np.cross(i * omega, omega) / i)
-
-    def spun(self, seen: Watched) -> FloatArray:
-        """Angular velocity in the body's frame as it was seen, (n, 3)."""
-        rows = seen.bodies[:, 0]
-        return np.asarray(rotation_of(rows[:, 3:7]).inv().apply(rows[:, 10:]))
+        return np.asarray(np.cross(self.inertia * omega, omega) / self.inertia)
 
 
 @dataclass(frozen=True)
@@ -288,11 +281,8 @@ class TumbleEnergyDrift(_TumbleDrift, quantity="change of the energy", unit="%")
 
     def read(self, seen: Watched) -> Reading:
         start = float(self.inertia @ np.square(self.omega)) / 2
-        found = np.square(self.spun(seen)) @ self.inertia / 2
-        _, rate = self.rates()
-        share = float((np.square(rate) @ self.inertia).mean()) * self.seconds / start
-        allowed = share * seen.dt + rounding(2.0, seen.steps)
-        return Reading(100 * float(np.abs(found / start - 1).max()), 0.0, 100 * allowed)
+        share = float((np.square(self.rates()) @ self.inertia).mean()) * self.seconds / start
+        return seen.reading(100 * self.energy(seen), 0.0, 100 * share, 200.0)
 
 
 @dataclass(frozen=True)
@@ -305,10 +295,10 @@ class TumbleMomentumDrift(_TumbleDrift, quantity="change of the angular momentum
     def read(self, seen: Watched) -> Reading:
         start = float(np.linalg.norm(self.inertia * self.omega))
         found = np.linalg.norm(self.inertia * self.spun(seen), axis=1)
-        _, rate = self.rates()
-        share = float(np.square(self.inertia * rate).sum(axis=1).mean()) * self.seconds / start**2
-        allowed = share * seen.dt + rounding(2.0, seen.steps)
-        return Reading(100 * float(np.abs(found / start - 1).max()), 0.0, 100 * allowed)
+        bent = np.square(self.inertia * self.rates()).sum(axis=1)
+        share = float(bent.mean()) * self.seconds / start**2
+        worst = float(np.abs(found / start - 1).max())
+        return seen.reading(100 * worst, 0.0, 100 * share, 200.0)
 
 
 RADIUS, LENGTH, MASS = 0.05, 0.3, 2.0

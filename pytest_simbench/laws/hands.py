@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from pytest_simbench.client.world import World
 from pytest_simbench.laws.base import (
     GRAVITY,
     Law,
     Reading,
     Watched,
-    follow,
-    rounding,
+    held,
     solved,
     stillness,
 )
@@ -25,6 +23,7 @@ from pytest_simbench.laws.sticking import SHARES, fan
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import (
+    STANDARD_GRAVITY,
     Box,
     ConvexMesh,
     FloatArray,
@@ -46,6 +45,50 @@ SQUEEZE = 5.0
 """Of each finger [N]."""
 
 
+def of_scene(scene: Scene) -> Robot:
+    """The scene's robot.
+
+    Raises:
+        LookupError: it has none.
+    """
+    if scene.robot is None:
+        raise LookupError(f"scene {scene.name!r} has no robot to command")
+    return scene.robot
+
+
+def with_joint(robot: Robot, *names: str, **values: Any) -> Robot:
+    """The same robot with values of some joints replaced."""
+    joints = tuple(replace(j, **values) if j.name in names else j for j in robot.joints)
+    return replace(robot, joints=joints)
+
+
+def squeezing(robot: Robot, force: float) -> Robot:
+    """The same robot, each finger pressing with at most `force` [N]."""
+    robot = with_joint(robot, *robot.gripper.joints, effort_limit=force)
+    return replace(robot, gripper=replace(robot.gripper, squeeze=force))
+
+
+def around(robot: Robot, gap: float = GAP) -> Robot:
+    """The same robot, each finger `gap` [m] from what is held."""
+    return with_joint(robot, *robot.gripper.joints, initial_position=HELD / 2 + gap)
+
+
+def gravity_effort(robot: Robot, q: FloatArray, gravity: Vector3 = STANDARD_GRAVITY) -> FloatArray:
+    """Efforts that hold the robot at rest at `q`, (n_joints,) [N m, N]."""
+    zero = np.zeros((1, len(q)))
+    return np.asarray(RobotModel(robot).inverse_dynamics(np.array(gravity), q[None], zero, zero)[0])
+
+
+def close_command(scene: Scene, timestep: float) -> Trajectory:
+    """One command: arm at its start with gravity compensated, fingers closed."""
+    robot = of_scene(scene)
+    goal = robot.column("initial_position")
+    effort = gravity_effort(robot, goal, scene.gravity)
+    goal[robot.finger_indices] = robot.gripper.closed
+    effort[robot.finger_indices] = 0.0
+    return Trajectory.holding(timestep, goal, effort)
+
+
 class _Grip(Law, phenomenon="grasping"):
     """The Panda holds a cube between its fingers, whose friction is 1; what of it two fingers can
     carry, 2 mu F, is `1 / load` of its weight."""
@@ -54,42 +97,18 @@ class _Grip(Law, phenomenon="grasping"):
     aside: ClassVar[float] = 0.0
     held_for: ClassVar[float] = 0.3
 
-    def robot(self) -> Robot:
-        found = panda()
-        joints = tuple(
-            replace(j, effort_limit=SQUEEZE, initial_position=HELD / 2 + GAP)
-            if j.name in found.gripper.joints
-            else j
-            for j in found.joints
-        )
-        hand = replace(found.gripper, squeeze=SQUEEZE)
-        return replace(found, joints=joints, gripper=hand)
-
-    def pull(self) -> Vector3:
-        """Gravity [m/s^2]: down, turned by `aside` [rad] within the plane of the fingers."""
-        tool = RobotModel(self.robot()).tool_pose(self.robot().column("initial_position"))
+    def build(self) -> Scene:
+        """Gravity is turned by `aside` [rad] within the plane of the fingers."""
+        robot = around(squeezing(panda(), SQUEEZE))
+        tool = RobotModel(robot).tool_pose(robot.column("initial_position"))
         x, _, z = tool.rotation().T
         a, b, c = (math.cos(self.aside) * z + math.sin(self.aside) * x) * GRAVITY
-        return (float(a), float(b), float(c))
-
-    def build(self) -> Scene:
-        robot = self.robot()
-        tool = RobotModel(robot).tool_pose(robot.column("initial_position"))
         mass = self.load * 2 * robot.friction * SQUEEZE / GRAVITY
         cube = Box("cube", (HELD,) * 3, tool, mass)
-        return Scene(self.name, (cube,), robot, gravity=self.pull())
+        return Scene(self.name, (cube,), robot, gravity=(float(a), float(b), float(c)))
 
-    def close(self) -> Trajectory:
-        """Told all the time: the arm holds its place, its weight compensated, the fingers close."""
-        robot = self.robot()
-        goal = robot.column("initial_position")
-        still = np.zeros((1, len(goal)))
-        effort = RobotModel(robot).inverse_dynamics(
-            np.array(self.pull()), goal[None], still, still
-        )[0]
-        goal[robot.finger_indices] = robot.gripper.closed
-        effort[robot.finger_indices] = 0.0
-        return Trajectory.holding(self.held_for, goal, effort)
+    def commands(self) -> Trajectory:
+        return close_command(self.build(), self.held_for)
 
 
 @dataclass(frozen=True)
@@ -101,9 +120,8 @@ class GripHolds(_Grip, quantity="way in the hand in 0.35 s", unit="m"):
 
     load: float = 0.8
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, self.close())
-        model = RobotModel(self.robot())
+    def read(self, seen: Watched) -> Reading:
+        model = RobotModel(of_scene(self.build()))
 
         def in_hand(k: int) -> FloatArray:
             tool = model.tool_pose(seen.joints[k, 0, : model.arm])
@@ -122,13 +140,11 @@ class GripSlips(_Grip, quantity="acceleration", unit="m/s^2"):
 
     load: float = 1.15
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, self.close())
-        along = seen.bodies[:, 0, 7:10] @ np.array(self.pull()) / GRAVITY
+    def read(self, seen: Watched) -> Reading:
+        along = seen.bodies[:, 0, 7:10] @ np.array(self.build().gravity) / GRAVITY
         used = (seen.t > 0.06) & (seen.t < 0.22)
         found = float(np.polyfit(seen.t[used], along[used], 1)[0])
-        allowed = 2 * GRAVITY * seen.dt / 0.16 + rounding(1.0, seen.steps)
-        return Reading(found, GRAVITY * (1 - 1 / self.load), allowed)
+        return seen.reading(found, GRAVITY * (1 - 1 / self.load), 2 * GRAVITY / 0.16, 1.0)
 
 
 @dataclass(frozen=True)
@@ -163,10 +179,8 @@ class _Push(Law, phenomenon="pushing", unit="m"):
         block = Box("block", BLOCK, at.translated((BAR[0] + BLOCK[0]) / 2), 1.0, self.friction)
         return Scene(self.name, (block,), robot, ground_friction=self.friction)
 
-    def push(self) -> Trajectory:
-        time = np.array([0.0, self.seconds])
-        speed = np.full((2, 1), self.speed)
-        return Trajectory(self.seconds, self.speed * time[:, None], speed, 0 * speed)
+    def commands(self) -> Trajectory:
+        return held(self.speed * self.seconds, self.seconds, self.speed)
 
 
 @dataclass(frozen=True)
@@ -175,8 +189,7 @@ class PushForce(_Push, quantity="lag of the bar"):
     block steadily (Coulomb, Hooke). Tolerance: what gravity moves within one step, g dt^2, and the
     bar late by two steps, as of `Tracking`: 2 v dt."""
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, self.push())
+    def read(self, seen: Watched) -> Reading:
         lag = self.speed * seen.end - float(seen.joints[-1, 0, 0])
         exact = self.friction * GRAVITY / self.stiffness
         allowed = 2 * self.speed * seen.dt + stillness(seen.dt, 0.1)
@@ -188,8 +201,7 @@ class PushStraight(_Push, quantity="distance from its place at the bar"):
     """A block that is pushed in its middle stays at the bar: it neither runs ahead, nor turns, nor
     is it entered. Tolerance as of `PushForce`."""
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, self.push())
+    def read(self, seen: Watched) -> Reading:
         place = np.array([float(seen.joints[-1, 0, 0]) + (BAR[0] + BLOCK[0]) / 2, 0.0])
         off = float(np.linalg.norm(seen.bodies[-1, 0, :2] - place))
         allowed = 2 * self.speed * seen.dt + stillness(seen.dt, 0.1)
@@ -282,9 +294,8 @@ class PushTurns(Law, phenomenon="pushing", quantity="angle turned", unit="rad"):
     def read(self, seen: Watched) -> Reading:
         row, time = seen.bodies[-1, 0], seen.end
         angle, rate, pulled = self.exact(time)
-        allowed = (abs(rate[-1]) + float(np.abs(pulled).max()) * time) * seen.dt
-        found = 2 * math.atan2(float(row[6]), float(row[3]))
-        return Reading(found, float(angle[-1]), float(allowed) + rounding(1.0, seen.steps))
+        late = abs(rate[-1]) + float(np.abs(pulled).max()) * time
+        return seen.reading(2 * math.atan2(row[6], row[3]), angle[-1], late, 1.0)
 
 
 @dataclass(frozen=True)
@@ -318,8 +329,8 @@ class PushTips(Law, phenomenon="pushing", quantity="depth at which it tips", uni
             blocks.append(Box(f"block {k}", (depth, 0.1, 0.3), place, 0.5, self.friction))
         return Scene(self.name, tuple(blocks), robot, ground_friction=self.friction)
 
-    def measure(self, world: World) -> Reading:
-        time = np.array([[0.0], [self.seconds]])
-        speed = np.full((2, 1), 0.1)
-        follow(world, Trajectory(self.seconds, 0.1 * time, speed, 0 * speed))
-        return fan(self.critical, [tilt(row) < 0.05 for row in world.bodies])
+    def commands(self) -> Trajectory:
+        return held(0.1 * self.seconds, self.seconds, 0.1)
+
+    def read(self, seen: Watched) -> Reading:
+        return fan(self.critical, [tilt(row) < 0.05 for row in seen.bodies[-1]])

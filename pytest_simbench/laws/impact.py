@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, rounding, watch
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, watch
 from pytest_simbench.laws.contact import CUBE, EDGE
 from pytest_simbench.scene import Box, Pose, Scene, Sphere
 
@@ -130,9 +130,8 @@ class BounceRatio(BounceHeight, quantity="second bounce over the first", unit=""
         e = self.restitution
         seen = watch(world, self.fall * (1 + 2 * e + 2 * e**2))
         first, second = self.rises(seen)
-        allowed = 4 * GRAVITY * self.fall * seen.dt / (e**2 * self.height)
-        ratio = second / first if first > 0 else 0.0
-        return Reading(ratio, e**2, allowed + rounding(1.0, seen.steps))
+        late = 4 * GRAVITY * self.fall / (e**2 * self.height)
+        return seen.reading(second / first if first > 0 else 0.0, e**2, late, 1.0)
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+import pinocchio as pin
 from scipy.special import ellipk
 
 from pytest_simbench.laws.base import GRAVITY, LONG, Law, Reading, Watched, solved
 from pytest_simbench.laws.mechanisms import INERTIA_OF_A_POINT, MOUNT, Part, Y, mechanism
+from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Scene, Vector3
 
 
@@ -22,48 +24,35 @@ class Passive(Law, name="", phenomenon="joints"):
     def parts(self) -> tuple[Part, ...]:
         raise NotImplementedError
 
+    @property
+    def mechanism(self) -> Robot:
+        """The parts, as they are let go."""
+        return mechanism(self.name, *self.parts())
+
     def build(self) -> Scene:
-        return Scene(self.name, robot=mechanism(self.name, *self.parts()), gravity=self.gravity)
+        return Scene(self.name, robot=self.mechanism, gravity=self.gravity)
+
+    @property
+    def model(self) -> Any:  # Pinocchio has no types
+        """The same for Pinocchio, with gravity."""
+        found = RobotModel(self.mechanism).pin
+        found.gravity.linear = np.array(self.gravity)
+        return found
 
     def exact(self, seconds: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Joint positions, velocities and accelerations of the equations of motion M(q) q'' +
         h(q, q') = 0, by Pinocchio's articulated-body algorithm and DOP853 with a relative
         tolerance of 1e-10, (n, n_joints) each."""
-        import pinocchio as pin
-
-        robot = self.build().robot
-        assert robot is not None
-        model, n = model_of(robot, self.gravity), len(robot.joints)
-        data, no_effort = model.createData(), np.zeros(n)
+        model, start = self.model, self.mechanism.column("initial_position")
+        data, n = model.createData(), len(start)
 
         def change(_: float, state: FloatArray) -> FloatArray:
             q, v = state[:n], state[n:]
-            return np.concatenate([v, pin.aba(model, data, q, v, no_effort)])
+            return np.concatenate([v, pin.aba(model, data, q, v, np.zeros(n))])
 
-        start = np.concatenate([robot.column("initial_position"), np.zeros(n)])
-        found = solved(change, start, seconds, 200)
+        found = solved(change, [*start, *np.zeros(n)], seconds, 200)
         bent = np.array([change(0.0, state)[n:] for state in found])
         return found[:, :n], found[:, n:], bent
-
-    def energy(self, seen: Watched) -> tuple[FloatArray, FloatArray]:
-        """Kinetic and potential energy at each sample [J], (n,) each."""
-        import pinocchio as pin
-
-        robot = self.build().robot
-        assert robot is not None
-        model = model_of(robot, self.gravity)
-        data = model.createData()
-        kinetic = [pin.computeKineticEnergy(model, data, q, v) for q, v in seen.joints]
-        potential = [pin.computePotentialEnergy(model, data, q) for q, _ in seen.joints]
-        return np.array(kinetic), np.array(potential)
-
-
-def model_of(robot: Robot, gravity: Vector3):  # type: ignore[no-untyped-def]  # Pinocchio has no types
-    from pytest_simbench.motion.model import RobotModel
-
-    model = RobotModel(robot).pin
-    model.gravity.linear = np.array(gravity)
-    return model
 
 
 class Motion(
@@ -83,13 +72,11 @@ class _Energy(Passive, quantity="largest change of the energy", unit="J"):
     """The energy stays what it was."""
 
     def read(self, seen: Watched) -> Reading:
-        kinetic, potential = self.energy(seen)
-        robot = self.build().robot
-        assert robot is not None
-        start = robot.column("initial_position")[None, None]
-        rest = np.concatenate([start, np.zeros_like(start)], axis=1)
-        _, before = self.energy(Watched(seen.dt, seen.t[:1], rest, seen.bodies[:1]))
-        off = float(np.abs(kinetic + potential - before[0]).max())
+        model, (q, v) = self.model, seen.joints.swapaxes(0, 1)
+        data, rows = model.createData(), [self.mechanism.column("initial_position"), *q]
+        kinetic = [pin.computeKineticEnergy(model, data, *row) for row in zip(q, v, strict=True)]
+        before, *potential = (pin.computePotentialEnergy(model, data, row) for row in rows)
+        off = float(np.abs(np.add(kinetic, potential) - before).max())
         scale = float(np.ptp(potential))
         late = self.late(np.gradient(potential, seen.dt))
         return seen.reading(off, 0.0, late, scale)

@@ -29,6 +29,9 @@ class _Loaded(Passive, phenomenon="mechanisms"):
 
     needs: ClassVar[tuple[Capability, ...]] = (Capability.JOINT_WRENCHES,)
 
+    which: ClassVar[slice]
+    """Of a wrench: force or torque."""
+
     length: ClassVar[float] = 0.5
     aside: ClassVar[float] = 0.3
     angle: ClassVar[float] = 2.0
@@ -64,15 +67,15 @@ class _Loaded(Passive, phenomenon="mechanisms"):
         fallen = math.cos(angle) - math.cos(self.angle)
         return math.sqrt(max(0.0, 2 * self.slow * fallen))
 
-    def compare(self, world: World, which: slice) -> Reading:
+    def measure(self, world: World) -> Reading:
         """The largest error of force or torque, and by how much they change in a step."""
         errors = []
         for _ in range(LOOKS):
             dt = watch(world, self.seconds / LOOKS).dt
             told = world.joint_wrenches()[0] - self.carried(float(world.joints[0, 0]))
-            errors.append(float(np.linalg.norm(told[which])))
+            errors.append(float(np.linalg.norm(told[self.which])))
         angles = np.linspace(-self.angle, self.angle, 401)
-        right = np.array([self.carried(angle)[which] for angle in angles])
+        right = np.array([self.carried(angle)[self.which] for angle in angles])
         bend = np.linalg.norm(np.gradient(right, angles, axis=0), axis=1)
         fastest = max(a * self.rate(angle) for a, angle in zip(bend, angles, strict=True))
         scale = float(np.linalg.norm(right, axis=1).max())
@@ -86,8 +89,7 @@ class PendulumForce(_Loaded, quantity="largest error of the hinge's force", unit
     1673). Tolerance: what is told is of the last step, whose begin is one step ago, and the speed
     was late by one then: two steps, 2 dt times the largest |dF/dt| of the swing."""
 
-    def measure(self, world: World) -> Reading:
-        return self.compare(world, slice(0, 3))
+    which: ClassVar[slice] = slice(0, 3)
 
 
 @dataclass(frozen=True)
@@ -96,5 +98,4 @@ class PendulumTorque(_Loaded, quantity="largest error of the hinge's torque", un
     the bob's way aside times the force, and none about it (Euler's second law). Tolerance as of
     `PendulumForce`, of the torque."""
 
-    def measure(self, world: World) -> Reading:
-        return self.compare(world, slice(3, 6))
+    which: ClassVar[slice] = slice(3, 6)

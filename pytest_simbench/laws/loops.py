@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+import pinocchio as pin
 
 from pytest_simbench.description.links import ends, reduced
 from pytest_simbench.laws.base import Reading, Watched, rounding, solved
-from pytest_simbench.laws.joints import Motion, Passive, model_of
+from pytest_simbench.laws.joints import Motion, Passive
 from pytest_simbench.laws.mechanisms import MOUNT, Part, Y, mechanism
-from pytest_simbench.scene import Closure, FloatArray, Scene, Vector3
+from pytest_simbench.scene import Closure, FloatArray, Robot, Vector3
 from pytest_simbench.simulator import Capability, PreparedRobot
 
 CRANK, COUPLER, ROCKER, GROUND = 0.25, 0.5, 0.4, 0.5
@@ -40,10 +41,10 @@ class _FourBar(Passive, phenomenon="mechanisms"):
 
     crank: float = 1.2
 
-    def build(self) -> Scene:
+    @property
+    def mechanism(self) -> Robot:
         hinge = Closure("coupler link", "rocker link", (COUPLER, 0.0, 0.0), (0.0, 0.0, -ROCKER))
-        robot = mechanism(self.name, *self.parts(), closures=(hinge,))
-        return Scene(self.name, robot=robot, gravity=self.gravity)
+        return mechanism(self.name, *self.parts(), closures=(hinge,))
 
     def parts(self) -> tuple[Part, ...]:
         first, second, third = (float(angle) for angle in four_bar(self.crank))
@@ -61,11 +62,7 @@ class _FourBar(Passive, phenomenon="mechanisms"):
         energy V(s), is m s'' + m' s'^2 / 2 + V' = 0; by DOP853 with a relative tolerance of
         1e-8. M and V are Pinocchio's.
         """
-        import pinocchio as pin
-
-        robot = self.build().robot
-        assert robot is not None
-        model = model_of(robot, self.gravity)
+        model = self.model
         data = model.createData()
 
         def inertia(s: float) -> float:
@@ -121,9 +118,7 @@ class FourBarClosure(_FourBar, quantity="largest opening of the loop", unit="mm"
     seconds: float = 2.0
 
     def read(self, seen: Watched) -> Reading:
-        robot = self.build().robot
-        assert robot is not None
-        prepared = PreparedRobot(robot)
+        prepared = PreparedRobot(self.mechanism)
         (hinge,) = reduced(prepared)
         some = seen.joints[:: max(1, seen.steps // LOOKS), 0]
         pairs = (ends(prepared, hinge, q) for q in some)

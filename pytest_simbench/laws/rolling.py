@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, rounding, watch
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, watch
 from pytest_simbench.laws.sliding import TOP, BeltSpeed
 from pytest_simbench.laws.sticking import acceleration, tilted
 from pytest_simbench.scene import Body, ConvexMesh, Cylinder, Pose, Scene, Sphere
@@ -43,7 +43,7 @@ class RollingSphere(Law, phenomenon="rolling", quantity="acceleration", unit="m/
 
     def read(self, seen: Watched) -> Reading:
         pull = GRAVITY * math.sin(math.atan(self.slope))
-        return acceleration(seen.dt, seen.t, seen.bodies[:, 0, 7], 0.2, self.share * pull, pull)
+        return acceleration(seen, seen.bodies[:, 0, 7], 0.2, self.share * pull, pull)
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,6 @@ class RimlessWheel(
         angles = np.unwrap(2 * halves, period=2 * math.pi)
         reached = seen.crossings(angles, step)
         found = float(seen.at(reached[0], seen.bodies[:, 0, 11])) if len(reached) else 0.0
-        late, rate = self.pull * seen.dt, self.pull * before * seen.dt
+        late, rate = self.pull, self.pull * before
         off = (after / before) * (late + rate * first) + late
-        allowed = (after / top) * off + late + rate * second + rounding(before, seen.steps)
-        return Reading(found, top, allowed)
+        return seen.reading(found, top, (after / top) * off + late + rate * second, before)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, follow, rounding, watch
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, rounding, watch
 from pytest_simbench.laws.sticking import SLAB, SLAB_AT, Carried, acceleration, slab_on
 from pytest_simbench.scene import Body, Box, ConvexMesh, Pose, Scene, Vector3
 
@@ -32,7 +32,7 @@ class SlideX(Law, phenomenon="sliding", quantity="acceleration", unit="m/s^2"):
         angle = math.atan(self.slope)
         along = seen.bodies[:, 0, 7:9] @ [math.cos(self.direction), math.sin(self.direction)]
         exact = GRAVITY * (math.sin(angle) - self.friction * math.cos(angle))
-        return acceleration(seen.dt, seen.t, along, 0.2, exact, GRAVITY * math.sin(angle))
+        return acceleration(seen, along, 0.2, exact, GRAVITY * math.sin(angle))
 
 
 @dataclass(frozen=True)
@@ -110,9 +110,7 @@ class Glide(Law, phenomenon="sliding", quantity="speed", unit="m/s"):
         return Scene(self.name, (slab,), ground_friction=0.0)
 
     def read(self, seen: Watched) -> Reading:
-        return Reading(
-            float(seen.bodies[-1, 0, 7]), self.speed, rounding(2 * self.speed, seen.steps)
-        )
+        return seen.reading(seen.bodies[-1, 0, 7], self.speed, 0.0, 2 * self.speed)
 
 
 @dataclass(frozen=True)
@@ -124,10 +122,9 @@ class Belt(Carried, phenomenon="sliding", quantity="acceleration", unit="m/s^2")
     acceleration: float = 8.0
     seconds: float = 0.4
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, self.ride())
-        return acceleration(seen.dt, seen.t, seen.bodies[:, 0, 7], 0.1, self.friction * GRAVITY,
-                             self.friction * GRAVITY)  # fmt: skip
+    def read(self, seen: Watched) -> Reading:
+        pull = self.friction * GRAVITY
+        return acceleration(seen, seen.bodies[:, 0, 7], 0.1, pull, pull)
 
 
 TOP = 0.5

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, follow, rounding, stillness, watch
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, stillness, watch
 from pytest_simbench.laws.mechanisms import STRONG, Part, mechanism
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Trajectory, Vector3
 
@@ -62,14 +62,13 @@ def fan(critical: float, moved: Sequence[bool]) -> Reading:
 
 
 def acceleration(
-    dt: float, t: FloatArray, speed: FloatArray, begin: float, exact: float, force: float
+    seen: Watched, speed: FloatArray, begin: float, exact: float, force: float
 ) -> Reading:
     """The slope of a speed [m/s] from `begin` [s] to the end; `force`: the largest one, for each
     kg [m/s^2]."""
-    used = t > begin
-    found = float(np.polyfit(t[used], speed[used], 1)[0])
-    span = float(t[-1]) - begin
-    return Reading(found, exact, 2 * force * dt / span + rounding(1.0, len(t)))
+    used = seen.t > begin
+    found = float(np.polyfit(seen.t[used], speed[used], 1)[0])
+    return seen.reading(found, exact, 2 * force / (seen.end - begin), 1.0)
 
 
 @dataclass(frozen=True)
@@ -157,7 +156,7 @@ class Carried(Law, phenomenon="sticking", quantity="way on the carriage", unit="
         box = Box("box", SLAB, Pose.at(0.0, 0.0, 0.55 + SLAB[2] / 2), 0.2, self.friction)
         return Scene(self.name, (box,), robot, ground_friction=self.friction)
 
-    def ride(self) -> Trajectory:
+    def commands(self) -> Trajectory:
         """The carriage's set points, with the force that its mass asks for."""
         time = np.linspace(0.0, self.seconds, 101)
         a = self.acceleration
@@ -165,8 +164,7 @@ class Carried(Law, phenomenon="sticking", quantity="way on the carriage", unit="
         effort = np.full((101, 1), 5.0 * a)
         return Trajectory(float(time[1]), position[:, None], velocity[:, None], effort)
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, self.ride())
+    def read(self, seen: Watched) -> Reading:
         slid = float(seen.bodies[-1, 0, 0] - seen.joints[-1, 0, 0])
         allowed = stillness(seen.dt, 1.0) + self.acceleration * seen.dt**2
         return Reading(slid, 0.0, allowed)

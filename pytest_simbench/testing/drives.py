@@ -5,15 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from pytest_simbench.laws.hands import close_command, gravity_effort
 from pytest_simbench.motion.model import RobotModel
-from pytest_simbench.scene import (
-    STANDARD_GRAVITY,
-    FloatArray,
-    Robot,
-    Scene,
-    Trajectory,
-    Vector3,
-)
+from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Scene, Trajectory
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
 from pytest_simbench.testing.robots import any_robot, coupled, finger_unit, grasping
@@ -21,12 +15,6 @@ from pytest_simbench.testing.subject import Subject, logged, require, require_cl
 
 ARM_TICK = 0.004
 """Control tick of the set points [s], as in the tasks."""
-
-
-def gravity_effort(robot: Robot, q: FloatArray, gravity: Vector3 = STANDARD_GRAVITY) -> FloatArray:
-    """Efforts that hold the robot at rest at `q`, (n_joints,) [N m, N]."""
-    zero = np.zeros((1, len(q)))
-    return np.asarray(RobotModel(robot).inverse_dynamics(np.array(gravity), q[None], zero, zero)[0])
 
 
 @check(robot=any_robot)
@@ -208,13 +196,3 @@ def hold_command(scene: Scene, timestep: float) -> Trajectory:
     start = robot.column("initial_position")
     effort = gravity_effort(robot, start, scene.gravity)
     return Trajectory.holding(timestep, start, effort)
-
-
-def close_command(scene: Scene, timestep: float) -> Trajectory:
-    """One command: arm at its start with gravity compensated, fingers closed."""
-    robot = scenes.of_scene(scene)
-    goal = robot.column("initial_position")
-    effort = gravity_effort(robot, goal, scene.gravity)
-    goal[robot.finger_indices] = robot.gripper.closed
-    effort[robot.finger_indices] = 0.0
-    return Trajectory.holding(timestep, goal, effort)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from pytest_simbench.laws.hands import gravity_effort
 from pytest_simbench.laws.loops import FourBarClosure, FourBarSwing
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Trajectory, Vector3
@@ -15,7 +16,6 @@ from pytest_simbench.simulator import Capability, PreparedRobot
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
 from pytest_simbench.testing.drives import (
-    gravity_effort,
     has_armature,
     hold_command,
     own_inertia,

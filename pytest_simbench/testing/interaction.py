@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from pytest_simbench.laws.hands import close_command, gravity_effort
 from pytest_simbench.laws.impact import DeadLanding
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
-from pytest_simbench.testing.drives import close_command, gravity_effort, hold_command
+from pytest_simbench.testing.drives import hold_command
 from pytest_simbench.testing.robots import any_robot, grasping
 from pytest_simbench.testing.scenes import GRAVITY, MASS
 from pytest_simbench.testing.subject import Subject, asked, logged, require, require_close

@@ -8,13 +8,14 @@ import numpy as np
 
 from pytest_simbench.client.world import Motion
 from pytest_simbench.laws.free import rotation_of
+from pytest_simbench.laws.hands import close_command
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import Pose, Wrench
 from pytest_simbench.tasks.manipulator import Manipulator
 from pytest_simbench.tasks.throw_analysis import Thrown
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
-from pytest_simbench.testing.drives import close_command, hold_command
+from pytest_simbench.testing.drives import hold_command
 from pytest_simbench.testing.robots import grasping, throwing
 from pytest_simbench.testing.scenes import EDGE, GRAVITY
 from pytest_simbench.testing.subject import Subject, logged, require, require_close

@@ -8,6 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.laws.hands import GAP, HELD, around
+from pytest_simbench.laws.hands import of_scene as of_scene
+from pytest_simbench.laws.hands import squeezing as squeezing
+from pytest_simbench.laws.hands import with_joint as with_joint
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import (
@@ -25,7 +29,7 @@ from pytest_simbench.scene import (
 from pytest_simbench.simulator import PreparedRobot
 
 GRAVITY = -STANDARD_GRAVITY[2]
-EDGE, MASS = 0.05, 0.1
+EDGE, MASS = HELD, 0.1
 """The cube of the tasks [m], [kg]."""
 
 Vertices = tuple[Vector3, ...]
@@ -168,26 +172,9 @@ def arm() -> Robot:
     return panda()
 
 
-def of_scene(scene: Scene) -> Robot:
-    """The scene's robot.
-
-    Raises:
-        LookupError: it has none.
-    """
-    if scene.robot is None:
-        raise LookupError(f"scene {scene.name!r} has no robot to command")
-    return scene.robot
-
-
 def lifted(robot: Robot) -> Robot:
     """The same robot, so high above the ground that it does not touch it in any posture."""
     return replace(robot, base=Pose.at(0.0, 0.0, max(2.0, 1.2 * RobotModel(robot).reach)))
-
-
-def with_joint(robot: Robot, name: str, **values: Any) -> Robot:
-    """The same robot with values of one joint replaced."""
-    joints = tuple(replace(j, **values) if j.name == name else j for j in robot.joints)
-    return replace(robot, joints=joints)
 
 
 def at_random(robot: Robot, rng: np.random.Generator) -> Robot:
@@ -208,19 +195,10 @@ def arm_alone(
 
 
 def grip(
-    robot: Robot | None = None, mass: float = MASS, gap: float = 2e-4, name: str = "grip"
+    robot: Robot | None = None, mass: float = MASS, gap: float = GAP, name: str = "grip"
 ) -> Scene:
     """A robot with a cube between its fingers, which stand `gap` [m] from it on either side."""
-    robot = robot or arm()
-    for finger in robot.gripper.joints:
-        robot = with_joint(robot, finger, initial_position=EDGE / 2 + gap)
+    robot = around(robot or arm(), gap)
     start = robot.column("initial_position")
     held = cube("held", RobotModel(robot).tool_pose(np.asarray(start)), mass)
     return Scene(name, (held,), robot=robot)
-
-
-def squeezing(robot: Robot, force: float) -> Robot:
-    """The same robot, each finger pressing with at most `force` [N]."""
-    for finger in robot.gripper.joints:
-        robot = with_joint(robot, finger, effort_limit=force)
-    return replace(robot, gripper=replace(robot.gripper, squeeze=force))
