@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from pytest_simbench.plugin.repeatability import Perturber
     from pytest_simbench.plugin.run import Run
     from pytest_simbench.plugin.variants import Variant
-    from pytest_simbench.repeatability.replay_result import Replay
+    from pytest_simbench.repeatability.replay import Replay
     from pytest_simbench.scene import Robot, Scene
     from pytest_simbench.tasks.base import Task
 

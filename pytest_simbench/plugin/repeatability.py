@@ -23,13 +23,11 @@ from pytest_simbench.repeatability import search, stability
 from pytest_simbench.repeatability.agreement import FOLDER, Sample
 from pytest_simbench.repeatability.episode import Episodes
 from pytest_simbench.repeatability.perturbation import Perturbation
-from pytest_simbench.repeatability.replay import replay
-from pytest_simbench.repeatability.replay_result import Replay
+from pytest_simbench.repeatability.replay import Replay, replay
 from pytest_simbench.repeatability.search import Finding
 from pytest_simbench.repeatability.stability import Sensitivity, Stability
 from pytest_simbench.report.files import write_tables
 from pytest_simbench.report.terminal.parts import render_tables as render_terminal
-from pytest_simbench.simulator.info import Capability
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks.base import Task
 
@@ -61,7 +59,6 @@ class ReplayFixture:
             episodes = Episodes(can_do(Experiment(case, task), self.skips), handle(case))
             result = replay(
                 episodes,
-                claims=Capability.DETERMINISTIC in info.capabilities,
                 capabilities=info.capabilities,
                 fresh=handle(case),
                 other_mode=self._other_mode(info.modes, handle),

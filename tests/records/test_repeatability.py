@@ -9,9 +9,7 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.records.lines import Found
-from pytest_simbench.records.repeatability import NAME, Line, append, read
-from pytest_simbench.repeatability.motions import Difference
-from pytest_simbench.repeatability.replay_result import Again
+from pytest_simbench.records.repeatability import NAME, Again, Line, append, read
 
 LINE = Line(
     "search",
@@ -36,7 +34,9 @@ def test_kept_and_read_back(tmp_path: Path) -> None:
     assert LINE.label == "mujoco headless tuned"
 
 
-AGAIN = Again("reset", Difference(1.0, "a", {1.0: 0.1, 5.0: None}, 0.2), ("moved",)).to_wire()
+AGAIN = Again(
+    way="reset", first=1.0, body="a", growth={"1": 0.1, "5": None}, largest=0.2, changed=["moved"]
+).to_wire()
 REPLAY = replace(LINE, kind="replay", result={"claims": True, "again": [AGAIN]})
 
 

@@ -10,13 +10,13 @@ import pytest
 
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.repeatability.episode import Episodes
-from pytest_simbench.repeatability.replay import replay
-from pytest_simbench.repeatability.replay_result import Replay
+from pytest_simbench.repeatability.replay import Replay, replay
 from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks import Moment, Throwing
 from tests.repeatability.conftest import first_seed
 
 EVERYTHING = frozenset(Capability)
+UNCLAIMED = EVERYTHING - {Capability.DETERMINISTIC}
 MOMENTS = (Moment("in flight", "fly"),)
 WAYS = (
     "after a reset",
@@ -35,7 +35,7 @@ def replayed(
 
     def run(name: str = "mujoco", episodes: Episodes | None = None, **options: Any) -> Replay:
         given = {
-            "claims": True, "capabilities": EVERYTHING, "fresh": handle_of(name),
+            "capabilities": EVERYTHING, "fresh": handle_of(name),
             "other_mode": "no display", "moments": MOMENTS, **options,
         }  # fmt: skip
         return replay(episodes or tumbling(name), **given)
@@ -44,7 +44,7 @@ def replayed(
 
 
 def broken(result: Replay) -> set[str]:
-    return {again.way for again in result.again if again.difference is not None}
+    return {again.way for again in result.again if again.first is not None}
 
 
 @pytest.mark.parametrize("name", ["mujoco", "pybullet"])
@@ -59,17 +59,16 @@ def test_engines_keep_their_claim(replayed: Callable[..., Replay], name: str) ->
 def test_noise_is_found_everywhere_and_grows(replayed: Callable[..., Replay]) -> None:
     result = replayed("Noisy")
     assert broken(result) == set(WAYS[:4])
-    first = result.again[0].difference
-    assert first is not None
+    first = result.again[0]
     assert first.first == pytest.approx(0.02)  # the first sample
-    assert first.growth[1.0] is not None
+    assert first.growth["1"] is not None
     assert 1e-12 < first.largest < 0.1
     with pytest.raises(AssertionError, match="Noisy claims to be deterministic, but\n.*0.02 s"):
         result.assert_as_claimed()
 
 
 def test_noise_without_a_claim_is_a_result(replayed: Callable[..., Replay]) -> None:
-    result = replayed("Noisy", claims=False)
+    result = replayed("Noisy", capabilities=UNCLAIMED)
     assert broken(result)
     result.assert_as_claimed()
 
@@ -116,7 +115,7 @@ def test_an_effect_of_the_window_is_found(
 def test_failure_to_run_again_is_a_failure_without_a_claim(
     replayed: Callable[..., Replay],
 ) -> None:
-    result = replayed("Refusing", claims=False)
+    result = replayed("Refusing", capabilities=UNCLAIMED)
     assert [again.failure for again in result.again if again.failure] == [
         "EngineFailed: RuntimeError: no way back"
     ]
