@@ -9,8 +9,7 @@ from pytest_simbench.laws.hands import close_command, gravity_effort
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Scene, Trajectory
 from pytest_simbench.testing import scenes
-from pytest_simbench.testing.checks import check
-from pytest_simbench.testing.robots import any_robot, coupled, finger_unit, grasping
+from pytest_simbench.testing.checks import any_robot, check, coupled, finger_unit, grasping
 from pytest_simbench.testing.subject import Subject, logged, require, require_close
 
 ARM_TICK = 0.004

@@ -14,10 +14,9 @@ from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
-from pytest_simbench.testing.checks import check
+from pytest_simbench.testing.checks import any_robot, check
 from pytest_simbench.testing.contract import SINGLE
 from pytest_simbench.testing.faults import Fault, robot_faults, rounds, true_scene
-from pytest_simbench.testing.robots import any_robot
 from pytest_simbench.testing.state import require_same, swung
 from pytest_simbench.testing.subject import Subject, require
 

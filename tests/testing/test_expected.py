@@ -8,7 +8,7 @@ import pytest
 
 from pytest_simbench.simulator.registry import UnknownSimulatorError
 from pytest_simbench.testing import CHECKS, ConformanceWarning, conformance_checks
-from pytest_simbench.testing.expected import read_expected_failures, reason_for, unmatched
+from pytest_simbench.testing.kit import read_expected_failures, reason_for, unmatched
 
 
 def test_file_of_expected_failures(tmp_path: Path) -> None:

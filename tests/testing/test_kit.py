@@ -11,9 +11,9 @@ from pytest_simbench.sims.mujoco.adapter import MuJoCo
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.registry import BUILT_IN, find
 from pytest_simbench.testing import CHECKS, ConformanceTest, ConformanceWarning, Subject
+from pytest_simbench.testing.checks import any_robot, coupled, grasping
 from pytest_simbench.testing.faults import robot_faults
 from pytest_simbench.testing.kit import Kit, conformance_checks
-from pytest_simbench.testing.robots import any_robot, coupled, grasping
 from pytest_simbench.testing.scenes import at_random, lifted
 from pytest_simbench.testing.touch import approaches, beside, link_clouds
 
