@@ -19,7 +19,7 @@ from pytest_simbench.laws.base import (
     stillness,
     watch,
 )
-from pytest_simbench.laws.sticking import SHARES, WEDGE, fan, slope_pose
+from pytest_simbench.laws.sticking import SHARES, fan, slopes
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Vector3, rotation_matrix
 from pytest_simbench.simulator import Capability
 
@@ -165,14 +165,7 @@ class TippingSlope(
     seconds: float = 0.8
 
     def build(self) -> Scene:
-        critical, bodies = self.size[0] / self.size[2], []
-        for k, share in enumerate(SHARES):
-            turn = slope_pose(share * critical, 0.0)
-            place = Pose((0.0, 0.5 * (k - 2.5), 1.0), turn.quaternion)
-            on_top = place * Pose.at(0.0, 0.0, (WEDGE[2] + self.size[2]) / 2)
-            bodies.append(Box(f"slope {k}", WEDGE, place))
-            bodies.append(Box(f"block {k}", self.size, on_top, 1.0))
-        return Scene(self.name, tuple(bodies))
+        return slopes(self.name, self.size[0] / self.size[2], self.size, 0.0, 1.0)
 
     def measure(self, world: World) -> Reading:
         critical = self.size[0] / self.size[2]

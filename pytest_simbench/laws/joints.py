@@ -100,6 +100,12 @@ def _period(length: float, angle: float, mass: float, inertia: float) -> float:
     return 4 * slow * float(ellipk(math.sin(angle / 2) ** 2))
 
 
+def _seen_period(seen: Watched, joint: int) -> float:
+    """Between the first two passes of a joint; the whole time where there are none [s]."""
+    found = seen.crossings(seen.joints[:, 0, joint])
+    return float(found[1] - found[0]) if len(found) > 1 else seen.end
+
+
 @dataclass(frozen=True)
 class PendulumPeriod(Passive, quantity="period", unit="s"):
     """A pendulum that is let go at the angle a swings with the period T = 4 sqrt(I / m g l)
@@ -118,9 +124,7 @@ class PendulumPeriod(Passive, quantity="period", unit="s"):
         return _period(self.length, self.angle, 1.0, INERTIA_OF_A_POINT)
 
     def read(self, seen: Watched) -> Reading:
-        found = seen.crossings(seen.joints[:, 0, 0])
-        period = float(found[1] - found[0]) if len(found) > 1 else self.seconds
-        return Reading(period, self.period, 2 * seen.dt)
+        return Reading(_seen_period(seen, 0), self.period, 2 * seen.dt)
 
 
 @dataclass(frozen=True)
@@ -134,9 +138,7 @@ class CompoundPendulum(PendulumPeriod):
     inertia: float = 0.05
 
     def parts(self) -> tuple[Part, ...]:
-        moments = (self.inertia,) * 3
-        (part,) = super().parts()
-        return (Part("swing", Y, centre=part.centre, start=self.angle, inertia=moments),)
+        return (replace(*super().parts(), inertia=(self.inertia,) * 3),)
 
     @property
     def period(self) -> float:
@@ -156,29 +158,22 @@ class TwoPendulums(Passive, quantity="larger error of the two periods", unit="s"
     seconds: float = 3.6
 
     def parts(self) -> tuple[Part, ...]:
-        made = []
-        for k, length in enumerate(self.lengths):
-            made.append(
-                Part(
-                    f"swing {k}",
-                    Y,
-                    (0.0, k * self.apart, 0.0),
-                    centre=(0.0, 0.0, -length),
-                    mass=self.masses[k],
-                    start=self.angles[k],
-                    on=MOUNT,
-                )
+        pairs = zip(self.lengths, self.masses, self.angles, strict=True)
+        return tuple(
+            Part(
+                f"swing {k}", Y, (0.0, k * self.apart, 0.0), (0.0, 0.0, -length), mass,
+                start=angle, on=MOUNT,
             )
-        return tuple(made)
+            for k, (length, mass, angle) in enumerate(pairs)
+        )  # fmt: skip
 
     def read(self, seen: Watched) -> Reading:
         errors = []
         for k, (length, angle, mass) in enumerate(
             zip(self.lengths, self.angles, self.masses, strict=True)
         ):
-            found = seen.crossings(seen.joints[:, 0, k])
-            period = float(found[1] - found[0]) if len(found) > 1 else self.seconds
-            errors.append(abs(period - _period(length, angle, mass, INERTIA_OF_A_POINT)))
+            period = _period(length, angle, mass, INERTIA_OF_A_POINT)
+            errors.append(abs(_seen_period(seen, k) - period))
         return Reading(max(errors), 0.0, 2 * seen.dt)
 
 

@@ -36,15 +36,22 @@ def slab_on(name: str, slope: float, direction: float, friction: float) -> Scene
     return Scene(name, (slab,), gravity=tilted(slope, direction), ground_friction=friction)
 
 
-def slope_pose(slope: float, direction: float) -> Pose:
-    """A turn that tilts a level plane so that it goes down towards `direction` [rad]."""
-    half = math.atan(slope) / 2
-    down = Pose(quaternion=(math.cos(half), 0.0, math.sin(half), 0.0))
-    return Pose.at(0.0, 0.0, 0.0, yaw=direction) * down
-
-
 SHARES = (0.92, 0.96, 0.98, 1.02, 1.04, 1.08)
 """Of a critical value: a fan of cases on both sides of it."""
+
+
+def slopes(name: str, critical: float, size: Vector3, direction: float, friction: float) -> Scene:
+    """Such a fan of slopes [tangents], down towards `direction` [rad], a box of 1 kg on each."""
+    bodies = []
+    for k, share in enumerate(SHARES):
+        half = math.atan(share * critical) / 2
+        down = Pose(quaternion=(math.cos(half), 0.0, math.sin(half), 0.0))
+        place = Pose.at(0.6 * (k % 2), 0.5 * (k - 2.5), 1.0, yaw=direction) * down
+        on_top = place * Pose.at(0.0, 0.0, (WEDGE[2] + size[2]) / 2)
+        bodies.append(Box(f"slope {k}", WEDGE, place, friction=friction))
+        bodies.append(Box(f"slab {k}", size, on_top, 1.0, friction))
+    return Scene(name, tuple(bodies), ground_friction=friction)
+
 
 BETWEEN = 0.02
 """Tolerance of a fan: half of the gap in which the critical value lies, as a share of it."""
@@ -84,14 +91,7 @@ class StickAngleX(
     seconds: float = 0.8
 
     def build(self) -> Scene:
-        bodies = []
-        for k, share in enumerate(SHARES):
-            turn = slope_pose(share * self.friction, self.direction)
-            place = Pose((0.6 * (k % 2), 0.5 * (k - 2.5), 1.0), turn.quaternion)
-            on_top = place * Pose.at(0.0, 0.0, (WEDGE[2] + SLAB[2]) / 2)
-            bodies.append(Box(f"slope {k}", WEDGE, place, friction=self.friction))
-            bodies.append(Box(f"slab {k}", SLAB, on_top, 1.0, self.friction))
-        return Scene(self.name, tuple(bodies), ground_friction=self.friction)
+        return slopes(self.name, self.friction, SLAB, self.direction, self.friction)
 
     def measure(self, world: World) -> Reading:
         start = world.bodies[:, :3].copy()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
 from pytest_simbench.laws.hands import close_command, gravity_effort
 from pytest_simbench.motion.model import RobotModel
@@ -177,11 +176,10 @@ def has_armature(subject: Subject) -> bool:
 
 def joint_momentum(robot: Robot, q: FloatArray, v: FloatArray, armature: bool) -> FloatArray:
     """Momentum of each joint, M(q) v, (n_joints,) [kg m^2/s, kg m/s]."""
-    model = RobotModel(robot).pin
+    model, zero = RobotModel(robot), np.zeros((1, len(q)))
     if not armature:
-        model.armature = np.zeros(len(q))
-    upper = np.triu(pin.crba(model, model.createData(), q))
-    return np.asarray((upper + np.triu(upper, 1).T) @ v)
+        model.pin.armature = zero[0]
+    return np.asarray(model.inverse_dynamics(np.zeros(3), q[None], zero, v[None])[0])
 
 
 def own_inertia(robot: Robot, q: FloatArray, k: int, armature: bool) -> float:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -88,11 +86,10 @@ def planted_faults_are_seen(subject: Subject) -> None:
 def planted(subject: Subject, faults: Iterable[Fault]) -> ParityResult:
     """A world with the faults, read back by an adapter that remembers the true scene."""
     truth = faulty = _truth(subject)
-    with tempfile.TemporaryDirectory() as folder:
-        for fault in faults:
-            faulty = fault.plant(faulty, Path(folder))
-        with subject.world(faulty, parity=False) as world:
-            reported = world.process.request("read_back", remember=truth.to_wire())
+    for fault in faults:
+        faulty = fault.plant(faulty)
+    with subject.world(faulty, parity=False) as world:
+        reported = world.process.request("read_back", remember=truth.to_wire())
     return compare(
         expected_quantities(truth, subject.settings),
         reported,

@@ -60,7 +60,7 @@ def test_an_agreement_is_known_in_full() -> None:
 def test_only_the_same_can_be_compared(changes: dict[str, object], told: str) -> None:
     first = sample("a", TIMES, [0.2] * 4)
     with pytest.raises(ValueError, match=told):
-        agreement(first, replace(first, label="b", **changes))  # type: ignore[arg-type]
+        agreement(first, replace(first, label="b", **changes))
 
 
 def test_commands_that_part() -> None:
@@ -107,7 +107,6 @@ def test_partings_are_told_by_the_first_one_s_time() -> None:
     for one, other, when, asked in ((first, second, 0.8, 0.4), (second, first, 0.81, 0.41)):
         found = agreement(one, other)
         millimetre = found.partings[0.001]
-        assert millimetre is not None
         assert millimetre.time == pytest.approx(when)
         assert found.commands_part == pytest.approx(asked)
 
@@ -143,7 +142,6 @@ def test_engines_with_the_same_law_agree_until_things_collide(
     ]
     found = agreement(*samples)
     centimetre = found.partings[0.01]
-    assert centimetre is not None
     assert 0.1 < centimetre.time < 1.6
     assert agreement(samples[0], samples[0]).partings == {0.001: None, 0.01: None}
 
@@ -175,7 +173,7 @@ def test_a_file_with_something_else_in_it(tmp_path: Path, wrong: dict[str, objec
     sample("a", TIMES, [0.2] * 4).save(path.parent, path.name)
     with np.load(path) as data:
         arrays = {**data, **wrong}
-    np.savez(path, **{k: v for k, v in arrays.items() if v is not None})  # type: ignore[arg-type]
+    np.savez(path, **{k: v for k, v in arrays.items() if v is not None})
     with pytest.raises(ValueError, match=f"{path} holds no motion of pytest-simbench"):
         Sample.load(path)
 

@@ -82,12 +82,11 @@ def test_an_attack_remembers_and_ends() -> None:
         return moved(shift(perturbed))
 
     experiment = Scripted(run)
-    attack = Attack(experiment, 2)  # type: ignore[arg-type]
+    attack = Attack(experiment, 2)
     assert [asked[0] for asked in experiment.asked] == [()]
     assert not attack.exhausted
     harmless, harmful = attack.trial(step[1]), attack.trial(step[2])
-    assert harmless == Trial(pytest.approx(3e-4), kept=1.0)  # type: ignore[arg-type]
-    assert harmful is not None
+    assert harmless == Trial(pytest.approx(3e-4), kept=1.0)
     assert (harmful.effect, harmful.kept) == ("changes standing from 100 % to 50 %", 0.5)
     assert attack.exhausted
     assert attack.trial(step[3]) is None
@@ -105,7 +104,7 @@ def test_a_crash_keeps_nothing() -> None:
             raise dead(perturbed)
         return moved(0.0)
 
-    trial = Attack(Scripted(run), 1).trial((Perturbation("x", 1, "a"),))  # type: ignore[arg-type]
+    trial = Attack(Scripted(run), 1).trial((Perturbation("x", 1, "a"),))
     assert trial == Trial(1.0, "ends in WorkerExited", 0.0)
 
 
@@ -120,8 +119,7 @@ def test_a_crash_keeps_nothing() -> None:
 def test_what_is_kept_is_of_what_could_be_lost(after: dict[str, float | None], kept: float) -> None:
     """Of counts that are good when high, and were not 0; never more than all."""
     experiment = Scripted(lambda p: moved(0.0, after if p else {"standing": 0.5, "lost": 0.0}))
-    trial = Attack(experiment, 1).trial((Perturbation("x", 1, "a"),))  # type: ignore[arg-type]
-    assert trial is not None
+    trial = Attack(experiment, 1).trial((Perturbation("x", 1, "a"),))
     assert trial.kept == kept
 
 
@@ -151,8 +149,7 @@ def test_a_search_of_a_known_world(monkeypatch: pytest.MonkeyPatch) -> None:
         "pytest_simbench.repeatability.search._kept_example", lambda attack, smallest: "replay me"
     )
     experiment = Scripted(toppling)
-    found = search(experiment, {"x": 2e-3}, examples=40, at_once=1)  # type: ignore[arg-type]
-    assert found.smallest is not None
+    found = search(experiment, {"x": 2e-3}, examples=40, at_once=1)
     assert [(p.quantity, abs(p.steps), p.body) for p in found.smallest] == [("x", 5, "a")]
     assert found.effect == "topples one"
     assert found.confirmed is True
@@ -169,7 +166,7 @@ def test_a_search_of_a_known_world(monkeypatch: pytest.MonkeyPatch) -> None:
     found.assert_found()
     found.assert_not_below("x", 4e-4)
     found.assert_not_below("yaw", 1.0)
-    same = search(Scripted(toppling), {"x": 2e-3}, examples=40, at_once=1)  # type: ignore[arg-type]
+    same = search(Scripted(toppling), {"x": 2e-3}, examples=40, at_once=1)
     assert same == found
     with pytest.raises(AssertionError) as caught:
         found.assert_not_below("x", 6e-4)
@@ -181,7 +178,7 @@ def test_a_search_of_a_known_world(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_search_that_finds_nothing_makes_all_its_runs() -> None:
     """One in six perturbs one thing alone, the others up to a dozen."""
     experiment = Scripted(lambda perturbed: moved(0.0))
-    found = search(experiment, {"x": 2e-3, "y": 2e-3}, examples=18)  # type: ignore[arg-type]
+    found = search(experiment, {"x": 2e-3, "y": 2e-3}, examples=18)
     assert (found.smallest, found.first, found.examples) == (None, None, 0)
     assert found.runs == len(experiment.asked) - 1 <= 18
     assert (found.effect, found.replay, found.confirmed) == ("", "", False)
@@ -208,7 +205,7 @@ def test_shrinking_has_its_bound(monkeypatch: pytest.MonkeyPatch) -> None:
         "pytest_simbench.repeatability.search._kept_example", lambda attack, smallest: ""
     )
     experiment = Scripted(toppling)
-    found = search(experiment, {"x": 2e-3}, examples=40, shrinks=2, at_once=1)  # type: ignore[arg-type]
+    found = search(experiment, {"x": 2e-3}, examples=40, shrinks=2, at_once=1)
     assert found.runs <= found.examples + 2
 
 
@@ -226,7 +223,7 @@ def test_what_the_perturbation_did_not_do_is_not_confirmed(
     def run(perturbed: Perturbed) -> Episode:
         return toppling((Perturbation("x", 5 * (next(worlds) in bad), "a"),))
 
-    found = search(Scripted(run), {"y": 1e-3}, examples=8, shrinks=5, at_once=1)  # type: ignore[arg-type]
+    found = search(Scripted(run), {"y": 1e-3}, examples=8, shrinks=5, at_once=1)
     assert (found.effect, found.examples, found.confirmed) == ("topples one", 2, False)
     assert found.sentence.endswith(" topples one (not confirmed by a second run)")
     with pytest.raises(AssertionError, match="not confirmed"):
@@ -250,10 +247,8 @@ def test_several_count_together() -> None:
 
 def test_bounds_in_words() -> None:
     experiment = Scripted(toppling)
-    assert bounds_in_words(experiment, {"x": 1e-3, "mass": 0.1}) == (  # type: ignore[arg-type]
-        "1 mm in x, 10 % in mass"
-    )
-    assert bounds_in_words(experiment, None) == (  # type: ignore[arg-type]
+    assert bounds_in_words(experiment, {"x": 1e-3, "mass": 0.1}) == ("1 mm in x, 10 % in mass")
+    assert bounds_in_words(experiment, None) == (
         "1 mm in x, 1 mm in y, 1 deg in yaw, 10 % in mass, 20 % in friction"
     )
 
@@ -337,8 +332,7 @@ def test_the_smallest_is_kept_as_an_example(
 
     monkeypatch.setattr(search_module, "write_example", write)
     monkeypatch.setattr(search_module, "replay_command", command)
-    found = search(experiment, {"x": 2e-3}, examples=40, at_once=1)  # type: ignore[arg-type]
-    assert found.smallest is not None
+    found = search(experiment, {"x": 2e-3}, examples=40, at_once=1)
     x = shift(found.smallest)
     assert found.replay == f"replay example.json of {x:.4f}"
     ((of, name, scene, tape, versions),) = kept
@@ -352,21 +346,21 @@ def test_the_smallest_is_kept_as_an_example(
         raise OSError("no space")
 
     monkeypatch.setattr(search_module, "write_example", full)
-    assert search(experiment, {"x": 2e-3}, examples=40, at_once=1).replay == ""  # type: ignore[arg-type]
+    assert search(experiment, {"x": 2e-3}, examples=40, at_once=1).replay == ""
 
     def crashing(perturbed: Perturbed) -> Episode:
         if abs(shift(perturbed)) > 4.5e-4:
             raise dead(perturbed)
         return moved(0.0)
 
-    crash = search(Scripted(crashing), {"x": 2e-3}, examples=40, at_once=1)  # type: ignore[arg-type]
+    crash = search(Scripted(crashing), {"x": 2e-3}, examples=40, at_once=1)
     assert (crash.effect, crash.replay) == ("ends in WorkerExited", "")
 
 
 def test_bounds_of_a_scene_with_a_robot() -> None:
     scene = Throwing().scene(1, Jitter())
     experiment = SimpleNamespace(scene=lambda: scene)
-    assert bounds_in_words(experiment, None).endswith(  # type: ignore[arg-type]
+    assert bounds_in_words(experiment, None).endswith(
         "20 % in friction, 20 % in squeeze, 20 ms in delay"
     )
 

@@ -44,7 +44,7 @@ def test_growth_per_displacement(steps: int) -> None:
     experiment = Scripted(growing)
     perturbation = Perturbation("x", steps, "a")
     moments = [Moment("swung", "swing", 1), Moment("at first", "settle"), Moment("never", "swim")]
-    found = sensitivity(experiment, perturbation, moments)  # type: ignore[arg-type]
+    found = sensitivity(experiment, perturbation, moments)
     assert experiment.asked == [((), None), ((perturbation,), TAPE)]
     assert found.simulator == "sim"
     assert found.perturbation == f"{0.1 * steps:g} mm in x of a"
@@ -85,7 +85,7 @@ def test_a_world_that_is_left_alone_begins_at_once() -> None:
         found = growing(perturbed)
         return episode(ALL, found.motions, [operation("wait", "fall", 1.0)] * 3)
 
-    found = sensitivity(Scripted(run), Perturbation("x", 1, "a"))  # type: ignore[arg-type]
+    found = sensitivity(Scripted(run), Perturbation("x", 1, "a"))
     assert found.ratio[0.1] == pytest.approx(1.0)
     assert found.ratio[1.0] == pytest.approx(6.0)
 
@@ -111,13 +111,13 @@ def test_only_what_comes_before_is_judged() -> None:
 def test_no_growth_is_told_of_what_is_no_displacement() -> None:
     experiment = Scripted(growing)
     with pytest.raises(ValueError, match="^sensitivity is told per millimetre, not for 1 deg of"):
-        sensitivity(experiment, Perturbation("yaw", 10, "a"))  # type: ignore[arg-type]
+        sensitivity(experiment, Perturbation("yaw", 10, "a"))
     assert not experiment.asked
 
 
 def test_stability_of_a_known_world() -> None:
     experiment = Scripted(toppling)
-    found = stability(experiment, {"x": 1e-3}, examples=12, at_most=1)  # type: ignore[arg-type]
+    found = stability(experiment, {"x": 1e-3}, examples=12, at_most=1)
     assert len(experiment.asked) == 13
     trials = [toppling(asked[0]).counts["standing"] for asked in experiment.asked[1:]]
     assert list(found.kept) == trials
@@ -129,10 +129,10 @@ def test_stability_of_a_known_world() -> None:
     assert found.worst == f"{worst[0][0]} {names[min(trials)]}"
     assert found.share.mean == pytest.approx(np.mean(trials))
     assert found.same.mean == pytest.approx(found.unchanged / 12)
-    again = stability(Scripted(toppling), {"x": 1e-3}, examples=12, at_most=1)  # type: ignore[arg-type]
+    again = stability(Scripted(toppling), {"x": 1e-3}, examples=12, at_most=1)
     assert again == found
     other = Scripted(toppling)
-    stability(other, {"x": 1e-3}, examples=12, at_most=1, random_seed=1)  # type: ignore[arg-type]
+    stability(other, {"x": 1e-3}, examples=12, at_most=1, random_seed=1)
     assert other.asked != experiment.asked
 
 
