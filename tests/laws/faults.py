@@ -98,7 +98,6 @@ def drives(**factors: float) -> Fault:
         return replace(robot, joints=joints)
 
     def change(scene: Scene) -> Scene:
-        assert scene.robot is not None
         return replace(scene, robot=of(scene.robot))
 
     return change
@@ -124,7 +123,6 @@ def hung_on(part: str, joint: str) -> Fault:
     """A joint of a mechanism hangs on another part, at the same place."""
 
     def change(scene: Scene) -> Scene:
-        assert scene.robot is not None
         xml = ET.parse(scene.robot.urdf)
         for element in xml.iterfind(f"joint[@name='{joint}']/parent"):
             element.set("link", f"{part} link")
@@ -136,13 +134,11 @@ def hung_on(part: str, joint: str) -> Fault:
 
 def left_open(scene: Scene) -> Scene:
     """Loops are not closed."""
-    assert scene.robot is not None
     return replace(scene, robot=replace(scene.robot, closures=()))
 
 
 def passing_through(scene: Scene) -> Scene:
     """Links of the robot do not touch each other."""
-    assert scene.robot is not None
     return replace(scene, robot=replace(scene.robot, self_collide=False))
 
 

@@ -16,7 +16,6 @@ from pytest_simbench.tasks import Moment, Throwing
 from tests.repeatability.conftest import first_seed
 
 EVERYTHING = frozenset(Capability)
-UNCLAIMED = EVERYTHING - {Capability.DETERMINISTIC}
 MOMENTS = (Moment("in flight", "fly"),)
 WAYS = (
     "after a reset",
@@ -67,55 +66,48 @@ def test_noise_is_found_everywhere_and_grows(replayed: Callable[..., Replay]) ->
         result.assert_as_claimed()
 
 
-def test_noise_without_a_claim_is_a_result(replayed: Callable[..., Replay]) -> None:
-    result = replayed("Noisy", capabilities=UNCLAIMED)
-    assert broken(result)
-    result.assert_as_claimed()
-
-
-def test_memory_of_earlier_worlds_is_found(replayed: Callable[..., Replay]) -> None:
-    result = replayed("Haunted")
-    assert broken(result) == {"after a reset", "after another episode", "restored in flight"}
-    with pytest.raises(AssertionError, match="after a reset"):
-        result.assert_as_claimed()
-
-
-def test_half_a_restore_is_found(replayed: Callable[..., Replay]) -> None:
-    result = replayed("Forgetful")
-    assert broken(result) == {"restored in flight"}
-    with pytest.raises(AssertionError, match="restored in flight: first differs at t = 0.07 s"):
-        result.assert_as_claimed()
-
-
-def test_a_restore_that_only_holds_for_a_moment_is_found(replayed: Callable[..., Replay]) -> None:
-    """The world goes on for 0.3 s before it is restored: it has gone astray by then."""
-    result = replayed("Stale")
-    assert broken(result) == {"restored in flight"}
-    with pytest.raises(AssertionError, match="restored in flight: first differs at t = 0.07 s"):
-        result.assert_as_claimed()
-
-
-def test_a_restore_that_nobody_claims_to_be_exact_is_a_result(
+@pytest.mark.parametrize(
+    ("name", "mode", "ways", "told"),
+    [
+        # memory of earlier worlds
+        ("Haunted", None, {WAYS[0], WAYS[1], WAYS[2]}, "after a reset"),
+        # half a restore
+        ("Forgetful", None, {WAYS[2]}, "restored in flight: first differs at t = 0.07 s"),
+        # a restore that only holds for a moment: the world goes on for 0.3 s before it is restored
+        ("Stale", None, {WAYS[2]}, "restored in flight: first differs at t = 0.07 s"),
+        ("Windowed", "gui", {WAYS[4]}, "with a window"),
+    ],
+)
+def test_what_an_engine_does_not_repeat_is_found(
     replayed: Callable[..., Replay],
+    handle_of: Callable[..., SimulatorHandle],
+    name: str,
+    mode: str | None,
+    ways: set[str],
+    told: str,
 ) -> None:
-    result = replayed("Forgetful", capabilities=EVERYTHING - {Capability.EXACT_RESTORE})
-    assert broken(result) == {"restored in flight"}
-    result.assert_as_claimed()
-
-
-def test_an_effect_of_the_window_is_found(
-    replayed: Callable[..., Replay], handle_of: Callable[..., SimulatorHandle]
-) -> None:
-    result = replayed("Windowed", other_mode=handle_of("Windowed", "gui"))
-    assert broken(result) == {"with a window"}
-    with pytest.raises(AssertionError, match="with a window"):
+    result = replayed(name, other_mode=handle_of(name, mode) if mode else "no display")
+    assert broken(result) == ways
+    with pytest.raises(AssertionError, match=told):
         result.assert_as_claimed()
+
+
+@pytest.mark.parametrize(
+    ("name", "unclaimed"),
+    [("Noisy", Capability.DETERMINISTIC), ("Forgetful", Capability.EXACT_RESTORE)],
+)
+def test_what_nobody_claims_is_a_result(
+    replayed: Callable[..., Replay], name: str, unclaimed: Capability
+) -> None:
+    result = replayed(name, capabilities=EVERYTHING - {unclaimed})
+    assert "restored in flight" in broken(result)
+    result.assert_as_claimed()
 
 
 def test_failure_to_run_again_is_a_failure_without_a_claim(
     replayed: Callable[..., Replay],
 ) -> None:
-    result = replayed("Refusing", capabilities=UNCLAIMED)
+    result = replayed("Refusing", capabilities=EVERYTHING - {Capability.DETERMINISTIC})
     assert [again.failure for again in result.again if again.failure] == [
         "EngineFailed: RuntimeError: no way back"
     ]

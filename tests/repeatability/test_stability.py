@@ -48,30 +48,16 @@ def test_growth_per_displacement(steps: int) -> None:
     assert experiment.asked == [((), None), ((perturbation,), TAPE)]
     assert found.simulator == "sim"
     assert found.perturbation == f"{0.1 * steps:g} mm in x of a"
-    assert found.ratio == {
-        0.1: pytest.approx(3.0),
-        1.0: pytest.approx(6.0),
-        5.0: pytest.approx(1.0),
-        20.0: None,
-    }
+    assert found.ratio == pytest.approx({0.1: 3.0, 1.0: 6.0, 5.0: 1.0, 20.0: None})
     assert found.largest == pytest.approx(6.0)
-    assert found.until == {
-        "swung": pytest.approx(6.0),
-        "at first": pytest.approx(1.0),
-        "never": None,
-    }
+    assert found.until == pytest.approx({"swung": 6.0, "at first": 1.0, "never": None})
     assert found.sentence == (
         f"mm per mm after {0.1 * steps:g} mm in x of a: 3 at 0.1 s, 6 at 1 s, 1 at 5 s, "
         "6 until swung, 1 until at first; most 6"
     )
     assert found.to_wire() == {
         "perturbation": found.perturbation,
-        "ratio": {
-            "0.1": found.ratio[0.1],
-            "1": found.ratio[1.0],
-            "5": found.ratio[5.0],
-            "20": None,
-        },
+        "ratio": dict(zip(("0.1", "1", "5", "20"), found.ratio.values(), strict=True)),
         "until": found.until,
         "largest": found.largest,
         "sentence": found.sentence,
