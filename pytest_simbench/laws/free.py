@@ -4,20 +4,37 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pytest_simbench.client.world import World
 from pytest_simbench.laws.base import GRAVITY, LONG, Law, Reading, Watched, solved, watch
-from pytest_simbench.scene import Box, Cylinder, FloatArray, Pose, Scene, Vector3, Wrench
+from pytest_simbench.scene import (
+    STANDARD_GRAVITY,
+    Box,
+    Cylinder,
+    FloatArray,
+    Pose,
+    Scene,
+    Vector3,
+    Wrench,
+)
 
 FREE = "free motion"
 OPEN: Vector3 = (1e3, 1e3, 1e3)
 """A room without walls [m]."""
 
 WEIGHTLESS: Vector3 = (0.0, 0.0, 0.0)
+
+
+def alone(
+    law: Law, size: Vector3, height: float, gravity: Vector3 = STANDARD_GRAVITY, **values: Any
+) -> Scene:
+    """A box of 1 kg, so high above the ground [m] that it does not reach it."""
+    body = Box("body", size, Pose.at(0.0, 0.0, height), 1.0, **values)
+    return Scene(law.name, (body,), gravity=gravity)
 
 
 @dataclass(frozen=True)
@@ -28,7 +45,7 @@ class FreeFall(Law, phenomenon=FREE, quantity="height fallen", unit="m"):
     seconds: float = 1.0
 
     def build(self) -> Scene:
-        return Scene(self.name, (Box("body", (0.1,) * 3, Pose.at(0.0, 0.0, 8.0), 1.0),))
+        return alone(self, (0.1,) * 3, 8.0)
 
     def read(self, seen: Watched) -> Reading:
         t = seen.end
@@ -53,8 +70,7 @@ class DampedFall(FreeFall, quantity="speed of the fall", unit="m/s"):
     damping: float = 2.0
 
     def build(self) -> Scene:
-        body = Box("body", (0.1,) * 3, Pose.at(0.0, 0.0, 8.0), 1.0, linear_damping=self.damping)
-        return Scene(self.name, (body,))
+        return alone(self, (0.1,) * 3, 8.0, linear_damping=self.damping)
 
     def read(self, seen: Watched) -> Reading:
         exact = GRAVITY / self.damping * -math.expm1(-self.damping * seen.end)
@@ -70,8 +86,7 @@ class ObliqueGravity(Law, phenomenon=FREE, quantity="distance from the place", u
     seconds: float = 1.0
 
     def build(self) -> Scene:
-        body = Box("body", (0.1,) * 3, Pose.at(0.0, 0.0, 8.0), 1.0)
-        return Scene(self.name, (body,), gravity=self.gravity)
+        return alone(self, (0.1,) * 3, 8.0, self.gravity)
 
     def read(self, seen: Watched) -> Reading:
         t = seen.end
@@ -92,15 +107,8 @@ class Projectile(Law, phenomenon=FREE, quantity="distance from the place, turn i
     seconds: float = 1.0
 
     def build(self) -> Scene:
-        body = Box(
-            "body",
-            (0.3, 0.2, 0.1),
-            Pose.at(0.0, 0.0, 2.0),
-            1.0,
-            linear_velocity=self.velocity,
-            angular_velocity=(0.0, 0.0, self.spin),
-        )
-        return Scene(self.name, (body,))
+        start = {"linear_velocity": self.velocity, "angular_velocity": (0.0, 0.0, self.spin)}
+        return alone(self, (0.3, 0.2, 0.1), 2.0, **start)
 
     def read(self, seen: Watched) -> Reading:
         t, row = seen.end, seen.bodies[-1, 0]
@@ -125,14 +133,8 @@ class Spin(Law, phenomenon=FREE, quantity="angular velocity", unit="rad/s"):
     seconds: float = 1.0
 
     def build(self) -> Scene:
-        body = Box(
-            "body",
-            (0.1, 0.2, 0.3),
-            Pose.at(0.0, 0.0, 2.0),
-            1.0,
-            angular_velocity=(0.0, 0.0, self.spin),
-        )
-        return Scene(self.name, (body,), gravity=WEIGHTLESS)
+        omega = (0.0, 0.0, self.spin)
+        return alone(self, (0.1, 0.2, 0.3), 2.0, WEIGHTLESS, angular_velocity=omega)
 
     def read(self, seen: Watched) -> Reading:
         return seen.reading(seen.bodies[-1, 0, 12], self.spin, 0.0, 2 * self.spin)
@@ -150,8 +152,7 @@ class FreeTop(Law, phenomenon=FREE, quantity="angle from the attitude", unit="ra
     seconds: float = 1.0
 
     def build(self) -> Scene:
-        body = Box("body", self.size, Pose.at(0.0, 0.0, 2.0), 1.0, angular_velocity=self.omega)
-        return Scene(self.name, (body,), gravity=WEIGHTLESS)
+        return alone(self, self.size, 2.0, WEIGHTLESS, angular_velocity=self.omega)
 
     def attitude(self, t: float) -> Rotation:
         """After a time [s]."""
@@ -188,8 +189,7 @@ class _Tumble(Law, phenomenon=FREE):
     omega: ClassVar[Vector3] = (0.05, 6.0, 0.05)
 
     def build(self) -> Scene:
-        body = Box("body", self.size, Pose.at(0.0, 0.0, 2.0), 1.0, angular_velocity=self.omega)
-        return Scene(self.name, (body,), gravity=WEIGHTLESS)
+        return alone(self, self.size, 2.0, WEIGHTLESS, angular_velocity=self.omega)
 
     @property
     def inertia(self) -> FloatArray:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -15,6 +15,15 @@ from pytest_simbench.scene import Box, Pose, Scene, Sphere
 
 RADIUS = 0.05
 """[m]."""
+
+
+def let_go(
+    law: Law, height: float, restitution: float, friction: float = 1.0, **values: Any
+) -> Scene:
+    """A ball of 1 kg so high above the ground [m]; both have these."""
+    place = Pose.at(0.0, 0.0, RADIUS + height)
+    ball = Sphere("ball", RADIUS, place, 1.0, friction, restitution=restitution, **values)
+    return Scene(law.name, (ball,), ground_friction=friction, ground_restitution=restitution)
 
 
 @dataclass(frozen=True)
@@ -98,9 +107,7 @@ class BounceHeight(Law, phenomenon="impact", quantity="height of the bounce", un
     height: float = 0.5
 
     def build(self) -> Scene:
-        place = Pose.at(0.0, 0.0, RADIUS + self.height)
-        ball = Sphere("ball", RADIUS, place, 1.0, restitution=self.restitution)
-        return Scene(self.name, (ball,), ground_restitution=self.restitution)
+        return let_go(self, self.height, self.restitution)
 
     @property
     def fall(self) -> float:
@@ -145,19 +152,13 @@ class ElasticChain(Law, phenomenon="impact", quantity="speed of the last ball", 
     seconds: float = 0.3
 
     def build(self) -> Scene:
-        balls = [
-            Sphere(
-                f"ball_{k}",
-                RADIUS,
-                Pose.at(k * (2 * RADIUS + 0.01), 0.0, RADIUS),
-                1.0,
-                0.0,
-                restitution=1.0,
-                linear_velocity=(self.speed if k == 0 else 0.0, 0.0, 0.0),
-            )
-            for k in range(4)
-        ]
-        return Scene(self.name, tuple(balls), ground_friction=0.0, ground_restitution=1.0)
+        row = [Pose.at(k * (2 * RADIUS + 0.01), 0.0, RADIUS) for k in range(4)]
+        one, *others = (
+            Sphere(f"ball_{k}", RADIUS, place, 1.0, 0.0, restitution=1.0)
+            for k, place in enumerate(row)
+        )
+        balls = (replace(one, linear_velocity=(self.speed, 0.0, 0.0)), *others)
+        return Scene(self.name, balls, ground_friction=0.0, ground_restitution=1.0)
 
     def read(self, seen: Watched) -> Reading:
         return seen.reading(seen.bodies[-1, -1, 7], self.speed, GRAVITY, self.speed)
@@ -177,21 +178,8 @@ class ObliqueBounceSlip(
     height: float = 0.2
 
     def build(self) -> Scene:
-        ball = Sphere(
-            "ball",
-            RADIUS,
-            Pose.at(0.0, 0.0, RADIUS + self.height),
-            1.0,
-            self.friction,
-            restitution=self.restitution,
-            linear_velocity=(self.level, 0.0, 0.0),
-        )
-        return Scene(
-            self.name,
-            (ball,),
-            ground_friction=self.friction,
-            ground_restitution=self.restitution,
-        )
+        level = (self.level, 0.0, 0.0)
+        return let_go(self, self.height, self.restitution, self.friction, linear_velocity=level)
 
     @property
     def exact(self) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -34,12 +34,8 @@ class RollingSphere(Law, phenomenon="rolling", quantity="acceleration", unit="m/
         return Sphere("ball", RADIUS, Pose.at(0.0, 0.0, RADIUS), 1.0, self.friction)
 
     def build(self) -> Scene:
-        return Scene(
-            self.name,
-            (self.body(),),
-            gravity=tilted(self.slope, 0.0),
-            ground_friction=self.friction,
-        )
+        gravity = tilted(self.slope, 0.0)
+        return Scene(self.name, (self.body(),), gravity=gravity, ground_friction=self.friction)
 
     def read(self, seen: Watched) -> Reading:
         pull = GRAVITY * math.sin(math.atan(self.slope))
@@ -68,16 +64,10 @@ class SlipToRoll(Law, phenomenon="rolling", quantity="speed", unit="m/s"):
     seconds: float = 0.5
 
     def build(self) -> Scene:
-        ball = Sphere(
-            "ball",
-            RADIUS,
-            Pose.at(0.0, 0.0, RADIUS),
-            1.0,
-            self.friction,
-            linear_velocity=(self.speed, 0.0, 0.0),
-            angular_velocity=(0.0, self.spin, 0.0),
-        )
-        return Scene(self.name, (ball,), ground_friction=self.friction)
+        ball = Sphere("ball", RADIUS, Pose.at(0.0, 0.0, RADIUS), 1.0, self.friction)
+        v, w = (self.speed, 0.0, 0.0), (0.0, self.spin, 0.0)
+        pushed = replace(ball, linear_velocity=v, angular_velocity=w)
+        return Scene(self.name, (pushed,), ground_friction=self.friction)
 
     def read(self, seen: Watched) -> Reading:
         exact = (5 * self.speed + 2 * self.spin * RADIUS) / 7

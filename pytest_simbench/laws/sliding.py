@@ -4,7 +4,7 @@ beside the box that it is."""
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -75,11 +75,8 @@ class StoppingDistance(Law, phenomenon="sliding", quantity="way", unit="m"):
     friction: float = 0.5
 
     def build(self) -> Scene:
-        velocity = (
-            self.speed * math.cos(self.direction),
-            self.speed * math.sin(self.direction),
-            0.0,
-        )
+        cos, sin = math.cos(self.direction), math.sin(self.direction)
+        velocity = (self.speed * cos, self.speed * sin, 0.0)
         slab = Box("slab", SLAB, SLAB_AT, 1.0, self.friction, linear_velocity=velocity)
         return Scene(self.name, (slab,), ground_friction=self.friction)
 
@@ -146,20 +143,21 @@ class BeltSpeed(Law, phenomenon="sliding", quantity="way", unit="m"):
         return Box("box", (0.1, 0.1, 0.05), Pose.at(0.0, 0.0, TOP + 0.025), 0.5, self.friction)
 
     def build(self) -> Scene:
-        belt = Box(
-            "belt",
-            (4.0, 0.4, 0.1),
-            Pose.at(0.0, 0.0, TOP - 0.05),
-            friction=self.friction,
-            linear_velocity=(self.speed, 0.0, 0.0),
-            prescribed=True,
-        )
+        place, speed = Pose.at(0.0, 0.0, TOP - 0.05), (self.speed, 0.0, 0.0)
+        belt = Box("belt", (4.0, 0.4, 0.1), place, friction=self.friction)
+        belt = replace(belt, linear_velocity=speed, prescribed=True)
         return Scene(self.name, (belt, self.body()), ground_friction=self.friction)
 
     def read(self, seen: Watched) -> Reading:
         t, slips = seen.end, self.speed / (self.friction * GRAVITY)
         exact = self.speed * (t - slips / 2)
         return seen.reading(seen.bodies[-1, 1, 0], exact, self.speed, 1.0)
+
+
+def block(size: Vector3) -> tuple[Vector3, ...]:
+    """Corners of a box about its centre [m]."""
+    x, y, z = (edge / 2 for edge in size)
+    return tuple((a, b, c) for a in (-x, x) for b in (-y, y) for c in (-z, z))
 
 
 @dataclass(frozen=True)
@@ -177,8 +175,7 @@ class MeshTwin(
     seconds: float = 0.4
 
     def build(self) -> Scene:
-        x, y, z = (edge / 2 for edge in self.size)
-        corners = tuple((a, b, c) for a in (-x, x) for b in (-y, y) for c in (-z, z))
+        corners, z = block(self.size), self.size[2] / 2
         thrown = Pose.at(0.0, 0.0, z + self.height), 1.0, self.friction
         box = Box("box", self.size, *thrown, linear_velocity=(self.speed, 0.0, 0.0))
         mesh = ConvexMesh("mesh", corners, *thrown, linear_velocity=(self.speed, 0.0, 0.0))

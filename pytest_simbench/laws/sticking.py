@@ -23,11 +23,8 @@ def tilted(slope: float, direction: float) -> Vector3:
     """Gravity that makes the ground a slope [tangent], down towards `direction` [rad]."""
     angle = math.atan(slope)
     pull = GRAVITY * math.sin(angle)
-    return (
-        pull * math.cos(direction),
-        pull * math.sin(direction),
-        -GRAVITY * math.cos(angle),
-    )
+    down = -GRAVITY * math.cos(angle)
+    return pull * math.cos(direction), pull * math.sin(direction), down
 
 
 def slab_on(name: str, slope: float, direction: float, friction: float) -> Scene:

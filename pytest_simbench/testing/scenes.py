@@ -12,6 +12,7 @@ from pytest_simbench.laws.hands import GAP, HELD, around
 from pytest_simbench.laws.hands import of_scene as of_scene
 from pytest_simbench.laws.hands import squeezing as squeezing
 from pytest_simbench.laws.hands import with_joint as with_joint
+from pytest_simbench.laws.sliding import block
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import (
@@ -115,12 +116,6 @@ def wedge(length: float = 0.1, width: float = 0.05, height: float = 0.04) -> Ver
     a third of its own, it stands as a box does."""
     ends = [(-length / 2, -height / 3), (length / 2, -height / 3), (0.0, 2 * height / 3)]
     return tuple((x, y, z) for x, z in ends for y in (-width / 2, width / 2))
-
-
-def block(size: Vector3) -> Vertices:
-    """Corners of a box about its centre [m]."""
-    x, y, z = (edge / 2 for edge in size)
-    return tuple((a, b, c) for a in (-x, x) for b in (-y, y) for c in (-z, z))
 
 
 def meshes() -> Scene:
