@@ -158,7 +158,8 @@ def shift(y: float = 0.0, z: float = 0.0) -> Edit:
     return edit
 
 
-def _set(**values: str) -> Edit:
+def put(**values: str) -> Edit:
+    """Other values of attributes."""
     return lambda element: element.attrib.update(values)
 
 
@@ -261,7 +262,7 @@ _THINNER = (0.1, 0.058, 0.03)
 
 _ROWS: dict[str, tuple[Any, ...]] = {
     "finger_shape": ("the rubber tip of a finger is 3 mm thinner", "link/panda_leftfinger/boxes",
-                     edited(f"{_TIP}/geometry/box", _set(size="17.5e-3 12.2e-3 18.5e-3"))),
+                     edited(f"{_TIP}/geometry/box", put(size="17.5e-3 12.2e-3 18.5e-3"))),
     "finger_pad": ("the rubber tip of a finger is 2 mm nearer to the hand",
                    "link/panda_leftfinger/boxes", edited(_TIP, shift(z=-0.002))),
     "mesh_scale": ("the mesh of link 4 is 1.3 times as large", "link/panda_link4/meshes",
