@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +18,6 @@ from pytest_simbench.repeatability.agreement import (
     agreement,
     agreements,
 )
-from pytest_simbench.repeatability.episode import Episodes
 from tests.repeatability.scripted import episode, motion, operation
 
 
@@ -130,20 +129,6 @@ def test_kept_and_read_back(tmp_path: Path) -> None:
     assert [len(motion) for motion in read.motions] == [1, 4]
     assert [(a.first, a.second) for a in agreements(tmp_path)] == [("a", "b")]
     assert agreements(tmp_path / "nothing") == []
-
-
-def test_engines_with_the_same_law_agree_until_things_collide(
-    tumbling: Callable[..., Episodes],
-) -> None:
-    """Falling is the same everywhere; from the first contact on, engines go their own ways. The
-    steps are 1 ms and 1/240 s and the first-order integrators differ by g h t / 2 on the way."""
-    samples = [
-        Sample.of(tumbling(name).run(), name, "tumbling", 1) for name in ("mujoco", "pybullet")
-    ]
-    found = agreement(*samples)
-    centimetre = found.partings[0.01]
-    assert 0.1 < centimetre.time < 1.6
-    assert agreement(samples[0], samples[0]).partings == {0.001: None, 0.01: None}
 
 
 @pytest.mark.parametrize(

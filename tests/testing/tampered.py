@@ -9,7 +9,7 @@ from typing import Any
 
 from pytest_simbench.sims.mujoco.world import ROBOT
 
-from tests.testing.wrong import Lying
+from tests.testing.wrong import FINGERS, Lying
 
 Tamper = Callable[[Any], None]
 Rows = Any
@@ -18,8 +18,6 @@ Rows = Any
 ALL = slice(None)
 SLIDING = (ALL, 0)
 """The first of MuJoCo's three coefficients of friction."""
-
-FINGERS = ("panda_leftfinger", "panda_rightfinger")
 
 
 def put(array: str, value: Any, rows: Rows = ALL) -> Tamper:
