@@ -54,7 +54,7 @@ def stillness(dt: float, scale: float, contacts: int = 1) -> float:
 
 class Law(Task):
     """One law. Subclasses are frozen dataclasses; formula, source and tolerance in the docstring,
-    and what follows in the head: `class FallSpeed(FreeFall, quantity="speed of the fall")`.
+    and what is the same of every instance in the head: `class FallSpeed(FreeFall, unit="m/s")`.
     What a head does not say is that of the class above. The law's name is the class's, here
     `fall_speed`, unless the class has a `name`. A class whose name is "" or begins with `_` is no
     law: others share what it has.
@@ -83,7 +83,7 @@ class Law(Task):
     known: ClassVar[list[type[Law]]] = []
     """Every law: it registers when it is defined."""
 
-    def __init_subclass__(cls, **head: str) -> None:
+    def __init_subclass__(cls, **head: Any) -> None:
         own = re.sub("(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
         for attribute, value in {"name": vars(cls).get("name", own), **head}.items():
             setattr(cls, attribute, value)

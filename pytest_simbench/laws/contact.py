@@ -53,15 +53,15 @@ class _Stack(Law, phenomenon="stacking", quantity="way of the top cube", unit="m
 
 
 @dataclass(frozen=True)
-class RestDepth(_Stack):
+class RestDepth(_Stack, masses=(1.0,)):
     """A cube put on the ground stays there: it neither sinks nor moves aside. Tolerance: an
     equilibrium, g dt^2."""
 
-    masses: ClassVar[tuple[float, ...]] = (1.0,)
-
 
 @dataclass(frozen=True)
-class RestForce(_Stack, quantity="force upward", unit="N"):
+class RestForce(
+    _Stack, quantity="force upward", unit="N", needs=(Capability.CONTACT_FORCES,), masses=(1.0,)
+):
     """The ground carries a cube at rest with m g (Newton's first law).
 
     The force is the mean of a time T after one of settling, step by step. By the law of momentum
@@ -69,10 +69,7 @@ class RestForce(_Stack, quantity="force upward", unit="N"):
     2 m g dt / T.
     """
 
-    needs: ClassVar[tuple[Capability, ...]] = (Capability.CONTACT_FORCES,)
-
     carrying: ClassVar[str] = "ground"
-    masses: ClassVar[tuple[float, ...]] = (1.0,)
     settling: float = 0.3
     seconds: float = 0.1
 
@@ -95,19 +92,14 @@ class RestForce(_Stack, quantity="force upward", unit="N"):
 
 
 @dataclass(frozen=True)
-class Tower(_Stack):
+class Tower(_Stack, masses=(1.0,) * 5):
     """A tower of five equal cubes stands. Tolerance: g dt^2 for each contact."""
-
-    masses: ClassVar[tuple[float, ...]] = (1.0,) * 5
 
 
 @dataclass(frozen=True)
-class TowerForce(RestForce):
+class TowerForce(RestForce, carrying="body/cube 0", masses=(1.0,) * 4):
     """In a tower of four equal cubes the lowest carries the other three with 3 m g. Tolerance as of
     `RestForce`."""
-
-    carrying: ClassVar[str] = "body/cube 0"
-    masses: ClassVar[tuple[float, ...]] = (1.0,) * 4
 
     @property
     def carried(self) -> tuple[str, float]:
@@ -115,20 +107,17 @@ class TowerForce(RestForce):
 
 
 @dataclass(frozen=True)
-class HeavyOnTop(_Stack):
+class HeavyOnTop(_Stack, masses=(1.0, 1.0, 1.0, 100.0)):
     """Three cubes of 1 kg carry one of 100 kg: masses do not matter to statics. Tolerance as of
     `Tower`. Solvers that iterate converge the slower, the larger the ratio of masses."""
 
-    masses: ClassVar[tuple[float, ...]] = (1.0, 1.0, 1.0, 100.0)
-
 
 @dataclass(frozen=True)
-class Overhang(_Stack):
+class Overhang(_Stack, masses=(1.0,) * 4):
     """Four cubes, each shifted on the one below by 0.9 of what statics allows, L / 2 (1, 1/2, 1/3)
     from the top (Coffin 1923; Paterson, Zwick, Overhang, 2009): the stack stands. Tolerance as of
     `Tower`."""
 
-    masses: ClassVar[tuple[float, ...]] = (1.0,) * 4
     overhangs: ClassVar[tuple[float, ...]] = tuple(0.9 * EDGE / 2 / k for k in (3, 2, 1))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from scipy.integrate import quad
@@ -101,14 +100,18 @@ def passages(plates: int) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class DominoWave(Law, phenomenon="mechanisms", quantity="speed of the wave", unit="m/s"):
+class DominoWave(
+    Law,
+    phenomenon="mechanisms",
+    quantity="speed of the wave",
+    unit="m/s",
+    needs=(Capability.SELF_COLLIDE,),
+):
     """In a row of plates hinged at their feet each strikes the next, inelastically, and all that
     fell stay together and push: a train of one degree of freedom between impacts (van Leeuwen, The
     domino effect, Am. J. Phys. 78, 721, 2010, without friction; `passages`). The speed is that from
     where the first plate strikes to where the last one would. Tolerance: each impact is late by
     one step, in its place and in its speed, so each of the passages may take two steps longer."""
-
-    needs: ClassVar[tuple[Capability, ...]] = (Capability.SELF_COLLIDE,)
 
     plates: int = 8
 

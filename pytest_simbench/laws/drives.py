@@ -77,11 +77,9 @@ class SpringDamper(_Driven):
 
 
 @dataclass(frozen=True)
-class EffortLimit(_Driven):
+class EffortLimit(_Driven, goal=5.0):
     """A drive told to go far away pushes with its limit and no more: x = (F / I) t^2 / 2.
     Tolerance: (F / I) t dt."""
-
-    goal: ClassVar[float] = 5.0
 
     effort: float = 2.0
     seconds: float = 0.5

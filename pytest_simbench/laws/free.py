@@ -253,13 +253,10 @@ class TumbleMomentum(_Tumble, quantity="change of the angular momentum", unit="%
 
 
 @dataclass(frozen=True)
-class _TumbleDrift(_Tumble):
+class _TumbleDrift(_Tumble, omega=(2 / 120, 2.0, 2 / 120), study_timeout=LONG):
     """The same for a minute, three times slower: 6 turns over. A first-order method adds to energy
     and momentum in each step, and does not take it back: at 6 rad/s it may lose all that there is
     in a minute, at any usual step, and nothing could be asked of it."""
-
-    omega: ClassVar[Vector3] = (2 / 120, 2.0, 2 / 120)
-    study_timeout: ClassVar[float] = LONG
 
     seconds: float = 60.0
 

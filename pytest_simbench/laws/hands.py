@@ -112,11 +112,9 @@ class _Grip(Law, phenomenon="grasping"):
 
 
 @dataclass(frozen=True)
-class GripHolds(_Grip, quantity="way in the hand in 0.35 s", unit="m"):
+class GripHolds(_Grip, quantity="way in the hand in 0.35 s", unit="m", held_for=0.5):
     """A cube of 0.8 times what the fingers carry stays where it is in the hand, from 0.15 s on.
     Tolerance: an equilibrium, g dt^2."""
-
-    held_for: ClassVar[float] = 0.5
 
     load: float = 0.8
 
@@ -148,11 +146,9 @@ class GripSlips(_Grip, quantity="acceleration", unit="m/s^2"):
 
 
 @dataclass(frozen=True)
-class GripSlipsDiagonally(GripSlips):
+class GripSlipsDiagonally(GripSlips, aside=math.pi / 4):
     """The same when the load pulls at 45 degrees, within the plane of the fingers: a friction
     pyramid holds up to sqrt(2) times as much there."""
-
-    aside: ClassVar[float] = math.pi / 4
 
 
 BLOCK: Vector3 = (0.1, 0.1, 0.1)

@@ -191,12 +191,10 @@ class PendulumEnergy(_Energy):
 
 
 @dataclass(frozen=True)
-class PendulumEnergyDrift(PendulumEnergy):
+class PendulumEnergyDrift(PendulumEnergy, study_timeout=LONG):
     """Over 100 periods the energy of that pendulum stays what it was, too. Tolerance as of
     `PendulumEnergy`, whatever the number of periods: what a symplectic method is off by swings with
     the pendulum and does not add up. Only rounding does. The protocol `smoke` takes 4 periods."""
-
-    study_timeout: ClassVar[float] = LONG
 
     seconds: float = 100 * _period(0.1, 1.5, 1.0, INERTIA_OF_A_POINT)
 
@@ -247,11 +245,9 @@ class SwingingSlider(Motion):
 
 
 @dataclass(frozen=True)
-class SphericalPendulum(Motion):
+class SphericalPendulum(Motion, gravity=(3.0, 4.0, -8.0)):
     """A bob on two crossed hinges that moves out of their planes: gyroscopic terms of three
     dimensions, against the equations of motion. Tolerance as of `DoublePendulum`."""
-
-    gravity: ClassVar[Vector3] = (3.0, 4.0, -8.0)
 
     seconds: float = 1.0
 

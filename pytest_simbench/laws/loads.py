@@ -23,11 +23,9 @@ MASS = 2.0
 
 
 @dataclass(frozen=True)
-class _Loaded(Passive, phenomenon="mechanisms"):
+class _Loaded(Passive, phenomenon="mechanisms", needs=(Capability.JOINT_WRENCHES,)):
     """A pendulum whose bob hangs aside of its plane: its hinge carries a force, and a torque
     across its axis."""
-
-    needs: ClassVar[tuple[Capability, ...]] = (Capability.JOINT_WRENCHES,)
 
     which: ClassVar[slice]
     """Of a wrench: force or torque."""
@@ -83,19 +81,19 @@ class _Loaded(Passive, phenomenon="mechanisms"):
 
 
 @dataclass(frozen=True)
-class PendulumForce(_Loaded, quantity="largest error of the hinge's force", unit="N"):
+class PendulumForce(
+    _Loaded, quantity="largest error of the hinge's force", unit="N", which=slice(0, 3)
+):
     """The hinge of a pendulum carries F = m (a - g): along the rod m g cos q + m l w^2, and across
     it what an inertia about the bob's centre asks for (Newton; Huygens, Horologium oscillatorium,
     1673). Tolerance: what is told is of the last step, whose begin is one step ago, and the speed
     was late by one then: two steps, 2 dt times the largest |dF/dt| of the swing."""
 
-    which: ClassVar[slice] = slice(0, 3)
-
 
 @dataclass(frozen=True)
-class PendulumTorque(_Loaded, quantity="largest error of the hinge's torque", unit="N m"):
+class PendulumTorque(
+    _Loaded, quantity="largest error of the hinge's torque", unit="N m", which=slice(3, 6)
+):
     """The hinge of a pendulum whose bob hangs aside of its plane carries a torque across its axis,
     the bob's way aside times the force, and none about it (Euler's second law). Tolerance as of
     `PendulumForce`, of the torque."""
-
-    which: ClassVar[slice] = slice(3, 6)

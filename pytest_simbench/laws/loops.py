@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -33,11 +32,9 @@ a part in 1e12, which the integrator below does not see."""
 
 
 @dataclass(frozen=True)
-class _FourBar(Passive, phenomenon="mechanisms"):
+class _FourBar(Passive, phenomenon="mechanisms", needs=(Capability.LOOPS,)):
     """Three rods: a crank and a rocker that hang on the mount, GROUND apart, and a coupler that is
     hinged to the crank and held at the rocker's end. It is let go at a crank angle."""
-
-    needs: ClassVar[tuple[Capability, ...]] = (Capability.LOOPS,)
 
     crank: float = 1.2
 

@@ -43,10 +43,8 @@ class RollingSphere(Law, phenomenon="rolling", quantity="acceleration", unit="m/
 
 
 @dataclass(frozen=True)
-class RollingCylinder(RollingSphere):
+class RollingCylinder(RollingSphere, share=2 / 3):
     """A cylinder rolls with a = 2/3 g sin a (I = m r^2 / 2). Tolerance as of `RollingSphere`."""
-
-    share: ClassVar[float] = 2 / 3
 
     def body(self) -> Body:
         return Cylinder("roller", RADIUS, 0.2, ON_ITS_SIDE, 1.0, self.friction)
