@@ -60,11 +60,13 @@ class Trial:
             displacement at the start does not count.
         effect: what the perturbation does, in words, "" when the outcome is the same.
         kept: of each count, how much is left: 1 when it is the same or better.
+        tape: of a run that had an end, and another outcome.
     """
 
     divergence: float
     effect: str = ""
     kept: float = 1.0
+    tape: Tape = ()
 
 
 class Attack:
@@ -84,16 +86,11 @@ class Attack:
         self.examples = examples
         self.base: Episode = episodes.run()
         self.trials: dict[Perturbations, Trial] = {}
-        self.tapes: dict[Perturbations, Tape] = {}
-
-    @property
-    def exhausted(self) -> bool:
-        return len(self.trials) >= self.examples
 
     def trial(self, perturbed: Perturbations) -> Trial | None:
         """The result of a perturbation; None when it is unknown and no more runs are allowed."""
         if perturbed not in self.trials:
-            if self.exhausted:
+            if len(self.trials) >= self.examples:
                 return None
             self.trials[perturbed] = self.run(perturbed)
         return self.trials[perturbed]
@@ -105,13 +102,12 @@ class Attack:
         except WorkerError as error:
             return Trial(1.0, f"ends in {type(error).__name__}", kept=0.0)
         found = changed(self.base.counts, episode.counts)
-        if found:
-            self.tapes[perturbed] = episode.tape
         task = self.episodes.task
         return Trial(
             divergence(self.base, episode),
             effect(task, self.base.outcome, episode.outcome, found),
-            kept=_kept(task, self.base, episode),
+            _kept(task, self.base, episode),
+            episode.tape if found else (),
         )
 
 
@@ -313,8 +309,8 @@ def _failing(
 def _kept_example(attack: Attack, smallest: Perturbations) -> str:
     """The line that replays the smallest perturbation, from its file in the run folder."""
     episodes = attack.episodes
-    tape = attack.tapes.get(smallest)
-    if tape is None:  # it crashed: its episode wrote its own file
+    tape = attack.trials[smallest].tape
+    if not tape:  # it crashed: its episode wrote its own file
         return ""
     case, versions = episodes.handle.case, episodes.handle.constructed.versions
     name = f"smallest-{episodes.task.name}-{case.simulator}-{case.mode}"

@@ -84,18 +84,16 @@ def test_an_attack_remembers_and_ends() -> None:
     experiment = Scripted(run)
     attack = Attack(experiment, 2)
     assert [asked[0] for asked in experiment.asked] == [()]
-    assert not attack.exhausted
     harmless, harmful = attack.trial(step[1]), attack.trial(step[2])
     assert harmless == Trial(pytest.approx(3e-4), kept=1.0)
     assert (harmful.effect, harmful.kept) == ("changes standing from 100 % to 50 %", 0.5)
-    assert attack.exhausted
-    assert attack.trial(step[3]) is None
+    assert attack.trial(step[3]) is None  # no more than two
     assert attack.trial(step[2]) is harmful
     assert len(experiment.asked) == 3
     attack.examples = 3
     assert attack.trial(step[3]) is not None
     assert list(attack.trials) == step[1:]
-    assert list(attack.tapes) == step[2:]
+    assert [step for step, trial in attack.trials.items() if trial.tape] == step[2:]
 
 
 def test_a_crash_keeps_nothing() -> None:
