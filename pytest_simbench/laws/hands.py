@@ -79,14 +79,19 @@ def gravity_effort(robot: Robot, q: FloatArray, gravity: Vector3 = STANDARD_GRAV
     return np.asarray(RobotModel(robot).inverse_dynamics(np.array(gravity), q[None], zero, zero)[0])
 
 
-def close_command(scene: Scene, timestep: float) -> Trajectory:
-    """One command: arm at its start with gravity compensated, fingers closed."""
+def hold_command(scene: Scene, timestep: float) -> Trajectory:
+    """One command: everything at its start, gravity compensated."""
     robot = of_scene(scene)
-    goal = robot.column("initial_position")
-    effort = gravity_effort(robot, goal, scene.gravity)
-    goal[robot.finger_indices] = robot.gripper.closed
-    effort[robot.finger_indices] = 0.0
-    return Trajectory.holding(timestep, goal, effort)
+    start = robot.column("initial_position")
+    return Trajectory.holding(timestep, start, gravity_effort(robot, start, scene.gravity))
+
+
+def close_command(scene: Scene, timestep: float) -> Trajectory:
+    """The same with the fingers closed."""
+    robot, told = of_scene(scene), hold_command(scene, timestep)
+    told.position[:, robot.finger_indices] = robot.gripper.closed
+    told.effort[:, robot.finger_indices] = 0.0
+    return told
 
 
 class _Grip(Law, phenomenon="grasping"):

@@ -57,7 +57,7 @@ class DeadLanding(LandingTime, quantity="rise after the landing", unit="m"):
 
 
 @dataclass(frozen=True)
-class _Collision(Law, phenomenon="impact", unit="m/s"):
+class _Collision(Law, phenomenon="impact", unit="m/s", seconds=0.3):
     """A cube hits another one that is at rest, face on face, on ground without friction."""
 
     masses: ClassVar[tuple[float, float]] = (1.0, 2.0)
@@ -82,8 +82,7 @@ class DeadCollision(_Collision, quantity="speed of the cube that was hit"):
     """With e = 0 both go on with the common speed m1 v / (m1 + m2). Tolerance: what gravity changes
     within one step, g dt: an impact is solved at once, whatever the step."""
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, 0.3)
+    def read(self, seen: Watched) -> Reading:
         return seen.reading(seen.bodies[-1, 1, 7], self.common, GRAVITY, 1.0)
 
 
@@ -92,8 +91,7 @@ class CollisionMomentum(_Collision, quantity="speed of the common centre of mass
     """Whatever else happens, momentum stays: (m1 v1 + m2 v2) / (m1 + m2) is what it was. Tolerance
     as of `DeadCollision`."""
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, 0.3)
+    def read(self, seen: Watched) -> Reading:
         found = float(seen.bodies[-1, :, 7] @ self.masses) / sum(self.masses)
         return seen.reading(found, self.common, 0.0, 2.0)
 

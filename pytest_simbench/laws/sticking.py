@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, stillness, watch
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, stillness
 from pytest_simbench.laws.mechanisms import STRONG, Part, mechanism
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Trajectory, Vector3
 
@@ -116,7 +116,7 @@ class StickAngleDiagonal(StickAngleX):
 
 
 @dataclass(frozen=True)
-class Creep(Law, phenomenon="sticking", quantity="way in 1 s", unit="m"):
+class Creep(Law, phenomenon="sticking", quantity="way in 1 s", unit="m", seconds=1.2):
     """A slab on a slope of 0.8 mu stays where it is. Tolerance: an equilibrium, g dt^2; it is
     looked at from 0.2 s on."""
 
@@ -127,8 +127,7 @@ class Creep(Law, phenomenon="sticking", quantity="way in 1 s", unit="m"):
     def build(self) -> Scene:
         return slab_on(self.name, self.share * self.friction, self.direction, self.friction)
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, 1.2)
+    def read(self, seen: Watched) -> Reading:
         way = seen.bodies[-1, 0, :2] - seen.at(0.2, seen.bodies[:, 0, :2])
         allowed = stillness(seen.dt, 0.1)
         return Reading(float(np.linalg.norm(way)), 0.0, allowed)

@@ -6,7 +6,7 @@ import numpy as np
 
 from pytest_simbench.laws.hands import close_command, gravity_effort
 from pytest_simbench.motion.model import RobotModel
-from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Scene, Trajectory
+from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Trajectory
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import any_robot, check, coupled, finger_unit, grasping
 from pytest_simbench.testing.subject import Subject, logged, require, require_close
@@ -185,11 +185,3 @@ def joint_momentum(robot: Robot, q: FloatArray, v: FloatArray, armature: bool) -
 def own_inertia(robot: Robot, q: FloatArray, k: int, armature: bool) -> float:
     """Inertia that the drive of joint `k` meets while the others stand still, M(q)_kk [kg m^2]."""
     return float(joint_momentum(robot, q, np.eye(len(q))[k], armature)[k])
-
-
-def hold_command(scene: Scene, timestep: float) -> Trajectory:
-    """One command: everything at its start, gravity compensated."""
-    robot = scenes.of_scene(scene)
-    start = robot.column("initial_position")
-    effort = gravity_effort(robot, start, scene.gravity)
-    return Trajectory.holding(timestep, start, effort)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from pytest_simbench.laws.hands import gravity_effort
+from pytest_simbench.laws.hands import gravity_effort, hold_command
 from pytest_simbench.laws.loops import FourBarClosure, FourBarSwing
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Trajectory, Vector3
@@ -17,7 +17,6 @@ from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import any_robot, check
 from pytest_simbench.testing.drives import (
     has_armature,
-    hold_command,
     own_inertia,
     require_limit_reached,
 )

@@ -9,7 +9,7 @@ import numpy as np
 
 from pytest_simbench.client.world import Motion
 from pytest_simbench.laws.free import rotation_of
-from pytest_simbench.laws.hands import close_command, gravity_effort
+from pytest_simbench.laws.hands import close_command, gravity_effort, hold_command
 from pytest_simbench.laws.impact import DeadLanding
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import FloatArray, Pose, Scene, Wrench
@@ -17,7 +17,6 @@ from pytest_simbench.tasks.manipulator import Manipulator
 from pytest_simbench.tasks.throw_analysis import Thrown
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import any_robot, check, grasping, throwing
-from pytest_simbench.testing.drives import hold_command
 from pytest_simbench.testing.scenes import EDGE, GRAVITY, MASS
 from pytest_simbench.testing.subject import Subject, asked, logged, require, require_close
 from pytest_simbench.testing.touch import Approach, approaches, beside

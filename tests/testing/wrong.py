@@ -182,20 +182,6 @@ class OneShot(MuJoCo):
             self.data.ctrl[:] = self.scene.robot.column("initial_position")
 
 
-class WrongMass(Lying):
-    def tamper(self) -> None:
-        self.model.body_mass[-1] *= 1.5
-        self.model.body_inertia[-1] *= 1.5
-        self.model.dof_M0[-6:] *= 1.5  # which the engine takes for bodies that nothing hangs on
-
-
-class DeepGround(Lying):
-    def tamper(self) -> None:
-        ground = self.model.geom("ground").id
-        self.model.geom_pos[ground, 2] -= 0.003
-        self.model.geom_sameframe[ground] = 0  # else the engine takes the body's frame
-
-
 class Meddler(MuJoCo):
     """Steps while it is asked."""
 
@@ -272,12 +258,6 @@ class Misbuilt(MuJoCo):
         self.model.opt.gravity *= 0.5
 
 
-class SoftDrives(Lying):
-    def tamper(self) -> None:
-        self.model.actuator_gainprm[:, 0] /= 2
-        self.model.actuator_biasprm[:, 1] /= 2
-
-
 DRIVE_NOT_TOLD = replace(
     MuJoCo.info,
     deviations=(
@@ -290,10 +270,6 @@ DRIVE_NOT_TOLD = replace(
 class DrivesNotTold(MuJoCo):
     """Springs as they should be, which are declared not to be told."""
 
-    info: ClassVar[SimulatorInfo] = DRIVE_NOT_TOLD
-
-
-class SoftDrivesNotTold(SoftDrives):
     info: ClassVar[SimulatorInfo] = DRIVE_NOT_TOLD
 
 
