@@ -23,13 +23,8 @@ from tests.repeatability.scripted import episode, motion, operation
 
 def sample(label: str, times: Sequence[float], x: Sequence[float]) -> Sample:
     """One cube at positions x, at rest, in one wait; another that stays where it is."""
-    bodies = np.zeros((len(x), 2, 13))
-    bodies[:, 0, 0] = x
-    bodies[:, 1, 0] = 0.5
-    motion = Motion(np.array(times), np.zeros((len(x), 2, 0)), bodies)
-    start = Motion(np.zeros(1), np.zeros((1, 2, 0)), bodies[:1])
-    asked = np.array([[1.0]])
-    return Sample(label, "t", 1, ["moving", "resting"], {"n": 1.0}, [start, motion], asked)
+    motions = [motion([0.0], x[:1], [0.5]), motion(times, x, [0.5] * len(x))]
+    return Sample(label, "t", 1, ["moving", "resting"], {"n": 1.0}, motions, np.array([[1.0]]))
 
 
 TIMES = (0.1, 0.2, 0.3, 0.4)
