@@ -57,11 +57,6 @@ def check(needs: Capability | None = None, robot: Unfit | None = None) -> Callab
     return add
 
 
-def finger_unit(robot: Robot) -> str:
-    """Of the fingers' positions, "m" or "rad"."""
-    return RobotModel(robot).finger_unit
-
-
 def any_robot(robot: Robot) -> str | None:
     """Nothing is asked of the robot."""
     return None

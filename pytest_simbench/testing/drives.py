@@ -8,7 +8,7 @@ from pytest_simbench.laws.hands import close_command, gravity_effort
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Trajectory
 from pytest_simbench.testing import scenes
-from pytest_simbench.testing.checks import any_robot, check, coupled, finger_unit, grasping
+from pytest_simbench.testing.checks import any_robot, check, coupled, grasping
 from pytest_simbench.testing.subject import Subject, logged, require, require_close
 
 ARM_TICK = 0.004
@@ -139,7 +139,7 @@ def fingers_stay_coupled(subject: Subject) -> None:
     different positions, 2/7 and 6/7 of their way."""
     robot = subject.arm
     goal = robot.column("initial_position")
-    hand, unit = robot.gripper, finger_unit(robot)
+    hand, unit = robot.gripper, RobotModel(robot).finger_unit
     shares = np.resize([6 / 7, 2 / 7], len(hand.joints))
     goal[robot.finger_indices] = hand.closed + shares * (hand.opened - hand.closed)
     split = Trajectory.holding(subject.timestep, goal)
