@@ -28,9 +28,7 @@ class Gaps:
 
     def largest(self) -> FloatArray:
         """Over the cubes [m], (n,)."""
-        if self.distance.shape[1] == 0:
-            return np.zeros(len(self.time))
-        return np.asarray(self.distance.max(axis=1))
+        return np.asarray(self.distance.max(axis=1, initial=0.0))
 
     def first_beyond(self, limit: float) -> tuple[int, int] | None:
         """Sample and cube where a distance first exceeds `limit` [m]."""
