@@ -69,24 +69,21 @@ class RestForce(
     2 m g dt / T.
     """
 
-    carrying: ClassVar[str] = "ground"
+    lowest: ClassVar[int] = 0
+    """Of the cubes that are carried."""
+
     settling: float = 0.3
     seconds: float = 0.1
 
-    @property
-    def carried(self) -> tuple[str, float]:
-        """The body that is pressed upward, and the mass that it carries, its own included [kg]."""
-        return "body/cube 0", sum(self.masses)
-
     def measure(self, world: World) -> Reading:
         dt = watch(world, self.settling).dt
-        body, mass = self.carried
+        below = f"body/cube {self.lowest - 1}" if self.lowest else "ground"
         forces, count = [], max(1, round(self.seconds / dt))
         for _ in range(count):
             world.wait(dt)
-            wrench = world.contact_forces().get((body, self.carrying))
+            wrench = world.contact_forces().get((f"body/cube {self.lowest}", below))
             forces.append(0.0 if wrench is None else float(wrench[2]))
-        weight = mass * GRAVITY
+        weight = sum(self.masses[self.lowest :]) * GRAVITY
         allowed = 2 * weight / count + rounding(weight, 1)
         return Reading(float(np.mean(forces)), weight, allowed)
 
@@ -97,13 +94,9 @@ class Tower(_Stack, masses=(1.0,) * 5):
 
 
 @dataclass(frozen=True)
-class TowerForce(RestForce, carrying="body/cube 0", masses=(1.0,) * 4):
+class TowerForce(RestForce, lowest=1, masses=(1.0,) * 4):
     """In a tower of four equal cubes the lowest carries the other three with 3 m g. Tolerance as of
     `RestForce`."""
-
-    @property
-    def carried(self) -> tuple[str, float]:
-        return "body/cube 1", sum(self.masses[1:])
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import pinocchio as pin
 from scipy.special import ellipk
 
 from pytest_simbench.laws.base import GRAVITY, LONG, Law, Reading, Watched, solved
-from pytest_simbench.laws.mechanisms import INERTIA_OF_A_POINT, MOUNT, Part, Y, mechanism
+from pytest_simbench.laws.mechanisms import MOUNT, Part, Y, mechanism
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Scene, Vector3
 
@@ -87,17 +87,12 @@ class _Energy(Passive, quantity="largest change of the energy", unit="J"):
         return float(np.abs(power).max())
 
 
-def _period(length: float, angle: float, mass: float, inertia: float) -> float:
-    """Of a pendulum let go at an angle [rad], see `PendulumPeriod` [s].
-
-    Args:
-        length: of its centre of mass from the hinge [m].
-        angle: at which it is let go [rad].
-        mass: [kg].
-        inertia: about the centre of mass [kg m^2].
-    """
-    slow = math.sqrt((mass * length**2 + inertia) / (mass * GRAVITY * length))
-    return 4 * slow * float(ellipk(math.sin(angle / 2) ** 2))
+def _period(part: Part) -> float:
+    """Of a part that hangs from its hinge and is let go, see `PendulumPeriod` [s]."""
+    length = -part.centre[2]
+    about_hinge = part.mass * length**2 + part.inertia[1]
+    slow = math.sqrt(about_hinge / (part.mass * GRAVITY * length))
+    return 4 * slow * float(ellipk(math.sin(part.start / 2) ** 2))
 
 
 def _seen_period(seen: Watched, joint: int) -> float:
@@ -119,12 +114,8 @@ class PendulumPeriod(Passive, quantity="period", unit="s"):
     def parts(self) -> tuple[Part, ...]:
         return (Part("swing", Y, centre=(0.0, 0.0, -self.length), start=self.angle),)
 
-    @property
-    def period(self) -> float:
-        return _period(self.length, self.angle, 1.0, INERTIA_OF_A_POINT)
-
     def read(self, seen: Watched) -> Reading:
-        return Reading(_seen_period(seen, 0), self.period, 2 * seen.dt)
+        return Reading(_seen_period(seen, 0), _period(*self.parts()), 2 * seen.dt)
 
 
 @dataclass(frozen=True)
@@ -139,10 +130,6 @@ class CompoundPendulum(PendulumPeriod):
 
     def parts(self) -> tuple[Part, ...]:
         return (replace(*super().parts(), inertia=(self.inertia,) * 3),)
-
-    @property
-    def period(self) -> float:
-        return _period(self.length, self.angle, 1.0, self.inertia)
 
 
 @dataclass(frozen=True)
@@ -168,13 +155,12 @@ class TwoPendulums(Passive, quantity="larger error of the two periods", unit="s"
         )  # fmt: skip
 
     def read(self, seen: Watched) -> Reading:
-        errors = []
-        for k, (length, angle, mass) in enumerate(
-            zip(self.lengths, self.angles, self.masses, strict=True)
-        ):
-            period = _period(length, angle, mass, INERTIA_OF_A_POINT)
-            errors.append(abs(_seen_period(seen, k) - period))
+        parts = enumerate(self.parts())
+        errors = [abs(_seen_period(seen, k) - _period(part)) for k, part in parts]
         return Reading(max(errors), 0.0, 2 * seen.dt)
+
+
+SWING = Part("swing", Y, centre=(0.0, 0.0, -0.1), start=1.5)
 
 
 @dataclass(frozen=True)
@@ -187,7 +173,7 @@ class PendulumEnergy(_Energy):
     seconds: float = 6.0
 
     def parts(self) -> tuple[Part, ...]:
-        return (Part("swing", Y, centre=(0.0, 0.0, -0.1), start=1.5),)
+        return (SWING,)
 
 
 @dataclass(frozen=True)
@@ -196,7 +182,7 @@ class PendulumEnergyDrift(PendulumEnergy, study_timeout=LONG):
     `PendulumEnergy`, whatever the number of periods: what a symplectic method is off by swings with
     the pendulum and does not add up. Only rounding does. The protocol `smoke` takes 4 periods."""
 
-    seconds: float = 100 * _period(0.1, 1.5, 1.0, INERTIA_OF_A_POINT)
+    seconds: float = 100 * _period(SWING)
 
     def smoke(self) -> PendulumEnergyDrift:
         return replace(self, seconds=self.seconds / 25)
