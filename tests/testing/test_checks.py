@@ -69,15 +69,6 @@ def test_what_a_copy_of_the_scene_hides_is_felt(quantity: str) -> None:
         ConformanceTest(subject, CHECKS[cheats.ECHOES[quantity][1]])()
 
 
-@pytest.mark.parametrize(
-    ("adapter", "name"), FAULTS, ids=[f"{cls.__name__}-{name}" for cls, name in FAULTS]
-)
-def test_fault_is_found(adapter: type[Simulator], name: str) -> None:
-    test = ConformanceTest(Subject(adapter), CHECKS[name])
-    with pytest.raises((ConformanceFailure, WorldParityError)):
-        test()
-
-
 WITH_ROBOTS: list[tuple[type[Simulator], str, str]] = [
     (tampered.SoftDrives, "static_hold", "so101"),
     (wrong.NoFeedForward, "tracks_trajectory", "xarm7"),
@@ -92,13 +83,16 @@ WITH_ROBOTS: list[tuple[type[Simulator], str, str]] = [
 ]
 
 
+CASES = [*((cls, name, "") for cls, name in FAULTS), *WITH_ROBOTS]
+
+
 @pytest.mark.parametrize(
     ("adapter", "name", "robot"),
-    WITH_ROBOTS,
-    ids=[f"{cls.__name__}-{robot}-{name}" for cls, name, robot in WITH_ROBOTS],
+    CASES,
+    ids=["-".join(filter(None, (cls.__name__, robot, name))) for cls, name, robot in CASES],
 )
-def test_fault_is_found_with_other_robots(adapter: type[Simulator], name: str, robot: str) -> None:
-    test = ConformanceTest(Subject(adapter, robot=find(robot)), CHECKS[name])
+def test_fault_is_found(adapter: type[Simulator], name: str, robot: str) -> None:
+    test = ConformanceTest(Subject(adapter, robot=find(robot) if robot else None), CHECKS[name])
     with pytest.raises((ConformanceFailure, WorldParityError)):
         test()
 

@@ -29,11 +29,8 @@ LAWS = ("free_fall", "static_hold", "grip_holds", "fingers_stay_coupled")
 KIT = Kit((Subject(MuJoCo),), LAWS, {})
 
 
-def test_the_panda_adds_nothing_to_ids() -> None:
+def test_ids_name_other_robots_than_the_panda_and_a_law_about_no_robot_is_one_test() -> None:
     assert [test.id for test in KIT.tests([None])] == [f"mujoco-tuned-{law}" for law in LAWS]
-
-
-def test_other_robots_do_and_a_law_about_no_robot_is_one_test() -> None:
     ids = [test.id for test in KIT.tests([find("ur5"), find("so101")])]
     assert ids[:3] == [
         "mujoco-tuned-free_fall",
