@@ -21,8 +21,8 @@ from pytest_simbench.parity.compare import ParityResult
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.testing import CHECKS, Subject
-from pytest_simbench.testing.expected import read_expected_failures, reason_for
 from pytest_simbench.testing.faults import FAULTS, Fault, rounds
+from pytest_simbench.testing.kit import read_expected_failures, reason_for
 from pytest_simbench.testing.parity import planted
 
 TABLE = ROOT / "docs" / "data" / "planted_faults.csv"

@@ -13,19 +13,21 @@ docstring."""
 
 from __future__ import annotations
 
+import re
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.phenomena import PHENOMENON
 from pytest_simbench.records.readings import Reading as Reading
 from pytest_simbench.records.readings import rounding as rounding
-from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.scene import FloatArray, Scene, Trajectory
 from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task
 
@@ -52,8 +54,10 @@ def stillness(dt: float, scale: float, contacts: int = 1) -> float:
 
 class Law(Task):
     """One law. Subclasses are frozen dataclasses; formula, source and tolerance in the docstring,
-    and what follows in the head: `class FallSpeed(FreeFall, name="fall_speed", quantity="speed")`.
-    What a head does not say is that of the class above.
+    and what is the same of every instance in the head: `class FallSpeed(FreeFall, unit="m/s")`.
+    What a head does not say is that of the class above. The law's name is the class's, here
+    `fall_speed`, unless the class has a `name`. A class whose name is "" or begins with `_` is no
+    law: others share what it has.
 
     A law draws nothing: seed and jitter do not matter, and one repetition is enough of an engine
     that is deterministic.
@@ -77,12 +81,13 @@ class Law(Task):
     seconds: float
 
     known: ClassVar[list[type[Law]]] = []
-    """Every law: a subclass with a name registers when it is defined."""
+    """Every law: it registers when it is defined."""
 
-    def __init_subclass__(cls, **head: str) -> None:
-        for attribute, value in head.items():
+    def __init_subclass__(cls, **head: Any) -> None:
+        own = re.sub("(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
+        for attribute, value in {"name": vars(cls).get("name", own), **head}.items():
             setattr(cls, attribute, value)
-        if "name" in head:
+        if cls.name and not cls.name.startswith("_"):
             Law.known.append(cls)
 
     @property
@@ -98,12 +103,17 @@ class Law(Task):
     def build(self) -> Scene:
         """The scene."""
 
+    def commands(self) -> Trajectory | None:
+        """Set points of the drives; None: nothing is told, and `seconds` pass."""
+        return None
+
     def measure(self, world: World) -> Reading:
         """Let time pass in a freshly loaded world, and read. By default it is watched once."""
-        return self.read(watch(world, self.seconds))
+        rows = self.commands()
+        return self.read(watch(world, self.seconds) if rows is None else follow(world, rows))
 
     def read(self, seen: Watched) -> Reading:
-        """Read a motion that was watched for `seconds`, of a law that does not `measure` itself."""
+        """Read the motion that was watched, of a law that does not `measure` itself."""
         raise NotImplementedError
 
     def parameters(self) -> dict[str, Any]:
@@ -178,14 +188,40 @@ def watch(world: World, duration: float) -> Watched:
     Raises:
         ValueError: the engine told no step.
     """
-    motion = world.wait(duration, log_period=0.0)
+    return _watched(world.wait(duration, log_period=0.0))
+
+
+def follow(world: World, rows: Trajectory) -> Watched:
+    """The same while the drives follow set points."""
+    return _watched(world.follow(rows, log_period=0.0))
+
+
+def held(position: float, seconds: float, velocity: float = 0.0, effort: float = 0.0) -> Trajectory:
+    """One joint told to be at `position` [rad or m] at the end, moving there at `velocity`."""
+    ends = np.array([[position - velocity * seconds], [position]])
+    return Trajectory(seconds, ends, np.full((2, 1), velocity), np.full((2, 1), effort))
+
+
+def _watched(motion: Motion | None) -> Watched:
     if motion is None or not len(motion):
         raise ValueError("a motion was asked for step by step, and none came back")
-    return watched(motion)
-
-
-def watched(motion: Motion) -> Watched:
-    """The same of a motion that was logged at every step."""
     first = float(motion.time[0])
     dt = float(motion.time[1]) - first if len(motion) > 1 else first
     return Watched(dt, motion.time, motion.joints, motion.bodies)
+
+
+def solved(
+    change: Callable[[float, FloatArray], Sequence[float] | FloatArray],
+    start: Sequence[float] | FloatArray,
+    seconds: float,
+    samples: int = 2,
+    within: float = 1e-10,
+) -> FloatArray:
+    """The states from `start` on of what changes at the rate `change(t, state)`, at even times up
+    to `seconds`, (samples, n); by DOP853 (Hairer, Norsett, Wanner, II.5) with a relative tolerance.
+    """
+    times = np.linspace(0.0, seconds, samples)
+    found = solve_ivp(
+        change, (0.0, seconds), start, "DOP853", times, rtol=within, atol=within / 100
+    )
+    return np.asarray(found.y.T)

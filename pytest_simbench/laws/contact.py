@@ -1,4 +1,4 @@
-"""Laws of bodies that rest on each other, of what they press with, and of impacts."""
+"""Laws of bodies that rest on each other, and of what they press with."""
 
 from __future__ import annotations
 
@@ -7,11 +7,19 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, stillness, watch
-from pytest_simbench.laws.sticking import SHARES, WEDGE, fan, slope_pose
+from pytest_simbench.laws.base import (
+    GRAVITY,
+    Law,
+    Reading,
+    Watched,
+    rounding,
+    solved,
+    stillness,
+    watch,
+)
+from pytest_simbench.laws.sticking import SHARES, fan, slopes
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Vector3, rotation_matrix
 from pytest_simbench.simulator import Capability
 
@@ -45,46 +53,69 @@ class _Stack(Law, phenomenon="stacking", quantity="way of the top cube", unit="m
 
 
 @dataclass(frozen=True)
-class RestDepth(_Stack, name="rest_depth"):
+class RestDepth(_Stack, masses=(1.0,)):
     """A cube put on the ground stays there: it neither sinks nor moves aside. Tolerance: an
     equilibrium, g dt^2."""
 
-    masses: ClassVar[tuple[float, ...]] = (1.0,)
+
+@dataclass(frozen=True)
+class RestForce(
+    _Stack, quantity="force upward", unit="N", needs=(Capability.CONTACT_FORCES,), masses=(1.0,)
+):
+    """The ground carries a cube at rest with m g (Newton's first law).
+
+    The force is the mean of a time T after one of settling, step by step. By the law of momentum
+    it is m g and m (v1 - v0) / T. Tolerance: both speeds are late by one step, g dt each:
+    2 m g dt / T.
+    """
+
+    lowest: ClassVar[int] = 0
+    """Of the cubes that are carried."""
+
+    settling: float = 0.3
+    seconds: float = 0.1
+
+    def measure(self, world: World) -> Reading:
+        dt = watch(world, self.settling).dt
+        below = f"body/cube {self.lowest - 1}" if self.lowest else "ground"
+        forces, count = [], max(1, round(self.seconds / dt))
+        for _ in range(count):
+            world.wait(dt)
+            wrench = world.contact_forces().get((f"body/cube {self.lowest}", below))
+            forces.append(0.0 if wrench is None else float(wrench[2]))
+        weight = sum(self.masses[self.lowest :]) * GRAVITY
+        allowed = 2 * weight / count + rounding(weight, 1)
+        return Reading(float(np.mean(forces)), weight, allowed)
 
 
 @dataclass(frozen=True)
-class Tower(_Stack, name="tower"):
+class Tower(_Stack, masses=(1.0,) * 5):
     """A tower of five equal cubes stands. Tolerance: g dt^2 for each contact."""
 
-    masses: ClassVar[tuple[float, ...]] = (1.0,) * 5
+
+@dataclass(frozen=True)
+class TowerForce(RestForce, lowest=1, masses=(1.0,) * 4):
+    """In a tower of four equal cubes the lowest carries the other three with 3 m g. Tolerance as of
+    `RestForce`."""
 
 
 @dataclass(frozen=True)
-class HeavyOnTop(_Stack, name="heavy_on_top"):
+class HeavyOnTop(_Stack, masses=(1.0, 1.0, 1.0, 100.0)):
     """Three cubes of 1 kg carry one of 100 kg: masses do not matter to statics. Tolerance as of
     `Tower`. Solvers that iterate converge the slower, the larger the ratio of masses."""
 
-    masses: ClassVar[tuple[float, ...]] = (1.0, 1.0, 1.0, 100.0)
-
 
 @dataclass(frozen=True)
-class Overhang(_Stack, name="overhang"):
+class Overhang(_Stack, masses=(1.0,) * 4):
     """Four cubes, each shifted on the one below by 0.9 of what statics allows, L / 2 (1, 1/2, 1/3)
     from the top (Coffin 1923; Paterson, Zwick, Overhang, 2009): the stack stands. Tolerance as of
     `Tower`."""
 
-    masses: ClassVar[tuple[float, ...]] = (1.0,) * 4
     overhangs: ClassVar[tuple[float, ...]] = tuple(0.9 * EDGE / 2 / k for k in (3, 2, 1))
 
 
 @dataclass(frozen=True)
-class TippingEdge(
-    Law,
-    name="tipping_edge",
-    phenomenon="stacking",
-    quantity="largest overhang that stands",
-    unit="m",
-):
+class TippingEdge(Law, phenomenon="stacking", quantity="largest overhang that stands", unit="m"):
     """A cube that lies over an edge tips when its centre is beyond it: six cubes, whose overhang is
     0.92 to 1.08 of half their length. One has tipped that is turned by 0.05 rad. Tolerance: half of
     the gap between those on either side, 0.02 of it; no step."""
@@ -100,18 +131,13 @@ class TippingEdge(
             bodies.append(Box(f"cube {k}", CUBE, place, 1.0))
         return Scene(self.name, tuple(bodies))
 
-    def measure(self, world: World) -> Reading:
-        world.wait(self.seconds)
-        return fan(EDGE / 2, [tilt(row) > 0.05 for row in world.bodies])
+    def read(self, seen: Watched) -> Reading:
+        return fan(EDGE / 2, [tilt(row) > 0.05 for row in seen.bodies[-1]])
 
 
 @dataclass(frozen=True)
 class TippingSlope(
-    Law,
-    name="tipping_slope",
-    phenomenon="stacking",
-    quantity="tangent of the steepest slope that holds",
-    unit="",
+    Law, phenomenon="stacking", quantity="tangent of the steepest slope that holds", unit=""
 ):
     """A tall block on a slope tips, and does not slide, when the slope's tangent is above its width
     over its height, and mu is more than that: six slopes. Turned by 0.05 rad it has tipped.
@@ -121,14 +147,7 @@ class TippingSlope(
     seconds: float = 0.8
 
     def build(self) -> Scene:
-        critical, bodies = self.size[0] / self.size[2], []
-        for k, share in enumerate(SHARES):
-            turn = slope_pose(share * critical, 0.0)
-            place = Pose((0.0, 0.5 * (k - 2.5), 1.0), turn.quaternion)
-            on_top = place * Pose.at(0.0, 0.0, (WEDGE[2] + self.size[2]) / 2)
-            bodies.append(Box(f"slope {k}", WEDGE, place))
-            bodies.append(Box(f"block {k}", self.size, on_top, 1.0))
-        return Scene(self.name, tuple(bodies))
+        return slopes(self.name, self.size[0] / self.size[2], self.size, 0.0, 1.0)
 
     def measure(self, world: World) -> Reading:
         critical = self.size[0] / self.size[2]
@@ -141,8 +160,13 @@ class TippingSlope(
         return fan(critical, turned)
 
 
+def tilt(row: FloatArray) -> float:
+    """Of a body's upper face from the horizontal [rad]."""
+    return math.acos(min(1.0, max(-1.0, float(rotation_matrix(row[3:7])[2, 2]))))
+
+
 @dataclass(frozen=True)
-class Pivot(Law, name="pivot", phenomenon="rolling", quantity="angle turned", unit="rad"):
+class Pivot(Law, phenomenon="rolling", quantity="angle turned", unit="rad"):
     """A plank that stands on an edge, leaning, turns about that edge: (I + m r^2) x'' = m g r cos
     x, with x the angle of its centre above the edge; friction 1 holds the edge. Against DOP853.
     Tolerance: late by one step and a rate late by one step all the time: |v| dt + |a| t dt."""
@@ -168,9 +192,8 @@ class Pivot(Law, name="pivot", phenomenon="rolling", quantity="angle turned", un
         def fall(_: float, state: FloatArray) -> FloatArray:
             return np.array([state[1], -GRAVITY * radius * math.cos(state[0]) / inertia])
 
-        begin = np.array([start, 0.0])
-        end = solve_ivp(fall, (0.0, seconds), begin, "DOP853", rtol=1e-10, atol=1e-12).y
-        return start - float(end[0, -1]), abs(float(end[1, -1])), GRAVITY * radius / inertia
+        angle, rate = solved(fall, [start, 0.0], seconds)[-1]
+        return start - float(angle), abs(float(rate)), GRAVITY * radius / inertia
 
     def measure(self, world: World) -> Reading:
         before = rotation_matrix(world.bodies[0, 3:7])
@@ -179,138 +202,3 @@ class Pivot(Law, name="pivot", phenomenon="rolling", quantity="angle turned", un
         along = before[:, 0] @ rotation_matrix(seen.bodies[-1, 0, 3:7])[:, 0]
         exact, rate, change = self.exact(t)
         return seen.reading(math.acos(min(1.0, float(along))), exact, (rate + change * t), 1.0)
-
-
-@dataclass(frozen=True)
-class LandingTime(
-    Law, name="landing_time", phenomenon="impact", quantity="time of the landing", unit="s"
-):
-    """A cube let go at the height h lands after sqrt(2 h / g): its speed is the largest then.
-    Tolerance: late by one step, and read to one step."""
-
-    height: float = 0.5
-
-    def build(self) -> Scene:
-        cube = Box("cube", CUBE, Pose.at(0.0, 0.0, EDGE / 2 + self.height), 1.0)
-        return Scene(self.name, (cube,))
-
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, 1.5 * math.sqrt(2 * self.height / GRAVITY))
-        found = float(seen.t[int(np.argmin(seen.bodies[:, 0, 9]))])
-        return Reading(found, math.sqrt(2 * self.height / GRAVITY), 2 * seen.dt)
-
-
-@dataclass(frozen=True)
-class DeadLanding(LandingTime, name="dead_landing", quantity="rise after the landing", unit="m"):
-    """It does not rise again: e = 0 (Newton). Tolerance: the impact is late by one step, so that
-    it is pushed out of the ground by v dt."""
-
-    def measure(self, world: World) -> Reading:
-        fall = math.sqrt(2 * self.height / GRAVITY)
-        seen = watch(world, 2 * fall)
-        landed = seen.bodies[seen.t > 1.1 * fall, 0, 2] - EDGE / 2
-        rise = max(0.0, float(landed.max()))
-        return seen.reading(rise, 0.0, GRAVITY * fall, 1.0)
-
-
-@dataclass(frozen=True)
-class _Collision(Law, phenomenon="impact", unit="m/s"):
-    """A cube hits another one that is at rest, face on face, on ground without friction."""
-
-    masses: ClassVar[tuple[float, float]] = (1.0, 2.0)
-
-    speed: float = 1.0
-
-    @property
-    def common(self) -> float:
-        """Speed of the common centre of mass [m/s]."""
-        return self.speed * self.masses[0] / sum(self.masses)
-
-    def build(self) -> Scene:
-        at = Pose.at(0.0, 0.0, EDGE / 2)
-        velocity = (self.speed, 0.0, 0.0)
-        one = Box("one", CUBE, at, self.masses[0], 0.0, linear_velocity=velocity)
-        two = Box("two", CUBE, at.translated(EDGE + 0.1), self.masses[1], 0.0)
-        return Scene(self.name, (one, two), ground_friction=0.0)
-
-
-@dataclass(frozen=True)
-class DeadCollision(_Collision, name="dead_collision", quantity="speed of the cube that was hit"):
-    """With e = 0 both go on with the common speed m1 v / (m1 + m2). Tolerance: what gravity changes
-    within one step, g dt: an impact is solved at once, whatever the step."""
-
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, 0.3)
-        return seen.reading(seen.bodies[-1, 1, 7], self.common, GRAVITY, 1.0)
-
-
-@dataclass(frozen=True)
-class CollisionMomentum(
-    _Collision, name="collision_momentum", quantity="speed of the common centre of mass"
-):
-    """Whatever else happens, momentum stays: (m1 v1 + m2 v2) / (m1 + m2) is what it was. Tolerance
-    as of `DeadCollision`."""
-
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, 0.3)
-        found = float(seen.bodies[-1, :, 7] @ self.masses) / sum(self.masses)
-        return seen.reading(found, self.common, 0.0, 2.0)
-
-
-def tilt(row: FloatArray) -> float:
-    """Of a body's upper face from the horizontal [rad]."""
-    return math.acos(min(1.0, max(-1.0, float(rotation_matrix(row[3:7])[2, 2]))))
-
-
-@dataclass(frozen=True)
-class RestForce(Law, name="rest_force", phenomenon="stacking", quantity="force upward", unit="N"):
-    """The ground carries a cube at rest with m g (Newton's first law).
-
-    The force is the mean of a time T after one of settling, step by step. By the law of momentum
-    it is m g and m (v1 - v0) / T. Tolerance: both speeds are late by one step, g dt each:
-    2 m g dt / T.
-    """
-
-    needs: ClassVar[tuple[Capability, ...]] = (Capability.CONTACT_FORCES,)
-
-    carrying: ClassVar[str] = "ground"
-    masses: ClassVar[tuple[float, ...]] = (1.0,)
-    settling: float = 0.3
-    seconds: float = 0.1
-
-    def build(self) -> Scene:
-        bodies = [
-            Box(f"cube {k}", CUBE, Pose.at(0.0, 0.0, EDGE * (k + 0.5)), mass)
-            for k, mass in enumerate(self.masses)
-        ]
-        return Scene(self.name, tuple(bodies))
-
-    @property
-    def carried(self) -> tuple[str, float]:
-        """The body that is pressed upward, and the mass that it carries, its own included [kg]."""
-        return "body/cube 0", sum(self.masses)
-
-    def measure(self, world: World) -> Reading:
-        dt = watch(world, self.settling).dt
-        body, mass = self.carried
-        forces, count = [], max(1, round(self.seconds / dt))
-        for _ in range(count):
-            world.wait(dt)
-            wrench = world.contact_forces().get((body, self.carrying))
-            forces.append(0.0 if wrench is None else float(wrench[2]))
-        weight = mass * GRAVITY
-        allowed = 2 * weight / count + rounding(weight, 1)
-        return Reading(float(np.mean(forces)), weight, allowed)
-
-
-@dataclass(frozen=True)
-class TowerForce(RestForce, name="tower_force"):
-    """In a tower of four equal cubes the lowest carries the other three with 3 m g. Tolerance as of
-    `RestForce`."""
-
-    carrying: ClassVar[str] = "body/cube 0"
-    masses: ClassVar[tuple[float, ...]] = (1.0,) * 4
-
-    @property
-    def carried(self) -> tuple[str, float]:
-        return "body/cube 1", sum(self.masses[1:])

@@ -5,15 +5,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from scipy.integrate import quad
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, watch
-from pytest_simbench.laws.joints import Y
-from pytest_simbench.laws.mechanisms import MOUNT, Part, mechanism
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, watch
+from pytest_simbench.laws.mechanisms import MOUNT, Part, Y, mechanism
 from pytest_simbench.scene import FloatArray, Scene, Vector3
 from pytest_simbench.simulator import Capability
 
@@ -103,15 +101,17 @@ def passages(plates: int) -> FloatArray:
 
 @dataclass(frozen=True)
 class DominoWave(
-    Law, name="domino_wave", phenomenon="mechanisms", quantity="speed of the wave", unit="m/s"
+    Law,
+    phenomenon="mechanisms",
+    quantity="speed of the wave",
+    unit="m/s",
+    needs=(Capability.SELF_COLLIDE,),
 ):
     """In a row of plates hinged at their feet each strikes the next, inelastically, and all that
     fell stay together and push: a train of one degree of freedom between impacts (van Leeuwen, The
     domino effect, Am. J. Phys. 78, 721, 2010, without friction; `passages`). The speed is that from
     where the first plate strikes to where the last one would. Tolerance: each impact is late by
     one step, in its place and in its speed, so each of the passages may take two steps longer."""
-
-    needs: ClassVar[tuple[Capability, ...]] = (Capability.SELF_COLLIDE,)
 
     plates: int = 8
 
@@ -128,9 +128,8 @@ class DominoWave(
         first, last = (float(times[0]) if len(times) else math.inf for times in passed)
         way, seconds = PITCH * len(exact), float(exact.sum())
         right = way / seconds
-        allowed = right * 2 * len(exact) * seen.dt / seconds
         speed = way / (last - first) if last > first else 0.0
-        return Reading(speed, right, allowed + rounding(right, seen.steps))
+        return seen.reading(speed, right, right * 2 * len(exact) / seconds, right)
 
 
 def fall() -> float:

@@ -6,47 +6,21 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
 from scipy.optimize import brentq
 
-from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import (
-    GRAVITY,
-    Law,
-    Reading,
-    Watched,
-    stillness,
-    watched,
-)
-from pytest_simbench.laws.mechanisms import Part, mechanism
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, held, stillness
+from pytest_simbench.laws.mechanisms import STRONG, Part, mechanism
 from pytest_simbench.scene import Scene, Trajectory
-
-STRONG = 1e4
-"""Effort limit of a drive that is to obey its law [N m]."""
-
-
-def follow(world: World, rows: Trajectory) -> Watched:
-    """Have the drives follow, and see every step.
-
-    Raises:
-        ValueError: the engine told no step.
-    """
-    motion = world.follow(rows, log_period=0.0)
-    if motion is None or not len(motion):
-        raise ValueError("a motion was asked for step by step, and none came back")
-    return watched(motion)
-
-
-def held(position: float, seconds: float, velocity: float = 0.0, effort: float = 0.0) -> Trajectory:
-    """One joint told to be at `position` [rad or m] at the end, moving there at `velocity`."""
-    ends = np.array([[position - velocity * seconds], [position]])
-    return Trajectory(seconds, ends, np.full((2, 1), velocity), np.full((2, 1), effort))
 
 
 class _Driven(Law, phenomenon="joints", quantity="angle", unit="rad"):
     """A wheel of 0.5 kg m^2 on a vertical axis, and its drive."""
 
     inertia: ClassVar[float] = 0.5
+    goal: ClassVar[float] = 0.0
+
+    def commands(self) -> Trajectory:
+        return held(self.goal, self.seconds)
 
     def wheel(
         self, stiffness: float, damping: float, start: float = 0.0, effort: float = STRONG
@@ -60,7 +34,7 @@ class _Driven(Law, phenomenon="joints", quantity="angle", unit="rad"):
 
 
 @dataclass(frozen=True)
-class StepResponse(_Driven, name="step_response"):
+class StepResponse(_Driven):
     """A critically damped drive that is told to go from x0 to 0 is at x0 (1 + w t) exp(-w t), with
     w^2 = k / I. Tolerance: |v| dt + |a| t dt at the largest, x0 w / e and x0 w^2."""
 
@@ -72,8 +46,7 @@ class StepResponse(_Driven, name="step_response"):
         k, d = self.inertia * self.rate**2, 2 * self.inertia * self.rate
         return self.wheel(k, d, self.start)
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, held(0.0, self.seconds))
+    def read(self, seen: Watched) -> Reading:
         t = seen.end
         x = self.rate * t
         exact = self.start * (1 + x) * math.exp(-x)
@@ -82,7 +55,7 @@ class StepResponse(_Driven, name="step_response"):
 
 
 @dataclass(frozen=True)
-class SpringAndDamper(_Driven, name="spring_damper"):
+class SpringDamper(_Driven):
     """A weakly damped one swings: x0 exp(-z w t) (cos(u t) + z w / u sin(u t)), u = w sqrt(1 -
     z^2). Tolerance as of `StepResponse`, with |v| up to x0 w."""
 
@@ -95,8 +68,7 @@ class SpringAndDamper(_Driven, name="spring_damper"):
         d = 2 * self.damping * self.inertia * self.rate
         return self.wheel(self.inertia * self.rate**2, d, self.start)
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, held(0.0, self.seconds))
+    def read(self, seen: Watched) -> Reading:
         t, w, z = seen.end, self.rate, self.damping
         u = w * math.sqrt(1 - z * z)
         exact = self.start * math.exp(-z * w * t)
@@ -105,7 +77,7 @@ class SpringAndDamper(_Driven, name="spring_damper"):
 
 
 @dataclass(frozen=True)
-class EffortLimit(_Driven, name="effort_limit"):
+class EffortLimit(_Driven, goal=5.0):
     """A drive told to go far away pushes with its limit and no more: x = (F / I) t^2 / 2.
     Tolerance: (F / I) t dt."""
 
@@ -115,14 +87,13 @@ class EffortLimit(_Driven, name="effort_limit"):
     def build(self) -> Scene:
         return self.wheel(2000.0, 20.0, effort=self.effort)
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, held(5.0, self.seconds))
+    def read(self, seen: Watched) -> Reading:
         t, pull = seen.end, self.effort / self.inertia
         return seen.reading(seen.joints[-1, 0, 0], pull * t * t / 2, pull * t, 1.0)
 
 
 @dataclass(frozen=True)
-class Tracking(_Driven, name="tracking"):
+class Tracking(_Driven):
     """A drive that is told position and velocity of a steady turn follows it: x = v t (1 - exp(-w
     t)) from rest, critically damped. Tolerance: late by one step, and a set point of the end of
     each step holds from its beginning on: 2 v dt."""
@@ -134,15 +105,17 @@ class Tracking(_Driven, name="tracking"):
     def build(self) -> Scene:
         return self.wheel(self.inertia * self.rate**2, 2 * self.inertia * self.rate)
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, held(self.speed * self.seconds, self.seconds, self.speed))
+    def commands(self) -> Trajectory:
+        return held(self.speed * self.seconds, self.seconds, self.speed)
+
+    def read(self, seen: Watched) -> Reading:
         t = seen.end
         exact = self.speed * t * (1 - math.exp(-self.rate * t))
         return seen.reading(seen.joints[-1, 0, 0], exact, 2 * self.speed, 1.0)
 
 
 @dataclass(frozen=True)
-class Sag(Law, name="sag", phenomenon="joints", quantity="angle", unit="rad"):
+class Sag(Law, phenomenon="joints", quantity="angle", unit="rad"):
     """A level rod on a spring sags until k x = m g l cos x. Tolerance: what gravity turns it by
     within one step, (g / l) dt^2, and rounding."""
 
@@ -163,12 +136,14 @@ class Sag(Law, name="sag", phenomenon="joints", quantity="angle", unit="rad"):
 
 
 @dataclass(frozen=True)
-class FeedForward(Sag, name="feed_forward"):
+class FeedForward(Sag):
     """The same rod is told the torque that gravity asks for, m g l: it stays level. Tolerance as
     of `Sag`."""
 
     seconds: float = 1.0
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, held(0.0, self.seconds, effort=-GRAVITY))
+    def commands(self) -> Trajectory:
+        return held(0.0, self.seconds, effort=-GRAVITY)
+
+    def read(self, seen: Watched) -> Reading:
         return Reading(float(seen.joints[-1, 0, 0]), 0.0, stillness(seen.dt, 1.0))

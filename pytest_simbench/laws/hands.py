@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
-from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, rounding, stillness
+from pytest_simbench.laws.base import (
+    GRAVITY,
+    Law,
+    Reading,
+    Watched,
+    held,
+    solved,
+    stillness,
+)
 from pytest_simbench.laws.contact import tilt
-from pytest_simbench.laws.drives import STRONG, follow
-from pytest_simbench.laws.mechanisms import Part, mechanism
+from pytest_simbench.laws.mechanisms import STRONG, Part, mechanism
 from pytest_simbench.laws.sticking import SHARES, fan
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import (
+    STANDARD_GRAVITY,
     Box,
     ConvexMesh,
     FloatArray,
@@ -39,6 +45,55 @@ SQUEEZE = 5.0
 """Of each finger [N]."""
 
 
+def of_scene(scene: Scene) -> Robot:
+    """The scene's robot.
+
+    Raises:
+        LookupError: it has none.
+    """
+    if scene.robot is None:
+        raise LookupError(f"scene {scene.name!r} has no robot to command")
+    return scene.robot
+
+
+def with_joint(robot: Robot, *names: str, **values: Any) -> Robot:
+    """The same robot with values of some joints replaced."""
+    joints = tuple(replace(j, **values) if j.name in names else j for j in robot.joints)
+    return replace(robot, joints=joints)
+
+
+def squeezing(robot: Robot, force: float) -> Robot:
+    """The same robot, each finger pressing with at most `force` [N]."""
+    robot = with_joint(robot, *robot.gripper.joints, effort_limit=force)
+    return replace(robot, gripper=replace(robot.gripper, squeeze=force))
+
+
+def around(robot: Robot, gap: float = GAP) -> Robot:
+    """The same robot, each finger `gap` [m] from what is held."""
+    return with_joint(robot, *robot.gripper.joints, initial_position=HELD / 2 + gap)
+
+
+def gravity_effort(robot: Robot, q: FloatArray, gravity: Vector3 = STANDARD_GRAVITY) -> FloatArray:
+    """Efforts that hold the robot at rest at `q`, (n_joints,) [N m, N]."""
+    zero = np.zeros((1, len(q)))
+    return np.asarray(RobotModel(robot).inverse_dynamics(np.array(gravity), q[None], zero, zero)[0])
+
+
+def hold_command(scene: Scene, timestep: float) -> Trajectory:
+    """One command: everything at its start, gravity compensated."""
+    robot = of_scene(scene)
+    start = robot.column("initial_position")
+    return Trajectory.holding(timestep, start, gravity_effort(robot, start, scene.gravity))
+
+
+def close_command(scene: Scene, timestep: float) -> Trajectory:
+    """The same with the fingers closed."""
+    robot, told = of_scene(scene), hold_command(scene, timestep)
+    told.position[:, robot.finger_indices] = robot.gripper.closed
+    told.effort[:, robot.finger_indices] = 0.0
+    return told
+
+
 class _Grip(Law, phenomenon="grasping"):
     """The Panda holds a cube between its fingers, whose friction is 1; what of it two fingers can
     carry, 2 mu F, is `1 / load` of its weight."""
@@ -47,81 +102,29 @@ class _Grip(Law, phenomenon="grasping"):
     aside: ClassVar[float] = 0.0
     held_for: ClassVar[float] = 0.3
 
-    def robot(self) -> Robot:
-        found = panda()
-        joints = tuple(
-            replace(j, effort_limit=SQUEEZE, initial_position=HELD / 2 + GAP)
-            if j.name in found.gripper.joints
-            else j
-            for j in found.joints
-        )
-        hand = replace(found.gripper, squeeze=SQUEEZE)
-        return replace(found, joints=joints, gripper=hand)
-
-    def pull(self) -> Vector3:
-        """Gravity [m/s^2]: down, turned by `aside` [rad] within the plane of the fingers."""
-        tool = RobotModel(self.robot()).tool_pose(self.robot().column("initial_position"))
+    def build(self) -> Scene:
+        """Gravity is turned by `aside` [rad] within the plane of the fingers."""
+        robot = around(squeezing(panda(), SQUEEZE))
+        tool = RobotModel(robot).tool_pose(robot.column("initial_position"))
         x, _, z = tool.rotation().T
         a, b, c = (math.cos(self.aside) * z + math.sin(self.aside) * x) * GRAVITY
-        return (float(a), float(b), float(c))
-
-    def build(self) -> Scene:
-        robot = self.robot()
-        tool = RobotModel(robot).tool_pose(robot.column("initial_position"))
         mass = self.load * 2 * robot.friction * SQUEEZE / GRAVITY
         cube = Box("cube", (HELD,) * 3, tool, mass)
-        return Scene(self.name, (cube,), robot, gravity=self.pull())
+        return Scene(self.name, (cube,), robot, gravity=(float(a), float(b), float(c)))
 
-    def close(self) -> Trajectory:
-        """Told all the time: the arm holds its place, its weight compensated, the fingers close."""
-        robot = self.robot()
-        goal = robot.column("initial_position")
-        still = np.zeros((1, len(goal)))
-        effort = RobotModel(robot).inverse_dynamics(
-            np.array(self.pull()), goal[None], still, still
-        )[0]
-        goal[robot.finger_indices] = robot.gripper.closed
-        effort[robot.finger_indices] = 0.0
-        return Trajectory.holding(self.held_for, goal, effort)
+    def commands(self) -> Trajectory:
+        return close_command(self.build(), self.held_for)
 
 
 @dataclass(frozen=True)
-class GripSlips(_Grip, name="grip_slips", quantity="acceleration", unit="m/s^2"):
-    """Two fingers that press with F carry 2 mu F and no more (Coulomb): a cube of 1.15 times that
-    weight slips down with a = g - 2 mu F / m. Tolerance: its speed is late by one step at either
-    end of the time T over which it is taken: 2 g dt / T."""
-
-    load: float = 1.15
-
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, self.close())
-        along = seen.bodies[:, 0, 7:10] @ np.array(self.pull()) / GRAVITY
-        used = (seen.t > 0.06) & (seen.t < 0.22)
-        found = float(np.polyfit(seen.t[used], along[used], 1)[0])
-        allowed = 2 * GRAVITY * seen.dt / 0.16 + rounding(1.0, seen.steps)
-        return Reading(found, GRAVITY * (1 - 1 / self.load), allowed)
-
-
-@dataclass(frozen=True)
-class GripSlipsDiagonally(GripSlips, name="grip_slips_diagonally"):
-    """The same when the load pulls at 45 degrees, within the plane of the fingers: a friction
-    pyramid holds up to sqrt(2) times as much there."""
-
-    aside: ClassVar[float] = math.pi / 4
-
-
-@dataclass(frozen=True)
-class GripHolds(_Grip, name="grip_holds", quantity="way in the hand in 0.35 s", unit="m"):
+class GripHolds(_Grip, quantity="way in the hand in 0.35 s", unit="m", held_for=0.5):
     """A cube of 0.8 times what the fingers carry stays where it is in the hand, from 0.15 s on.
     Tolerance: an equilibrium, g dt^2."""
 
-    held_for: ClassVar[float] = 0.5
-
     load: float = 0.8
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, self.close())
-        model = RobotModel(self.robot())
+    def read(self, seen: Watched) -> Reading:
+        model = RobotModel(of_scene(self.build()))
 
         def in_hand(k: int) -> FloatArray:
             tool = model.tool_pose(seen.joints[k, 0, : model.arm])
@@ -130,6 +133,27 @@ class GripHolds(_Grip, name="grip_holds", quantity="way in the hand in 0.35 s", 
 
         way = float(np.linalg.norm(in_hand(-1) - in_hand(int(np.argmax(seen.t > 0.15)))))
         return Reading(way, 0.0, stillness(seen.dt, 0.5))
+
+
+@dataclass(frozen=True)
+class GripSlips(_Grip, quantity="acceleration", unit="m/s^2"):
+    """Two fingers that press with F carry 2 mu F and no more (Coulomb): a cube of 1.15 times that
+    weight slips down with a = g - 2 mu F / m. Tolerance: its speed is late by one step at either
+    end of the time T over which it is taken: 2 g dt / T."""
+
+    load: float = 1.15
+
+    def read(self, seen: Watched) -> Reading:
+        along = seen.bodies[:, 0, 7:10] @ np.array(self.build().gravity) / GRAVITY
+        used = (seen.t > 0.06) & (seen.t < 0.22)
+        found = float(np.polyfit(seen.t[used], along[used], 1)[0])
+        return seen.reading(found, GRAVITY * (1 - 1 / self.load), 2 * GRAVITY / 0.16, 1.0)
+
+
+@dataclass(frozen=True)
+class GripSlipsDiagonally(GripSlips, aside=math.pi / 4):
+    """The same when the load pulls at 45 degrees, within the plane of the fingers: a friction
+    pyramid holds up to sqrt(2) times as much there."""
 
 
 BLOCK: Vector3 = (0.1, 0.1, 0.1)
@@ -156,20 +180,17 @@ class _Push(Law, phenomenon="pushing", unit="m"):
         block = Box("block", BLOCK, at.translated((BAR[0] + BLOCK[0]) / 2), 1.0, self.friction)
         return Scene(self.name, (block,), robot, ground_friction=self.friction)
 
-    def push(self) -> Trajectory:
-        time = np.array([0.0, self.seconds])
-        speed = np.full((2, 1), self.speed)
-        return Trajectory(self.seconds, self.speed * time[:, None], speed, 0 * speed)
+    def commands(self) -> Trajectory:
+        return held(self.speed * self.seconds, self.seconds, self.speed)
 
 
 @dataclass(frozen=True)
-class PushForce(_Push, name="push_force", quantity="lag of the bar"):
+class PushForce(_Push, quantity="lag of the bar"):
     """The bar hangs on a spring that pulls it on: it lags behind by mu m g / k while it pushes a
     block steadily (Coulomb, Hooke). Tolerance: what gravity moves within one step, g dt^2, and the
     bar late by two steps, as of `Tracking`: 2 v dt."""
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, self.push())
+    def read(self, seen: Watched) -> Reading:
         lag = self.speed * seen.end - float(seen.joints[-1, 0, 0])
         exact = self.friction * GRAVITY / self.stiffness
         allowed = 2 * self.speed * seen.dt + stillness(seen.dt, 0.1)
@@ -177,56 +198,15 @@ class PushForce(_Push, name="push_force", quantity="lag of the bar"):
 
 
 @dataclass(frozen=True)
-class PushStraight(_Push, name="push_straight", quantity="distance from its place at the bar"):
+class PushStraight(_Push, quantity="distance from its place at the bar"):
     """A block that is pushed in its middle stays at the bar: it neither runs ahead, nor turns, nor
     is it entered. Tolerance as of `PushForce`."""
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, self.push())
+    def read(self, seen: Watched) -> Reading:
         place = np.array([float(seen.joints[-1, 0, 0]) + (BAR[0] + BLOCK[0]) / 2, 0.0])
         off = float(np.linalg.norm(seen.bodies[-1, 0, :2] - place))
         allowed = 2 * self.speed * seen.dt + stillness(seen.dt, 0.1)
         return Reading(off, 0.0, allowed)
-
-
-@dataclass(frozen=True)
-class PushTips(
-    Law, name="push_tips", phenomenon="pushing", quantity="depth at which it tips", unit="m"
-):
-    """A block that is pushed at the height h slides when its depth is more than 2 mu h / (1 + mu^2)
-    and tips when it is less, all friction alike: the ground pulls with F = mu N, the bar holds its
-    back down with mu F, and torques are taken about its front edge. Six depths, pushed by one bar.
-    Turned by 0.05 rad it has tipped. Tolerance: half of the gap between the depths on either side;
-    no step."""
-
-    friction: float = 0.5
-    height: float = 0.2
-    seconds: float = 0.6
-
-    @property
-    def critical(self) -> float:
-        """Depth [m]."""
-        return 2 * self.friction * self.height / (1 + self.friction**2)
-
-    def build(self) -> Scene:
-        bar = Part(
-            "bar", (1.0, 0.0, 0.0), mass=20.0, inertia=(5.0,) * 3, slides=True,
-            shape=(0.05, 1.2, 0.004), stiffness=1e5, damping=4e3, effort=STRONG,
-        )  # fmt: skip
-        at = Pose.at(0.0, 0.0, self.height)
-        robot = mechanism("ram", bar, base=at, friction=self.friction)
-        blocks = []
-        for k, share in enumerate(SHARES):
-            depth = share * self.critical
-            place = Pose.at(0.025 + depth / 2, 0.2 * (k - 2.5), 0.15)
-            blocks.append(Box(f"block {k}", (depth, 0.1, 0.3), place, 0.5, self.friction))
-        return Scene(self.name, tuple(blocks), robot, ground_friction=self.friction)
-
-    def measure(self, world: World) -> Reading:
-        time = np.array([[0.0], [self.seconds]])
-        speed = np.full((2, 1), 0.1)
-        follow(world, Trajectory(self.seconds, 0.1 * time, speed, 0 * speed))
-        return fan(self.critical, [tilt(row) < 0.05 for row in world.bodies])
 
 
 SIDE, HEIGHT = 0.2, 0.04
@@ -243,7 +223,7 @@ FEET: FloatArray = np.array([[-INSIDE, -SIDE / 2], [-INSIDE, SIDE / 2], [2 * INS
 
 
 @dataclass(frozen=True)
-class PushTurns(Law, name="push_turns", phenomenon="pushing", quantity="angle turned", unit="rad"):
+class PushTurns(Law, phenomenon="pushing", quantity="angle turned", unit="rad"):
     """A block that slides is pushed beside its centre, and turns as its limit surface says.
 
     The friction that the ground can give a sliding body is a surface in the space of force and
@@ -308,14 +288,50 @@ class PushTurns(Law, name="push_turns", phenomenon="pushing", quantity="angle tu
         def change(_: float, state: FloatArray) -> FloatArray:
             return np.concatenate([state[3:], self.acceleration(state[2], state[3:])])
 
-        times, start = np.linspace(0.0, seconds, 100), [0.0, 0.0, 0.0, self.speed, 0.0, 0.0]
-        found = solve_ivp(change, (0.0, seconds), start, "DOP853", times, rtol=1e-9, atol=1e-12).y
-        pulled = [self.acceleration(state[2], state[3:])[2] for state in found.T]
-        return np.array([found[2], found[5], pulled])
+        found = solved(change, [0.0, 0.0, 0.0, self.speed, 0.0, 0.0], seconds, 100, 1e-9)
+        pulled = [self.acceleration(state[2], state[3:])[2] for state in found]
+        return np.array([found[:, 2], found[:, 5], pulled])
 
     def read(self, seen: Watched) -> Reading:
         row, time = seen.bodies[-1, 0], seen.end
         angle, rate, pulled = self.exact(time)
-        allowed = (abs(rate[-1]) + float(np.abs(pulled).max()) * time) * seen.dt
-        found = 2 * math.atan2(float(row[6]), float(row[3]))
-        return Reading(found, float(angle[-1]), float(allowed) + rounding(1.0, seen.steps))
+        late = abs(rate[-1]) + float(np.abs(pulled).max()) * time
+        return seen.reading(2 * math.atan2(row[6], row[3]), angle[-1], late, 1.0)
+
+
+@dataclass(frozen=True)
+class PushTips(Law, phenomenon="pushing", quantity="depth at which it tips", unit="m"):
+    """A block that is pushed at the height h slides when its depth is more than 2 mu h / (1 + mu^2)
+    and tips when it is less, all friction alike: the ground pulls with F = mu N, the bar holds its
+    back down with mu F, and torques are taken about its front edge. Six depths, pushed by one bar.
+    Turned by 0.05 rad it has tipped. Tolerance: half of the gap between the depths on either side;
+    no step."""
+
+    friction: float = 0.5
+    height: float = 0.2
+    seconds: float = 0.6
+
+    @property
+    def critical(self) -> float:
+        """Depth [m]."""
+        return 2 * self.friction * self.height / (1 + self.friction**2)
+
+    def build(self) -> Scene:
+        bar = Part(
+            "bar", (1.0, 0.0, 0.0), mass=20.0, inertia=(5.0,) * 3, slides=True,
+            shape=(0.05, 1.2, 0.004), stiffness=1e5, damping=4e3, effort=STRONG,
+        )  # fmt: skip
+        at = Pose.at(0.0, 0.0, self.height)
+        robot = mechanism("ram", bar, base=at, friction=self.friction)
+        blocks = []
+        for k, share in enumerate(SHARES):
+            depth = share * self.critical
+            place = Pose.at(0.025 + depth / 2, 0.2 * (k - 2.5), 0.15)
+            blocks.append(Box(f"block {k}", (depth, 0.1, 0.3), place, 0.5, self.friction))
+        return Scene(self.name, tuple(blocks), robot, ground_friction=self.friction)
+
+    def commands(self) -> Trajectory:
+        return held(0.1 * self.seconds, self.seconds, 0.1)
+
+    def read(self, seen: Watched) -> Reading:
+        return fan(self.critical, [tilt(row) < 0.05 for row in seen.bodies[-1]])

@@ -1,25 +1,22 @@
-"""Laws of joints that move freely, pendulums and sliders, and of what a joint transmits."""
+"""Laws of joints that move freely, pendulums and sliders."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from scipy.integrate import solve_ivp
+import pinocchio as pin
 from scipy.special import ellipk
 
-from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, LONG, Law, Reading, Watched, rounding, watch
-from pytest_simbench.laws.mechanisms import INERTIA_OF_A_POINT, MOUNT, Part, mechanism
+from pytest_simbench.laws.base import GRAVITY, LONG, Law, Reading, Watched, solved
+from pytest_simbench.laws.mechanisms import MOUNT, Part, Y, mechanism
+from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Scene, Vector3
-from pytest_simbench.simulator import Capability
-
-Y: Vector3 = (0.0, 1.0, 0.0)
 
 
-class Passive(Law, phenomenon="joints"):
+class Passive(Law, name="", phenomenon="joints"):
     """A mechanism without drives that falls under gravity."""
 
     gravity: ClassVar[Vector3] = STANDARD_GRAVITY
@@ -27,54 +24,40 @@ class Passive(Law, phenomenon="joints"):
     def parts(self) -> tuple[Part, ...]:
         raise NotImplementedError
 
+    @property
+    def mechanism(self) -> Robot:
+        """The parts, as they are let go."""
+        return mechanism(self.name, *self.parts())
+
     def build(self) -> Scene:
-        return Scene(self.name, robot=mechanism(self.name, *self.parts()), gravity=self.gravity)
+        return Scene(self.name, robot=self.mechanism, gravity=self.gravity)
+
+    @property
+    def model(self) -> Any:  # Pinocchio has no types
+        """The same for Pinocchio, with gravity."""
+        found = RobotModel(self.mechanism).pin
+        found.gravity.linear = np.array(self.gravity)
+        return found
 
     def exact(self, seconds: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Joint positions, velocities and accelerations of the equations of motion M(q) q'' +
         h(q, q') = 0, by Pinocchio's articulated-body algorithm and DOP853 with a relative
         tolerance of 1e-10, (n, n_joints) each."""
-        import pinocchio as pin
-
-        robot = self.build().robot
-        assert robot is not None
-        model, n = model_of(robot, self.gravity), len(robot.joints)
-        data, no_effort = model.createData(), np.zeros(n)
+        model, start = self.model, self.mechanism.column("initial_position")
+        data, n = model.createData(), len(start)
 
         def change(_: float, state: FloatArray) -> FloatArray:
             q, v = state[:n], state[n:]
-            return np.concatenate([v, pin.aba(model, data, q, v, no_effort)])
+            return np.concatenate([v, pin.aba(model, data, q, v, np.zeros(n))])
 
-        start = np.concatenate([robot.column("initial_position"), np.zeros(n)])
-        times = np.linspace(0.0, seconds, 200)
-        found = solve_ivp(
-            change, (0.0, seconds), start, "DOP853", times, rtol=1e-10, atol=1e-12
-        ).y.T
+        found = solved(change, [*start, *np.zeros(n)], seconds, 200)
         bent = np.array([change(0.0, state)[n:] for state in found])
         return found[:, :n], found[:, n:], bent
 
-    def energy(self, seen: Watched) -> tuple[FloatArray, FloatArray]:
-        """Kinetic and potential energy at each sample [J], (n,) each."""
-        import pinocchio as pin
 
-        robot = self.build().robot
-        assert robot is not None
-        model = model_of(robot, self.gravity)
-        data = model.createData()
-        kinetic = [pin.computeKineticEnergy(model, data, q, v) for q, v in seen.joints]
-        potential = [pin.computePotentialEnergy(model, data, q) for q, _ in seen.joints]
-        return np.array(kinetic), np.array(potential)
-
-
-def model_of(robot: Robot, gravity: Vector3):  # type: ignore[no-untyped-def]  # Pinocchio has no types
-    from pytest_simbench.motion.model import RobotModel
-
-    model = RobotModel(robot).pin
-    model.gravity.linear = np.array(gravity)
-    return model
-
-
-class Motion(Passive, quantity="largest distance of a joint from its place", unit="rad or m"):
+class Motion(
+    Passive, name="", quantity="largest distance of a joint from its place", unit="rad or m"
+):
     """Where the joints are after a time, by the equations of motion."""
 
     def read(self, seen: Watched) -> Reading:
@@ -89,13 +72,11 @@ class _Energy(Passive, quantity="largest change of the energy", unit="J"):
     """The energy stays what it was."""
 
     def read(self, seen: Watched) -> Reading:
-        kinetic, potential = self.energy(seen)
-        robot = self.build().robot
-        assert robot is not None
-        start = robot.column("initial_position")[None, None]
-        rest = np.concatenate([start, np.zeros_like(start)], axis=1)
-        _, before = self.energy(Watched(seen.dt, seen.t[:1], rest, seen.bodies[:1]))
-        off = float(np.abs(kinetic + potential - before[0]).max())
+        model, (q, v) = self.model, seen.joints.swapaxes(0, 1)
+        data, rows = model.createData(), [self.mechanism.column("initial_position"), *q]
+        kinetic = [pin.computeKineticEnergy(model, data, *row) for row in zip(q, v, strict=True)]
+        before, *potential = (pin.computePotentialEnergy(model, data, row) for row in rows)
+        off = float(np.abs(np.add(kinetic, potential) - before).max())
         scale = float(np.ptp(potential))
         late = self.late(np.gradient(potential, seen.dt))
         return seen.reading(off, 0.0, late, scale)
@@ -106,21 +87,22 @@ class _Energy(Passive, quantity="largest change of the energy", unit="J"):
         return float(np.abs(power).max())
 
 
-def _period(length: float, angle: float, mass: float, inertia: float) -> float:
-    """Of a pendulum let go at an angle [rad], see `PendulumPeriod` [s].
+def _period(part: Part) -> float:
+    """Of a part that hangs from its hinge and is let go, see `PendulumPeriod` [s]."""
+    length = -part.centre[2]
+    about_hinge = part.mass * length**2 + part.inertia[1]
+    slow = math.sqrt(about_hinge / (part.mass * GRAVITY * length))
+    return 4 * slow * float(ellipk(math.sin(part.start / 2) ** 2))
 
-    Args:
-        length: of its centre of mass from the hinge [m].
-        angle: at which it is let go [rad].
-        mass: [kg].
-        inertia: about the centre of mass [kg m^2].
-    """
-    slow = math.sqrt((mass * length**2 + inertia) / (mass * GRAVITY * length))
-    return 4 * slow * float(ellipk(math.sin(angle / 2) ** 2))
+
+def _seen_period(seen: Watched, joint: int) -> float:
+    """Between the first two passes of a joint; the whole time where there are none [s]."""
+    found = seen.crossings(seen.joints[:, 0, joint])
+    return float(found[1] - found[0]) if len(found) > 1 else seen.end
 
 
 @dataclass(frozen=True)
-class PendulumPeriod(Passive, name="pendulum_period", quantity="period", unit="s"):
+class PendulumPeriod(Passive, quantity="period", unit="s"):
     """A pendulum that is let go at the angle a swings with the period T = 4 sqrt(I / m g l)
     K(sin^2(a / 2)), K the complete elliptic integral of the first kind (Landau, Lifshitz,
     Mechanics, section 11). Tolerance: late by one step, at each end of the period."""
@@ -132,18 +114,12 @@ class PendulumPeriod(Passive, name="pendulum_period", quantity="period", unit="s
     def parts(self) -> tuple[Part, ...]:
         return (Part("swing", Y, centre=(0.0, 0.0, -self.length), start=self.angle),)
 
-    @property
-    def period(self) -> float:
-        return _period(self.length, self.angle, 1.0, INERTIA_OF_A_POINT)
-
     def read(self, seen: Watched) -> Reading:
-        found = seen.crossings(seen.joints[:, 0, 0])
-        period = float(found[1] - found[0]) if len(found) > 1 else self.seconds
-        return Reading(period, self.period, 2 * seen.dt)
+        return Reading(_seen_period(seen, 0), _period(*self.parts()), 2 * seen.dt)
 
 
 @dataclass(frozen=True)
-class CompoundPendulum(PendulumPeriod, name="compound_pendulum"):
+class CompoundPendulum(PendulumPeriod):
     """A heavy body on a hinge: its moment of inertia about its centre counts (Huygens, Steiner):
     I = m l^2 + I_c. Tolerance as of `PendulumPeriod`."""
 
@@ -153,19 +129,11 @@ class CompoundPendulum(PendulumPeriod, name="compound_pendulum"):
     inertia: float = 0.05
 
     def parts(self) -> tuple[Part, ...]:
-        moments = (self.inertia,) * 3
-        (part,) = super().parts()
-        return (Part("swing", Y, centre=part.centre, start=self.angle, inertia=moments),)
-
-    @property
-    def period(self) -> float:
-        return _period(self.length, self.angle, 1.0, self.inertia)
+        return (replace(*super().parts(), inertia=(self.inertia,) * 3),)
 
 
 @dataclass(frozen=True)
-class TwoPendulums(
-    Passive, name="two_pendulums", quantity="larger error of the two periods", unit="s"
-):
+class TwoPendulums(Passive, quantity="larger error of the two periods", unit="s"):
     """Two pendulums that hang on one fixed mount do not know of each other (Newton: what cannot
     move transmits no motion): each swings with its own period, that of `PendulumPeriod`, whatever
     the other's length, mass and swing. Tolerance as there."""
@@ -177,34 +145,26 @@ class TwoPendulums(
     seconds: float = 3.6
 
     def parts(self) -> tuple[Part, ...]:
-        made = []
-        for k, length in enumerate(self.lengths):
-            made.append(
-                Part(
-                    f"swing {k}",
-                    Y,
-                    (0.0, k * self.apart, 0.0),
-                    centre=(0.0, 0.0, -length),
-                    mass=self.masses[k],
-                    start=self.angles[k],
-                    on=MOUNT,
-                )
+        pairs = zip(self.lengths, self.masses, self.angles, strict=True)
+        return tuple(
+            Part(
+                f"swing {k}", Y, (0.0, k * self.apart, 0.0), (0.0, 0.0, -length), mass,
+                start=angle, on=MOUNT,
             )
-        return tuple(made)
+            for k, (length, mass, angle) in enumerate(pairs)
+        )  # fmt: skip
 
     def read(self, seen: Watched) -> Reading:
-        errors = []
-        for k, (length, angle, mass) in enumerate(
-            zip(self.lengths, self.angles, self.masses, strict=True)
-        ):
-            found = seen.crossings(seen.joints[:, 0, k])
-            period = float(found[1] - found[0]) if len(found) > 1 else self.seconds
-            errors.append(abs(period - _period(length, angle, mass, INERTIA_OF_A_POINT)))
+        parts = enumerate(self.parts())
+        errors = [abs(_seen_period(seen, k) - _period(part)) for k, part in parts]
         return Reading(max(errors), 0.0, 2 * seen.dt)
 
 
+SWING = Part("swing", Y, centre=(0.0, 0.0, -0.1), start=1.5)
+
+
 @dataclass(frozen=True)
-class PendulumEnergy(_Energy, name="pendulum_energy"):
+class PendulumEnergy(_Energy):
     """The energy of a pendulum that swings by 1.5 rad stays what it was. Tolerance: the potential
     energy is late by one step against the kinetic one, P dt with P the largest power; a symplectic
     method of the first order is off by half of that, and does not drift (Hairer, Lubich, Wanner,
@@ -213,25 +173,23 @@ class PendulumEnergy(_Energy, name="pendulum_energy"):
     seconds: float = 6.0
 
     def parts(self) -> tuple[Part, ...]:
-        return (Part("swing", Y, centre=(0.0, 0.0, -0.1), start=1.5),)
+        return (SWING,)
 
 
 @dataclass(frozen=True)
-class PendulumEnergyDrift(PendulumEnergy, name="pendulum_energy_drift"):
+class PendulumEnergyDrift(PendulumEnergy, study_timeout=LONG):
     """Over 100 periods the energy of that pendulum stays what it was, too. Tolerance as of
     `PendulumEnergy`, whatever the number of periods: what a symplectic method is off by swings with
     the pendulum and does not add up. Only rounding does. The protocol `smoke` takes 4 periods."""
 
-    study_timeout: ClassVar[float] = LONG
-
-    seconds: float = 100 * _period(0.1, 1.5, 1.0, INERTIA_OF_A_POINT)
+    seconds: float = 100 * _period(SWING)
 
     def smoke(self) -> PendulumEnergyDrift:
         return replace(self, seconds=self.seconds / 25)
 
 
 @dataclass(frozen=True)
-class DoublePendulum(Motion, name="double_pendulum"):
+class DoublePendulum(Motion):
     """Two pendulums, one hung on the other (Lagrange), against the equations of motion. Tolerance:
     late by one step, and a velocity that is late by one step all the time: |v| dt + |a| t dt."""
 
@@ -244,7 +202,7 @@ class DoublePendulum(Motion, name="double_pendulum"):
 
 
 @dataclass(frozen=True)
-class DoublePendulumEnergy(_Energy, name="double_pendulum_energy"):
+class DoublePendulumEnergy(_Energy):
     """The energy of a double pendulum stays what it was. Tolerance: the power is late by one step
     all the time, the step times the sum of its changes. Its mass matrix changes with its position,
     so that semi-implicit Euler is not symplectic, and the bound of `PendulumEnergy` does not
@@ -260,7 +218,7 @@ class DoublePendulumEnergy(_Energy, name="double_pendulum_energy"):
 
 
 @dataclass(frozen=True)
-class SwingingSlider(Motion, name="swinging_slider"):
+class SwingingSlider(Motion):
     """A mass slides without friction along a rod that swings: Coriolis force, centrifugal force and
     gravity, r'' = r q'^2 + g cos q, (I + m r^2) q'' = -m g r sin q - 2 m r r' q'. Tolerance as of
     `DoublePendulum`."""
@@ -273,103 +231,12 @@ class SwingingSlider(Motion, name="swinging_slider"):
 
 
 @dataclass(frozen=True)
-class SphericalPendulum(Motion, name="spherical_pendulum"):
+class SphericalPendulum(Motion, gravity=(3.0, 4.0, -8.0)):
     """A bob on two crossed hinges that moves out of their planes: gyroscopic terms of three
     dimensions, against the equations of motion. Tolerance as of `DoublePendulum`."""
-
-    gravity: ClassVar[Vector3] = (3.0, 4.0, -8.0)
 
     seconds: float = 1.0
 
     def parts(self) -> tuple[Part, ...]:
         bob = Part("across", Y, centre=(0.0, 0.1, -0.5), start=0.3, inertia=(0.02, 0.04, 0.03))
         return Part("along", (1.0, 0.0, 0.0), start=0.8), bob
-
-
-LOOKS = 20
-"""How often the joint is asked, at even times."""
-
-MASS = 2.0
-"""Of the bob [kg]."""
-
-
-@dataclass(frozen=True)
-class _Loaded(Passive, phenomenon="mechanisms"):
-    """A pendulum whose bob hangs aside of its plane: its hinge carries a force, and a torque
-    across its axis."""
-
-    needs: ClassVar[tuple[Capability, ...]] = (Capability.JOINT_WRENCHES,)
-
-    length: ClassVar[float] = 0.5
-    aside: ClassVar[float] = 0.3
-    angle: ClassVar[float] = 2.0
-
-    seconds: float = 1.2
-
-    def parts(self) -> tuple[Part, ...]:
-        centre = (0.0, self.aside, -self.length)
-        return (Part("swing", Y, centre=centre, mass=MASS, start=self.angle),)
-
-    @property
-    def slow(self) -> float:
-        """m g l / I about the hinge [1/s^2]."""
-        return MASS * GRAVITY * self.length / (MASS * self.length**2 + INERTIA_OF_A_POINT)
-
-    def carried(self, angle: float) -> FloatArray:
-        """The hinge's wrench on the rod at an angle [rad] while it swings, (6,).
-
-        Newton: F = m (a - g) with the bob's acceleration, along and across the rod; the speed of
-        the swing is that of energy conservation. Of the torque about the hinge, the part about its
-        axis is 0, and that across it is the bob's way aside times F.
-        """
-        bend = -self.slow * math.sin(angle)
-        inward = np.array([math.sin(angle), 0.0, math.cos(angle)])
-        onward = np.array([-math.cos(angle), 0.0, math.sin(angle)])
-        acceleration = self.length * (self.rate(angle) ** 2 * inward + bend * onward)
-        force = MASS * (acceleration + np.array([0.0, 0.0, GRAVITY]))
-        torque = np.cross([0.0, self.aside, 0.0], force)
-        return np.concatenate([force, torque])
-
-    def rate(self, angle: float) -> float:
-        """Of the swing at an angle, by energy conservation [rad/s], (its size)."""
-        fallen = math.cos(angle) - math.cos(self.angle)
-        return math.sqrt(max(0.0, 2 * self.slow * fallen))
-
-    def compare(self, world: World, which: slice) -> Reading:
-        """The largest error of force or torque, and by how much they change in a step."""
-        errors = []
-        for _ in range(LOOKS):
-            dt = watch(world, self.seconds / LOOKS).dt
-            told = world.joint_wrenches()[0] - self.carried(float(world.joints[0, 0]))
-            errors.append(float(np.linalg.norm(told[which])))
-        angles = np.linspace(-self.angle, self.angle, 401)
-        right = np.array([self.carried(angle)[which] for angle in angles])
-        bend = np.linalg.norm(np.gradient(right, angles, axis=0), axis=1)
-        fastest = max(a * self.rate(angle) for a, angle in zip(bend, angles, strict=True))
-        scale = float(np.linalg.norm(right, axis=1).max())
-        return Reading(max(errors), 0.0, 2 * float(fastest) * dt + rounding(scale, 1))
-
-
-@dataclass(frozen=True)
-class PendulumForce(
-    _Loaded, name="pendulum_force", quantity="largest error of the hinge's force", unit="N"
-):
-    """The hinge of a pendulum carries F = m (a - g): along the rod m g cos q + m l w^2, and across
-    it what an inertia about the bob's centre asks for (Newton; Huygens, Horologium oscillatorium,
-    1673). Tolerance: what is told is of the last step, whose begin is one step ago, and the speed
-    was late by one then: two steps, 2 dt times the largest |dF/dt| of the swing."""
-
-    def measure(self, world: World) -> Reading:
-        return self.compare(world, slice(0, 3))
-
-
-@dataclass(frozen=True)
-class PendulumTorque(
-    _Loaded, name="pendulum_torque", quantity="largest error of the hinge's torque", unit="N m"
-):
-    """The hinge of a pendulum whose bob hangs aside of its plane carries a torque across its axis,
-    the bob's way aside times the force, and none about it (Euler's second law). Tolerance as of
-    `PendulumForce`, of the torque."""
-
-    def measure(self, world: World) -> Reading:
-        return self.compare(world, slice(3, 6))

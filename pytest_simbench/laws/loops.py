@@ -5,16 +5,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
-from scipy.integrate import solve_ivp
+import pinocchio as pin
 
 from pytest_simbench.description.links import ends, reduced
-from pytest_simbench.laws.base import Reading, Watched, rounding
-from pytest_simbench.laws.joints import Motion, Passive, Y, model_of
-from pytest_simbench.laws.mechanisms import MOUNT, Part, mechanism
-from pytest_simbench.scene import Closure, FloatArray, Scene, Vector3
+from pytest_simbench.laws.base import Reading, Watched, rounding, solved
+from pytest_simbench.laws.joints import Motion, Passive
+from pytest_simbench.laws.mechanisms import MOUNT, Part, Y, mechanism
+from pytest_simbench.scene import Closure, FloatArray, Robot, Vector3
 from pytest_simbench.simulator import Capability, PreparedRobot
 
 CRANK, COUPLER, ROCKER, GROUND = 0.25, 0.5, 0.4, 0.5
@@ -33,18 +32,16 @@ a part in 1e12, which the integrator below does not see."""
 
 
 @dataclass(frozen=True)
-class _FourBar(Passive, phenomenon="mechanisms"):
+class _FourBar(Passive, phenomenon="mechanisms", needs=(Capability.LOOPS,)):
     """Three rods: a crank and a rocker that hang on the mount, GROUND apart, and a coupler that is
     hinged to the crank and held at the rocker's end. It is let go at a crank angle."""
 
-    needs: ClassVar[tuple[Capability, ...]] = (Capability.LOOPS,)
-
     crank: float = 1.2
 
-    def build(self) -> Scene:
+    @property
+    def mechanism(self) -> Robot:
         hinge = Closure("coupler link", "rocker link", (COUPLER, 0.0, 0.0), (0.0, 0.0, -ROCKER))
-        robot = mechanism(self.name, *self.parts(), closures=(hinge,))
-        return Scene(self.name, robot=robot, gravity=self.gravity)
+        return mechanism(self.name, *self.parts(), closures=(hinge,))
 
     def parts(self) -> tuple[Part, ...]:
         first, second, third = (float(angle) for angle in four_bar(self.crank))
@@ -62,18 +59,11 @@ class _FourBar(Passive, phenomenon="mechanisms"):
         energy V(s), is m s'' + m' s'^2 / 2 + V' = 0; by DOP853 with a relative tolerance of
         1e-8. M and V are Pinocchio's.
         """
-        import pinocchio as pin
-
-        robot = self.build().robot
-        assert robot is not None
-        model = model_of(robot, self.gravity)
+        model = self.model
         data = model.createData()
 
         def inertia(s: float) -> float:
-            across = slope(s)
-            matrix = pin.crba(model, data, four_bar(s))
-            whole = np.triu(matrix) + np.triu(matrix, 1).T
-            return float(across @ whole @ across)
+            return float(2 * pin.computeKineticEnergy(model, data, four_bar(s), slope(s)))
 
         def potential(s: float) -> float:
             return float(pin.computePotentialEnergy(model, data, four_bar(s)))
@@ -84,12 +74,10 @@ class _FourBar(Passive, phenomenon="mechanisms"):
             v_slope = (potential(s + H) - potential(s - H)) / (2 * H)
             return [rate, -(v_slope + m_slope * rate**2 / 2) / inertia(s)]
 
-        times = np.linspace(0.0, seconds, 200)
-        start = [self.crank, 0.0]
-        s, rate = solve_ivp(change, (0.0, seconds), start, "DOP853", times, rtol=1e-8, atol=1e-10).y
+        s, rate = solved(change, [self.crank, 0.0], seconds, 200, 1e-8).T
         q = np.array([four_bar(value) for value in s])
         v = np.array([slope(value) for value in s]) * rate[:, None]
-        return q, v, np.gradient(v, times, axis=0)
+        return q, v, np.gradient(v, seconds / 199, axis=0)
 
 
 def four_bar(crank: float) -> FloatArray:
@@ -115,9 +103,7 @@ def slope(crank: float) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class FourBarClosure(
-    _FourBar, name="four_bar_closure", quantity="largest opening of the loop", unit="mm"
-):
+class FourBarClosure(_FourBar, quantity="largest opening of the loop", unit="mm"):
     """A loop stays closed: in a four-bar linkage that swings, the coupler's end is where the
     rocker's is (Freudenstein, Approximate synthesis of four-bar linkages, 1955: the loop equation).
     Tolerance: one end is late by one step, the speed of the crank's end times dt; rounding of one
@@ -126,9 +112,7 @@ class FourBarClosure(
     seconds: float = 2.0
 
     def read(self, seen: Watched) -> Reading:
-        robot = self.build().robot
-        assert robot is not None
-        prepared = PreparedRobot(robot)
+        prepared = PreparedRobot(self.mechanism)
         (hinge,) = reduced(prepared)
         some = seen.joints[:: max(1, seen.steps // LOOKS), 0]
         pairs = (ends(prepared, hinge, q) for q in some)
@@ -139,7 +123,7 @@ class FourBarClosure(
 
 
 @dataclass(frozen=True)
-class FourBarSwing(_FourBar, Motion, name="four_bar_swing"):
+class FourBarSwing(_FourBar, Motion):
     """A four-bar linkage that is let go swings as its one degree of freedom has it: Lagrange's
     equation of the crank's angle, coupler and rocker by the loop equation. Tolerance as of
     `DoublePendulum`."""

@@ -12,6 +12,11 @@ from pytest_simbench.description.robot_files import keep
 from pytest_simbench.scene import Closure, Gripper, Joint, Pose, Robot, Vector3
 from pytest_simbench.scene.robot import FARTHEST, FREE, WIDEST
 
+STRONG = 1e4
+"""Effort limit of a drive that is to obey its law [N m]."""
+
+Y: Vector3 = (0.0, 1.0, 0.0)
+
 MOUNT = "mount"
 """The part that is fixed in the world."""
 

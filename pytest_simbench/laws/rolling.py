@@ -1,20 +1,18 @@
-"""Laws of what rolls: round bodies, which may slip first, and a wheel without a rim. And of meshes:
-one beside the box that it is."""
+"""Laws of what rolls: round bodies, which may slip first, and a wheel without a rim."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, rounding, watch
-from pytest_simbench.laws.free import WEIGHTLESS
-from pytest_simbench.laws.spinning import FreeTop
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, watch
+from pytest_simbench.laws.sliding import TOP, BeltSpeed
 from pytest_simbench.laws.sticking import acceleration, tilted
-from pytest_simbench.scene import Body, Box, ConvexMesh, Cylinder, Pose, Scene, Sphere, Vector3
+from pytest_simbench.scene import Body, ConvexMesh, Cylinder, Pose, Scene, Sphere
 
 RADIUS = 0.05
 ON_ITS_SIDE = Pose((0.0, 0.0, RADIUS), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0))
@@ -22,9 +20,7 @@ ON_ITS_SIDE = Pose((0.0, 0.0, RADIUS), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0
 
 
 @dataclass(frozen=True)
-class RollingSphere(
-    Law, name="rolling_sphere", phenomenon="rolling", quantity="acceleration", unit="m/s^2"
-):
+class RollingSphere(Law, phenomenon="rolling", quantity="acceleration", unit="m/s^2"):
     """Down a slope a sphere rolls without slipping with a = 5/7 g sin a, where mu is more than 2/7
     of the slope (I = 2/5 m r^2). Tolerance: its speed is late by one step at either end of the time
     T over which it is taken, under the largest of the forces: 2 g sin a dt / T."""
@@ -38,30 +34,24 @@ class RollingSphere(
         return Sphere("ball", RADIUS, Pose.at(0.0, 0.0, RADIUS), 1.0, self.friction)
 
     def build(self) -> Scene:
-        return Scene(
-            self.name,
-            (self.body(),),
-            gravity=tilted(self.slope, 0.0),
-            ground_friction=self.friction,
-        )
+        gravity = tilted(self.slope, 0.0)
+        return Scene(self.name, (self.body(),), gravity=gravity, ground_friction=self.friction)
 
     def read(self, seen: Watched) -> Reading:
         pull = GRAVITY * math.sin(math.atan(self.slope))
-        return acceleration(seen.dt, seen.t, seen.bodies[:, 0, 7], 0.2, self.share * pull, pull)
+        return acceleration(seen, seen.bodies[:, 0, 7], 0.2, self.share * pull, pull)
 
 
 @dataclass(frozen=True)
-class RollingCylinder(RollingSphere, name="rolling_cylinder"):
+class RollingCylinder(RollingSphere, share=2 / 3):
     """A cylinder rolls with a = 2/3 g sin a (I = m r^2 / 2). Tolerance as of `RollingSphere`."""
-
-    share: ClassVar[float] = 2 / 3
 
     def body(self) -> Body:
         return Cylinder("roller", RADIUS, 0.2, ON_ITS_SIDE, 1.0, self.friction)
 
 
 @dataclass(frozen=True)
-class SlipToRoll(Law, name="slip_to_roll", phenomenon="rolling", quantity="speed", unit="m/s"):
+class SlipToRoll(Law, phenomenon="rolling", quantity="speed", unit="m/s"):
     """A sphere that is pushed off with v0 and w0 slips until it rolls, with (5 v0 + 2 w0 r) / 7,
     whatever mu (angular momentum about the ground; Coriolis, Billard, 1835). Tolerance: its speed
     is late by one step, mu g dt."""
@@ -72,16 +62,10 @@ class SlipToRoll(Law, name="slip_to_roll", phenomenon="rolling", quantity="speed
     seconds: float = 0.5
 
     def build(self) -> Scene:
-        ball = Sphere(
-            "ball",
-            RADIUS,
-            Pose.at(0.0, 0.0, RADIUS),
-            1.0,
-            self.friction,
-            linear_velocity=(self.speed, 0.0, 0.0),
-            angular_velocity=(0.0, self.spin, 0.0),
-        )
-        return Scene(self.name, (ball,), ground_friction=self.friction)
+        ball = Sphere("ball", RADIUS, Pose.at(0.0, 0.0, RADIUS), 1.0, self.friction)
+        v, w = (self.speed, 0.0, 0.0), (0.0, self.spin, 0.0)
+        pushed = replace(ball, linear_velocity=v, angular_velocity=w)
+        return Scene(self.name, (pushed,), ground_friction=self.friction)
 
     def read(self, seen: Watched) -> Reading:
         exact = (5 * self.speed + 2 * self.spin * RADIUS) / 7
@@ -89,7 +73,7 @@ class SlipToRoll(Law, name="slip_to_roll", phenomenon="rolling", quantity="speed
 
 
 @dataclass(frozen=True)
-class SpinToRoll(SlipToRoll, name="spin_to_roll"):
+class SpinToRoll(SlipToRoll):
     """A sphere that only spins about a level axis runs off: the same with v0 = 0. Tolerance
     as of `SlipToRoll`."""
 
@@ -98,22 +82,21 @@ class SpinToRoll(SlipToRoll, name="spin_to_roll"):
 
 
 @dataclass(frozen=True)
-class FreeCylinder(FreeTop, name="free_cylinder"):
-    """The same for a cylinder (I1 = m (3 r^2 + l^2) / 12, I3 = m r^2 / 2).
-    Tolerance as of `FreeTop`."""
+class BallOnBelt(BeltSpeed, phenomenon="rolling", quantity="speed", unit="m/s"):
+    """A ball laid on a running belt comes to roll on it with 2/7 of the belt's speed: friction
+    gives it m v and turns it back by 2/5 m r^2 w = m v r until v + w r is that of the belt.
+    Tolerance: its speed is late by one step, mu g dt."""
 
-    def build(self) -> Scene:
-        body = Cylinder("rod", 0.05, 0.4, Pose.at(0.0, 0.0, 2.0), 1.0, angular_velocity=self.omega)
-        return Scene(self.name, (body,), gravity=WEIGHTLESS)
+    def body(self) -> Body:
+        return Sphere("ball", RADIUS, Pose.at(0.0, 0.0, TOP + RADIUS), 0.5, self.friction)
+
+    def read(self, seen: Watched) -> Reading:
+        return seen.reading(seen.bodies[-1, 1, 7], 2 / 7 * self.speed, self.friction * GRAVITY, 1.0)
 
 
 @dataclass(frozen=True)
 class RimlessWheel(
-    Law,
-    name="rimless_wheel",
-    phenomenon="rolling",
-    quantity="angular speed above the next edge",
-    unit="rad/s",
+    Law, phenomenon="rolling", quantity="angular speed above the next edge", unit="rad/s"
 ):
     """A regular prism of n sides rolls on its edges: a step of a wheel without a rim.
 
@@ -178,39 +161,6 @@ class RimlessWheel(
         angles = np.unwrap(2 * halves, period=2 * math.pi)
         reached = seen.crossings(angles, step)
         found = float(seen.at(reached[0], seen.bodies[:, 0, 11])) if len(reached) else 0.0
-        late, rate = self.pull * seen.dt, self.pull * before * seen.dt
+        late, rate = self.pull, self.pull * before
         off = (after / before) * (late + rate * first) + late
-        allowed = (after / top) * off + late + rate * second + rounding(before, seen.steps)
-        return Reading(found, top, allowed)
-
-
-@dataclass(frozen=True)
-class MeshTwin(
-    Law,
-    name="mesh_twin",
-    phenomenon="sliding",
-    quantity="distance of the mesh from where the box is",
-    unit="m",
-):
-    """A box, and a mesh with its corners beside it, fall, land flat, slide and stop alike: it is
-    one body. Each is thrown from the height h with the speed v. Tolerance: each may land and stop
-    late by one step, 2 v dt each."""
-
-    size: Vector3 = (0.2, 0.2, 0.05)
-    height: float = 0.01
-    speed: float = 1.0
-    friction: float = 0.5
-    seconds: float = 0.4
-
-    def build(self) -> Scene:
-        x, y, z = (edge / 2 for edge in self.size)
-        corners = tuple((a, b, c) for a in (-x, x) for b in (-y, y) for c in (-z, z))
-        thrown = Pose.at(0.0, 0.0, z + self.height), 1.0, self.friction
-        box = Box("box", self.size, *thrown, linear_velocity=(self.speed, 0.0, 0.0))
-        mesh = ConvexMesh("mesh", corners, *thrown, linear_velocity=(self.speed, 0.0, 0.0))
-        beside = mesh.moved_to(mesh.pose.translated(y=3 * self.size[1]))
-        return Scene(self.name, (box, beside), ground_friction=self.friction)
-
-    def read(self, seen: Watched) -> Reading:
-        apart = seen.bodies[-1, 1, :3] - seen.bodies[-1, 0, :3] - [0.0, 3 * self.size[1], 0.0]
-        return seen.reading(float(np.linalg.norm(apart)), 0.0, 4 * self.speed, 1.0)
+        return seen.reading(found, top, (after / top) * off + late + rate * second, before)

@@ -1,21 +1,21 @@
-"""Laws of sliding: how friction moves and stops what slides, or lies on a belt."""
+"""Laws of sliding: how friction moves and stops what slides, or lies on a belt. And of meshes: one
+beside the box that it is."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pytest_simbench.client.world import World
 from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, rounding, watch
-from pytest_simbench.laws.drives import follow
 from pytest_simbench.laws.sticking import SLAB, SLAB_AT, Carried, acceleration, slab_on
-from pytest_simbench.scene import Body, Box, Pose, Scene, Sphere
+from pytest_simbench.scene import Body, Box, ConvexMesh, Pose, Scene, Vector3
 
 
 @dataclass(frozen=True)
-class SlideX(Law, name="slide_x", phenomenon="sliding", quantity="acceleration", unit="m/s^2"):
+class SlideX(Law, phenomenon="sliding", quantity="acceleration", unit="m/s^2"):
     """Down a slope steeper than mu a slab accelerates by g (sin a - mu cos a) (Coulomb). Tolerance:
     the speed is late by one step at either end of the time T over which it is taken, under the
     largest of the forces: 2 g sin a dt / T."""
@@ -32,25 +32,25 @@ class SlideX(Law, name="slide_x", phenomenon="sliding", quantity="acceleration",
         angle = math.atan(self.slope)
         along = seen.bodies[:, 0, 7:9] @ [math.cos(self.direction), math.sin(self.direction)]
         exact = GRAVITY * (math.sin(angle) - self.friction * math.cos(angle))
-        return acceleration(seen.dt, seen.t, along, 0.2, exact, GRAVITY * math.sin(angle))
+        return acceleration(seen, along, 0.2, exact, GRAVITY * math.sin(angle))
 
 
 @dataclass(frozen=True)
-class SlideY(SlideX, name="slide_y"):
+class SlideY(SlideX):
     """The same in the direction y."""
 
     direction: float = math.pi / 2
 
 
 @dataclass(frozen=True)
-class SlideDiagonal(SlideX, name="slide_diagonal"):
+class SlideDiagonal(SlideX):
     """The same along a diagonal, where a friction pyramid differs most from the cone."""
 
     direction: float = math.pi / 4
 
 
 @dataclass(frozen=True)
-class SlideStraight(SlideX, name="slide_straight", quantity="angle aside", unit="deg"):
+class SlideStraight(SlideX, quantity="angle aside", unit="deg"):
     """A slab slides straight down, at 22.5 degrees to the axes too: friction is against the motion
     (a pyramid's is not, and the slab veers). Tolerance: the speed aside is late by one step, as an
     angle: g sin a dt / v."""
@@ -67,9 +67,7 @@ class SlideStraight(SlideX, name="slide_straight", quantity="angle aside", unit=
 
 
 @dataclass(frozen=True)
-class StoppingDistance(
-    Law, name="stopping_distance", phenomenon="sliding", quantity="way", unit="m"
-):
+class StoppingDistance(Law, phenomenon="sliding", quantity="way", unit="m"):
     """A slab that is given the speed v slides v^2 / (2 mu g). Tolerance: v dt."""
 
     direction: float = 0.0
@@ -77,11 +75,8 @@ class StoppingDistance(
     friction: float = 0.5
 
     def build(self) -> Scene:
-        velocity = (
-            self.speed * math.cos(self.direction),
-            self.speed * math.sin(self.direction),
-            0.0,
-        )
+        cos, sin = math.cos(self.direction), math.sin(self.direction)
+        velocity = (self.speed * cos, self.speed * sin, 0.0)
         slab = Box("slab", SLAB, SLAB_AT, 1.0, self.friction, linear_velocity=velocity)
         return Scene(self.name, (slab,), ground_friction=self.friction)
 
@@ -93,14 +88,14 @@ class StoppingDistance(
 
 
 @dataclass(frozen=True)
-class StoppingDistanceDiagonal(StoppingDistance, name="stopping_distance_oblique"):
+class StoppingDistanceOblique(StoppingDistance):
     """The same at 30 degrees to an axis. Tolerance as of `StoppingDistance`."""
 
     direction: float = math.pi / 6
 
 
 @dataclass(frozen=True)
-class Glide(Law, name="glide", phenomenon="sliding", quantity="speed", unit="m/s"):
+class Glide(Law, phenomenon="sliding", quantity="speed", unit="m/s"):
     """On ground without friction a slab keeps its speed (Newton's first law). Tolerance: rounding,
     for every consistent method keeps a constant."""
 
@@ -112,13 +107,11 @@ class Glide(Law, name="glide", phenomenon="sliding", quantity="speed", unit="m/s
         return Scene(self.name, (slab,), ground_friction=0.0)
 
     def read(self, seen: Watched) -> Reading:
-        return Reading(
-            float(seen.bodies[-1, 0, 7]), self.speed, rounding(2 * self.speed, seen.steps)
-        )
+        return seen.reading(seen.bodies[-1, 0, 7], self.speed, 0.0, 2 * self.speed)
 
 
 @dataclass(frozen=True)
-class Belt(Carried, name="belt", phenomenon="sliding", quantity="acceleration", unit="m/s^2"):
+class Belt(Carried, phenomenon="sliding", quantity="acceleration", unit="m/s^2"):
     """On one that starts faster than mu g the box slips, and friction alone moves it: it goes with
     a = mu g. Tolerance: its speed is late by one step at either end of the time T over which it is
     taken: 2 mu g dt / T."""
@@ -126,21 +119,17 @@ class Belt(Carried, name="belt", phenomenon="sliding", quantity="acceleration", 
     acceleration: float = 8.0
     seconds: float = 0.4
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, self.ride())
-        return acceleration(seen.dt, seen.t, seen.bodies[:, 0, 7], 0.1, self.friction * GRAVITY,
-                             self.friction * GRAVITY)  # fmt: skip
+    def read(self, seen: Watched) -> Reading:
+        pull = self.friction * GRAVITY
+        return acceleration(seen, seen.bodies[:, 0, 7], 0.1, pull, pull)
 
-
-BALL = 0.05
-"""Radius of the ball on the belt [m]."""
 
 TOP = 0.5
 """Height of the belt's upper side [m]."""
 
 
 @dataclass(frozen=True)
-class BeltSpeed(Law, name="belt_speed", phenomenon="sliding", quantity="way", unit="m"):
+class BeltSpeed(Law, phenomenon="sliding", quantity="way", unit="m"):
     """A box laid on a running belt slips until it has the belt's speed: a distance x = v^2 / (2 mu
     g) from where it was laid (Coulomb's friction does the work of the kinetic energy), and goes on
     with the belt from v / (mu g) on. Its place is read when it goes with the belt. Tolerance: its
@@ -154,14 +143,9 @@ class BeltSpeed(Law, name="belt_speed", phenomenon="sliding", quantity="way", un
         return Box("box", (0.1, 0.1, 0.05), Pose.at(0.0, 0.0, TOP + 0.025), 0.5, self.friction)
 
     def build(self) -> Scene:
-        belt = Box(
-            "belt",
-            (4.0, 0.4, 0.1),
-            Pose.at(0.0, 0.0, TOP - 0.05),
-            friction=self.friction,
-            linear_velocity=(self.speed, 0.0, 0.0),
-            prescribed=True,
-        )
+        place, speed = Pose.at(0.0, 0.0, TOP - 0.05), (self.speed, 0.0, 0.0)
+        belt = Box("belt", (4.0, 0.4, 0.1), place, friction=self.friction)
+        belt = replace(belt, linear_velocity=speed, prescribed=True)
         return Scene(self.name, (belt, self.body()), ground_friction=self.friction)
 
     def read(self, seen: Watched) -> Reading:
@@ -170,16 +154,34 @@ class BeltSpeed(Law, name="belt_speed", phenomenon="sliding", quantity="way", un
         return seen.reading(seen.bodies[-1, 1, 0], exact, self.speed, 1.0)
 
 
-@dataclass(frozen=True)
-class BallOnBelt(
-    BeltSpeed, name="ball_on_belt", phenomenon="rolling", quantity="speed", unit="m/s"
-):
-    """A ball laid on a running belt comes to roll on it with 2/7 of the belt's speed: friction
-    gives it m v and turns it back by 2/5 m r^2 w = m v r until v + w r is that of the belt.
-    Tolerance: its speed is late by one step, mu g dt."""
+def block(size: Vector3) -> tuple[Vector3, ...]:
+    """Corners of a box about its centre [m]."""
+    x, y, z = (edge / 2 for edge in size)
+    return tuple((a, b, c) for a in (-x, x) for b in (-y, y) for c in (-z, z))
 
-    def body(self) -> Body:
-        return Sphere("ball", BALL, Pose.at(0.0, 0.0, TOP + BALL), 0.5, self.friction)
+
+@dataclass(frozen=True)
+class MeshTwin(
+    Law, phenomenon="sliding", quantity="distance of the mesh from where the box is", unit="m"
+):
+    """A box, and a mesh with its corners beside it, fall, land flat, slide and stop alike: it is
+    one body. Each is thrown from the height h with the speed v. Tolerance: each may land and stop
+    late by one step, 2 v dt each."""
+
+    size: Vector3 = (0.2, 0.2, 0.05)
+    height: float = 0.01
+    speed: float = 1.0
+    friction: float = 0.5
+    seconds: float = 0.4
+
+    def build(self) -> Scene:
+        corners, z = block(self.size), self.size[2] / 2
+        thrown = Pose.at(0.0, 0.0, z + self.height), 1.0, self.friction
+        box = Box("box", self.size, *thrown, linear_velocity=(self.speed, 0.0, 0.0))
+        mesh = ConvexMesh("mesh", corners, *thrown, linear_velocity=(self.speed, 0.0, 0.0))
+        beside = mesh.moved_to(mesh.pose.translated(y=3 * self.size[1]))
+        return Scene(self.name, (box, beside), ground_friction=self.friction)
 
     def read(self, seen: Watched) -> Reading:
-        return seen.reading(seen.bodies[-1, 1, 7], 2 / 7 * self.speed, self.friction * GRAVITY, 1.0)
+        apart = seen.bodies[-1, 1, :3] - seen.bodies[-1, 0, :3] - [0.0, 3 * self.size[1], 0.0]
+        return seen.reading(float(np.linalg.norm(apart)), 0.0, 4 * self.speed, 1.0)

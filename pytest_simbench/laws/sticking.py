@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, Law, Reading, rounding, stillness, watch
-from pytest_simbench.laws.drives import STRONG, follow
-from pytest_simbench.laws.mechanisms import Part, mechanism
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, stillness
+from pytest_simbench.laws.mechanisms import STRONG, Part, mechanism
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Trajectory, Vector3
 
 SLAB: Vector3 = (0.1, 0.1, 0.02)
@@ -24,11 +23,8 @@ def tilted(slope: float, direction: float) -> Vector3:
     """Gravity that makes the ground a slope [tangent], down towards `direction` [rad]."""
     angle = math.atan(slope)
     pull = GRAVITY * math.sin(angle)
-    return (
-        pull * math.cos(direction),
-        pull * math.sin(direction),
-        -GRAVITY * math.cos(angle),
-    )
+    down = -GRAVITY * math.cos(angle)
+    return pull * math.cos(direction), pull * math.sin(direction), down
 
 
 def slab_on(name: str, slope: float, direction: float, friction: float) -> Scene:
@@ -37,15 +33,22 @@ def slab_on(name: str, slope: float, direction: float, friction: float) -> Scene
     return Scene(name, (slab,), gravity=tilted(slope, direction), ground_friction=friction)
 
 
-def slope_pose(slope: float, direction: float) -> Pose:
-    """A turn that tilts a level plane so that it goes down towards `direction` [rad]."""
-    half = math.atan(slope) / 2
-    down = Pose(quaternion=(math.cos(half), 0.0, math.sin(half), 0.0))
-    return Pose.at(0.0, 0.0, 0.0, yaw=direction) * down
-
-
 SHARES = (0.92, 0.96, 0.98, 1.02, 1.04, 1.08)
 """Of a critical value: a fan of cases on both sides of it."""
+
+
+def slopes(name: str, critical: float, size: Vector3, direction: float, friction: float) -> Scene:
+    """Such a fan of slopes [tangents], down towards `direction` [rad], a box of 1 kg on each."""
+    bodies = []
+    for k, share in enumerate(SHARES):
+        half = math.atan(share * critical) / 2
+        down = Pose(quaternion=(math.cos(half), 0.0, math.sin(half), 0.0))
+        place = Pose.at(0.6 * (k % 2), 0.5 * (k - 2.5), 1.0, yaw=direction) * down
+        on_top = place * Pose.at(0.0, 0.0, (WEDGE[2] + size[2]) / 2)
+        bodies.append(Box(f"slope {k}", WEDGE, place, friction=friction))
+        bodies.append(Box(f"slab {k}", size, on_top, 1.0, friction))
+    return Scene(name, tuple(bodies), ground_friction=friction)
+
 
 BETWEEN = 0.02
 """Tolerance of a fan: half of the gap in which the critical value lies, as a share of it."""
@@ -63,23 +66,18 @@ def fan(critical: float, moved: Sequence[bool]) -> Reading:
 
 
 def acceleration(
-    dt: float, t: FloatArray, speed: FloatArray, begin: float, exact: float, force: float
+    seen: Watched, speed: FloatArray, begin: float, exact: float, force: float
 ) -> Reading:
     """The slope of a speed [m/s] from `begin` [s] to the end; `force`: the largest one, for each
     kg [m/s^2]."""
-    used = t > begin
-    found = float(np.polyfit(t[used], speed[used], 1)[0])
-    span = float(t[-1]) - begin
-    return Reading(found, exact, 2 * force * dt / span + rounding(1.0, len(t)))
+    used = seen.t > begin
+    found = float(np.polyfit(seen.t[used], speed[used], 1)[0])
+    return seen.reading(found, exact, 2 * force / (seen.end - begin), 1.0)
 
 
 @dataclass(frozen=True)
-class StickAngle(
-    Law,
-    name="stick_angle_x",
-    phenomenon="sticking",
-    quantity="tangent of the steepest slope that holds",
-    unit="",
+class StickAngleX(
+    Law, phenomenon="sticking", quantity="tangent of the steepest slope that holds", unit=""
 ):
     """A slab on a slope stays up to the angle atan mu and slides above it (Coulomb; Amontons): six
     slopes, from 0.92 to 1.08 mu. It slides where it has gone half as far as the least steep one
@@ -90,14 +88,7 @@ class StickAngle(
     seconds: float = 0.8
 
     def build(self) -> Scene:
-        bodies = []
-        for k, share in enumerate(SHARES):
-            turn = slope_pose(share * self.friction, self.direction)
-            place = Pose((0.6 * (k % 2), 0.5 * (k - 2.5), 1.0), turn.quaternion)
-            on_top = place * Pose.at(0.0, 0.0, (WEDGE[2] + SLAB[2]) / 2)
-            bodies.append(Box(f"slope {k}", WEDGE, place, friction=self.friction))
-            bodies.append(Box(f"slab {k}", SLAB, on_top, 1.0, self.friction))
-        return Scene(self.name, tuple(bodies), ground_friction=self.friction)
+        return slopes(self.name, self.friction, SLAB, self.direction, self.friction)
 
     def measure(self, world: World) -> Reading:
         start = world.bodies[:, :3].copy()
@@ -110,14 +101,14 @@ class StickAngle(
 
 
 @dataclass(frozen=True)
-class StickAngleAcross(StickAngle, name="stick_angle_y"):
+class StickAngleY(StickAngleX):
     """The same in the direction y."""
 
     direction: float = math.pi / 2
 
 
 @dataclass(frozen=True)
-class StickAngleDiagonal(StickAngle, name="stick_angle_diagonal"):
+class StickAngleDiagonal(StickAngleX):
     """The same along a diagonal, where a friction pyramid holds up to sqrt(2) mu, or only up to
     mu / sqrt(2)."""
 
@@ -125,7 +116,7 @@ class StickAngleDiagonal(StickAngle, name="stick_angle_diagonal"):
 
 
 @dataclass(frozen=True)
-class Creep(Law, name="creep", phenomenon="sticking", quantity="way in 1 s", unit="m"):
+class Creep(Law, phenomenon="sticking", quantity="way in 1 s", unit="m", seconds=1.2):
     """A slab on a slope of 0.8 mu stays where it is. Tolerance: an equilibrium, g dt^2; it is
     looked at from 0.2 s on."""
 
@@ -136,15 +127,14 @@ class Creep(Law, name="creep", phenomenon="sticking", quantity="way in 1 s", uni
     def build(self) -> Scene:
         return slab_on(self.name, self.share * self.friction, self.direction, self.friction)
 
-    def measure(self, world: World) -> Reading:
-        seen = watch(world, 1.2)
+    def read(self, seen: Watched) -> Reading:
         way = seen.bodies[-1, 0, :2] - seen.at(0.2, seen.bodies[:, 0, :2])
         allowed = stillness(seen.dt, 0.1)
         return Reading(float(np.linalg.norm(way)), 0.0, allowed)
 
 
 @dataclass(frozen=True)
-class Carried(Law, name="carried", phenomenon="sticking", quantity="way on the carriage", unit="m"):
+class Carried(Law, phenomenon="sticking", quantity="way on the carriage", unit="m"):
     """A box on a carriage that starts with less than mu g goes with it: it stays where it lies on
     the carriage. Tolerance: an equilibrium in the carriage's frame, g dt^2, and the carriage's
     motion late by one step, a dt^2."""
@@ -162,7 +152,7 @@ class Carried(Law, name="carried", phenomenon="sticking", quantity="way on the c
         box = Box("box", SLAB, Pose.at(0.0, 0.0, 0.55 + SLAB[2] / 2), 0.2, self.friction)
         return Scene(self.name, (box,), robot, ground_friction=self.friction)
 
-    def ride(self) -> Trajectory:
+    def commands(self) -> Trajectory:
         """The carriage's set points, with the force that its mass asks for."""
         time = np.linspace(0.0, self.seconds, 101)
         a = self.acceleration
@@ -170,8 +160,7 @@ class Carried(Law, name="carried", phenomenon="sticking", quantity="way on the c
         effort = np.full((101, 1), 5.0 * a)
         return Trajectory(float(time[1]), position[:, None], velocity[:, None], effort)
 
-    def measure(self, world: World) -> Reading:
-        seen = follow(world, self.ride())
+    def read(self, seen: Watched) -> Reading:
         slid = float(seen.bodies[-1, 0, 0] - seen.joints[-1, 0, 0])
         allowed = stillness(seen.dt, 1.0) + self.acceleration * seen.dt**2
         return Reading(slid, 0.0, allowed)

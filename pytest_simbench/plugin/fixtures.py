@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from pytest_simbench.plugin.repeatability import Perturber
     from pytest_simbench.plugin.run import Run
     from pytest_simbench.plugin.variants import Variant
-    from pytest_simbench.repeatability.replay_result import Replay
+    from pytest_simbench.repeatability.replay import Replay
     from pytest_simbench.scene import Robot, Scene
     from pytest_simbench.tasks.base import Task
 
@@ -214,13 +214,18 @@ def replay(request: pytest.FixtureRequest, simbench_case_here: Case) -> Callable
     Takes `moments=` in place of those that the task declares. The first run's motion is kept for
     the comparison between simulators.
     """
-    from pytest_simbench.plugin.repeatability import ReplayFixture
+    from pytest_simbench.experiment.experiment import Experiment
+    from pytest_simbench.plugin.repeatability import replayed
 
     jobs = options.value(request.config, "sim_jobs")
     session = session_of(request.config)
-    skips = session.selection.every_robot
-    run = ReplayFixture(simbench_case_here, session.run.displays, jobs, skips)
-    return lambda task, **more: run(arguments.checked_task(task, "replay"), **more)
+
+    def replay_task(task: Task, **more: Any) -> Replay:
+        experiment = Experiment(simbench_case_here, arguments.checked_task(task, "replay"))
+        arguments.can_do(experiment, session.selection.every_robot)
+        return replayed(experiment, session.run.displays, jobs, **more)
+
+    return replay_task
 
 
 @pytest.fixture

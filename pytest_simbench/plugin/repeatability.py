@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,78 +17,64 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.ground.text import for_terminal
-from pytest_simbench.plugin.arguments import can_do
 from pytest_simbench.records.repeatability import NAME, Kind, Line, append
 from pytest_simbench.repeatability import search, stability
 from pytest_simbench.repeatability.agreement import FOLDER, Sample
 from pytest_simbench.repeatability.episode import Episodes
 from pytest_simbench.repeatability.perturbation import Perturbation
-from pytest_simbench.repeatability.replay import replay
-from pytest_simbench.repeatability.replay_result import Replay
+from pytest_simbench.repeatability.replay import Replay, replay
 from pytest_simbench.repeatability.search import Finding
 from pytest_simbench.repeatability.stability import Sensitivity, Stability
 from pytest_simbench.report.files import write_tables
 from pytest_simbench.report.terminal.parts import render_tables as render_terminal
-from pytest_simbench.simulator.info import Capability
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks.base import Task
 
 
-@dataclass(frozen=True)
-class ReplayFixture:
-    """What the fixture `replay` does, called with a task.
+def replayed(experiment: Experiment, displays: Displays, jobs: int, **options: Any) -> Replay:
+    """Run the first seed of an experiment, and again in every way.
 
-    Attributes:
-        case: simulator and settings.
+    Args:
         displays: for a window, if the case has none.
         jobs: how many workers may run side by side.
-        skips: skip what the robot cannot do (`can_do`).
+        options: of `replay`.
     """
+    case, info = experiment.case, adapter(experiment.case.simulator).info
+    other_mode = _other_mode(case, info.modes, displays)
+    with ExitStack() as stack:
 
-    case: Case
-    displays: Displays
-    jobs: int
-    skips: bool
+        def handle(case: Case) -> SimulatorHandle:
+            return stack.enter_context(closing(SimulatorHandle(case)))
 
-    def __call__(self, task: Task, **options: Any) -> Replay:
-        """Run the first seed of a task, and again in every way."""
-        case, info = self.case, adapter(self.case.simulator).info
-        with ExitStack() as stack:
+        episodes = Episodes(experiment, handle(case))
+        result = replay(
+            episodes,
+            capabilities=info.capabilities,
+            fresh=handle(case),
+            other_mode=other_mode if isinstance(other_mode, str) else handle(other_mode),
+            jobs=jobs,
+            **options,
+        )
+    with suppress(OSError):
+        label = f"{case.simulator} {case.mode} {case.profile}"
+        sample = Sample.of(result.first, label, episodes.task.name, case.seed)
+        sample.save(case.folder, f"{FOLDER}/{case.short_name}.npz")
+    _keep("replay", episodes, result.to_wire())
+    return result
 
-            def handle(case: Case) -> SimulatorHandle:
-                return stack.enter_context(closing(SimulatorHandle(case)))
 
-            episodes = Episodes(can_do(Experiment(case, task), self.skips), handle(case))
-            result = replay(
-                episodes,
-                claims=Capability.DETERMINISTIC in info.capabilities,
-                capabilities=info.capabilities,
-                fresh=handle(case),
-                other_mode=self._other_mode(info.modes, handle),
-                jobs=self.jobs,
-                **options,
-            )
-        with suppress(OSError):
-            label = f"{case.simulator} {case.mode} {case.profile}"
-            sample = Sample.of(result.first, label, episodes.task.name, case.seed)
-            sample.save(case.folder, f"{FOLDER}/{case.short_name}.npz")
-        _keep("replay", episodes, result.to_wire())
-        return result
-
-    def _other_mode(
-        self, modes: tuple[str, ...], handle: Callable[[Case], SimulatorHandle]
-    ) -> SimulatorHandle | str:
-        """A handle in the mode that the test does not run in, or why there is none."""
-        other = "headless" if self.case.mode == "gui" else "gui"
-        if other not in modes:
-            return f"{self.case.simulator} has no window"
-        if other == "gui":
-            try:
-                self.displays.environment()
-            except DisplayError as reason:
-                return str(reason)
-        display = self.displays if other == "gui" else None
-        return handle(replace(self.case, mode=other, display=display))
+def _other_mode(case: Case, modes: tuple[str, ...], displays: Displays) -> Case | str:
+    """The same in the mode that the test does not run in, or why there is none."""
+    other = "headless" if case.mode == "gui" else "gui"
+    if other not in modes:
+        return f"{case.simulator} has no window"
+    if other == "headless":
+        return replace(case, mode=other, display=None)
+    try:
+        displays.environment()
+    except DisplayError as reason:
+        return str(reason)
+    return replace(case, mode=other, display=displays)
 
 
 def _keep(kind: Kind, episodes: Episodes, result: Mapping[str, Any]) -> None:

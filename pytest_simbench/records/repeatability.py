@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypedDict
@@ -13,6 +13,7 @@ import msgspec
 
 from pytest_simbench.records import checked, lines
 from pytest_simbench.records.lines import Found, LinesFile, Unwritten
+from pytest_simbench.records.metrics import significant
 
 NAME = "repeatability.jsonl"
 SCHEMA = 1
@@ -22,25 +23,85 @@ Seconds = Annotated[str, msgspec.Meta(pattern=r"^\d+(\.\d+)?$")]
 """A time as a key."""
 
 
-class Way(TypedDict):
-    """One way of running again, see `repeatability.replay_result.Again`."""
+GROWTH_TIMES = ("1", "5", "20")
+"""Growth of a difference is reported so long after it arose [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Difference:
+    """How two runs of the same commands part; nothing is set where every bit is the same.
+
+    Attributes:
+        first: simulated time of the first sample that is not the same, bit for bit [s].
+        body: the cube that differs there, "" when it is the robot alone.
+        growth: by seconds after that, the largest distance between a cube here and there [m];
+            None where the episode was over.
+        largest: of these distances at any time [m].
+
+    Raises:
+        ValueError: only some are set.
+    """
+
+    first: float | None = None
+    body: str | None = None
+    growth: Mapping[Seconds, float | None] | None = None
+    largest: float | None = None
+
+    def __post_init__(self) -> None:
+        if len({part is None for part in (self.first, self.body, self.growth, self.largest)}) > 1:
+            raise ValueError("it parted in part")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Again(Difference):
+    """One way of running again, and where it parted from the first run.
+
+    Attributes:
+        way: what was done in between, for tables.
+        changed: counts of the task's outcome that are not the same.
+        left_at: when the task no longer asked for what the tape has next [s].
+        skipped: why it was not run, "" when it was.
+        failure: the error that ended it, "" when there was none.
+        claimed: whether the adapter claims that this way gives the same.
+    """
 
     way: str
-    first: float | None
-    body: str | None
-    growth: dict[Seconds, float | None] | None
-    largest: float | None
-    changed: list[str]
-    left_at: float | None
-    skipped: str
-    failure: str
+    changed: Sequence[str] = ()
+    left_at: float | None = None
+    skipped: str = ""
+    failure: str = ""
+    claimed: bool = True
+
+    @property
+    def identical(self) -> bool:
+        """Whether it ran and every bit was the same."""
+        return not (self.skipped or self.failure) and self.first is None
+
+    @property
+    def text(self) -> str:
+        """The result in words."""
+        if self.skipped or self.failure:
+            return self.skipped or self.failure
+        if self.first is None:
+            return "bit-identical"
+        gaps = [(after, gap) for after, gap in (self.growth or {}).items() if gap is not None]
+        growth = ", ".join(f"{significant(1000 * gap)} mm {after} s later" for after, gap in gaps)
+        what = f"first differs at t = {self.first:.2f} s"
+        what += f" ({self.body})" if self.body else " (robot)"
+        what += f", then {growth}" if growth else ""
+        what += f", {significant(1000 * (self.largest or 0.0))} mm at most"
+        return what + (f"; changed {', '.join(self.changed)}" if self.changed else "")
+
+    def to_wire(self) -> dict[str, Any]:
+        """Plain data."""
+        return {**vars(self), "identical": self.identical}
 
 
 class Replayed(TypedDict):
     """Result of a replay."""
 
     claims: bool
-    again: list[Way]
+    again: list[Again]
 
 
 class Told(TypedDict):
@@ -77,6 +138,11 @@ class Line:
         """Simulator, mode and profile, as tables name them."""
         return f"{self.simulator} {self.mode} {self.profile}"
 
+    @property
+    def again(self) -> list[Again]:
+        """Of a replay, each way of running again."""
+        return checked.convert(self.result, Replayed)["again"]
+
 
 def append(folder: Path, line: Line) -> Unwritten:
     """Write one line to the run folder, else elsewhere; what it returns says where. Never raises
@@ -108,13 +174,7 @@ def _line(data: dict[str, Any], where: str) -> Line:
     schema = data.pop("schema", None)
     try:
         line = checked.convert(checked.plain(data), Line)
-        if line.kind == "replay":
-            for way in checked.convert(line.result, Replayed)["again"]:
-                parted = [way[key] for key in ("first", "body", "growth", "largest")]
-                if None in parted and any(part is not None for part in parted):
-                    raise checked.CheckError(f"{way['way']!r} parted in part")
-        else:
-            checked.convert(line.result, Told)
+        checked.convert(line.result, Replayed if line.kind == "replay" else Told)
     except checked.CheckError:
         raise ValueError(f"{where}: not a result on repeatability") from None
     if schema != SCHEMA:

@@ -11,10 +11,9 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import combinations, zip_longest
 from pathlib import Path
-from typing import TypedDict
 
 import numpy as np
 
@@ -39,27 +38,14 @@ LARGEST = 256 * 2**20
 """Of a file, packed and unpacked [bytes]; a whole stacking has 7 MB."""
 
 
-class Facts(TypedDict):
-    """What a file holds besides arrays, see `Sample`."""
-
-    label: str
-    task: str
-    seed: int
-    bodies: list[str]
-    counts: dict[str, float | None]
-
-
 @dataclass(frozen=True)
-class Sample:
-    """One simulator's episode as kept in the run folder.
+class Facts:
+    """What was run, in the file beside the arrays.
 
     Attributes:
         label: simulator, with mode and profile where a reader needs them.
         task, seed: what was run; only equal ones are compared.
         bodies: names of the free bodies.
-        motions: see `TapedWorld.motions`.
-        commands: arm and finger positions at the end of each motion, None for waits.
-        durations: of the operations [s].
         counts: of the outcome.
     """
 
@@ -67,26 +53,29 @@ class Sample:
     task: str
     seed: int
     bodies: Sequence[str]
-    motions: Sequence[Motion]
-    commands: Sequence[FloatArray | None]
-    durations: Sequence[float]
     counts: Mapping[str, float | None]
+
+
+@dataclass(frozen=True)
+class Sample(Facts):
+    """One simulator's episode as kept in the run folder.
+
+    Attributes:
+        motions: see `TapedWorld.motions`.
+        asked: of each operation its duration [s], then the positions of arm and fingers at its
+            end, which are not a number for waits, (n, 1 + n_joints).
+    """
+
+    motions: Sequence[Motion]
+    asked: FloatArray
 
     @classmethod
     def of(cls, episode: Episode, label: str, task: str, seed: int) -> Sample:
-        commands = [
-            None if o.kind == "wait" else np.asarray(o.arguments["position"][-1], dtype=float)
-            for o in episode.tape
-        ]
-        durations = [operation.duration for operation in episode.tape]
-        bodies, motions, counts = list(episode.bodies), episode.motions, episode.counts
-        return cls(label, task, seed, bodies, motions, commands, durations, counts)
-
-    @property
-    def asked(self) -> list[FloatArray]:
-        """Of each operation its duration [s] and, if it is a motion, the positions at its end."""
-        pairs = zip(self.durations, self.commands, strict=False)
-        return [np.array([lasting, *([] if goal is None else goal)]) for lasting, goal in pairs]
+        ends = [o.arguments["position"][-1] for o in episode.tape if o.kind != "wait"]
+        asked = np.full((len(episode.tape), 1 + max(map(len, ends), default=0)), np.nan)
+        asked[:, 0] = [operation.duration for operation in episode.tape]
+        asked[[o.kind != "wait" for o in episode.tape], 1:] = ends or np.nan
+        return cls(label, task, seed, episode.bodies, episode.counts, episode.motions, asked)
 
     def save(self, folder: Path, name: str) -> None:
         """Write it as .npz into a run folder.
@@ -95,12 +84,7 @@ class Sample:
             OSError: the folder cannot be written to.
         """
         joined = Motion.joined(list(self.motions))
-        width = max((len(c) for c in self.commands if c is not None), default=0)
-        commands = [np.full(width, np.nan) if c is None else c for c in self.commands]
-        facts = Facts(
-            label=self.label, task=self.task, seed=self.seed, bodies=list(self.bodies),
-            counts=dict(self.counts),
-        )  # fmt: skip
+        facts = {field.name: getattr(self, field.name) for field in fields(Facts)}
         file = io.BytesIO()
         np.savez_compressed(
             file,
@@ -109,8 +93,8 @@ class Sample:
             joints=joined.joints,
             bodies=joined.bodies,
             lengths=np.array([len(motion) for motion in self.motions]),
-            commands=np.array(commands).reshape(len(commands), width),
-            durations=np.array(self.durations),
+            commands=self.asked[:, 1:],
+            durations=self.asked[:, 0],
         )
         write_whole(folder, name, file.getvalue())
 
@@ -124,16 +108,15 @@ class Sample:
         data = read_arrays(path, LARGEST)
         try:
             facts = checked.convert(read_json(str(data["facts"])), Facts)
-            if not _fits(data, len(facts["bodies"])):
+            if not _fits(data, len(facts.bodies)):
                 raise ValueError("its arrays do not fit each other")
         except (ValueError, KeyError, TypeError) as error:
             raise ValueError(f"{path} holds no motion of pytest-simbench: {error}") from None
         cuts = np.cumsum(data["lengths"])[:-1]
         parts = (np.split(data[name], cuts) for name in ("time", "joints", "bodies"))
         motions = [Motion(*part) for part in zip(*parts, strict=True)]
-        commands = [None if np.isnan(row).all() else row for row in data["commands"]]
-        durations = [float(value) for value in data["durations"]]
-        return cls(**facts, motions=motions, commands=commands, durations=durations)
+        asked = np.column_stack([data["durations"], data["commands"]])
+        return cls(**vars(facts), motions=motions, asked=asked)
 
 
 def _fits(data: Mapping[str, np.ndarray], bodies: int) -> bool:
@@ -199,14 +182,7 @@ class Agreement:
 
 
 def agreement(first: Sample, second: Sample) -> Agreement:
-    """Compare two simulators' episodes of one task and seed.
-
-    Raises:
-        ValueError: they are of different tasks, seeds or scenes.
-    """
-    mine, other = [(s.task, s.seed, tuple(s.bodies)) for s in (first, second)]
-    if mine != other:
-        raise ValueError(f"{first.label} ran {mine[:2]}, {second.label} ran {other[:2]}")
+    """Compare two simulators' episodes of one task, seed and scene."""
     between = gaps(first.motions, second.motions)
 
     def parting(limit: float) -> Parting | None:
@@ -227,9 +203,9 @@ def agreement(first: Sample, second: Sample) -> Agreement:
 
 
 def _commands_part(first: Sample, second: Sample) -> float | None:
-    for number, (a, b) in enumerate(zip_longest(first.asked, second.asked)):
-        same = a is not None and b is not None and a.shape == b.shape
-        if not same or not np.allclose(a, b, rtol=0, atol=SAME_COMMAND):
+    for number, rows in enumerate(zip_longest(first.asked, second.asked, fillvalue=np.empty(0))):
+        a, b = (row[np.isfinite(row)] for row in rows)
+        if a.shape != b.shape or not np.allclose(a, b, rtol=0, atol=SAME_COMMAND):
             return float(first.motions[min(number, len(first.motions) - 1)].time[-1])
     return None
 

@@ -2,34 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from pytest_simbench.client.world import Motion
+from pytest_simbench.records.repeatability import GROWTH_TIMES, Difference
 from pytest_simbench.scene import FloatArray
-
-GROWTH_TIMES = (1.0, 5.0, 20.0)
-"""Growth of a difference is reported so long after it arose [s]."""
-
-
-@dataclass(frozen=True)
-class Difference:
-    """How two runs of the same commands part.
-
-    Attributes:
-        first: simulated time of the first sample that is not the same, bit for bit [s].
-        body: the cube that differs there, "" when it is the robot alone.
-        growth: by seconds after that, the largest distance between a cube here and there [m];
-            None where the episode was over.
-        largest: of these distances at any time [m].
-    """
-
-    first: float
-    body: str
-    growth: Mapping[float, float | None]
-    largest: float
 
 
 @dataclass(frozen=True)
@@ -48,9 +28,7 @@ class Gaps:
 
     def largest(self) -> FloatArray:
         """Over the cubes [m], (n,)."""
-        if self.distance.shape[1] == 0:
-            return np.zeros(len(self.time))
-        return np.asarray(self.distance.max(axis=1))
+        return np.asarray(self.distance.max(axis=1, initial=0.0))
 
     def first_beyond(self, limit: float) -> tuple[int, int] | None:
         """Sample and cube where a distance first exceeds `limit` [m]."""
@@ -107,8 +85,8 @@ def _at(clock: FloatArray, before: Motion, motion: Motion) -> FloatArray:
 
 def difference(
     first: Sequence[Motion], second: Sequence[Motion], bodies: Sequence[str]
-) -> Difference | None:
-    """How two runs in one simulator part; None when every sampled bit is the same.
+) -> Difference:
+    """How two runs in one simulator part, sampled bit by bit.
 
     Args:
         first, second: `TapedWorld.motions` of both.
@@ -116,12 +94,15 @@ def difference(
     """
     found = _first_difference(first, second)
     if found is None:
-        return None
+        return Difference()
     time, body = found
     between = gaps(first, second)
-    growth = {after: between.after(time + after) for after in GROWTH_TIMES}
-    largest = float(between.largest().max(initial=0.0))
-    return Difference(time, bodies[body] if body is not None else "", growth, largest)
+    return Difference(
+        first=time,
+        body="" if body is None else bodies[body],
+        growth={after: between.after(time + float(after)) for after in GROWTH_TIMES},
+        largest=float(between.largest().max(initial=0.0)),
+    )
 
 
 def _first_difference(

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 from pytest_simbench.client.errors import Unavailable, WorkerError
 from pytest_simbench.client.tape import Operation, TapedWorld
 from pytest_simbench.experiment.handle import SimulatorHandle
+from pytest_simbench.records.repeatability import Again
 from pytest_simbench.repeatability.episode import Episode, Episodes, changed
 from pytest_simbench.repeatability.motions import difference
-from pytest_simbench.repeatability.replay_result import Again, Replay
 from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.simulator.info import Capability
 from pytest_simbench.tasks import Moment
@@ -34,10 +35,50 @@ ANOTHER = Scene(
 """What a process simulates between two runs of an experiment: a cube falls upon another's edge."""
 
 
+@dataclass(frozen=True)
+class Replay:
+    """All ways of running one seed again in one simulator.
+
+    Attributes:
+        simulator: its name.
+        claims: whether its adapter claims that it is deterministic.
+        first: the run that the others are compared with.
+        again: the ways, with their results.
+    """
+
+    simulator: str
+    claims: bool
+    first: Episode
+    again: tuple[Again, ...]
+
+    def to_wire(self) -> dict[str, Any]:
+        """Plain data for the run's records."""
+        return {
+            "claims": self.claims,
+            "counts": dict(self.first.counts),
+            "again": [again.to_wire() for again in self.again],
+        }
+
+    def assert_as_claimed(self) -> None:
+        """Raise AssertionError when a way that is claimed to give the same does not, or when the
+        simulator could not run again what it ran before.
+
+        Claimed are, with the capability `deterministic`, all ways but those that restore a state,
+        and with `exact_restore` those.
+        """
+        bad = [
+            f"{again.way}: {again.text}"
+            for again in self.again
+            if again.failure or (again.claimed and not again.identical and not again.skipped)
+        ]
+        if bad:
+            head = "claims to be deterministic, but" if self.claims else "could not run again"
+            raise AssertionError(f"{self.simulator} {head}\n  " + "\n  ".join(bad))
+
+
 def replay(
     episodes: Episodes,
     *,
-    claims: bool,
     capabilities: frozenset[Capability],
     fresh: SimulatorHandle,
     other_mode: SimulatorHandle | str,
@@ -48,8 +89,7 @@ def replay(
 
     Args:
         episodes: its handle should not have been used before.
-        claims: whether the adapter claims determinism.
-        capabilities: of the simulator.
+        capabilities: that the adapter claims.
         fresh: a handle of the same case, for a process of its own.
         other_mode: a handle in the other mode (with a window, when the first has none), or why
             there is none.
@@ -77,6 +117,7 @@ def replay(
         except BaseException:
             _end(started, [handle for _, handle in ways])
             raise
+    claims = Capability.DETERMINISTIC in capabilities
     if not claims:
         results = [replace(again, claimed=False) for again in results]
     return Replay(simulator, claims, first, tuple(results))
@@ -87,7 +128,7 @@ def _elsewhere(
 ) -> Again:
     """In a worker of its own, or the reason why there is none."""
     if isinstance(handle, str):
-        return Again(way, skipped=handle)
+        return Again(way=way, skipped=handle)
     return _again(way, first, lambda: episodes.run(play=first.tape, handle=handle))
 
 
@@ -110,12 +151,12 @@ def _restored_at(
     first: Episode,
 ) -> Iterator[Again]:
     if not moments:
-        yield Again("restored", skipped=f"the task {episodes.task.name!r} declares no moments")
+        yield Again(way="restored", skipped=f"the task {episodes.task.name!r} declares no moments")
     for moment in moments:
         way = f"restored {moment.name}"
         if Capability.SAVE_RESTORE not in capabilities:
             simulator = episodes.handle.case.simulator
-            yield Again(way, skipped=f"{simulator} cannot save and restore")
+            yield Again(way=way, skipped=f"{simulator} cannot save and restore")
         else:
             restored = _restored(way, moment, episodes, first)
             yield replace(restored, claimed=Capability.EXACT_RESTORE in capabilities)
@@ -125,14 +166,14 @@ def _again(way: str, first: Episode, run: Callable[[], Episode]) -> Again:
     try:
         second = run()
     except Unavailable as error:
-        return Again(way, skipped=error.what)
+        return Again(way=way, skipped=error.what)
     except WorkerError as error:
-        return Again(way, failure=f"{type(error).__name__}: {error.what}")
+        return Again(way=way, failure=f"{type(error).__name__}: {error.what}")
     return Again(
-        way,
-        difference(first.motions, second.motions, first.bodies),
-        tuple(changed(first.counts, second.counts)),
-        second.left_at,
+        way=way,
+        changed=changed(first.counts, second.counts),
+        left_at=second.left_at,
+        **vars(difference(first.motions, second.motions, first.bodies)),
     )
 
 
@@ -159,5 +200,5 @@ def _restored(way: str, moment: Moment, episodes: Episodes, first: Episode) -> A
 
     result = _again(way, first, lambda: episodes.run(play=first.tape, before=before))
     if seen <= moment.operation and not result.failure:
-        return Again(way, skipped=f"the task never came to {moment.phase}")
+        return Again(way=way, skipped=f"the task never came to {moment.phase}")
     return result

@@ -11,7 +11,6 @@ from pytest_simbench.measure.intervals import Interval, interval, proportion
 from pytest_simbench.measure.results import InconclusiveWarning
 from pytest_simbench.measure.verdicts import Verdict, at_least, confidence, judge
 from pytest_simbench.records.metrics import Metric, significant
-from pytest_simbench.repeatability.attack import Attack, Perturbations
 from pytest_simbench.repeatability.episode import Episodes
 from pytest_simbench.repeatability.motions import gaps
 from pytest_simbench.repeatability.perturbation import (
@@ -20,7 +19,7 @@ from pytest_simbench.repeatability.perturbation import (
     described,
     perturbations,
 )
-from pytest_simbench.repeatability.search import bounds_in_words
+from pytest_simbench.repeatability.search import Attack, Perturbations, bounds_in_words
 from pytest_simbench.tasks import Moment
 
 SENSITIVITY_TIMES = (0.1, 1.0, 5.0, 20.0)
@@ -131,7 +130,7 @@ def stability(
     return Stability(
         episodes.handle.case.simulator,
         tuple(trial.kept for trial in trials.values()),
-        sum(not trial.differs for trial in trials.values()),
+        sum(not trial.effect for trial in trials.values()),
         bounds_in_words(episodes, bounds),
         f"{described(worst)} {trials[worst].effect}" if lost else "",
     )

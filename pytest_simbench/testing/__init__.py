@@ -12,21 +12,18 @@ it holds the engine to, how closely, and why.
 
 from __future__ import annotations
 
-from pytest_simbench.testing import (
+from pytest_simbench.testing import (  # noqa: F401  they register their checks
     acting,
     contract,
     drives,
     dynamics,
     interaction,
-    letting_go,
     parity,
     physics,
-    self_collision,
     state,
 )
 from pytest_simbench.testing.checks import CHECKS, Check
-from pytest_simbench.testing.expected import ConformanceWarning
-from pytest_simbench.testing.kit import ConformanceTest, conformance_checks
+from pytest_simbench.testing.kit import ConformanceTest, ConformanceWarning, conformance_checks
 from pytest_simbench.testing.subject import ConformanceFailure, Subject, close_workers
 
 __all__ = [
@@ -36,16 +33,6 @@ __all__ = [
     "ConformanceTest",
     "ConformanceWarning",
     "Subject",
-    "acting",
     "close_workers",
     "conformance_checks",
-    "contract",
-    "drives",
-    "dynamics",
-    "interaction",
-    "letting_go",
-    "parity",
-    "physics",
-    "self_collision",
-    "state",
 ]

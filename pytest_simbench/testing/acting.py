@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pytest_simbench.laws.free import AxialForce, AxialTorque
 from pytest_simbench.laws.sliding import BeltSpeed
-from pytest_simbench.scene import Pose, Scene
+from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
@@ -34,7 +36,15 @@ def moves_as_prescribed(subject: Subject) -> None:
     """A belt under a cube, and a plate that turns as it rises, are where the scene's constant
     velocities bring them, and as fast: within 0.1 % of the way and of the speed, and 1e-4 m of
     single precision. Neither weight nor cube changes that; the scene's gravity is not small."""
-    scene = scenes.driven()
+    belt = Box("belt", (2.0, 0.4, 0.1), Pose.at(0.0, 0.0, 0.5), prescribed=True)
+    plate = Box("plate", (0.4, 0.3, 0.1), Pose((0.0, 1.5, 0.8), (0.8, 0.0, 0.6, 0.0)))
+    turning = {"linear_velocity": (0.0, 0.0, 0.2), "angular_velocity": (0.5, -0.3, 1.0)}
+    bodies = (
+        replace(belt, linear_velocity=(0.5, 0.0, 0.0)),
+        scenes.cube("cube", Pose.at(0.0, 0.0, 0.55 + EDGE / 2)),
+        replace(plate, prescribed=True, **turning),  # type: ignore[arg-type]
+    )
+    scene = Scene("driven", bodies)
     motion = subject.motion(scene, 0.6, 0.02)
     for k, body in enumerate(scene.free_bodies):
         if not body.prescribed:

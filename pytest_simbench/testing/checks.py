@@ -1,10 +1,11 @@
-"""The list of checks: name, law, the capability each needs."""
+"""The list of checks: name, law, the capability each needs, and which robots it can be asked of."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing.subject import Subject
@@ -12,7 +13,11 @@ from pytest_simbench.testing.subject import Subject
 Law = Callable[[Subject], None]
 
 Unfit = Callable[[Robot], str | None]
-"""Why a law cannot be asked of a robot, or None, see `testing.robots`."""
+"""Why a law cannot be asked of a robot, in one sentence, or None."""
+
+
+CUBE, SPACE = 0.05, 0.01
+"""Edge of the cube that a hand grasps, and space beside it on either side, open [m]."""
 
 
 @dataclass(frozen=True)
@@ -50,3 +55,31 @@ def check(needs: Capability | None = None, robot: Unfit | None = None) -> Callab
         return law
 
     return add
+
+
+def any_robot(robot: Robot) -> str | None:
+    """Nothing is asked of the robot."""
+    return None
+
+
+def coupled(robot: Robot) -> str | None:
+    """It must have two fingers that move together."""
+    count = len(robot.gripper.joints)
+    return None if count > 1 else f"{robot.name} has {count} finger joints: none is coupled"
+
+
+def grasping(robot: Robot) -> str | None:
+    """It must have two parallel fingers, which open wide enough for a cube."""
+    if not RobotModel(robot).has_parallel_fingers:
+        return f"{robot.name} has no hand with two parallel fingers"
+    needed, opened = CUBE / 2 + SPACE, robot.gripper.opened
+    if opened < needed:
+        return f"{robot.name} opens its fingers to {opened:g} m; the law takes {needed:g} m"
+    return None
+
+
+def throwing(robot: Robot) -> str | None:
+    """It must grasp, and know how to swing its arm for a throw."""
+    return grasping(robot) or (
+        None if robot.swing else f"robot {robot.name!r} has no swing for the throw"
+    )

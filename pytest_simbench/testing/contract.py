@@ -16,12 +16,12 @@ from pytest_simbench.client.errors import WorkerError
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.ground.versions import base_name
 from pytest_simbench.laws.free import rotation_of
+from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import Trajectory
 from pytest_simbench.simulator import Capability, Settings
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.testing import scenes
-from pytest_simbench.testing.checks import check
-from pytest_simbench.testing.robots import any_robot, finger_unit
+from pytest_simbench.testing.checks import any_robot, check
 from pytest_simbench.testing.subject import Subject, logged, require, require_close
 
 SINGLE = 1e-5
@@ -198,7 +198,7 @@ def commands_persist(subject: Subject) -> None:
     arm, fingers = len(robot.arm_joints), robot.finger_indices
     goal[:arm] += 0.05
     goal[fingers] -= 0.01
-    unit = finger_unit(robot)
+    unit = RobotModel(robot).finger_unit
     allowed = 1e-3 if unit == "m" else 5e-3
     once = Trajectory.holding(subject.timestep, goal)
     with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "arm weightless")) as world:

@@ -3,30 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
+from pytest_simbench.laws.hands import close_command, gravity_effort
 from pytest_simbench.motion.model import RobotModel
-from pytest_simbench.scene import (
-    STANDARD_GRAVITY,
-    FloatArray,
-    Robot,
-    Scene,
-    Trajectory,
-    Vector3,
-)
+from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Trajectory
 from pytest_simbench.testing import scenes
-from pytest_simbench.testing.checks import check
-from pytest_simbench.testing.robots import any_robot, coupled, finger_unit, grasping
+from pytest_simbench.testing.checks import any_robot, check, coupled, grasping
 from pytest_simbench.testing.subject import Subject, logged, require, require_close
 
 ARM_TICK = 0.004
 """Control tick of the set points [s], as in the tasks."""
-
-
-def gravity_effort(robot: Robot, q: FloatArray, gravity: Vector3 = STANDARD_GRAVITY) -> FloatArray:
-    """Efforts that hold the robot at rest at `q`, (n_joints,) [N m, N]."""
-    zero = np.zeros((1, len(q)))
-    return np.asarray(RobotModel(robot).inverse_dynamics(np.array(gravity), q[None], zero, zero)[0])
 
 
 @check(robot=any_robot)
@@ -153,7 +139,7 @@ def fingers_stay_coupled(subject: Subject) -> None:
     different positions, 2/7 and 6/7 of their way."""
     robot = subject.arm
     goal = robot.column("initial_position")
-    hand, unit = robot.gripper, finger_unit(robot)
+    hand, unit = robot.gripper, RobotModel(robot).finger_unit
     shares = np.resize([6 / 7, 2 / 7], len(hand.joints))
     goal[robot.finger_indices] = hand.closed + shares * (hand.opened - hand.closed)
     split = Trajectory.holding(subject.timestep, goal)
@@ -190,31 +176,12 @@ def has_armature(subject: Subject) -> bool:
 
 def joint_momentum(robot: Robot, q: FloatArray, v: FloatArray, armature: bool) -> FloatArray:
     """Momentum of each joint, M(q) v, (n_joints,) [kg m^2/s, kg m/s]."""
-    model = RobotModel(robot).pin
+    model, zero = RobotModel(robot), np.zeros((1, len(q)))
     if not armature:
-        model.armature = np.zeros(len(q))
-    upper = np.triu(pin.crba(model, model.createData(), q))
-    return np.asarray((upper + np.triu(upper, 1).T) @ v)
+        model.pin.armature = zero[0]
+    return np.asarray(model.inverse_dynamics(np.zeros(3), q[None], zero, v[None])[0])
 
 
 def own_inertia(robot: Robot, q: FloatArray, k: int, armature: bool) -> float:
     """Inertia that the drive of joint `k` meets while the others stand still, M(q)_kk [kg m^2]."""
     return float(joint_momentum(robot, q, np.eye(len(q))[k], armature)[k])
-
-
-def hold_command(scene: Scene, timestep: float) -> Trajectory:
-    """One command: everything at its start, gravity compensated."""
-    robot = scenes.of_scene(scene)
-    start = robot.column("initial_position")
-    effort = gravity_effort(robot, start, scene.gravity)
-    return Trajectory.holding(timestep, start, effort)
-
-
-def close_command(scene: Scene, timestep: float) -> Trajectory:
-    """One command: arm at its start with gravity compensated, fingers closed."""
-    robot = scenes.of_scene(scene)
-    goal = robot.column("initial_position")
-    effort = gravity_effort(robot, goal, scene.gravity)
-    goal[robot.finger_indices] = robot.gripper.closed
-    effort[robot.finger_indices] = 0.0
-    return Trajectory.holding(timestep, goal, effort)

@@ -8,20 +8,18 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from pytest_simbench.laws.hands import gravity_effort, hold_command
 from pytest_simbench.laws.loops import FourBarClosure, FourBarSwing
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Trajectory, Vector3
 from pytest_simbench.simulator import Capability, PreparedRobot
 from pytest_simbench.testing import scenes
-from pytest_simbench.testing.checks import check
+from pytest_simbench.testing.checks import any_robot, check
 from pytest_simbench.testing.drives import (
-    gravity_effort,
     has_armature,
-    hold_command,
     own_inertia,
     require_limit_reached,
 )
-from pytest_simbench.testing.robots import any_robot
 from pytest_simbench.testing.subject import Subject, asked, require, require_close
 
 _FALL = 0.2

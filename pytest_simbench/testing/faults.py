@@ -9,12 +9,11 @@ import math
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.robot_files import description_xml, digest
+from pytest_simbench.description.robot_files import content_of, digest, folder, keep
 from pytest_simbench.description.shapes import mesh_points
 from pytest_simbench.description.stl import written_stl
 from pytest_simbench.scene import (
@@ -31,11 +30,11 @@ from pytest_simbench.scene import (
 from pytest_simbench.simulator import Capability, PreparedRobot
 from pytest_simbench.testing import scenes
 
-Plant = Callable[[Scene, Path], Scene]
-"""Makes the faulty scene of the true one; files go into the folder."""
+Plant = Callable[[Scene], Scene]
+"""Makes the faulty scene of the true one."""
 
-Edit = Callable[[ET.Element, Path], None]
-"""Changes an element of a description; files go into the folder."""
+Edit = Callable[[ET.Element], None]
+"""Changes an element of a description."""
 
 
 @dataclass(frozen=True)
@@ -95,16 +94,16 @@ def true_scene() -> Scene:
 
 
 def of_scene(**values: Any) -> Plant:
-    return lambda scene, _: replace(scene, **values)
+    return lambda scene: replace(scene, **values)
 
 
 def of_body(name: str, **values: Any) -> Plant:
-    return lambda scene, _: scene.with_body(replace(scene.body(name), **values))
+    return lambda scene: scene.with_body(replace(scene.body(name), **values))
 
 
 def of_robot(change: Callable[[Robot], Robot]) -> Plant:
     """Another robot."""
-    return lambda scene, _: replace(scene, robot=change(scenes.of_scene(scene)))
+    return lambda scene: replace(scene, robot=change(scenes.of_scene(scene)))
 
 
 def of_joints(*names: str, farther: float = 0.0, **factors: float) -> Plant:
@@ -124,20 +123,15 @@ def of_joints(*names: str, farther: float = 0.0, **factors: float) -> Plant:
 def edited(path: str, edit: Edit) -> Plant:
     """An element of the URDF, edited; the meshes come along."""
 
-    def plant(scene: Scene, folder: Path) -> Scene:
-        def beside(mesh: Path) -> str:
-            data = mesh.read_bytes()
-            (folder / f"{digest(data)}.stl").write_bytes(data)
-            return f"{digest(data)}.stl"
-
+    def plant(scene: Scene) -> Scene:
         robot = scenes.of_scene(scene)
-        root = description_xml(robot, beside)
+        root = ET.parse(keep(**content_of(robot))).getroot()
         element = root.find(path)
         if element is None:
             raise LookupError(f"{robot.urdf} has no {path}")
-        edit(element, folder)
-        ET.ElementTree(root).write(folder / "faulty.urdf")
-        return replace(scene, robot=replace(robot, urdf=str(folder / "faulty.urdf")))
+        edit(element)
+        urdf = keep(ET.tostring(root, encoding="unicode"), {})
+        return replace(scene, robot=replace(robot, urdf=str(urdf)))
 
     return plant
 
@@ -145,7 +139,7 @@ def edited(path: str, edit: Edit) -> Plant:
 def add(key: str, value: float) -> Edit:
     """A larger value of an attribute."""
 
-    def edit(element: ET.Element, _: Path) -> None:
+    def edit(element: ET.Element) -> None:
         element.attrib[key] = str(float(element.attrib[key]) + value)
 
     return edit
@@ -154,7 +148,7 @@ def add(key: str, value: float) -> Edit:
 def shift(y: float = 0.0, z: float = 0.0) -> Edit:
     """The <origin> of an element, moved [m]."""
 
-    def edit(element: ET.Element, _: Path) -> None:
+    def edit(element: ET.Element) -> None:
         origin = element.find("origin")
         if origin is None:
             origin = ET.SubElement(element, "origin")
@@ -164,20 +158,22 @@ def shift(y: float = 0.0, z: float = 0.0) -> Edit:
     return edit
 
 
-def _set(**values: str) -> Edit:
-    return lambda element, _: element.attrib.update(values)
+def put(**values: str) -> Edit:
+    """Other values of attributes."""
+    return lambda element: element.attrib.update(values)
 
 
-def _scaled(mesh: ET.Element, folder: Path) -> None:
-    """A mesh 1.3 times as large, as an STL file of its own beside the description."""
-    points = 1.3 * mesh_points(str(folder / mesh.attrib["filename"]))
+def _scaled(mesh: ET.Element) -> None:
+    """A mesh 1.3 times as large, as an STL file of its own."""
+    points = 1.3 * mesh_points(str(folder() / mesh.attrib["filename"]))
     corners = np.resize(points, (3 * math.ceil(len(points) / 3), 3)).reshape(-1, 3, 3)
-    path = folder / "scaled.stl"
-    path.write_bytes(written_stl(corners))
+    data = written_stl(corners)
+    path = folder() / f"{digest(data)}.stl"
+    path.write_bytes(data)
     mesh.attrib["filename"] = path.name
 
 
-def _turned_inertia(inertia: ET.Element, _: Path) -> None:
+def _turned_inertia(inertia: ET.Element) -> None:
     """Turned by 90 degrees about z: x becomes y, y becomes minus x."""
     old = dict(inertia.attrib)
     negative = str(-float(old["ixy"]))
@@ -185,12 +181,12 @@ def _turned_inertia(inertia: ET.Element, _: Path) -> None:
     inertia.attrib.update(ixx=old["iyy"], iyy=old["ixx"], ixy=negative, ixz=turned, iyz=old["ixz"])
 
 
-def without_shapes(link: ET.Element, _: Path) -> None:
+def without_shapes(link: ET.Element) -> None:
     for shape in link.findall("collision"):
         link.remove(shape)
 
 
-def _tilt(joint: ET.Element, _: Path) -> None:
+def _tilt(joint: ET.Element) -> None:
     """The <axis>, turned by 5 degrees."""
     axis = joint.find("axis")
     if axis is None:
@@ -201,7 +197,7 @@ def _tilt(joint: ET.Element, _: Path) -> None:
     axis.attrib["xyz"] = _text(turned)
 
 
-def _larger(inertia: ET.Element, _: Path) -> None:
+def _larger(inertia: ET.Element) -> None:
     for key, value in inertia.attrib.items():
         inertia.attrib[key] = str(1.2 * float(value))
 
@@ -218,15 +214,8 @@ def robot_faults(robot: Robot) -> dict[str, Fault]:
     """Faults of the middle joint of an arm, of the link that it moves, of the base and the fingers.
     No two concern one quantity, so one world holds them all."""
     first, middle = robot.arm_joints[0].name, robot.arm_joints[len(robot.arm_joints) // 2].name
-    moved = {joint.name: joint.child for joint in PreparedRobot(robot).joints}
-    return _faults_about(moved[first], middle, moved[middle], robot.gripper.joints)
-
-
-def _faults_about(
-    first: str, middle: str, moved: str, fingers: tuple[str, ...]
-) -> dict[str, Fault]:
-    """The same by names: of the first link, of a joint, of the link that this moves, of the joints
-    of the fingers."""
+    children = {joint.name: joint.child for joint in PreparedRobot(robot).joints}
+    moved, fingers = children[middle], robot.gripper.joints
     joint, link = f"joint[@name='{middle}']", f"link[@name='{moved}']"
     inertial, drive, of_link = f"{link}/inertial", f"joint/{middle}", f"link/{moved}"
     rows: dict[str, tuple[str, str, Plant]] = {
@@ -244,7 +233,7 @@ def _faults_about(
                            edited(inertial, shift(y=0.01))),
         "inertia": (f"the inertia of {moved} is 20 % larger", f"{of_link}/inertia",
                     edited(f"{inertial}/inertia", _larger)),
-        "base": ("the base is 10 mm aside", f"link/{first}/pose",
+        "base": ("the base is 10 mm aside", f"link/{children[first]}/pose",
                  of_robot(lambda robot: replace(robot, base=robot.base * Pose.at(0.0, 0.01, 0.0)))),
         "friction": ("the robot's friction is 4", f"{of_link}/friction",
                      of_robot(lambda robot: replace(robot, friction=4.0))),
@@ -271,7 +260,7 @@ _THINNER = (0.1, 0.058, 0.03)
 
 _ROWS: dict[str, tuple[Any, ...]] = {
     "finger_shape": ("the rubber tip of a finger is 3 mm thinner", "link/panda_leftfinger/boxes",
-                     edited(f"{_TIP}/geometry/box", _set(size="17.5e-3 12.2e-3 18.5e-3"))),
+                     edited(f"{_TIP}/geometry/box", put(size="17.5e-3 12.2e-3 18.5e-3"))),
     "finger_pad": ("the rubber tip of a finger is 2 mm nearer to the hand",
                    "link/panda_leftfinger/boxes", edited(_TIP, shift(z=-0.002))),
     "mesh_scale": ("the mesh of link 4 is 1.3 times as large", "link/panda_link4/meshes",
@@ -294,7 +283,7 @@ _ROWS: dict[str, tuple[Any, ...]] = {
     "wedge_inertia": ("the wedge is 2 mm wider, and its inertia with it", "body/wedge/inertia",
                       of_body("wedge", vertices=scenes.wedge(width=0.052))),
     "wedge_is_a_box": ("the wedge is the box around it", "body/wedge/meshes",
-                       lambda scene, _: scene.with_body(
+                       lambda scene: scene.with_body(
                            Box("wedge", scene.body("wedge").extents, LEANING, 0.15, 0.7))),
     "restitution": ("the ball bounces less", "body/ball/restitution",
                     of_body("ball", restitution=0.55)),
@@ -303,7 +292,7 @@ _ROWS: dict[str, tuple[Any, ...]] = {
     "body_damping": ("the ball turns on undamped", "body/ball/damping",
                      of_body("ball", angular_damping=0.0)),
     "round_kind": ("the pillar is a capsule as long as it", "body/pillar/rounds",
-                   lambda scene, _: scene.with_body(
+                   lambda scene: scene.with_body(
                        Capsule("pillar", 0.04, 0.12, scene.body("pillar").pose, friction=0.7))),
     "body_inertia": ("the brick is 2 mm thinner, and its inertia with it", "body/brick/inertia",
                      of_body("brick", size=_THINNER)),
@@ -324,10 +313,8 @@ _ROWS: dict[str, tuple[Any, ...]] = {
                         of_scene(ground_friction=0.5)),
 }  # fmt: skip
 
-_FINGERS = ("panda_finger_joint1", "panda_finger_joint2")
-
 FAULTS: dict[str, Fault] = {
-    **_faults_about("panda_link1", "panda_joint4", "panda_link4", _FINGERS),
+    **robot_faults(scenes.arm()),
     **{name: Fault(*row) for name, row in _ROWS.items()},
 }
 """By short names."""

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -14,10 +12,9 @@ from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
-from pytest_simbench.testing.checks import check
+from pytest_simbench.testing.checks import any_robot, check
 from pytest_simbench.testing.contract import SINGLE
 from pytest_simbench.testing.faults import Fault, robot_faults, rounds, true_scene
-from pytest_simbench.testing.robots import any_robot
 from pytest_simbench.testing.state import require_same, swung
 from pytest_simbench.testing.subject import Subject, require
 
@@ -89,11 +86,10 @@ def planted_faults_are_seen(subject: Subject) -> None:
 def planted(subject: Subject, faults: Iterable[Fault]) -> ParityResult:
     """A world with the faults, read back by an adapter that remembers the true scene."""
     truth = faulty = _truth(subject)
-    with tempfile.TemporaryDirectory() as folder:
-        for fault in faults:
-            faulty = fault.plant(faulty, Path(folder))
-        with subject.world(faulty, parity=False) as world:
-            reported = world.process.request("read_back", remember=truth.to_wire())
+    for fault in faults:
+        faulty = fault.plant(faulty)
+    with subject.world(faulty, parity=False) as world:
+        reported = world.process.request("read_back", remember=truth.to_wire())
     return compare(
         expected_quantities(truth, subject.settings),
         reported,

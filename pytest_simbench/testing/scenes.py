@@ -4,34 +4,30 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
+from pytest_simbench.laws.hands import GAP, HELD, around
+from pytest_simbench.laws.hands import of_scene as of_scene
+from pytest_simbench.laws.hands import squeezing as squeezing
+from pytest_simbench.laws.hands import with_joint as with_joint
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import (
     STANDARD_GRAVITY,
     Box,
-    Capsule,
-    ConvexMesh,
-    Cylinder,
     Pose,
     Robot,
     Scene,
-    Sphere,
     Vector3,
 )
 from pytest_simbench.simulator import PreparedRobot
 
 GRAVITY = -STANDARD_GRAVITY[2]
-EDGE, MASS = 0.05, 0.1
+EDGE, MASS = HELD, 0.1
 """The cube of the tasks [m], [kg]."""
 
 Vertices = tuple[Vector3, ...]
-
-RADIUS = 0.03
-"""Of round bodies [m]."""
 
 
 def cube(name: str, pose: Pose, mass: float = MASS, friction: float = 1.0) -> Box:
@@ -51,85 +47,11 @@ def falling() -> Scene:
     )
 
 
-def thrown() -> Scene:
-    """A turned cube that starts with velocities in all six directions."""
-    turn = Pose((0.1, -0.2, 2.0), (0.5, 0.5, -0.1, 0.7))
-    body = replace(
-        cube("thrown", turn), linear_velocity=(1.0, -0.7, 1.5), angular_velocity=(3.0, -2.0, 1.5)
-    )
-    return Scene("thrown", (body,))
-
-
-def ball(height: float, **values: Any) -> Sphere:
-    """A ball whose centre is so high above the origin [m]."""
-    return Sphere("ball", RADIUS, Pose.at(0.0, 0.0, height), MASS, **values)
-
-
-def bouncing() -> Scene:
-    """A ball that falls on the plane at 3 m/s, and leaves with 0.6 of it."""
-    falling = ball(RADIUS + 0.05, linear_velocity=(0.0, 0.0, -3.0), restitution=0.6)
-    return Scene("bouncing", (falling,), ground_restitution=0.6)
-
-
-def damped() -> Scene:
-    """A ball that flies and turns, braked in both, far from everything and without weight."""
-    flying = ball(3.0, linear_velocity=(1.0, 0.0, 0.5), angular_velocity=(2.0, -1.0, 4.0))
-    braked = replace(flying, linear_damping=0.8, angular_damping=0.5)
-    return Scene("damped", (braked,), gravity=(0.0, 0.0, 0.0))
-
-
-def driven() -> Scene:
-    """A belt with a cube on it, and a plate that turns as it rises, both prescribed."""
-    belt = Box("belt", (2.0, 0.4, 0.1), Pose.at(0.0, 0.0, 0.5), prescribed=True)
-    plate = Box("plate", (0.4, 0.3, 0.1), Pose((0.0, 1.5, 0.8), (0.8, 0.0, 0.6, 0.0)))
-    turning = {"linear_velocity": (0.0, 0.0, 0.2), "angular_velocity": (0.5, -0.3, 1.0)}
-    return Scene(
-        "driven",
-        (
-            replace(belt, linear_velocity=(0.5, 0.0, 0.0)),
-            cube("cube", Pose.at(0.0, 0.0, 0.55 + EDGE / 2)),
-            replace(plate, prescribed=True, **turning),  # type: ignore[arg-type]
-        ),
-    )
-
-
-def standing() -> Scene:
-    """One of each round body, at rest on the plane: the can on its end, the pill on its side."""
-    lying = Pose((0.6, 0.0, RADIUS), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0))
-    return Scene(
-        "standing",
-        (
-            ball(RADIUS),
-            Cylinder("can", RADIUS, 2 * RADIUS, Pose.at(0.3, 0.0, RADIUS), MASS),
-            Capsule("pill", RADIUS, 2 * RADIUS, lying, MASS),
-        ),
-    )
-
-
 def wedge(length: float = 0.1, width: float = 0.05, height: float = 0.04) -> Vertices:
     """Corners of a wedge about its centre [m]: on its lower face, whose height above the ground is
     a third of its own, it stands as a box does."""
     ends = [(-length / 2, -height / 3), (length / 2, -height / 3), (0.0, 2 * height / 3)]
     return tuple((x, y, z) for x, z in ends for y in (-width / 2, width / 2))
-
-
-def block(size: Vector3) -> Vertices:
-    """Corners of a box about its centre [m]."""
-    x, y, z = (edge / 2 for edge in size)
-    return tuple((a, b, c) for a in (-x, x) for b in (-y, y) for c in (-z, z))
-
-
-def meshes() -> Scene:
-    """Meshes: a slab that slides off at 1 m/s, a wedge at rest, and a box on a block on a block."""
-    slab = ConvexMesh("slab", block((0.1, 0.1, 0.02)), Pose.at(0.0, 0.0, 0.01), MASS, 0.5)
-    slab = replace(slab, linear_velocity=(1.0, 0.0, 0.0))
-    lying = ConvexMesh("wedge", wedge(), Pose.at(0.0, 0.3, 0.04 / 3), MASS, 0.5)
-    cubes = [
-        ConvexMesh(name, block((EDGE,) * 3), Pose.at(0.4, 0.3, EDGE * (level + 0.5)), MASS, 0.5)
-        for level, name in enumerate(("low", "high"))
-    ]
-    top = cube("top", Pose.at(0.4, 0.3, 2.5 * EDGE), friction=0.5)
-    return Scene("meshes", (slab, lying, *cubes, top), ground_friction=0.5)
 
 
 def tower() -> Scene:
@@ -155,39 +77,14 @@ def tumbling(size: Vector3) -> Scene:
     return Scene(f"tumbling {size}", (ledge, Box("box", size, start, MASS)))
 
 
-def collision() -> Scene:
-    """A rolled cube falls upon the edge of one that stands on ice: nothing pushes sideways."""
-    roll = (math.cos(0.3), 0.0, math.sin(0.3), 0.0)
-    moving = cube("moving", Pose((-0.035, 0.0, 0.3), roll), friction=0.0)
-    standing = cube("standing", Pose.at(0.0, 0.0, EDGE / 2), mass=2 * MASS, friction=0.0)
-    return Scene("collision", (moving, standing), ground_friction=0.0)
-
-
 def arm() -> Robot:
     """The Panda."""
     return panda()
 
 
-def of_scene(scene: Scene) -> Robot:
-    """The scene's robot.
-
-    Raises:
-        LookupError: it has none.
-    """
-    if scene.robot is None:
-        raise LookupError(f"scene {scene.name!r} has no robot to command")
-    return scene.robot
-
-
 def lifted(robot: Robot) -> Robot:
     """The same robot, so high above the ground that it does not touch it in any posture."""
     return replace(robot, base=Pose.at(0.0, 0.0, max(2.0, 1.2 * RobotModel(robot).reach)))
-
-
-def with_joint(robot: Robot, name: str, **values: Any) -> Robot:
-    """The same robot with values of one joint replaced."""
-    joints = tuple(replace(j, **values) if j.name == name else j for j in robot.joints)
-    return replace(robot, joints=joints)
 
 
 def at_random(robot: Robot, rng: np.random.Generator) -> Robot:
@@ -208,19 +105,10 @@ def arm_alone(
 
 
 def grip(
-    robot: Robot | None = None, mass: float = MASS, gap: float = 2e-4, name: str = "grip"
+    robot: Robot | None = None, mass: float = MASS, gap: float = GAP, name: str = "grip"
 ) -> Scene:
     """A robot with a cube between its fingers, which stand `gap` [m] from it on either side."""
-    robot = robot or arm()
-    for finger in robot.gripper.joints:
-        robot = with_joint(robot, finger, initial_position=EDGE / 2 + gap)
+    robot = around(robot or arm(), gap)
     start = robot.column("initial_position")
     held = cube("held", RobotModel(robot).tool_pose(np.asarray(start)), mass)
     return Scene(name, (held,), robot=robot)
-
-
-def squeezing(robot: Robot, force: float) -> Robot:
-    """The same robot, each finger pressing with at most `force` [N]."""
-    for finger in robot.gripper.joints:
-        robot = with_joint(robot, finger, effort_limit=force)
-    return replace(robot, gripper=replace(robot.gripper, squeeze=force))

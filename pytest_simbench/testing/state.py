@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from pytest_simbench.client.world import Motion
+from pytest_simbench.laws.hands import close_command
 from pytest_simbench.scene import Pose, Robot, Scene, Trajectory
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
-from pytest_simbench.testing.checks import check
-from pytest_simbench.testing.drives import close_command
-from pytest_simbench.testing.robots import any_robot, grasping
+from pytest_simbench.testing.checks import any_robot, check, grasping
 from pytest_simbench.testing.subject import Subject, logged, require
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from pytest_simbench.description.robot_files import keep
-from pytest_simbench.scene import Body, Box, Pose, Robot, Scene
-
-Fault = Callable[[Scene], Scene]
+from pytest_simbench.scene import Body, Box, Pose, Scene
+from pytest_simbench.testing.faults import Plant as Fault
+from pytest_simbench.testing.faults import edited, of_joints, of_robot, put
 
 
 def heavier(scene: Scene) -> Scene:
@@ -62,12 +60,8 @@ def faster(factor: float) -> Fault:
     """They start with another velocity."""
 
     def change(body: Body) -> Body:
-        v, w = body.linear_velocity, body.angular_velocity
-        return replace(
-            body,
-            linear_velocity=(factor * v[0], factor * v[1], factor * v[2]),
-            angular_velocity=(factor * w[0], factor * w[1], factor * w[2]),
-        )
+        v, w = (factor * body.velocity).reshape(2, 3).tolist()
+        return replace(body, linear_velocity=tuple(v), angular_velocity=tuple(w))
 
     return bodies(change)
 
@@ -89,19 +83,7 @@ def sized(x: float, y: float, z: float, which: str = "") -> Fault:
 
 def drives(**factors: float) -> Fault:
     """The drives have other gains or limits."""
-
-    def of(robot: Robot) -> Robot:
-        joints = tuple(
-            replace(joint, **{name: k * getattr(joint, name) for name, k in factors.items()})
-            for joint in robot.joints
-        )
-        return replace(robot, joints=joints)
-
-    def change(scene: Scene) -> Scene:
-        assert scene.robot is not None
-        return replace(scene, robot=of(scene.robot))
-
-    return change
+    return lambda scene: of_joints(*scene.robot.joint_names, **factors)(scene)
 
 
 def step(scene: Scene) -> Scene:
@@ -118,32 +100,6 @@ def acting(**values: Any) -> Fault:
         return replace(body, wrenches=wrenches)
 
     return bodies(change)
-
-
-def hung_on(part: str, joint: str) -> Fault:
-    """A joint of a mechanism hangs on another part, at the same place."""
-
-    def change(scene: Scene) -> Scene:
-        assert scene.robot is not None
-        xml = ET.parse(scene.robot.urdf)
-        for element in xml.iterfind(f"joint[@name='{joint}']/parent"):
-            element.set("link", f"{part} link")
-        urdf = str(keep(ET.tostring(xml.getroot(), encoding="unicode"), {}))
-        return replace(scene, robot=replace(scene.robot, urdf=urdf))
-
-    return change
-
-
-def left_open(scene: Scene) -> Scene:
-    """Loops are not closed."""
-    assert scene.robot is not None
-    return replace(scene, robot=replace(scene.robot, closures=()))
-
-
-def passing_through(scene: Scene) -> Scene:
-    """Links of the robot do not touch each other."""
-    assert scene.robot is not None
-    return replace(scene, robot=replace(scene.robot, self_collide=False))
 
 
 FAULTS: dict[str, Fault] = {
@@ -198,12 +154,14 @@ FAULTS: dict[str, Fault] = {
         heavier,
     ),
     **dict.fromkeys(("step_response", "spring_damper", "sag"), drives(stiffness=1.5)),
-    "two_pendulums": hung_on("swing 0", "swing 1"),  # a chain in place of two
+    "two_pendulums": edited(  # a chain in place of two
+        "joint[@name='swing 1']/parent", put(link="swing 0 link")
+    ),
     "double_pendulum_energy": lambda scene: heavier(heavier(heavier(scene))),
     "effort_limit": drives(effort_limit=1.5),
     "tracking": drives(stiffness=0.01),
-    "four_bar_closure": left_open,
-    "domino_wave": passing_through,
+    "four_bar_closure": of_robot(lambda robot: replace(robot, closures=())),
+    "domino_wave": of_robot(lambda robot: replace(robot, self_collide=False)),
     **dict.fromkeys(("four_bar_swing", "pendulum_force", "pendulum_torque"), heavier),
     "push_force": rougher(1.5),
     "push_straight": moved(y=0.02),

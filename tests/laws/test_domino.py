@@ -9,11 +9,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import solve_ivp
 
 from pytest_simbench.laws import domino
 from pytest_simbench.laws.base import GRAVITY
-from pytest_simbench.laws.domino import HEIGHT, INERTIA, MASS, PITCH, START, STRIKE, THICKNESS
+from pytest_simbench.laws.domino import HEIGHT, INERTIA, MASS, PITCH, START, THICKNESS
 from pytest_simbench.scene import FloatArray
 
 PLATES = 8
@@ -118,34 +118,3 @@ def test_plates_that_fell_stay_together(row: Row) -> None:
     """No plate pulls another one, neither between impacts nor in one: least force 0.118 m g."""
     assert row.least_force > 0.1 * MASS * GRAVITY
     assert row.least_impulse > 0.01
-
-
-def test_a_train_touches_all_along() -> None:
-    for lean in np.linspace(0.0, STRIKE, 7):
-        leans, rates = domino.train(float(lean), PLATES)
-        assert gaps(leans[::-1]) == pytest.approx(0.0, abs=1e-12)
-        later, _ = domino.train(float(lean) + NEAR, PLATES)
-        earlier, _ = domino.train(float(lean) - NEAR, PLATES)
-        assert rates == pytest.approx((later - earlier) / (2 * NEAR), rel=1e-6)
-
-
-def test_plates_that_lie_on_each_other_lean_alike() -> None:
-    flat = math.acos(THICKNESS / PITCH)
-    assert domino.behind(flat) == pytest.approx(flat)
-    leans, _ = domino.train(STRIKE, 30)
-    assert leans[-1] == pytest.approx(flat, abs=1e-4)
-
-
-def test_a_long_wave_keeps_its_speed() -> None:
-    """Then each impact takes what a plate loses from standing to lying on the next one, and that
-    alone says how long a passage takes."""
-    count = 40
-    lost = MASS * GRAVITY * HEIGHT / 2 * (1 - THICKNESS / PITCH)
-    after = lost * domino.inertia(STRIKE, count) / INERTIA  # kinetic energy, of an impact
-    high = domino.potential(0.0, count)
-
-    def slowness(lean: float) -> float:
-        gained = high - domino.potential(lean, count)
-        return math.sqrt(domino.inertia(lean, count) / (2 * (after + gained)))
-
-    assert domino.passages(count)[-1] == pytest.approx(quad(slowness, 0.0, STRIKE)[0], rel=1e-4)

@@ -9,9 +9,7 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.records.lines import Found
-from pytest_simbench.records.repeatability import NAME, Line, append, read
-from pytest_simbench.repeatability.motions import Difference
-from pytest_simbench.repeatability.replay_result import Again
+from pytest_simbench.records.repeatability import NAME, Again, Line, append, read
 
 LINE = Line(
     "search",
@@ -27,22 +25,19 @@ LINE = Line(
 )
 
 
-def test_kept_and_read_back(tmp_path: Path) -> None:
-    folder = tmp_path / "run"
-    assert read(folder).items == ()
-    append(folder, LINE)
-    append(folder, LINE)
-    assert read(folder).items == (LINE, LINE)
-    assert LINE.label == "mujoco headless tuned"
-
-
-AGAIN = Again("reset", Difference(1.0, "a", {1.0: 0.1, 5.0: None}, 0.2), ("moved",)).to_wire()
+AGAIN = Again(
+    way="reset", first=1.0, body="a", growth={"1": 0.1, "5": None}, largest=0.2, changed=["moved"]
+).to_wire()
 REPLAY = replace(LINE, kind="replay", result={"claims": True, "again": [AGAIN]})
 
 
-def test_a_replay_is_read_back(tmp_path: Path) -> None:
-    append(tmp_path, REPLAY)
-    assert read(tmp_path).items == (REPLAY,)
+def test_kept_and_read_back(tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "run"
+    assert read(folder).items == ()
+    for line in (LINE, REPLAY, LINE):
+        append(folder, line)
+    assert read(folder).items == (REPLAY, LINE, LINE)
+    assert LINE.label == "mujoco headless tuned"
 
 
 @pytest.mark.parametrize(
@@ -109,8 +104,3 @@ def test_a_newer_schema(tmp_path: Path) -> None:
     path = tmp_path / NAME
     path.write_text(path.read_text().replace('"schema": 1', '"schema": 2'))
     assert read(tmp_path) == Found(refused=(f"{path}:1: schema 2, this reads 1",))
-
-
-def test_the_folder_is_made_with_those_above_it(tmp_path: Path) -> None:
-    append(tmp_path / "a" / "b", LINE)
-    assert read(tmp_path / "a" / "b").items == (LINE,)

@@ -79,11 +79,8 @@ def first_seed(
 def towers(handle_of: Callable[..., SimulatorHandle]) -> Callable[..., Episodes]:
     """One leaning tower in a simulator."""
 
-    def make(name: str = "mujoco", margin: float = 0.008) -> Episodes:
-        task = LeaningTowers(margins=(margin,), settle=1.5)
-        return first_seed(handle_of(name), task)
-
-    return make
+    task = LeaningTowers(margins=(0.008,), settle=1.5)
+    return lambda name="mujoco": first_seed(handle_of(name), task)
 
 
 @pytest.fixture

@@ -57,15 +57,12 @@ def test_mass_and_friction() -> None:
     assert heavier.body("cube_01").mass == pytest.approx(0.1)
     smoother = Perturbation("friction", -20).applied(THROW)
     surfaces = [body.friction for body in smoother.bodies]
-    assert smoother.robot is not None
     surfaces += [smoother.ground_friction, smoother.robot.friction]
     assert surfaces == pytest.approx([0.8] * len(surfaces))
 
 
 def test_squeeze_is_the_fingers_alone() -> None:
     scene = Perturbation("squeeze", 20).applied(THROW)
-    assert scene.robot is not None
-    assert THROW.robot is not None
     assert scene.robot.gripper.squeeze == pytest.approx(30.0)
     factors = scene.robot.column("effort_limit") / THROW.robot.column("effort_limit")
     assert list(factors) == pytest.approx([1.0] * 7 + [1.2] * 2)

@@ -21,32 +21,29 @@ def test_registered_with_no_deadline_and_no_silenced_check(name: str) -> None:
     assert profile.derandomize == (name == "sim-ci")
 
 
+def printed(code: str, **more: str) -> str:
+    """By a process that has little of this one's environment."""
+    environment = {"PATH": "/usr/bin:/bin", **more}
+    command = [sys.executable, "-c", code]
+    return subprocess.run(
+        command, check=True, env=environment, cwd="/", capture_output=True, text=True
+    ).stdout
+
+
 def test_the_same_in_ci() -> None:
     """Hypothesis loads its own `ci` profile where `CI` is set: ours must not inherit from it."""
     code = "from hypothesis import settings; print(*map(settings.get_profile, %r), sep='\\n')"
-    outputs = [
-        subprocess.run(
-            [sys.executable, "-c", code % list(PROFILES)],
-            check=True,
-            env={"PATH": "/usr/bin:/bin"} | more,
-            cwd="/",
-            capture_output=True,
-            text=True,
-        ).stdout
-        for more in ({}, {"CI": "true"})
-    ]
-    assert "max_examples=500" in outputs[0]
-    assert outputs[0] == outputs[1]
+    here, in_ci = (printed(code % list(PROFILES), **more) for more in ({}, {"CI": "true"}))
+    assert "max_examples=500" in here
+    assert here == in_ci
 
 
 def test_importing_hypothesis_loads_none_of_them() -> None:
-    code = (
+    printed(
         "from hypothesis import settings; settings.get_profile('sim-ci'); "
         "assert settings().max_examples == 100; assert settings().deadline is not None; "
         "import sys; assert 'numpy' not in sys.modules"
     )
-    environment = {"PATH": "/usr/bin:/bin"}
-    subprocess.run([sys.executable, "-c", code], check=True, env=environment, cwd="/")
 
 
 def test_pytest_without_hypothesis_does_not_import_it(pytester: pytest.Pytester) -> None:
@@ -64,7 +61,7 @@ def test_pytest_without_hypothesis_does_not_import_it(pytester: pytest.Pytester)
     pytester.runpytest_subprocess(*plugins).assert_outcomes(passed=1)
 
 
-def test_the_user_chooses(pytester: pytest.Pytester) -> None:
+def test_the_user_chooses(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
     pytester.makeconftest("")
     pytester.makepyfile(
         """
@@ -81,9 +78,7 @@ def test_the_user_chooses(pytester: pytest.Pytester) -> None:
         """
     )
     arguments = ("-p", "no:randomly", "-p", "no:cacheprovider")
-    environment = pytest.MonkeyPatch()
-    with environment.context() as patch:
-        patch.delenv("CI", raising=False)
-        chosen = pytester.runpytest_subprocess("--hypothesis-profile=sim-dev", *arguments)
-        chosen.assert_outcomes(passed=2)
-        pytester.runpytest_subprocess(*arguments).assert_outcomes(passed=2)
+    monkeypatch.delenv("CI", raising=False)
+    chosen = pytester.runpytest_subprocess("--hypothesis-profile=sim-dev", *arguments)
+    chosen.assert_outcomes(passed=2)
+    pytester.runpytest_subprocess(*arguments).assert_outcomes(passed=2)

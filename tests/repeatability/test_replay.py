@@ -10,8 +10,7 @@ import pytest
 
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.repeatability.episode import Episodes
-from pytest_simbench.repeatability.replay import replay
-from pytest_simbench.repeatability.replay_result import Replay
+from pytest_simbench.repeatability.replay import Replay, replay
 from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks import Moment, Throwing
 from tests.repeatability.conftest import first_seed
@@ -35,7 +34,7 @@ def replayed(
 
     def run(name: str = "mujoco", episodes: Episodes | None = None, **options: Any) -> Replay:
         given = {
-            "claims": True, "capabilities": EVERYTHING, "fresh": handle_of(name),
+            "capabilities": EVERYTHING, "fresh": handle_of(name),
             "other_mode": "no display", "moments": MOMENTS, **options,
         }  # fmt: skip
         return replay(episodes or tumbling(name), **given)
@@ -44,7 +43,7 @@ def replayed(
 
 
 def broken(result: Replay) -> set[str]:
-    return {again.way for again in result.again if again.difference is not None}
+    return {again.way for again in result.again if again.first is not None}
 
 
 @pytest.mark.parametrize("name", ["mujoco", "pybullet"])
@@ -59,64 +58,56 @@ def test_engines_keep_their_claim(replayed: Callable[..., Replay], name: str) ->
 def test_noise_is_found_everywhere_and_grows(replayed: Callable[..., Replay]) -> None:
     result = replayed("Noisy")
     assert broken(result) == set(WAYS[:4])
-    first = result.again[0].difference
-    assert first is not None
+    first = result.again[0]
     assert first.first == pytest.approx(0.02)  # the first sample
-    assert first.growth[1.0] is not None
+    assert first.growth["1"] is not None
     assert 1e-12 < first.largest < 0.1
     with pytest.raises(AssertionError, match="Noisy claims to be deterministic, but\n.*0.02 s"):
         result.assert_as_claimed()
 
 
-def test_noise_without_a_claim_is_a_result(replayed: Callable[..., Replay]) -> None:
-    result = replayed("Noisy", claims=False)
-    assert broken(result)
-    result.assert_as_claimed()
-
-
-def test_memory_of_earlier_worlds_is_found(replayed: Callable[..., Replay]) -> None:
-    result = replayed("Haunted")
-    assert broken(result) == {"after a reset", "after another episode", "restored in flight"}
-    with pytest.raises(AssertionError, match="after a reset"):
-        result.assert_as_claimed()
-
-
-def test_half_a_restore_is_found(replayed: Callable[..., Replay]) -> None:
-    result = replayed("Forgetful")
-    assert broken(result) == {"restored in flight"}
-    with pytest.raises(AssertionError, match="restored in flight: first differs at t = 0.07 s"):
-        result.assert_as_claimed()
-
-
-def test_a_restore_that_only_holds_for_a_moment_is_found(replayed: Callable[..., Replay]) -> None:
-    """The world goes on for 0.3 s before it is restored: it has gone astray by then."""
-    result = replayed("Stale")
-    assert broken(result) == {"restored in flight"}
-    with pytest.raises(AssertionError, match="restored in flight: first differs at t = 0.07 s"):
-        result.assert_as_claimed()
-
-
-def test_a_restore_that_nobody_claims_to_be_exact_is_a_result(
+@pytest.mark.parametrize(
+    ("name", "mode", "ways", "told"),
+    [
+        # memory of earlier worlds
+        ("Haunted", None, {WAYS[0], WAYS[1], WAYS[2]}, "after a reset"),
+        # half a restore
+        ("Forgetful", None, {WAYS[2]}, "restored in flight: first differs at t = 0.07 s"),
+        # a restore that only holds for a moment: the world goes on for 0.3 s before it is restored
+        ("Stale", None, {WAYS[2]}, "restored in flight: first differs at t = 0.07 s"),
+        ("Windowed", "gui", {WAYS[4]}, "with a window"),
+    ],
+)
+def test_what_an_engine_does_not_repeat_is_found(
     replayed: Callable[..., Replay],
+    handle_of: Callable[..., SimulatorHandle],
+    name: str,
+    mode: str | None,
+    ways: set[str],
+    told: str,
 ) -> None:
-    result = replayed("Forgetful", capabilities=EVERYTHING - {Capability.EXACT_RESTORE})
-    assert broken(result) == {"restored in flight"}
-    result.assert_as_claimed()
-
-
-def test_an_effect_of_the_window_is_found(
-    replayed: Callable[..., Replay], handle_of: Callable[..., SimulatorHandle]
-) -> None:
-    result = replayed("Windowed", other_mode=handle_of("Windowed", "gui"))
-    assert broken(result) == {"with a window"}
-    with pytest.raises(AssertionError, match="with a window"):
+    result = replayed(name, other_mode=handle_of(name, mode) if mode else "no display")
+    assert broken(result) == ways
+    with pytest.raises(AssertionError, match=told):
         result.assert_as_claimed()
+
+
+@pytest.mark.parametrize(
+    ("name", "unclaimed"),
+    [("Noisy", Capability.DETERMINISTIC), ("Forgetful", Capability.EXACT_RESTORE)],
+)
+def test_what_nobody_claims_is_a_result(
+    replayed: Callable[..., Replay], name: str, unclaimed: Capability
+) -> None:
+    result = replayed(name, capabilities=EVERYTHING - {unclaimed})
+    assert "restored in flight" in broken(result)
+    result.assert_as_claimed()
 
 
 def test_failure_to_run_again_is_a_failure_without_a_claim(
     replayed: Callable[..., Replay],
 ) -> None:
-    result = replayed("Refusing", claims=False)
+    result = replayed("Refusing", capabilities=EVERYTHING - {Capability.DETERMINISTIC})
     assert [again.failure for again in result.again if again.failure] == [
         "EngineFailed: RuntimeError: no way back"
     ]

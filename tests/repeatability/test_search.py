@@ -8,10 +8,9 @@ from collections.abc import Callable
 import pytest
 
 from pytest_simbench.repeatability.__main__ import main
-from pytest_simbench.repeatability.attack import Attack
 from pytest_simbench.repeatability.episode import Episodes
 from pytest_simbench.repeatability.perturbation import Perturbation
-from pytest_simbench.repeatability.search import search
+from pytest_simbench.repeatability.search import Attack, search
 
 WIDE = {"x": 0.012, "y": 0.012, "yaw": math.radians(10), "mass": 0.5, "friction": 0.5}
 """Enough to topple a tower with 8 mm to spare, among much that is not."""
@@ -24,8 +23,6 @@ def test_finds_what_topples_a_tower_among_much_that_does_not(
     finding.assert_found()
     assert 1 <= finding.examples <= 60
     assert finding.runs <= finding.examples + 60
-    assert finding.smallest is not None
-    assert finding.first is not None
     assert len(finding.smallest) <= len(finding.first)
     assert finding.effect == "topples tower 1"
 
@@ -43,7 +40,7 @@ def test_shrinks_to_the_margin_and_tells_how_to_replay(
     assert 7.4 <= -1000 * smallest.amount <= 8.2
     assert finding.sentence == f"{smallest} topples tower 1"
     less = Perturbation("x", smallest.steps + 1, smallest.body)
-    assert not Attack(episodes, 10).run((less,)).differs
+    assert not Attack(episodes, 10).run((less,)).effect
     finding.assert_not_below("x", 0.004)
     with pytest.raises(
         AssertionError,

@@ -12,8 +12,7 @@ import pytest
 from pytest_simbench.motion.registry import find
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.testing import CHECKS, ConformanceTest, Subject
-from pytest_simbench.testing.expected import read_expected_failures
-from pytest_simbench.testing.kit import Kit
+from pytest_simbench.testing.kit import Kit, read_expected_failures
 
 EXPECTED = read_expected_failures(Path(__file__).with_name("expected_failures.txt"))
 LAWS = [law.name for law in CHECKS.values() if law.robot and law.name != "window_changes_nothing"]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.testing import CHECKS
-from pytest_simbench.testing.expected import read_expected_failures
+from pytest_simbench.testing.kit import read_expected_failures
 
 EXPECTED = Path(__file__).with_name("expected_failures.txt")
 PAGE = Path(__file__).parents[2] / "docs" / "extending" / "known_failures.md"

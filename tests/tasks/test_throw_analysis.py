@@ -11,6 +11,7 @@ import pytest
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 from pytest_simbench.client.world import World
+from pytest_simbench.laws.hands import close_command
 from pytest_simbench.motion.throw import swing_of
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.tasks import Jitter, Throwing
@@ -24,7 +25,6 @@ from pytest_simbench.tasks.throw_analysis import (
     may_touch,
     unclenched,
 )
-from pytest_simbench.testing.drives import close_command
 from pytest_simbench.testing.scenes import grip, with_joint
 from pytest_simbench.testing.subject import Subject
 

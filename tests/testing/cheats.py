@@ -13,8 +13,7 @@ from pytest_simbench.sims.mujoco.adapter import MuJoCo
 from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import Body, FloatArray, Scene
 from tests.laws.faults import bodies, bouncier, drives, heavier, rougher
-
-FINGERS = ("panda_leftfinger", "panda_rightfinger")
+from tests.testing.wrong import FINGERS
 
 
 class Handling(MuJoCo):

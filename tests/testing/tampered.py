@@ -9,7 +9,7 @@ from typing import Any
 
 from pytest_simbench.sims.mujoco.world import ROBOT
 
-from tests.testing.wrong import Lying
+from tests.testing.wrong import FINGERS, DrivesNotTold, Lying
 
 Tamper = Callable[[Any], None]
 Rows = Any
@@ -18,8 +18,6 @@ Rows = Any
 ALL = slice(None)
 SLIDING = (ALL, 0)
 """The first of MuJoCo's three coefficients of friction."""
-
-FINGERS = ("panda_leftfinger", "panda_rightfinger")
 
 
 def put(array: str, value: Any, rows: Rows = ALL) -> Tamper:
@@ -71,6 +69,10 @@ def dof(name: str) -> Callable[[Any], Any]:
     return lambda s: s.model.joint(name).dofadr
 
 
+def ground(s: Any) -> Any:
+    return s.model.geom("ground").id
+
+
 def fat_link(s: Any) -> None:
     """The shapes of link 3 are 10 mm aside."""
     turn, rows = s.data.body("panda_link3").xmat.reshape(3, 3), geoms("panda_link3")(s)
@@ -94,6 +96,13 @@ def wrong_centre(s: Any) -> None:
 NO_LIMIT = (put("model.actuator_forcelimited", 0), put("model.jnt_actfrclimited", 0))
 """Of effort: the drive's, and the URDF's, which is the same."""
 
+HEAVIER = {"body_mass": -1, "body_inertia": -1, "dof_M0": slice(-6, None)}
+"""Of a body: the engine takes the last for bodies that nothing hangs on."""
+
+SOFT = (times("model.actuator_gainprm", 0.5, (ALL, 0)),
+        times("model.actuator_biasprm", 0.5, (ALL, 1)))  # fmt: skip
+"""Half the stiffness."""
+
 WORLDS: dict[str, tuple[tuple[Tamper, ...], tuple[str, ...]]] = {
     "Echo": ((), ("read_back_is_the_engines",)),
     "DoubleGravity": ((times("model.opt.gravity", 2),), ("free_fall",)),
@@ -110,6 +119,11 @@ WORLDS: dict[str, tuple[tuple[Tamper, ...], tuple[str, ...]]] = {
                      ("links_collide_when_asked",)),
     "JoinedLinksCollide": ((put("model.exclude_signature", 0),), ("links_collide_when_asked",)),
     "NoEffortLimit": (NO_LIMIT, ("effort_limit_bounds_acceleration", "weak_joint_sags")),
+    "WrongMass": (tuple(times(f"model.{name}", 1.5, rows) for name, rows in HEAVIER.items()),
+                  ("collision_keeps_momentum",)),
+    "DeepGround": ((add("model.geom_pos", -0.003, lambda s: (ground(s), 2)),
+                    put("model.geom_sameframe", 0, ground)), ("rest_on_plane",)),
+    "SoftDrives": (SOFT, ("static_hold",)),
     "FreeFingers": ((put("data.eq_active", 0),), ("fingers_stay_coupled",)),
 }  # fmt: skip
 """In every scene."""
@@ -142,6 +156,12 @@ def tampered(name: str) -> type[Lying]:
                 change(self)
 
     return type(name, (Lying,), {"tamper": tamper, "__module__": __name__})
+
+
+class SoftDrivesNotTold(tampered("SoftDrives")):
+    """Which are declared not to be told."""
+
+    info = DrivesNotTold.info
 
 
 FAULTS: list[tuple[type[Lying], str]] = []

@@ -7,7 +7,7 @@ check under test has to find it, not the parity check at loading.
 from __future__ import annotations
 
 import fnmatch
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -18,7 +18,13 @@ from pytest_simbench.sims.mujoco.adapter import MuJoCo
 from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.scene.overlap import rotations
-from pytest_simbench.simulator import SimulatorInfo
+from pytest_simbench.simulator import Deviation, NotSupportedError, SimulatorInfo
+
+FINGERS = ("panda_leftfinger", "panda_rightfinger")
+
+
+Told = Callable[[Any, Any], Any]
+"""What an adapter tells, of itself and of what it should tell."""
 
 
 class Lying(MuJoCo):
@@ -105,30 +111,6 @@ class StandingBelt(MuJoCo):
         super().lead(before, after)
 
 
-class Wrenched(MuJoCo):
-    """Tells contact forces and torques, (6,), multiplied."""
-
-    factor: ClassVar[FloatArray]
-
-    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
-        for first, second, wrench in super().contact_forces():
-            yield first, second, self.factor * wrench
-
-
-class WrongSign(Wrenched):
-    """Tells what the first does to the second."""
-
-    factor = -np.ones(6)
-
-
-class WrongTorque(Wrenched):
-    factor = np.repeat([1.0, -1.0], 3)
-
-
-class NormalAlone(Wrenched):
-    factor = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-
-
 class LongStep(Lying):
     def tamper(self) -> None:
         self.model.opt.timestep *= 1.001
@@ -143,34 +125,6 @@ class OwnClock(MuJoCo):
         return steps * self.profiles["tuned"].timestep
 
 
-class ScalarLast(MuJoCo):
-    def body_state(self) -> FloatArray:
-        state = super().body_state()
-        state[:, 3:7] = np.roll(state[:, 3:7], -1, axis=1)
-        return state
-
-
-class Reversed(MuJoCo):
-    def body_state(self) -> FloatArray:
-        return super().body_state()[::-1].copy()
-
-
-class BodyFrame(MuJoCo):
-    """Angular velocity in the body's frame, as the engine itself keeps it."""
-
-    def body_state(self) -> FloatArray:
-        state = super().body_state()
-        state[:, 10:] = self.data.qvel[self._body_v + 3]
-        return state
-
-
-class LongQuaternion(MuJoCo):
-    def body_state(self) -> FloatArray:
-        state = super().body_state()
-        state[:, 3:7] *= 1.001
-        return state
-
-
 class OneShot(MuJoCo):
     """Forgets its command after half a second."""
 
@@ -178,20 +132,6 @@ class OneShot(MuJoCo):
         super().step()
         if self.time > 0.5 and self.scene.robot is not None:
             self.data.ctrl[:] = self.scene.robot.column("initial_position")
-
-
-class WrongMass(Lying):
-    def tamper(self) -> None:
-        self.model.body_mass[-1] *= 1.5
-        self.model.body_inertia[-1] *= 1.5
-        self.model.dof_M0[-6:] *= 1.5  # which the engine takes for bodies that nothing hangs on
-
-
-class DeepGround(Lying):
-    def tamper(self) -> None:
-        ground = self.model.geom("ground").id
-        self.model.geom_pos[ground, 2] -= 0.003
-        self.model.geom_sameframe[ground] = 0  # else the engine takes the body's frame
 
 
 class Meddler(MuJoCo):
@@ -225,21 +165,11 @@ class EchoScene(EchoLimits):
     echoed = "*"
 
 
-class NoContacts(MuJoCo):
-    def contact_count(self) -> int:
-        return 0
-
-
 class ForgetsCommand(MuJoCo):
     def restore(self, state: FloatArray) -> None:
         command = self.data.ctrl.copy()
         super().restore(state)
         self.data.ctrl[:] = command
-
-
-class RoundsState(MuJoCo):
-    def save(self) -> FloatArray:
-        return super().save().astype(np.float32).astype(float)
 
 
 class Noisy(MuJoCo):
@@ -268,3 +198,139 @@ class Misbuilt(MuJoCo):
     def load(self, scene: Scene) -> None:
         super().load(scene)
         self.model.opt.gravity *= 0.5
+
+
+DRIVE_NOT_TOLD = replace(
+    MuJoCo.info,
+    deviations=(
+        *MuJoCo.info.deviations,
+        Deviation("joint/*/stiffness joint/*/damping", "the adapter's own drive"),
+    ),
+)
+
+
+class DrivesNotTold(MuJoCo):
+    """Springs as they should be, which are declared not to be told."""
+
+    info: ClassVar[SimulatorInfo] = DRIVE_NOT_TOLD
+
+
+class NoRobots(MuJoCo):
+    """Builds no robot, and says so."""
+
+    info: ClassVar[SimulatorInfo] = replace(
+        MuJoCo.info, deviations=(Deviation("link/*", "there are no robots here"),)
+    )
+
+    def load(self, scene: Scene) -> None:
+        if scene.robot is not None:
+            raise NotSupportedError("there are no robots here")
+        super().load(scene)
+
+
+class NoFeedForward(MuJoCo):
+    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        super().command(position, 0 * velocity, 0 * effort)
+
+
+class Teleports(MuJoCo):
+    """A cube between closed fingers goes where the hand goes, whatever the forces."""
+
+    def step(self) -> None:
+        super().step()
+        if self.scene.robot is None or not len(self._body_q):
+            return
+        hand = 0.5 * sum(self.data.body(finger).xpos for finger in FINGERS)
+        closed = self.joint_state()[0, 7] < 0.026
+        held = getattr(self, "held", None)
+        if closed and held is None:
+            self.held = self.data.qpos[self._body_q[0]][:3] - hand
+        elif closed:
+            self.data.qpos[self._body_q[0][:3]] = hand + held
+            self.data.qvel[self._body_v[0]] = 0.0
+
+
+class Magnet(MuJoCo):
+    """Cubes near the hand hang there, though no finger touches them."""
+
+    def step(self) -> None:
+        super().step()
+        if self.scene.robot is not None and len(self._body_q):
+            self.data.qvel[self._body_v[0]] *= 0.9
+
+
+class TiltedAxis(MuJoCo):
+    """The axis of joint 1 is tilted by 5 degrees; it is told as if it was not."""
+
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        if scene.robot is not None:
+            axis = (np.sin(np.radians(5)), 0.0, np.cos(np.radians(5)))
+            self.model.jnt_axis[self.model.joint("panda_joint1").id] = axis
+
+    def read_back(self) -> dict[str, Any]:
+        told = super().read_back()
+        return told | {k: v for k, v in self.straight.items() if k in told}
+
+    straight: ClassVar[dict[str, Any]] = {"joint/panda_joint1/axis": [0, 0, 1, 0, 0, 0]}
+
+
+def columns(first: int, last: int, change: Callable[[Any], Any]) -> Told:
+    """Some columns are told otherwise."""
+
+    def told(_: Any, rows: FloatArray) -> FloatArray:
+        rows[:, first:last] = change(rows[:, first:last])
+        return rows
+
+    return told
+
+
+def wrenches(*factors: float) -> Told:
+    """Contact forces and torques, (6,), are told multiplied."""
+    return lambda _, told: ((a, b, np.array(factors) * wrench) for a, b, wrench in told)
+
+
+def in_link_axes(s: Any, told: FloatArray) -> FloatArray:
+    turns = s.data.xmat[s.model.jnt_bodyid].reshape(-1, 3, 3)
+    return np.einsum("nij,nki->nkj", turns, told.reshape(-1, 2, 3)).reshape(-1, 6)
+
+
+def about_centres(s: Any, told: FloatArray) -> FloatArray:
+    """Torques are about the centres of mass of the links below."""
+    bodies = s.model.jnt_bodyid
+    told[:, 3:] -= np.cross(s.data.xipos[bodies] - s.data.xpos[bodies], told[:, :3])
+    return told
+
+
+TOLD: dict[str, tuple[str, Told, str]] = {
+    "ScalarLast": ("body_state", columns(3, 7, lambda q: np.roll(q, -1, axis=1)),
+                   "state_as_loaded"),
+    "Reversed": ("body_state", lambda _, rows: rows[::-1].copy(), "state_as_loaded"),
+    "BodyFrame": ("body_state", lambda s, rows: np.hstack(
+        [rows[:, :10], s.data.qvel[s._body_v + 3]]), "velocity_frames"),  # as the engine keeps it
+    "LongQuaternion": ("body_state", columns(3, 7, lambda q: 1.001 * q), "quaternions_are_unit"),
+    "WrongSign": ("contact_forces", wrenches(*[-1.0] * 6), "weight_is_told"),
+    "WrongTorque": ("contact_forces", wrenches(1, 1, 1, -1, -1, -1), "weight_is_told"),
+    "NormalAlone": ("contact_forces", wrenches(0, 0, 1, 0, 0, 0), "friction_is_told"),
+    "NoContacts": ("contact_count", lambda *_: 0, "contacts_counted"),
+    "LinkAxes": ("joint_wrenches", in_link_axes, "joint_loads_are_told"),
+    "OnTheLinkAbove": ("joint_wrenches", lambda _, told: -told, "joint_loads_are_told"),
+    "AboutCentres": ("joint_wrenches", about_centres, "joint_loads_are_told"),
+    "RoundsState": ("save", lambda _, state: state.astype(np.float32).astype(float),
+                    "restore_continues"),
+}  # fmt: skip
+"""Adapters that tell something else than the engine: which method, what, the law that finds it."""
+
+
+def telling(name: str) -> type[MuJoCo]:
+    """The adapter of a row; workers find it by the name of its class."""
+    method, change, _ = TOLD[name]
+
+    def told(self: MuJoCo) -> Any:
+        return change(self, getattr(MuJoCo, method)(self))
+
+    return type(name, (MuJoCo,), {method: told, "__module__": __name__})
+
+
+for _name in TOLD:
+    globals()[_name] = telling(_name)

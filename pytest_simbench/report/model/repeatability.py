@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pytest_simbench.records.metrics import significant
-from pytest_simbench.records.repeatability import Line, read
+from pytest_simbench.records.repeatability import GROWTH_TIMES, Again, Line, read
 from pytest_simbench.repeatability.agreement import LIMITS, Agreement, agreements
-from pytest_simbench.repeatability.motions import GROWTH_TIMES
-from pytest_simbench.repeatability.replay_result import Again
 from pytest_simbench.report.model.document import Column, Table
 
 REPLAY = (
@@ -44,7 +42,7 @@ def tables(lines: Sequence[Line], agreements: Sequence[Agreement]) -> list[Table
         ours = [line for line in replays if line.task == task]
         seeds = ", ".join(str(seed) for seed in dict.fromkeys(line.seed for line in ours))
         found.append(Table(f"Replay: {task}, seed {seeds}", replay_columns(ours), REPLAY))
-        parted = [(line, again) for line in ours for again in _agains(line) if again.difference]
+        parted = [(line, again) for line in ours for again in line.again if again.first is not None]
         if parted:
             found.append(Table(f"Replay: {task}, growth", growth_columns(parted), GROWTH))
     others = [line for line in lines if line.kind != "replay"]
@@ -56,13 +54,9 @@ def tables(lines: Sequence[Line], agreements: Sequence[Agreement]) -> list[Table
     return found
 
 
-def _agains(line: Line) -> list[Again]:
-    return [Again.from_wire(data) for data in line.result["again"]]
-
-
 def replay_columns(lines: Sequence[Line]) -> list[Column]:
     """A row for each simulator, a column for each way of running again."""
-    told = [{again.way: again for again in _agains(line)} for line in lines]
+    told = [{again.way: again for again in line.again} for line in lines]
     claims = ["yes" if line.result["claims"] else "no" for line in lines]
     return [
         Column("simulator", [line.label for line in lines], left=True),
@@ -79,29 +73,26 @@ def _cell(again: Again) -> str:
         return "failed"
     if again.skipped:
         return "not run"
-    if again.difference is None:
-        return "same"
-    return f"{again.difference.first:.2f} s"
+    return "same" if again.first is None else f"{again.first:.2f} s"
 
 
 def growth_columns(parted: Sequence[tuple[Line, Again]]) -> list[Column]:
     """A row for each way in which a simulator did not repeat itself."""
-    found = [(line, again, again.difference) for line, again in parted if again.difference]
-    differences = [difference for _, _, difference in found]
+    agains = [again for _, again in parted]
 
     def gap(size: float | None) -> str:
         return "" if size is None else significant(1000 * size)
 
     return [
-        Column("simulator", [f"{line.label}, {again.way}" for line, again, _ in found], left=True),
-        Column("first at s", [f"{d.first:.2f}" for d in differences]),
-        Column("cube", [d.body or "(robot)" for d in differences], left=True),
+        Column("simulator", [f"{line.label}, {again.way}" for line, again in parted], left=True),
+        Column("first at s", [f"{again.first:.2f}" for again in agains]),
+        Column("cube", [again.body or "(robot)" for again in agains], left=True),
         *(
-            Column(f"mm at {after:g} s", [gap(d.growth.get(after)) for d in differences])
+            Column(f"mm at {after} s", [gap((a.growth or {}).get(after)) for a in agains])
             for after in GROWTH_TIMES
         ),
-        Column("mm at most", [gap(d.largest) for d in differences]),
-        Column("outcome", [_outcome(again) for _, again, _ in found], left=True),
+        Column("mm at most", [gap(again.largest) for again in agains]),
+        Column("outcome", [_outcome(again) for again in agains], left=True),
     ]
 
 

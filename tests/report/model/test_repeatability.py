@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import pytest
 
-from pytest_simbench.records.repeatability import Line
+from pytest_simbench.records.repeatability import Again, Line
 from pytest_simbench.repeatability.agreement import Agreement, Parting
-from pytest_simbench.repeatability.motions import Difference
-from pytest_simbench.repeatability.replay_result import Again
 from pytest_simbench.report.markdown.run import render_tables as render_markdown
 from pytest_simbench.report.model.repeatability import tables
 from pytest_simbench.report.terminal.parts import render_tables as render_terminal
 
 AGAINS = (
-    Again("after a reset"),
-    Again("fresh process", Difference(1.234, "cube_1", {1.0: 0.0015, 5.0: 0.02}, 0.3), ("hit",)),
-    Again("with a window", skipped="no display"),
-    Again("restored", failure="WorkerExited: x"),
-)
+    Again(way="after a reset"),
+    Again(
+        way="fresh process", first=1.234, body="cube_1", growth={"1": 0.0015, "5": 0.02},
+        largest=0.3, changed=["hit"],
+    ),
+    Again(way="with a window", skipped="no display"),
+    Again(way="restored", failure="WorkerExited: x"),
+)  # fmt: skip
 
 
 def line(kind: str, simulator: str, **result: object) -> Line:
@@ -25,7 +26,7 @@ def line(kind: str, simulator: str, **result: object) -> Line:
 
 
 LINES = [
-    line("replay", "mujoco", claims=True, again=[Again("after a reset").to_wire()]),
+    line("replay", "mujoco", claims=True, again=[AGAINS[0].to_wire()]),
     line("replay", "wobbly", claims=False, again=[again.to_wire() for again in AGAINS]),
     line("search", "mujoco", sentence="0.7 mm in x of cube_12 topples tower 2"),
 ]
