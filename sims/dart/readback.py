@@ -11,12 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.shapes import (
-    DIRECTIONS,
-    box_reach,
-    cylinder_reach,
-    round_reach,
-)
+from pytest_simbench.description.shapes import DIRECTIONS, box_reach, cylinder_reach, round_reach
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import one_value
 from pytest_simbench.scene import FloatArray, Pose

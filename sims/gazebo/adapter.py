@@ -163,14 +163,7 @@ class Gazebo(Simulator):
         return bindings().sim.Model(self.server.world.model_by_name(ecm, name))
 
     def read_back(self) -> dict[str, Any]:
-        return ReadBack(
-            self.server,
-            self._physics,
-            robot_model(self.scene),
-            self._drives,
-            self.scene,
-            self.prepared,
-        ).all()
+        return ReadBack(self).all()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         # A velocity command finds the effort itself, so there is nothing to feed forward.

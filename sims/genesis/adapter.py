@@ -46,14 +46,7 @@ from .engine import (
 )
 from .readback import ReadBack
 from .settings import CHOSEN_ON, PROFILES, GenesisSettings
-from .world import (
-    LEAST_FRICTION,
-    add_body,
-    add_camera,
-    add_robot,
-    material,
-    new_world,
-)
+from .world import LEAST_FRICTION, add_body, add_camera, add_robot, material, new_world
 
 genesis = lazy_import("genesis")
 

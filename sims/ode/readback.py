@@ -23,17 +23,7 @@ from pytest_simbench.simulator import lazy_import
 
 from .axes import Axis
 from .contacts import Part
-from .library import (
-    HI_STOP,
-    LO_STOP,
-    MOST_FORCE,
-    SOFTNESS,
-    Convex,
-    Mesh,
-    damping,
-    library,
-    pose_of,
-)
+from .library import HI_STOP, LO_STOP, MOST_FORCE, SOFTNESS, Convex, Mesh, damping, library, pose_of
 
 ode = lazy_import("ode")
 
@@ -85,8 +75,9 @@ class ReadBack(readback.ReadBack):
             elif isinstance(geom, ode.GeomSphere):
                 yield "rounds", round_reach(geom.getRadius(), 0.0, pose)
             else:
-                pillar = isinstance(geom, ode.GeomCylinder)
-                yield "rounds", (cylinder_reach if pillar else round_reach)(*geom.getParams(), pose)
+                reached = cylinder_reach if isinstance(geom, ode.GeomCylinder) else round_reach
+                radius, length = geom.getParams()
+                yield "rounds", reached(radius, length, pose)
 
     def surface(self, part: Part) -> dict[str, Any]:
         return {"friction": part.surface.friction, "restitution": part.surface.bounce}

@@ -9,11 +9,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.description.links import link_poses
-from pytest_simbench.description.shapes import (
-    DIRECTIONS,
-    box_corners,
-    reach,
-)
+from pytest_simbench.description.shapes import DIRECTIONS, box_corners, reach
 from pytest_simbench.description.urdf import Link
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.quantities import kind_of

@@ -11,13 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.shapes import (
-    box_reach,
-    cylinder_reach,
-    placed,
-    reach,
-    round_reach,
-)
+from pytest_simbench.description.shapes import box_reach, cylinder_reach, placed, reach, round_reach
 from pytest_simbench.parity import readback
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.simulator import heavy, lazy_import

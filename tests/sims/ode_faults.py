@@ -15,12 +15,7 @@ from typing import Any
 import numpy as np
 from pytest_simbench.sims.ode.adapter import ODE
 from pytest_simbench.sims.ode.contacts import distinct
-from pytest_simbench.sims.ode.library import (
-    Mesh,
-    body_id,
-    library,
-    place,
-)
+from pytest_simbench.sims.ode.library import Mesh, body_id, library, place
 
 from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import lazy_import

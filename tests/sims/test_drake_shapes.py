@@ -5,11 +5,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from pytest_simbench.sims.drake.world import (
-    corner_centres,
-    fitting_radius,
-    pad_centres,
-)
+from pytest_simbench.sims.drake.world import corner_centres, fitting_radius, pad_centres
 
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.simulator import PreparedRobot
