@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import tempfile
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -27,8 +27,6 @@ from pytest_simbench.simulator import (
     Capability,
     Deviation,
     PreparedRobot,
-    Seen,
-    Settings,
     Simulator,
     SimulatorInfo,
     lazy_import,
@@ -47,7 +45,7 @@ State = tuple[float, list[tuple[FloatArray, FloatArray, FloatArray]], FloatArray
 class DART(Simulator):
     """Adapter of DART."""
 
-    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+    info = SimulatorInfo(
         name="dart",
         title="DART",
         distribution="dartpy",
@@ -98,12 +96,12 @@ class DART(Simulator):
         ),
         install_size_mb=80,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
+    profiles = PROFILES
+    chosen_on = CHOSEN_ON
     settings: DARTSettings
 
     def load(self, scene: Scene) -> None:
-        self.scene = scene
+        self.begin(scene)
         self.world = world = dartpy.simulation.World()
         self._set_options(world, scene)
         slab = self.settings.detector in ONE_CONTACT_ON_A_PLANE
@@ -112,10 +110,8 @@ class DART(Simulator):
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
         self._led = [self._bodies[box.name] for box in scene.prescribed_bodies]
         self._robot: Any = None
-        self.prepared = None
         self._base = np.empty(0)
-        if scene.robot is not None:
-            self.prepared = PreparedRobot(scene.robot)
+        if self.prepared is not None:
             self._load_robot(self.prepared)
         self._viewer = self._open_window() if self.gui else None
 

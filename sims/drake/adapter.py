@@ -28,22 +28,14 @@ What was learnt (1.51, tuned settings but for the one named, seed 100):
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pytest_simbench.scene import FloatArray, Robot, Scene
-from pytest_simbench.simulator import (
-    Capability,
-    Deviation,
-    Seen,
-    Settings,
-    Simulator,
-    SimulatorInfo,
-    lazy_import,
-)
+from pytest_simbench.simulator import Capability, Deviation, Simulator, SimulatorInfo, lazy_import
 from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
 
 from .readback import ReadBack
@@ -60,7 +52,7 @@ sensors = lazy_import("pydrake.systems.sensors")
 class Drake(Simulator):
     """Adapter of Drake."""
 
-    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+    info = SimulatorInfo(
         name="drake",
         title="Drake",
         distribution="drake",
@@ -109,14 +101,15 @@ class Drake(Simulator):
         ),
         install_size_mb=310,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
+    profiles = PROFILES
+    chosen_on = CHOSEN_ON
     settings: DrakeSettings
 
     def load(self, scene: Scene) -> None:
         self.close()
+        self.begin(scene)
         builder = framework.DiagramBuilder()
-        self.world = World(scene, self.settings, builder)
+        self.world = World(scene, self.prepared, self.settings, builder)
         self.plant, self.scene_graph = self.world.plant, self.world.scene_graph
         self._meshcat = self._open_window(builder) if self.gui else None
         self.simulator = analysis.Simulator(builder.Build())
@@ -141,7 +134,6 @@ class Drake(Simulator):
             state[at[7:]] = box.velocity
         self.plant.SetPositionsAndVelocities(self.context, state)
         self._led = [body.prescribed for body in scene.free_bodies]
-        self._steps = 0
         self._has_camera = False
         self.simulator.Initialize()
 

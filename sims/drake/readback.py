@@ -53,9 +53,9 @@ class ReadBack(readback.ReadBack):
         self.inspector = shapes.inspector()
         own = math.RigidTransform()
         super().__init__(
-            self.made,
+            simulator,
             Part(self.plant.world_body(), self.made.shapes["ground"], own),
-            {body.name: self._body(body) for body in self.made.scene.bodies},
+            {body.name: self._body(body) for body in simulator.scene.bodies},
             {
                 name: Part(body, self.made.shapes.get(name, ()), own)
                 for name, body in self.made.links.items()

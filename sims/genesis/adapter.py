@@ -13,7 +13,7 @@ from __future__ import annotations
 import dataclasses
 import gc
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any, ClassVar
 
 import numpy as np
@@ -23,9 +23,6 @@ from pytest_simbench.scene import FloatArray, Scene, rotation_matrix
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
-    PreparedRobot,
-    Seen,
-    Settings,
     Simulator,
     SimulatorInfo,
     heavy,
@@ -57,7 +54,7 @@ MOST_BOUNCE = 0.9999
 class Genesis(Simulator):
     """Adapter of Genesis."""
 
-    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+    info = SimulatorInfo(
         name="genesis",
         title="Genesis",
         distribution="genesis-world",
@@ -86,8 +83,8 @@ class Genesis(Simulator):
         install_size_mb=3700,
         language="Python (Quadrants)",
     )
-    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
+    profiles = PROFILES
+    chosen_on = CHOSEN_ON
     settings: GenesisSettings
     world: Any = None
     compiled: ClassVar[set[tuple[Any, ...]]] = set()
@@ -122,9 +119,8 @@ class Genesis(Simulator):
         self.compiled.add(kind)
 
     def load(self, scene: Scene) -> None:
-        self.scene, self._steps = scene, 0
+        self.begin(scene)
         self._camera: Any = None
-        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         start_engine(self.settings.precision)
         self.world = world = new_world(scene, self.settings, window=self.gui)
         self._ground = world.add_entity(

@@ -9,9 +9,9 @@ What was learnt stands in docs/engines/mujoco.md.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,16 +19,7 @@ from numpy.typing import NDArray
 from pytest_simbench.description.carried import Carried
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.scene.overlap import rotations
-from pytest_simbench.simulator import (
-    Capability,
-    Deviation,
-    PreparedRobot,
-    Seen,
-    Settings,
-    Simulator,
-    SimulatorInfo,
-    lazy_import,
-)
+from pytest_simbench.simulator import Capability, Deviation, Simulator, SimulatorInfo, lazy_import
 
 from .bounces import BOUNCES
 from .own_file import FileReadBack, OwnFile
@@ -44,7 +35,7 @@ mujoco = lazy_import("mujoco")
 class MuJoCo(Simulator):
     """Adapter of MuJoCo."""
 
-    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+    info = SimulatorInfo(
         name="mujoco",
         title="MuJoCo",
         distribution="mujoco",
@@ -73,14 +64,14 @@ class MuJoCo(Simulator):
         install_size_mb=60,
         environment=DISABLED,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
+    profiles = PROFILES
+    chosen_on = CHOSEN_ON
     settings: MuJoCoSettings
 
-    prepared: PreparedRobot | None
     _own_file: OwnFile | None = None
 
     def load(self, scene: Scene) -> None:
+        self.begin(scene)
         self._viewer: Any = None
         self._renderer: Any = None
         if isinstance(self.settings, FileSettings):
@@ -93,18 +84,15 @@ class MuJoCo(Simulator):
 
     def _load_file(self, scene: Scene) -> None:
         self._own_file = own = OwnFile(scene, self.settings.timestep)
-        self.scene, self.model, self.data = scene, own.model, own.data
-        self.prepared = None
+        self.model, self.data = own.model, own.data
         self._q = self._v = np.array([], dtype=int)
         self._body_ids = own.roots
         deviations = (*self.info.deviations, *own.deviations())
         vars(self)["info"] = replace(self.info, deviations=deviations)  # of this world alone
 
     def _build(self, scene: Scene) -> None:
-        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         self.model = model = build(scene, self.prepared, self.settings)
         self.data = data = mujoco.MjData(model)
-        self.scene = scene
 
         joints = [model.joint(name) for name in (scene.robot.joint_names if scene.robot else ())]
         self._q = np.array([joint.qposadr[0] for joint in joints], dtype=int)

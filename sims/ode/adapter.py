@@ -8,9 +8,9 @@ What was learnt stands in docs/engines/ode.md.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -21,8 +21,6 @@ from pytest_simbench.simulator import (
     Deviation,
     NotSupportedError,
     PreparedRobot,
-    Seen,
-    Settings,
     Simulator,
     SimulatorInfo,
     lazy_import,
@@ -70,7 +68,7 @@ class State:
 class ODE(Simulator):
     """Adapter of ODE."""
 
-    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+    info = SimulatorInfo(
         name="ode",
         title="Open Dynamics Engine",
         distribution="Py3ODE",
@@ -98,14 +96,14 @@ class ODE(Simulator):
         ),
         install_size_mb=40,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
+    profiles = PROFILES
+    chosen_on = CHOSEN_ON
     settings: ODESettings
 
     def load(self, scene: Scene) -> None:
         _check_hand(scene)
-        self.scene, s = scene, self.settings
-        self._steps = 0
+        self.begin(scene)
+        s = self.settings
         library().dRandSetSeed(SEED)
         self.world = world = ode.World()
         world.setGravity(scene.gravity)
@@ -129,9 +127,7 @@ class ODE(Simulator):
         self._axes: dict[str, Axis] = {}
         self._closures: list[Any] = []
         self._drives: Drives | None = None
-        self.prepared = None
-        if scene.robot is not None:
-            self.prepared = PreparedRobot(scene.robot)
+        if self.prepared is not None:
             self._load_robot(self.prepared)
         links = [part.body for part in self._links.values() if part.body is not None]
         self._moving = [*self._free, *links]

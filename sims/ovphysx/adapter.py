@@ -18,8 +18,8 @@ not quite that of the uninterrupted run.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,9 +30,6 @@ from pytest_simbench.simulator import (
     Capability,
     Deviation,
     NotSupportedError,
-    PreparedRobot,
-    Seen,
-    Settings,
     Simulator,
     SimulatorInfo,
     lazy_import,
@@ -51,7 +48,7 @@ _Saved = tuple[int, dict[str, NDArray[np.float32]], tuple[FloatArray, FloatArray
 class OvPhysX(Simulator):
     """Adapter of Omniverse PhysX."""
 
-    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+    info = SimulatorInfo(
         name="ovphysx",
         title="Omniverse PhysX",
         distribution="ovphysx",
@@ -123,13 +120,12 @@ class OvPhysX(Simulator):
         caches={"WARP_CACHE_PATH": "warp"},
         install_size_mb=1100,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
+    profiles = PROFILES
+    chosen_on = CHOSEN_ON
     settings: OvPhysXSettings
 
     def load(self, scene: Scene) -> None:
-        self.scene = scene
-        self.prepared = PreparedRobot(scene.robot) if scene.robot is not None else None
+        self.begin(scene)
         self._text = usd.Stage(scene, self.prepared, _attributes(self.settings)).text()
         self._start()
         self._free = [usd.body_path(i) for i, box in enumerate(scene.bodies) if not box.fixed]

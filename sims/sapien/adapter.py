@@ -10,9 +10,9 @@ stiffness that its URDF loader gives a mimic joint. See docs/engines/sapien.md.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -24,8 +24,6 @@ from pytest_simbench.simulator import (
     Capability,
     Deviation,
     PreparedRobot,
-    Seen,
-    Settings,
     Simulator,
     SimulatorInfo,
     lazy_import,
@@ -47,7 +45,7 @@ free body, are the first of what `PhysxCpuSystem.pack` gives, in single precisio
 class SAPIEN(Simulator):
     """Adapter of SAPIEN."""
 
-    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+    info = SimulatorInfo(
         name="sapien",
         title="SAPIEN",
         distribution="sapien",
@@ -84,14 +82,12 @@ class SAPIEN(Simulator):
         ),
         install_size_mb=340,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
+    profiles = PROFILES
+    chosen_on = CHOSEN_ON
     settings: SAPIENSettings
 
     def load(self, scene: Scene) -> None:
-        self.scene = scene
-        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
-        self._steps = 0
+        self.begin(scene)
         self._drawing: Drawing | None = None
         self._build(scene)
         if self.gui:
