@@ -13,9 +13,7 @@ What was learnt stands in docs/engines/dart.md.
 from __future__ import annotations
 
 import tempfile
-import xml.etree.ElementTree as ET
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -146,8 +144,7 @@ class DART(Simulator):
         options.mDefaultRootJointType = utils.DartLoaderRootJointType.FIXED
         loader.setOptions(options)
         with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "robot.urdf"
-            path.write_text(_with_mimic(prepared), encoding="utf-8")
+            path = prepared.write_urdf(folder, mimic=True)  # which dartpy cannot set itself
             self._robot = skeleton = loader.parseSkeleton(str(path))
         skeleton.setSelfCollisionCheck(robot.self_collide)  # but for links that a joint joins
         for body in skeleton.getBodyNodes():
@@ -299,13 +296,3 @@ class DART(Simulator):
 
     def close(self) -> None:
         self._viewer = self._node = None
-
-
-def _with_mimic(prepared: PreparedRobot) -> str:
-    """The reduced URDF, its other fingers following the first: dartpy cannot set that itself."""
-    fingers = prepared.robot.gripper.joints
-    root = ET.fromstring(prepared.to_urdf())
-    for joint in root.findall("joint"):
-        if joint.attrib["name"] in fingers[1:]:
-            ET.SubElement(joint, "mimic", joint=fingers[0], multiplier="1", offset="0")
-    return ET.tostring(root, encoding="unicode")

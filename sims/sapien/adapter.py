@@ -11,9 +11,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,8 +131,8 @@ class SAPIEN(Simulator):
         loader = self._world.create_urdf_loader()
         loader.set_material(robot.friction, robot.friction, 0.0)
         with tempfile.TemporaryDirectory() as folder:
-            path = prepared.write_urdf(folder)
-            _drop_visuals(path)
+            # even to note a visual shape down needs a Vulkan device
+            path = prepared.write_urdf(folder, visuals=False)
             builder = loader.load_file_as_articulation_builder(str(path))
         touches = WORLD | ROBOT if robot.self_collide else WORLD  # never two that a joint joins
         for link in builder.link_builders:
@@ -289,12 +287,3 @@ class SAPIEN(Simulator):
         for name in list(vars(self)):
             if name.startswith("_"):
                 delattr(self, name)
-
-
-def _drop_visuals(path: Path) -> None:
-    """Take the visual shapes out of a URDF file: even to note one down needs a Vulkan device."""
-    tree = ElementTree.parse(path)
-    for link in tree.iter("link"):
-        for visual in link.findall("visual"):
-            link.remove(visual)
-    tree.write(path)

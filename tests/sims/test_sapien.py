@@ -57,21 +57,12 @@ def test_default_is_what_the_engine_does_by_itself(tmp_path: Path) -> None:
     builder.initial_pose = sapien.Pose([0.6, 0.3, 0.025])
     cube = builder.build("cube").find_component_by_type(physx.PhysxRigidDynamicComponent)
     simulator._ground, simulator._free = cube, [cube]
-    path = PreparedRobot(scenes.arm()).write_urdf(tmp_path)
-    without_visuals(path)
+    path = PreparedRobot(scenes.arm()).write_urdf(tmp_path, visuals=False)
     simulator._robot = (
         bare.create_urdf_loader().load_file_as_articulation_builder(str(path)).build(True)
     )
     expected = {k: v for k, v in vars(simulator.settings).items() if k != "coupling_stiffness"}
     assert told_sapien(simulator) == pytest.approx(expected)
-
-
-def without_visuals(path: Path) -> None:
-    tree = ElementTree.parse(path)
-    for link in tree.iter("link"):
-        for visual in link.findall("visual"):
-            link.remove(visual)
-    tree.write(path)
 
 
 def turned_by_joint_1(robot: Robot, effort: float, seconds: float) -> tuple[float, float]:
