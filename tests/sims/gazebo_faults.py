@@ -22,7 +22,6 @@ LINK = "model[@name='robot']/link[@name='panda_link4']"
 JOINT = "model[@name='robot']/joint[@name='panda_joint4']/axis"
 CUBE = "model[@name='cube_05']"
 BOX = f"{CUBE}/link/collision"
-GROUND = "model[@name='ground']/link/collision"
 
 
 class FaultyGazebo(Planting, Gazebo):
@@ -94,8 +93,6 @@ def ghost(path: str) -> Fault:
 FAULTS: dict[str, Fault] = {
     "timestep": scaled("physics/max_step_size", 0.5),
     "ground/height": moved("model[@name='ground']/pose", 2, 0.01),
-    "ground/restitution": bouncing(GROUND),
-    "body/cube_05/restitution": bouncing(BOX),
     "body/cube_05/com": moved(f"{CUBE}/link/inertial/pose", 0, 0.01),
     "body/cube_05/gravity": added(f"{CUBE}/link", "gravity", "false"),
     "body/cube_05/touches": ghost(BOX),

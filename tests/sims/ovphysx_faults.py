@@ -7,7 +7,6 @@ names the quantity.
 from __future__ import annotations
 
 import re
-from typing import Any
 
 import pytest_simbench.sims.ovphysx.adapter as adapter
 
@@ -22,8 +21,6 @@ FAULTS: dict[str, tuple[str, str, str]] = {
         '"Z"\ndouble3 xformOp:translate = (0, 0, 0.01)\n'
         'uniform token[] xformOpOrder = ["xformOp:translate"]',
     ),
-    "body/brick/pose": ("body_1", "xformOp:translate", "(0.5, 0.1, 0.316)"),
-    "joint/panda_joint4/initial_position": ("joint_3", "state:angular:physics:position", "-90"),
     "body/brick/com": ("body_1", "physics:centerOfMass", "(0.01, 0, 0)"),
     "body/brick/gravity": (
         "body_1",
@@ -35,7 +32,6 @@ FAULTS: dict[str, tuple[str, str, str]] = {
         "material:binding:physics",
         "</World/friction_0p7>\nfloat physxCollision:restOffset = 0.002",
     ),
-    "body/brick/restitution": ("friction_0p7", "physics:restitution", "0.5"),
     "link/panda_link4/restitution": ("friction_1p0", "physics:restitution", "0.5"),
     "link/panda_link4/margin": (
         "link_4",
@@ -56,22 +52,23 @@ FAULTS: dict[str, tuple[str, str, str]] = {
 """Prim, attribute and wrong value, by the quantity that must be found wrong."""
 
 
+def edit(text: str, fault: str) -> str:
+    """The stage with one attribute of another value."""
+    prim, attribute, value = FAULTS[fault]
+    pattern = rf'(def \w+ "{prim}".*?\n[\w\[\] ]+ {attribute} = )[^\n]+'
+    wrong, count = re.subn(pattern, lambda m: m[1] + value, text, count=1, flags=re.S)
+    if count != 1 or wrong == text:
+        raise ValueError(f"the stage has no {attribute} at {prim} to be changed")
+    return wrong
+
+
 class FaultyOvPhysX(Planting, adapter.OvPhysX):
     """Hands PhysX a stage in which one attribute has another value."""
 
+    def _start(self) -> None:
+        if self.settings.fault:
+            self._text = edit(self._text, self.settings.fault)
+        super()._start()
+
     def load(self, scene: Scene) -> None:
-        honest = adapter.Session
-        prim, attribute, value = FAULTS[self.settings.fault]
-        pattern = rf'(def \w+ "{prim}".*?\n[\w\[\] ]+ {attribute} = )[^\n]+'
-
-        def edited(text: str, threads: int) -> Any:
-            wrong, count = re.subn(pattern, lambda m: m[1] + value, text, count=1, flags=re.S)
-            if count != 1 or wrong == text:
-                raise ValueError(f"the stage has no {attribute} at {prim} to be changed")
-            return honest(wrong, threads)
-
-        adapter.Session = edited
-        try:
-            adapter.OvPhysX.load(self, scene)
-        finally:
-            adapter.Session = honest
+        adapter.OvPhysX.load(self, scene)

@@ -9,7 +9,7 @@ holds the two lists together against all that the adapter reads back.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Any
@@ -19,9 +19,10 @@ import pytest
 from pytest_simbench.client.errors import WorldParityError
 from pytest_simbench.parity.compare import compare
 from pytest_simbench.parity.quantities import expected_quantities
-from pytest_simbench.scene import Scene
+from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.simulator import Simulator
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
+from pytest_simbench.testing import scenes
 from pytest_simbench.testing.faults import true_scene
 
 from . import (
@@ -32,11 +33,11 @@ from . import (
     mujoco_faults,
     newton_faults,
     ode_faults,
+    ovphysx_faults,
     pybullet_faults,
     sapien_faults,
 )
 from .coverage import uncovered
-from .planted import Plant
 from .worlds import Worlds
 
 
@@ -46,18 +47,30 @@ class Engine:
 
     Attributes:
         cls: the adapter that plants them.
-        faults: by quantity; what stands after a comma tells it from others of the same.
+        faults: the quantities; what stands after a comma tells it from others of the same.
         scene: that they are planted in.
         profile: of the settings.
         fixed: what cannot be changed in a world that stands, by its pattern, and why.
     """
 
     cls: type[Simulator]
-    faults: Mapping[str, Plant]
+    faults: Collection[str]
     scene: Scene = field(default_factory=true_scene)
     profile: str = "tuned"
     fixed: Mapping[str, str] = field(default_factory=dict)
 
+
+MEAN = Scene(
+    "parity",
+    (
+        Box("table", (0.9, 0.9, 0.3), Pose.at(0.8, 0.0, 0.15), friction=0.7),
+        Box("brick", (0.1, 0.06, 0.03), Pose.at(0.5, 0.1, 0.315, yaw=0.4), 0.23, 0.7),
+    ),
+    robot=scenes.arm(),
+    ground_friction=0.7,
+    friction_rule="mean",
+)
+"""With PhysX's own friction rule, so that its stage has these numbers."""
 
 STACKING = Stacking().scene(1, Jitter())
 ENGINES = {
@@ -84,6 +97,7 @@ ENGINES = {
     "mujoco": Engine(mujoco_faults.FaultyMuJoCo, mujoco_faults.FAULTS),
     "newton": Engine(newton_faults.FaultyNewton, newton_faults.FAULTS),
     "ode": Engine(ode_faults.FaultyODE, ode_faults.FAULTS, STACKING),
+    "ovphysx": Engine(ovphysx_faults.FaultyOvPhysX, ovphysx_faults.FAULTS, MEAN),
     "pybullet": Engine(
         pybullet_faults.FaultyPyBullet,
         pybullet_faults.FAULTS,
