@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pytest_simbench.ground.files import FileError, read_file
+from pytest_simbench.scene import FloatArray
 
 LARGEST_MESH = 16 * 2**20
 """[bytes]"""
@@ -73,6 +74,11 @@ def mesh_path(filename: str, urdf: str, packages: Mapping[str, str]) -> Path:
     return path
 
 
+def stl_triangles(data: bytes) -> FloatArray:
+    """Corners of each triangle of a binary STL file that was checked, (n, 3, 3) [m]."""
+    return np.frombuffer(data, TRIANGLE, offset=HEADER)["corners"].astype(float)
+
+
 def check_mesh(path: Path) -> None:
     """Raise `FileError` unless a file is a binary STL mesh that has a convex hull."""
     if path.suffix.lower() != ".stl":
@@ -83,7 +89,7 @@ def check_mesh(path: Path) -> None:
         raise FileError(f"{path} holds no binary STL mesh; write it anew from a mesh editor")
     if count > MOST_TRIANGLES:
         raise FileError(f"{path} has {count} triangles; simplify it to {MOST_TRIANGLES} or fewer")
-    points = np.frombuffer(data, TRIANGLE, offset=HEADER)["corners"].reshape(-1, 3).astype(float)
+    points = stl_triangles(data).reshape(-1, 3)
     if not (np.abs(points) <= FARTHEST).all():  # false for NaN
         raise FileError(f"{path} has a vertex that is not finite, or more than {FARTHEST:g} away")
     spread = np.linalg.eigvalsh(np.cov(points.T))

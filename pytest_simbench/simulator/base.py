@@ -47,6 +47,14 @@ FIELD_OF_VIEW = math.radians(40.0)
 """Vertical [rad]."""
 
 
+def view_axes() -> FloatArray:
+    """The picture's right and down, and ahead of the camera: columns, in the world, (3, 3)."""
+    ahead = np.subtract(LOOK_AT, EYE) / np.linalg.norm(np.subtract(LOOK_AT, EYE))
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    return np.column_stack([right, np.cross(ahead, right), ahead])
+
+
 def chosen_on(*tuned: Seen, real: tuple[Seen, ...] = ()) -> Mapping[str, tuple[Seen, ...]]:
     """What the settings of an adapter were chosen on, by profile: `tuned` on seeds, `real` on these
     and on each third toss of those that are not held out, and on what else is named."""

@@ -146,10 +146,12 @@ class Genesis(Simulator):
             parameters[:, 2:4] = self.settings.impedance
             for geom, values in zip(geoms, parameters, strict=True):
                 geom.set_sol_params(values)
-        bouncing = {self._boxes[body.name]: body.restitution for body in scene.bodies}
-        bouncing[self._ground] = scene.ground_restitution
+        surfaces = [(self._boxes[b.name], b.friction, b.restitution) for b in scene.bodies]
+        surfaces.append((self._ground, scene.ground_friction, scene.ground_restitution))
+        if scene.robot is not None:
+            surfaces.append((self._robot, scene.robot.friction, 0.0))
         substep = self.settings.timestep / self.settings.substeps
-        for entity, restitution in bouncing.items():
+        for entity, friction, restitution in surfaces:
             if restitution:
                 stiffness, damping = direct(min(restitution, MOST_BOUNCE), substep)
                 ratio = -damping / (2 * math.sqrt(-stiffness))
@@ -157,11 +159,6 @@ class Genesis(Simulator):
                     values = contact_parameters(geom)
                     values[:2] = -2 / damping, ratio  # time constant, damping ratio
                     geom.set_sol_params(values)
-        frictions = {self._boxes[box.name]: box.friction for box in scene.bodies}
-        frictions[self._ground] = scene.ground_friction
-        if scene.robot is not None:
-            frictions[self._robot] = scene.robot.friction
-        for entity, friction in frictions.items():
             if friction < LEAST_FRICTION:
                 for geom in entity.geoms:
                     solver.set_geom_friction(friction, geom.idx)

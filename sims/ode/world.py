@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.description.links import ends, link_poses, motion_subspace
-from pytest_simbench.description.mesh_check import TRIANGLE
+from pytest_simbench.description.mesh_check import stl_triangles
 from pytest_simbench.description.urdf import Link, MovingJoint, Shape
 from pytest_simbench.scene import (
     Body,
@@ -184,5 +184,4 @@ def _put(body: Any, pose: Pose) -> None:
 def _geom(space: Any, shape: Shape) -> Any:
     if shape.size is not None:
         return ode.GeomBox(space, shape.size)
-    data = Path(shape.mesh or "").read_bytes()  # a binary STL, as `mesh_check` saw to
-    return Mesh(space, np.frombuffer(data, TRIANGLE, offset=84)["corners"].astype(float))
+    return Mesh(space, stl_triangles(Path(shape.mesh or "").read_bytes()))

@@ -39,17 +39,12 @@ def uncoupled(s: Any) -> None:
 
 
 def in_geoms(name: str, array: str, value: Any) -> Plant:
-    """Sets rows of all shapes of a link, a body or the ground."""
+    """Sets rows of all shapes of a link or a body."""
 
     def plant(s: Any) -> None:
-        if name == "ground":
-            shapes = s._ground.geoms
-        elif name in s._boxes:
-            shapes = s._boxes[name].geoms
-        else:
-            shapes = s._robot.get_link(name).geoms
+        owner = s._boxes[name] if name in s._boxes else s._robot.get_link(name)
         tensor = array_of(getattr(s.solver.dyn_info.geoms, array), copy=False)
-        for shape in shapes:
+        for shape in owner.geoms:
             tensor[shape.idx, : len(value)] = value
 
     return plant
