@@ -27,7 +27,7 @@ from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack, contact_forces, joint_wrenches
 from .reading import Reading
 from .settings import CHOSEN_ON, PROFILES, FileSettings, MuJoCoSettings
-from .world import build, leave_out
+from .world import build, leave_out, shape_label
 
 mujoco = lazy_import("mujoco")
 
@@ -132,19 +132,16 @@ class MuJoCo(Simulator):
         if self._own_file is not None:
             return self._own_file.numbers()
         model, prepared = self.model, self.prepared
+        links = () if prepared is None else prepared.links
+        joints = () if prepared is None else prepared.robot.joint_names
         return Numbers(
             model.geom("ground").id,
             {
-                body.name: [
-                    model.geom(f"{body.name}/{k}" if k else body.name).id
-                    for k in range(len(body.parts))
-                ]
+                body.name: [model.geom(shape_label(body, k)).id for k in range(len(body.parts))]
                 for body in self.scene.bodies
             },
-            {} if prepared is None else {name: model.body(name).id for name in prepared.links},
-            {}
-            if prepared is None
-            else {name: model.joint(name).id for name in prepared.robot.joint_names},
+            {name: model.body(name).id for name in links},
+            {name: model.joint(name).id for name in joints},
         )
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:

@@ -32,9 +32,9 @@ from pytest_simbench.simulator import (
 from ..mujoco.bounces import BOUNCES, direct
 from ..mujoco.pictures import DISABLED, camera, renderer
 from ..mujoco.readback import Numbers, ReadBack, contact_forces, joint_wrenches
-from ..mujoco.world import leave_out
+from ..mujoco.world import leave_out, shape_label
 from .settings import CHOSEN_ON, PROFILES, NewtonSettings
-from .world import build_model, make_solver, names, shape_label
+from .world import build_model, make_solver, names
 
 LED = 1 << 20
 """Collision group of prescribed bodies, which Newton gives nobody."""

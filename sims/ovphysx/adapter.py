@@ -165,6 +165,17 @@ class OvPhysX(Simulator):
             found = self._bindings[kind] = binding, np.zeros(binding.shape, np.float32)
         return found
 
+    def _read(self, kind: str) -> NDArray[np.float32]:
+        """What a binding tells, until it is asked again."""
+        binding, buffer = self._binding(kind)
+        binding.read(buffer)
+        return buffer
+
+    def _write(self, kind: str, values: FloatArray | NDArray[np.float32]) -> None:
+        binding, buffer = self._binding(kind)
+        buffer[:] = values
+        binding.write(buffer)
+
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self._targets = position + effort / self._stiffness, velocity
         if self._steps > 0:
@@ -181,9 +192,7 @@ class OvPhysX(Simulator):
         if self._steps == 0:
             self.session.write("RIGID_BODY", "wrench", dict(zip(self._free, rows, strict=True)))
         else:
-            binding, buffer = self._binding("RIGID_BODY_WRENCH")
-            buffer[:] = rows
-            binding.write(buffer)
+            self._write("RIGID_BODY_WRENCH", rows)
 
     def lead(self, before: FloatArray, after: FloatArray) -> None:
         rows = self._still | dict(zip(self._led, after, strict=True))
@@ -213,9 +222,7 @@ class OvPhysX(Simulator):
                 row[:] = np.concatenate([values[name][path] for name in names])
         else:
             for kind, columns in (("POSE", slice(0, 7)), ("VELOCITY", slice(7, 13))):
-                binding, buffer = self._binding(f"RIGID_BODY_{kind}")
-                binding.read(buffer)
-                state[:, columns] = buffer
+                state[:, columns] = self._read(f"RIGID_BODY_{kind}")
         state[:, 3:7] = state[:, [6, 3, 4, 5]]
         return state
 
@@ -229,18 +236,16 @@ class OvPhysX(Simulator):
                 row[:] = [values[name][path][0] for path in self._joints] * self._unit
             return state
         for row, kind in zip(state, ("POSITION", "VELOCITY"), strict=True):
-            binding, buffer = self._binding(f"ARTICULATION_DOF_{kind}")
-            binding.read(buffer)
-            row[:] = buffer[0, self._columns]
+            row[:] = self._read(f"ARTICULATION_DOF_{kind}")[0, self._columns]
         return state
 
     def joint_wrenches(self) -> FloatArray:
         if self.prepared is None or self._steps == 0:  # nothing was transmitted so far
             return np.zeros((len(self._joints), 6))
-        binding, buffer = self._binding("ARTICULATION_LINK_INCOMING_JOINT_FORCE")
-        binding.read(buffer)
-        order = [binding.body_names.index(f"link_{k}") for k in range(len(self.prepared.links))]
-        return wrenches(buffer[0, order].astype(float), self.prepared, self.joint_state()[0])
+        kind = "ARTICULATION_LINK_INCOMING_JOINT_FORCE"
+        told, names = self._read(kind)[0], self._binding(kind)[0].body_names
+        order = [names.index(f"link_{k}") for k in range(len(self.prepared.links))]
+        return wrenches(told[order].astype(float), self.prepared, self.joint_state()[0])
 
     def read_back(self) -> dict[str, Any]:
         return ReadBack(self).all()
@@ -257,11 +262,8 @@ class OvPhysX(Simulator):
                 yield names[first], names[second], wrench
 
     def save(self) -> _Saved:
-        values = {}
-        for kind in self._state_kinds() if self._steps > 0 else ():
-            binding, buffer = self._binding(kind)
-            binding.read(buffer)
-            values[kind] = buffer.copy()
+        kinds = self._state_kinds() if self._steps > 0 else ()
+        values = {kind: self._read(kind).copy() for kind in kinds}
         return self._steps, values, self._targets
 
     def restore(self, state: _Saved) -> None:
@@ -270,9 +272,7 @@ class OvPhysX(Simulator):
         if steps > 0:
             self.step()
         for kind, saved in values.items():
-            binding, buffer = self._binding(kind)
-            buffer[:] = saved
-            binding.write(buffer)
+            self._write(kind, saved)
         self._steps, self._targets = steps, targets
         if targets is not None and steps > 0:
             self._write_targets(targets)
