@@ -9,7 +9,6 @@ What was learnt stands in docs/engines/ode.md.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -42,27 +41,10 @@ SEED = 0
 """Of ODE's own random numbers, by which quickStep shuffles its rows; 0 is where they begin."""
 
 
-@dataclass(frozen=True)
-class State:
-    """What a run goes on from.
-
-    Attributes:
-        steps: since loading.
-        bodies: position, linear and angular velocity of each body.
-        rotations: of each body.
-        awake: whether each body is.
-        turns: of each joint, see `Axis`.
-        commanded: the drives' set points.
-        seed: of ODE's random numbers.
-    """
-
-    steps: int
-    bodies: list[tuple[Any, ...]]
-    rotations: list[tuple[bytes, bytes]]
-    awake: list[bool]
-    turns: list[tuple[float, ...]]
-    commanded: tuple[FloatArray, FloatArray, FloatArray] | None
-    seed: int
+State = tuple[int, list[Any], list[tuple[bytes, bytes]], list[bool], list[Any], Any, int]
+"""What a run goes on from: steps since loading; of each body position and velocities, rotation, and
+whether it is awake; turns of each joint, see `Axis`; the drives' set points; seed of ODE's random
+numbers."""
 
 
 class ODE(Simulator):
@@ -199,25 +181,25 @@ class ODE(Simulator):
         awake = [bool(body.isEnabled()) for body in self._moving]
         turns = [tuple(axis.turn) for axis in self._axes.values()]
         seed = library().dRandGetSeed()
-        return State(self._steps, bodies, rotations, awake, turns, commanded, seed)
+        return self._steps, bodies, rotations, awake, turns, commanded, seed
 
     def restore(self, state: State) -> None:
-        self._steps = state.steps
+        self._steps, bodies, rotations, awake, turns, commanded, seed = state
         self.contacts.clear()
         self.contacts.settle()  # else the order of contacts is that of what went before
-        for name, rotation in zip(self._names, state.rotations, strict=True):
+        for name, rotation in zip(self._names, rotations, strict=True):
             turn(name, *rotation)
-        for body, values, awake in zip(self._moving, state.bodies, state.awake, strict=True):
+        for body, values, woken in zip(self._moving, bodies, awake, strict=True):
             position, linear, angular = values
             body.setPosition(position)
             body.setLinearVel(linear)
             body.setAngularVel(angular)
-            body.enable() if awake else body.disable()
-        for axis, turns in zip(self._axes.values(), state.turns, strict=True):
-            axis.turn[:] = turns
-        if self._drives is not None and state.commanded is not None:
-            self._drives.command(*state.commanded)
-        library().dRandSetSeed(state.seed)
+            body.enable() if woken else body.disable()
+        for axis, turn_ in zip(self._axes.values(), turns, strict=True):
+            axis.turn[:] = turn_
+        if self._drives is not None and commanded is not None:
+            self._drives.command(*commanded)
+        library().dRandSetSeed(seed)
 
     def joint_wrenches(self) -> FloatArray:
         if self.prepared is None:

@@ -16,7 +16,7 @@ from pytest_simbench.parity import readback
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.simulator import heavy, lazy_import
 
-from .world import points, pose_of
+from .world import inertial_frame, points, pose_of
 
 pybullet = lazy_import("pybullet")
 
@@ -86,7 +86,7 @@ class ReadBack(readback.ReadBack):
         }
 
     def inertial(self, part: Part) -> dict[str, Any]:
-        dynamics, inertial = self._dynamics(part), self._inertial_frame(part)
+        dynamics, inertial = self._dynamics(part), inertial_frame(self.c, *part)
         axes = inertial.rotation()
         return {
             "mass": dynamics[0],
@@ -95,7 +95,7 @@ class ReadBack(readback.ReadBack):
         }
 
     def shapes(self, part: Part) -> Iterator[tuple[str, FloatArray]]:
-        inertial = self._inertial_frame(part)
+        inertial = inertial_frame(self.c, *part)
         for k, (_, _, kind, size, _, place, turn) in enumerate(self._shapes(part)):
             pose = inertial * pose_of(place, turn)
             if kind == pybullet.GEOM_BOX:
@@ -164,11 +164,6 @@ class ReadBack(readback.ReadBack):
     def _shapes(self, part: Part) -> Any:
         return pybullet.getCollisionShapeData(*part, physicsClientId=self.c)
 
-    def _inertial_frame(self, part: Part) -> Pose:
-        """In the frame of the body or link."""
-        dynamics = self._dynamics(part)
-        return pose_of(dynamics[3], dynamics[4])
-
     def _frame(self, part: Part) -> Pose:
         """Of a body or link, in the world."""
         c, (body, link) = self.c, part
@@ -177,7 +172,7 @@ class ReadBack(readback.ReadBack):
         else:
             state = pybullet.getLinkState(body, link, computeForwardKinematics=1, physicsClientId=c)
             centre = state[:2]
-        return pose_of(*centre) * self._inertial_frame(part).inverse()
+        return pose_of(*centre) * inertial_frame(self.c, *part).inverse()
 
 
 def wrench(client: int, robot: int, joint: int, subspace: FloatArray) -> FloatArray:

@@ -189,22 +189,17 @@ def points(client: int, constraint: int) -> FloatArray:
     """Of a closure, in the frames of its links, (2, 3) [m]."""
     info = pybullet.getConstraintInfo(constraint, physicsClientId=client)
     body, ends = info[0], ((info[1], info[6]), (info[3], info[7]))
-    return np.array(
-        [
-            _inertial(client, body, link).rotation() @ at + _inertial(client, body, link).position
-            for link, at in ends
-        ]
-    )
+    return np.array([(inertial_frame(client, body, link) * Pose(at)).position for link, at in ends])
 
 
 def _from_centre(client: int, robot: int, link: int, point: Vector3) -> Any:
     """A point of a link in the frame that Bullet counts from, at its centre of mass."""
-    return (_inertial(client, robot, link).inverse() * Pose(point)).position
+    return (inertial_frame(client, robot, link).inverse() * Pose(point)).position
 
 
-def _inertial(client: int, robot: int, link: int) -> Pose:
-    """The inertial frame of a link in the link's frame."""
-    dynamics = pybullet.getDynamicsInfo(robot, link, physicsClientId=client)
+def inertial_frame(client: int, body: int, link: int) -> Pose:
+    """Of a link or, with -1, a body, in its frame."""
+    dynamics = pybullet.getDynamicsInfo(body, link, physicsClientId=client)
     return pose_of(dynamics[3], dynamics[4])
 
 

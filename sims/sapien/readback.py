@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -21,9 +20,11 @@ from pytest_simbench.parity.readback import one_value
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.simulator import lazy_import
 
+from .drawing import UPRIGHT
+
 physx = lazy_import("sapien.physx")
 
-LYING = Pose(quaternion=(math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0))
+LYING = UPRIGHT.inverse()
 """Turns the z axis to the x axis, along which SAPIEN's cylinders and capsules lie."""
 
 

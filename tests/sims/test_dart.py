@@ -83,19 +83,6 @@ def test_both_fingers_press_with_the_squeeze() -> None:
     assert squeeze(simulator) == pytest.approx((25.0, 25.0), rel=0.02)
 
 
-@pytest.mark.parametrize("solver", ["dantzig", "pgs", "nsgs"])
-def test_the_chosen_solver_is_the_engines(solver: str) -> None:
-    """Also that `pgs`, which dartpy cannot construct, is really put first."""
-    engine = world(scenes.tower(), solver=solver).world.getConstraintSolver()
-    assert solver in type(engine.getBoxedLcpSolver()).__name__.lower()
-
-
-@pytest.mark.parametrize("sleeping", [True, False])
-def test_sleeping_is_switched(sleeping: bool) -> None:
-    options = world(scenes.tower(), sleeping=sleeping).world.getDeactivationOptions()
-    assert options.mEnabled == sleeping
-
-
 def test_restore_of_bodies_asleep_continues_as_if_uninterrupted() -> None:
     """DART tells nobody who sleeps, so that is not part of the saved state. A cube falls on a tower
     asleep, which wakes: restored or not, the same happens."""
