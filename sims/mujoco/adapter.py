@@ -110,7 +110,6 @@ class MuJoCo(Simulator):
         for at, body in zip(self._body_v, scene.free_bodies, strict=True):
             data.qvel[at] = body.linear_velocity
             data.qvel[at + 3] = body.pose.rotation().T @ body.angular_velocity  # in its own frame
-        for at, body in zip(self._body_v, scene.free_bodies, strict=True):
             if body.damping.any():
                 model.dof_damping[at] = body.linear_damping * body.mass
                 model.dof_damping[at + 3] = body.angular_damping * body.inertia()
