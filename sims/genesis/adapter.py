@@ -167,14 +167,13 @@ class Genesis(Simulator):
         """Velocities and damping of free bodies: linear in the world's axes, angular in the
         body's."""
         for box in scene.free_bodies:
+            link = self._boxes[box.name].links[0]
+            dofs = list(range(link.dof_start, link.dof_end))
             if box.damping.any():
-                link = self._boxes[box.name].links[0]
                 spins = box.angular_damping * box.inertia()
                 damping = [*[box.linear_damping * box.mass] * 3, *spins]
-                self.solver.set_dofs_damping(damping, list(range(link.dof_start, link.dof_end)))
+                self.solver.set_dofs_damping(damping, dofs)
             if box.velocity.any():
-                link = self._boxes[box.name].links[0]
-                dofs = list(range(link.dof_start, link.dof_end))
                 spin = box.pose.rotation().T @ box.angular_velocity
                 self.solver.set_dofs_velocity([*box.linear_velocity, *spin], dofs)
 

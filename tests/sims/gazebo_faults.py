@@ -24,25 +24,6 @@ CUBE = "model[@name='cube_05']"
 BOX = f"{CUBE}/link/collision"
 
 
-class FaultyGazebo(Planting, Gazebo):
-    def load(self, scene: Scene) -> None:
-        honest = adapter.world_text
-
-        def text(*args: Any) -> str:
-            root = ET.fromstring(honest(*args))
-            world = root.find("world")
-            assert world is not None
-            PLANTS[self.settings.fault](world)
-            return ET.tostring(root, encoding="unicode")
-
-        if self.settings.fault:
-            adapter.world_text = text
-        try:
-            Gazebo.load(self, scene)
-        finally:
-            adapter.world_text = honest
-
-
 Fault = Callable[[ET.Element], None]
 
 
@@ -114,3 +95,24 @@ def childless(world: ET.Element) -> None:
 
 PLANTS: dict[str, Fault] = {**FAULTS, "refused": childless}
 """What can be planted: a fault, or what Gazebo refuses."""
+
+
+class FaultyGazebo(Planting, Gazebo):
+    faults = FAULTS
+
+    def load(self, scene: Scene) -> None:
+        honest = adapter.world_text
+
+        def text(*args: Any) -> str:
+            root = ET.fromstring(honest(*args))
+            world = root.find("world")
+            assert world is not None
+            PLANTS[self.settings.fault](world)
+            return ET.tostring(root, encoding="unicode")
+
+        if self.settings.fault:
+            adapter.world_text = text
+        try:
+            Gazebo.load(self, scene)
+        finally:
+            adapter.world_text = honest

@@ -20,7 +20,6 @@ from pytest_simbench.client.errors import WorldParityError
 from pytest_simbench.parity.compare import compare
 from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import Box, Pose, Scene
-from pytest_simbench.simulator import Simulator
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.faults import FAULTS, true_scene
@@ -37,6 +36,7 @@ from . import (
     pybullet_faults,
     sapien_faults,
 )
+from .planted import Planting
 from .worlds import Worlds
 
 
@@ -45,18 +45,21 @@ class Engine:
     """An engine whose changes are planted.
 
     Attributes:
-        cls: the adapter that plants them.
-        faults: the quantities; what stands after a comma tells it from others of the same.
+        cls: the adapter that plants its `faults`, by quantity; what stands after a comma tells one
+            from others of the same.
         scene: that they are planted in.
         profile: of the settings.
         fixed: what cannot be changed in a world that stands, by its pattern, and why.
     """
 
-    cls: type[Simulator]
-    faults: Collection[str]
+    cls: type[Planting]
     scene: Scene = field(default_factory=true_scene)
     profile: str = "tuned"
     fixed: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def faults(self) -> Collection[str]:
+        return self.cls.faults
 
 
 MEAN = Scene(
@@ -73,10 +76,9 @@ MEAN = Scene(
 
 STACKING = Stacking().scene(1, Jitter())
 ENGINES = {
-    "dart": Engine(dart_faults.FaultyDART, dart_faults.FAULTS),
+    "dart": Engine(dart_faults.FaultyDART),
     "drake": Engine(
         drake_faults.FaultyDrake,
-        drake_faults.FAULTS,
         fixed={
             "timestep": "of a plant, which is final",
             "ground/height": "the half space is anchored in the world when the plant is built",
@@ -87,25 +89,23 @@ ENGINES = {
     ),
     "gazebo": Engine(
         gazebo_faults.FaultyGazebo,
-        gazebo_faults.FAULTS,
         STACKING,
         "default",
         {"gripper/coupled": "dartsim's own to break, see `test_gazebo`"},
     ),
-    "genesis": Engine(genesis_faults.FaultyGenesis, genesis_faults.FAULTS, STACKING),
-    "mujoco": Engine(mujoco_faults.FaultyMuJoCo, mujoco_faults.FAULTS),
-    "newton": Engine(newton_faults.FaultyNewton, newton_faults.FAULTS),
-    "ode": Engine(ode_faults.FaultyODE, ode_faults.FAULTS, STACKING),
-    "ovphysx": Engine(ovphysx_faults.FaultyOvPhysX, ovphysx_faults.FAULTS, MEAN),
+    "genesis": Engine(genesis_faults.FaultyGenesis, STACKING),
+    "mujoco": Engine(mujoco_faults.FaultyMuJoCo),
+    "newton": Engine(newton_faults.FaultyNewton),
+    "ode": Engine(ode_faults.FaultyODE, STACKING),
+    "ovphysx": Engine(ovphysx_faults.FaultyOvPhysX, MEAN),
     "pybullet": Engine(
         pybullet_faults.FaultyPyBullet,
-        pybullet_faults.FAULTS,
         fixed={
             "link/*/margin": "changeDynamics leaves the margin of a link's shapes as it is",
             "joint/*/friction": "getJointInfo tells what was loaded, whatever was changed since",
         },
     ),
-    "sapien": Engine(sapien_faults.FaultySAPIEN, sapien_faults.FAULTS),
+    "sapien": Engine(sapien_faults.FaultySAPIEN),
 }
 HONEST = [
     (name, profile)
