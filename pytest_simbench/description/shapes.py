@@ -79,10 +79,11 @@ def outlines(
     Returns:
         Of each kind the reaches in an order of their own, (n_shapes, 26) [m].
     """
-    kinds, reaches = zip(*found, strict=True) if (found := list(shapes)) else ((), ())
-    order = np.argsort(np.reshape(reaches if asked is None else asked, (-1, 26)) @ _ORDER)
+    found, count = list(shapes), len(DIRECTIONS)
+    reaches = [reached for _, reached in found]
+    order = np.argsort(np.reshape(reaches if asked is None else asked, (-1, count)) @ _ORDER)
     return {
-        kind: np.reshape([reaches[k] for k in order if kinds[k] == kind], (-1, 26))
+        kind: np.reshape([reaches[k] for k in order if found[k][0] == kind], (-1, count))
         for kind in OUTLINES
     }
 

@@ -235,11 +235,10 @@ def body_urdf(body: Body, mesh: Callable[[str, Polytope], Path]) -> str:
         body: a free one, or a fixed one, which has no mass there.
         mesh: writes the hull of a mesh, given a name for it; the file.
     """
-    root = ET.Element("robot", name=body.name)
-    link = ET.SubElement(root, "link", name=body.name)
+    root = ET.Element("robot", name="body")  # names of the scene may hold what an engine's may not
+    link = ET.SubElement(root, "link", name="body")
     if body.mass:
-        of_body = Link(body.name, body.mass, np.zeros(3), np.diag(body.inertia()))
-        _write_inertial(link, of_body)
+        _write_inertial(link, Link("body", body.mass, inertia=np.diag(body.inertia())))
     for k, part in enumerate(body.parts):
         if isinstance(part, ConvexMesh):
             kind, written = "mesh", {"filename": str(mesh(str(k), part.hull))}

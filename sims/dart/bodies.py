@@ -104,7 +104,8 @@ def _mesh(body: ConvexMesh) -> Any:
     """The shape of a mesh. dartpy makes one only of a file that a URDF names."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "mesh.urdf"
-        path.write_text(body_urdf(body, lambda _, hull: write_obj(path.with_suffix(".obj"), hull)))
+        text = body_urdf(body, lambda _, hull: write_obj(path.with_suffix(".obj"), hull))
+        path.write_text(text, encoding="utf-8")
         skeleton = dartpy.utils.DartLoader().parseSkeleton(str(path))
     return skeleton.getBodyNode(0).getShapeNode(0).getShape()
 

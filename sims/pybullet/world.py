@@ -83,12 +83,11 @@ def _load_compound(c: int, body: Compound, mass: float) -> int:
     w, x, y, z = body.pose.quaternion
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "compound.urdf"
-        path.write_text(
-            body_urdf(
-                body.changed(prescribed=False, mass=mass or 1.0, moments=(1.0,) * 3),
-                lambda name, hull: write_stl(path.with_name(f"{name}.stl"), hull),
-            )
+        text = body_urdf(
+            body.changed(prescribed=False, mass=mass or 1.0, moments=(1.0,) * 3),
+            lambda name, hull: write_stl(path.with_name(f"{name}.stl"), hull),
         )
+        path.write_text(text, encoding="utf-8")
         made: int = pybullet.loadURDF(
             str(path),
             body.pose.position,
